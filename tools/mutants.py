@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
+r"""
 Break the code on purpose, one place at a time, and count how often the tests notice.
 
     tools/in_env python tools/mutants.py            the decision of a diagnosis
-    tools/in_env python tools/mutants.py --module weld_twin_core.diagnosis.algebra.gram \\
+    tools/in_env python tools/mutants.py --module weld_twin_core.diagnosis.algebra.gram \
         --tests test/diagnosis/test_normal_equations.py
 
 Mutants: a comparison flipped, or moved by its boundary; a number 25 % up or down; a branch that is

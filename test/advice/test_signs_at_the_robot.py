@@ -21,7 +21,7 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import effects_from_list
 from weld_twin_lab.programs.plain_arm import tool_pose
 from weld_twin_nodes.offline.exports import write_offsets
-from weld_twin_nodes.report.controllers import correction
+from weld_twin_report.report.controllers import correction
 
 ROBOT, JOINT, AT = load('kuka_kr6_r900'), 'joint_a3', 2
 TOOL = np.eye(4)

@@ -16,7 +16,7 @@ from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.diagnosis.unseen.regions import posture_regions
-from weld_twin_nodes.report.diagnosis_files import diagnosis_text
+from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 ARM = 'kuka_kr6_r900'
 TRUE = (

@@ -10,7 +10,7 @@ import pytest
 
 from weld_twin_nodes.cli import main
 from weld_twin_nodes.offline.exports import FORMATS
-from weld_twin_nodes.report.diagnosis_files import PAGE, RESULT
+from weld_twin_report.report.diagnosis_files import PAGE, RESULT
 
 ROOT = Path(__file__).parents[2]
 GUIDE = (ROOT / 'docs' / 'diagnosis.md').read_text(encoding='utf-8')

@@ -9,9 +9,9 @@ import pytest
 
 from weld_twin_lab.fleet.made_history import fill
 from weld_twin_nodes.cli.in_process import weld_twin
-from weld_twin_nodes.fleet.control_chart import baseline
-from weld_twin_nodes.history import Database
-from weld_twin_nodes.history.runs import Run, Runs
+from weld_twin_report.fleet.control_chart import baseline
+from weld_twin_report.history import Database
+from weld_twin_report.history.runs import Run, Runs
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
 

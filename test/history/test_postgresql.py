@@ -14,7 +14,7 @@ import pytest
 from weld_twin_core.errors import DataError
 from weld_twin_lab.fleet.postgres import NoServer, postgres
 from weld_twin_nodes.cli.in_process import weld_twin
-from weld_twin_nodes.history import Database, Entry
+from weld_twin_report.history import Database, Entry
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
 pytest.importorskip('psycopg', reason='PostgreSQL needs its driver')

@@ -22,7 +22,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_lab.fleet.made_history import fill, made
 from weld_twin_lab.fleet.postgres import NoServer, place_of, postgres, start, stop
 from weld_twin_nodes.cli.in_process import weld_twin
-from weld_twin_nodes.history import Database, Unavailable
+from weld_twin_report.history import Database, Unavailable
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
 
@@ -157,7 +157,7 @@ def test_a_lock_that_passes_costs_a_fleet_nothing_and_one_that_stays_is_no_refus
     listed, monkeypatch
 ):
     file, db = listed
-    monkeypatch.setattr('weld_twin_nodes.history.opening.BUSY', 0.1)
+    monkeypatch.setattr('weld_twin_report.history.opening.BUSY', 0.1)
     words = ('fleet', 'run', file, '--db', db, '--workers', '1')
     real = Database.write
 
@@ -169,13 +169,13 @@ def test_a_lock_that_passes_costs_a_fleet_nothing_and_one_that_stays_is_no_refus
             return real(self, work, **how)
 
     monkeypatch.setattr(Database, 'write', held)
-    monkeypatch.setattr('weld_twin_nodes.history.database.PATIENCE', 0.3)
+    monkeypatch.setattr('weld_twin_report.history.database.PATIENCE', 0.3)
     hold = 1.0
     said = weld_twin(*words)
     assert (said.code, said.out) == (1, f'{file}: 1 failed\n')
     assert 'not written; run it again' in said.err and 'locked' in said.err
     assert states(db) == []
-    monkeypatch.setattr('weld_twin_nodes.history.database.PATIENCE', 20.0)
+    monkeypatch.setattr('weld_twin_report.history.database.PATIENCE', 20.0)
     said = weld_twin(*words, '--again')
     assert (said.code, said.out) == (0, f'{file}: 1 done\n')
     assert states(db) == ['done']

@@ -17,7 +17,13 @@ from import_graph import (
 )
 
 LAYERS = layer_table((ROOT / 'docs/architecture.md').read_text(encoding='utf-8'))
-PACKAGES = ['weld_twin_core', 'weld_twin_msgs_py', 'weld_twin_nodes', 'weld_twin_lab']
+PACKAGES = [
+    'weld_twin_core',
+    'weld_twin_msgs_py',
+    'weld_twin_nodes',
+    'weld_twin_report',
+    'weld_twin_lab',
+]
 FILES = module_files(ROOT / 'src')
 
 

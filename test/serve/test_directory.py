@@ -10,8 +10,8 @@ import stat
 import pytest
 
 from weld_twin_nodes.cli.in_process import weld_twin
-from weld_twin_nodes.serve.directory import Directory
-from weld_twin_nodes.serve.job import Asked, Job
+from weld_twin_report.serve.directory import Directory
+from weld_twin_report.serve.job import Asked, Job
 
 for needed in ('fastapi', 'uvicorn', 'multipart', 'sqlalchemy'):
     pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")

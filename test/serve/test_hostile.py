@@ -13,8 +13,8 @@ import pytest
 from served import Person, Server, drop, fill, small_disk
 
 from weld_twin_nodes.cli.main import _parser
-from weld_twin_nodes.serve.access import _without_token
-from weld_twin_nodes.serve.fields import CORRECT, sentence
+from weld_twin_report.serve.access import _without_token
+from weld_twin_report.serve.fields import CORRECT, sentence
 
 for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
     pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")

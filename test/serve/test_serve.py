@@ -16,10 +16,10 @@ import pytest
 from served import Person, Server, drop, fill, form, small_disk, until
 
 from weld_twin_nodes.cli.in_process import weld_twin
-from weld_twin_nodes.history import Database
-from weld_twin_nodes.serve import Settings
-from weld_twin_nodes.serve.job import Asked, Job
-from weld_twin_nodes.serve.queue import Queue
+from weld_twin_report.history import Database
+from weld_twin_report.serve import Settings
+from weld_twin_report.serve.job import Asked, Job
+from weld_twin_report.serve.queue import Queue
 
 for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
     pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")

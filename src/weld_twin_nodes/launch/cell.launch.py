@@ -15,7 +15,12 @@ from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.conditions import IfCondition
-from launch.substitutions import EnvironmentVariable, LaunchConfiguration, NotEqualsSubstitution
+from launch.substitutions import (
+    EnvironmentVariable,
+    LaunchConfiguration,
+    NotEqualsSubstitution,
+    PythonExpression,
+)
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
@@ -45,6 +50,8 @@ ARGUMENTS = {
     'rviz': ('false', 'show the cell in RViz'),
     'config': ('', 'parameter file; empty: config/cell.yaml of this package'),
 }
+ENCLAVES = ("'/' + ('", "'.strip('/') or 'weld_twin')")
+"""What stands around the namespace in the folder of the enclaves, as `weld-twin policy` names it."""
 MODEL = ('base_frame', 'base_from_tf', 'base_link', 'measuring_frame', 'robot', 'tip_link')
 MEASURED = ('joint_prefix', 'measured_frame')
 FLAGS = ('base_from_tf', 'managed')
@@ -85,6 +92,13 @@ def generate_launch_description() -> LaunchDescription:
         default_value=EnvironmentVariable(RANGE, default_value='SUBNET'),
         description='LOCALHOST, SUBNET or OFF, for these nodes alone',
     )
+    enclaves = DeclareLaunchArgument(
+        'enclaves',
+        default_value=PythonExpression(
+            [ENCLAVES[0], LaunchConfiguration('namespace'), ENCLAVES[1]]
+        ),
+        description='folder of the enclaves, each called like its node; only with ROS_SECURITY_ENABLE',
+    )
     rviz = Node(
         package='rviz2',
         executable='rviz2',
@@ -92,7 +106,7 @@ def generate_launch_description() -> LaunchDescription:
         additional_env={RANGE: LaunchConfiguration('discovery')},
         condition=IfCondition(LaunchConfiguration('rviz')),
     )
-    return LaunchDescription([*declared, discovery, *map(_node, NODES), rviz])
+    return LaunchDescription([*declared, discovery, enclaves, *map(_node, NODES), rviz])
 
 
 def _node(name: str) -> Node:
@@ -109,6 +123,7 @@ def _node(name: str) -> Node:
         executable=name,
         namespace=LaunchConfiguration('namespace'),
         output='screen',
+        ros_arguments=['--enclave', [LaunchConfiguration('enclaves'), f'/{name}']],
         parameters=[LaunchConfiguration('config'), own],
         remappings=[(topic, LaunchConfiguration(key)) for topic, key in TOPICS.items()],
         additional_env={RANGE: LaunchConfiguration('discovery')},

@@ -38,6 +38,7 @@ def generate_launch_description() -> LaunchDescription:
         'config': (str(config), 'parameter file'),
         'bag': ('', 'bag to record, if any'),
         'discovery': ('LOCALHOST', 'LOCALHOST, SUBNET or OFF'),
+        'enclaves': ('/weld_twin', 'folder of the enclaves; only with ROS_SECURITY_ENABLE'),
     }
     bag = LaunchConfiguration('bag')
     recorder = _node(
@@ -63,6 +64,7 @@ def _node(name: str, own: dict[str, ParameterValue], **options: IfCondition) -> 
         package=PACKAGE,
         executable=name,
         output='screen',
+        ros_arguments=['--enclave', [LaunchConfiguration('enclaves'), f'/{name}']],
         parameters=[LaunchConfiguration('config'), own],
         additional_env={'ROS_AUTOMATIC_DISCOVERY_RANGE': LaunchConfiguration('discovery')},
         **options,

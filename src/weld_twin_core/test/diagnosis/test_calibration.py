@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core.diagnosis.calibration.features import KINDS, of_whole, odds
+from weld_twin_core.diagnosis.calibration.features import KINDS, odds, of_whole
 from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
 from weld_twin_core.diagnosis.posterior.table import table_of

@@ -11,8 +11,7 @@ import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.hypotheses.search import search
-from weld_twin_core.diagnosis.many.beside_few import members_beside
-from weld_twin_core.diagnosis.many.fitted_together import fitted_together
+from weld_twin_core.diagnosis.many.fitted_together import fitted_together, members_beside
 from weld_twin_core.diagnosis.many.small_errors import many_small
 from weld_twin_core.effects import REGISTRY, LinkTwist, MeasurementScale, TransmissionRipple
 

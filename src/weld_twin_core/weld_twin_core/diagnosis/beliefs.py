@@ -69,10 +69,6 @@ class Beliefs:
     close_share: float = _search(0.15)
     """The same as a share of the best: what the ranking misjudges grows with the effect."""
 
-    replacing_slack: float = _search(0.3)
-    """Share of the evidence of two effects by which one candidate may fall short in the linear
-    ranking and still be fitted in the place of both."""
-
     invisible: float = _search(0.12)
     """RMS change of the residual [noise] below which a lone effect is not worth a name, however
     many rows vouch for it. A judgement."""

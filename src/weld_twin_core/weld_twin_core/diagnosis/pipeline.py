@@ -23,8 +23,7 @@ from .frames.places import not_told
 from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
 from .hypotheses.structural_aliases import with_structural_aliases
-from .levels.carried import carried
-from .levels.curved import curved, standing
+from .levels.curved import carried, curved, standing
 from .levels.formulas import missed, no_noise
 from .levels.placed import placed
 from .many.fitted_together import fitted_together
@@ -33,7 +32,6 @@ from .predicting.allowed import allowed
 from .predicting.alone import alone
 from .result import Diagnosis, Shrink
 from .soundness import Examined, Given, examine, refuse_reused
-from .unseen.cancelling import uncancelled
 from .unseen.carrying import carrying
 from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
 from .unseen.leftover_structure import structure
@@ -195,7 +193,6 @@ def _searched(
     """Return what was found, few effects or many, each with what could take its place."""
     assert examined.posed is not None
     found = search(*examined.posed, exclude, beliefs, progress)
-    found = uncancelled(found, examined.posed, exclude, beliefs, progress)
     found = fitted_together(found, exclude, beliefs, progress)
     found = settled_between(found, examined.given.may_change, beliefs)
     return with_structural_aliases(found, exclude, beliefs)

@@ -64,12 +64,32 @@ def accuracy(gaps: Sequence[Array], covariances: Sequence[Array | None]) -> Accu
     if any(c is None for c in covariances):
         return Accuracy(rms, worst)
     factor = np.concatenate([_root(c[:, :3, :3]) for c in covariances if c is not None])
-    drawn = np.random.default_rng(0).standard_normal((DRAWS, 3))
-    sizes = [_rms(gap + factor @ z) for z in drawn]
-    low, high = np.percentile(sizes, SPAN)
+    low, high = np.percentile(_drawn_rms(gap, factor), SPAN)
     return Accuracy(
         float(np.hypot(rms, _rms(factor.reshape(-1, 9)))), worst, float(low), float(high)
     )
+
+
+def likely_rms(gap: Array, covariances: Array, share: float) -> float:
+    """
+    Return the RMS distance [m] that stays within for a share of the models the recordings allow.
+
+    Parameters
+    ----------
+    gap : array, shape (N, 6) [m, rad]
+        What is missing by the model.
+    covariances : array, shape (N, 6, 6)
+    share : float
+        Between 0 and 1.
+
+    """
+    return float(np.quantile(_drawn_rms(gap[:, :3], _root(covariances[:, :3, :3])), share))
+
+
+def _drawn_rms(gap: Array, factor: Array) -> list[float]:
+    """Return the RMS distance under drawn models, each off alike at all samples."""
+    drawn = np.random.default_rng(0).standard_normal((DRAWS, 3))
+    return [_rms(gap + factor @ z) for z in drawn]
 
 
 def along_seams(found: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | None]:

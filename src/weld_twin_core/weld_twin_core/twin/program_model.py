@@ -15,7 +15,7 @@ from ..arm.rotation import angle_between
 from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect
 from ..motion.programs import Move, Piece
-from ..recording import JointMotion, Recording
+from ..recording import JointMotion, Recording, Signal
 from .compensation import commandable
 from .domain import Domain, Outside
 from .posterior import Posterior, pose_covariances
@@ -42,6 +42,10 @@ class ProgramModel:
         While the program runs.
     setup : int
         Which base frame of the posterior.
+    wrench : array, shape (6,), optional [N, N m]
+        On the tool meanwhile, in ``wrench_frame``.
+    wrench_frame : str
+        'tool' or 'base'.
 
     """
 
@@ -50,6 +54,8 @@ class ProgramModel:
     posterior: Posterior | None = None
     temperature: float | None = None
     setup: int = 0
+    wrench: Array | None = None
+    wrench_frame: str = 'tool'
     _twins: dict[bytes, Twin] = field(default_factory=dict, repr=False)
 
     @property
@@ -137,7 +143,8 @@ class ProgramModel:
 
     def recording(self, motion: JointMotion) -> Recording:
         """Return a motion as the twin takes it."""
-        plain = Recording('program', motion)
+        pull = None if self.wrench is None else Signal(motion.t[:1], self.wrench[None])
+        plain = Recording('program', motion, None, pull, self.wrench_frame)
         return plain if self.temperature is None else plain.at_temperature(self.temperature)
 
     @staticmethod

@@ -5,18 +5,22 @@
 from __future__ import annotations
 
 import json
-import shutil
+from importlib.util import find_spec
 
 import pytest
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
+from weld_twin_core.errors import TwinError
+from weld_twin_lab.campaigns.securing.keys import keystore
 from weld_twin_lab.campaigns.security import verdict
 from weld_twin_lab.cli.lab import proofs
 from weld_twin_nodes.cli.in_process import weld_twin
 
-OPEN = {'heard': 9, 'recorded': [9, 8, 7], 'alive': True}
-LOCKED = {'heard': 0, 'recorded': [9, 0, 0], 'alive': True}
+TOPICS = {'/joint_states': 9, '/twin/tool_pose': 9}
+WELL = {'alive': True, 'topics': TOPICS, 'codes': [0, 0]}
+OPEN = {'heard': [9, 8, 7, 6], 'recorded': [9, 8, 7, 6], **WELL}
+LOCKED = {'heard': [9, 0, 0, 0], 'recorded': [9, 0, 0, 0], **WELL}
 
 
 def test_security_is_shown_when_strangers_get_through_without_keys_alone():
@@ -26,13 +30,17 @@ def test_security_is_shown_when_strangers_get_through_without_keys_alone():
 @pytest.mark.parametrize(
     ('way', 'change'),
     [
-        ('open', {'heard': 0}),  # the trial itself hears nothing
-        ('open', {'recorded': [9, 0, 7]}),
-        ('enforced', {'heard': 1}),
-        ('enforced', {'recorded': [9, 1, 0]}),
-        ('enforced', {'recorded': [9, 0, 1]}),
-        ('enforced', {'recorded': [0, 0, 0]}),
+        ('open', {'heard': [9, 0, 7, 6]}),  # the trial itself hears nothing
+        ('open', {'recorded': [9, 8, 7, 0]}),
+        ('enforced', {'heard': [9, 1, 0, 0]}),
+        ('enforced', {'heard': [9, 0, 0, 1]}),
+        ('enforced', {'recorded': [9, 1, 0, 0]}),
+        ('enforced', {'recorded': [9, 0, 1, 0]}),
+        ('enforced', {'recorded': [0, 0, 0, 0]}),
+        ('enforced', {'heard': [0, 0, 0, 0]}),  # nobody hears: the policy lets too little through
         ('enforced', {'alive': False}),
+        ('enforced', {'codes': [0, 1]}),
+        ('enforced', {'topics': {'/joint_states': 9}}),
     ],
 )
 def test_anything_else_shows_nothing(way, change):
@@ -54,13 +62,22 @@ def test_a_folder_without_the_middleware_is_refused_with_what_to_fetch(tmp_path)
     assert code == 1
     assert json.loads(out.read_text())['reason'] == (
         f"open: '{tmp_path}' holds no rmw_cyclonedds_cpp: fetch the branch jazzy of "
-        'ros2/rmw_cyclonedds, ros2/ros2cli and ros2/sros2 into a folder, and give it as --source'
+        'ros2/rmw_cyclonedds and ros2/sros2 into a folder, and give it as --source'
     )
 
 
+@pytest.mark.skipif(find_spec('sros2') is not None, reason='sros2 is here')
+def test_without_what_makes_keys_it_says_so(tmp_path):
+    with pytest.raises(
+        TwinError, match=r"without sros2: No module named 'sros2'; fetch the branch"
+    ):
+        keystore(tmp_path / 'keys', tmp_path / 'policy.xml', ['/weld_twin/party'])
+    assert not (tmp_path / 'keys').exists()
+
+
 @pytest.mark.skipif(
-    shutil.which('ros2') is None,
-    reason='ros2 security is not here, and no wheel of it: no keys can be made; see --source',
+    find_spec('sros2') is None,
+    reason='sros2 is not here, and no wheel of it: no keys can be made; see --source',
 )
 def test_strangers_hear_and_say_nothing_under_enforced_security(tmp_path):
     code, printed, _ = weld_twin('lab', 'security', '--out', str(tmp_path / 'security.json'))

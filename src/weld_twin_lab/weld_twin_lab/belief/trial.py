@@ -18,7 +18,7 @@ from weld_twin_core.recording import Recording
 
 from ..blind import layout
 from ..blind.achieved import aligned_on, counted, gap_on
-from ..blind.blind_cell import as_recording, record
+from ..blind.blind_cell import Take, as_recording, record
 from ..blind.diagnosing import engine_digest
 from ..blind.displacement import rms
 from ..blind.making import Case, truth_of
@@ -81,7 +81,7 @@ def row_of(name: str, case: Case, *, held_out: bool = True) -> dict[str, Any]:
     }
     start = time.process_time()
     try:
-        told = _diagnosed(case, held_out=held_out)
+        told = diagnosed(case, recordings_of(case), held_out=held_out)
     except Exception as error:
         return {**row, 'error': f'{type(error).__name__}: {error}'}
     row['seconds'] = time.process_time() - start
@@ -106,20 +106,44 @@ def said(told: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _diagnosed(case: Case, *, held_out: bool) -> Diagnosis:
-    cell = case.cell
-    train, holdout = (_recorded(case, use) for use in (layout.TRAIN, layout.HOLDOUT))
+def recordings_of(case: Case, more: Sequence[Take] = ()) -> list[Recording]:
+    """
+    Return the recordings of a case that are to be diagnosed.
+
+    Parameters
+    ----------
+    case : Case
+    more : sequence of Take
+        Further ones of the same truth.
+
+    """
     also = [
-        as_recording(f'{layout.TRAIN}_{k + 2}', record(cell, case.causes, taken))
-        for k, taken in enumerate(case.also)
+        as_recording(f'{layout.TRAIN}_{k + 2}', record(case.cell, case.causes, taken))
+        for k, taken in enumerate((*case.also, *more))
     ]
+    return [_recorded(case, layout.TRAIN), *also]
+
+
+def diagnosed(case: Case, recordings: Sequence[Recording], *, held_out: bool = False) -> Diagnosis:
+    """
+    Return the diagnosis of recordings of a case.
+
+    Parameters
+    ----------
+    case : Case
+    recordings : sequence of Recording
+    held_out : bool
+        Whether the held-out recording of the case is given.
+
+    """
+    cell = case.cell
     return diagnose(
-        [train, *also],
+        recordings,
         cell.robot,
         align=frozenset(cell.align),
         known=effects_from_list([dict(item) for item in cell.known], cell.robot),
         exclude=case.excluded,
-        holdout=[holdout] if held_out else [],
+        holdout=[_recorded(case, layout.HOLDOUT)] if held_out else [],
         experiment=False,
     )
 

@@ -22,7 +22,7 @@ from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots import load_robot
 from weld_twin_nodes.offline.task_pool import Runner, Task
 from weld_twin_nodes.offline.told_twin import build_twin
-from weld_twin_nodes.report.diagnosis_files import diagnosis_text
+from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 from . import layout, seal
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from importlib.resources import files
 from typing import Any
 
-from weld_twin_nodes.report.html import Html, document, section, table, tag
+from weld_twin_report.report.html import Html, document, section, table, tag
 
 from .judging import Judged
 from .measures import Measure

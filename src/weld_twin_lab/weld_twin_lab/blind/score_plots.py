@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from weld_twin_nodes.report.html import Html
+from weld_twin_report.report.html import Html
 
 from .achieved import Achieved
 from .judging import Judged

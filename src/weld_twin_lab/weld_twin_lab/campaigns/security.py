@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The nodes under enforced security: who has no keys, or others, hears and says nothing.
 
-The same is tried without keys first: there a stranger must hear the twin and be recorded, or else
-the trial shows nothing. It needs `ros2 security` and a middleware that is built with DDS security; where
-they are missing, the result says so and does not pass. With ``--source`` both are built first.
+The same is tried without keys first: there every stranger must hear the twin and be recorded, or else
+the trial shows nothing. It needs sros2 and a middleware that is built with DDS security; where they are
+missing, the result says so and does not pass. With ``--source`` both are built first.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--source',
         metavar='DIR',
-        help='folder with rmw_cyclonedds, ros2cli and sros2 (branch jazzy), to be built and used',
+        help='folder with rmw_cyclonedds and sros2 (branch jazzy), to be built and used',
     )
     parser.add_argument(
         '--work', metavar='DIR', help='where to build it; kept, and used again next time'
@@ -46,11 +46,12 @@ def _tried(args: argparse.Namespace, folder: Path, tell: Callable[[str], None]) 
     from contextlib import ExitStack
 
     from weld_twin_core.errors import TwinError
+    from weld_twin_nodes.harness.ros_domain import own_domain
 
     from .securing.middleware import secured_middleware
-    from .securing.scenario import keystore, played
+    from .securing.scenario import PARTIES, locks, played
 
-    result: dict[str, Any] = {'reason': ''}
+    result: dict[str, Any] = {'reason': '', 'parties': list(PARTIES)}
     with ExitStack() as stack:
         for way in WAYS:
             place = folder / way
@@ -60,8 +61,9 @@ def _tried(args: argparse.Namespace, folder: Path, tell: Callable[[str], None]) 
                     work = Path(args.work) if args.work else folder / 'built'
                     stack.enter_context(secured_middleware(Path(args.source), work))
                 result['middleware'] = os.environ.get('RMW_IMPLEMENTATION', '')
-                keys = keystore(place) if way == 'enforced' else None
-                result[way] = played(place, keys)
+                with own_domain():  # keys are for one domain
+                    locked = locks(place) if way == 'enforced' else [{} for _ in PARTIES]
+                    result[way] = played(place, locked)
             except TwinError as error:
                 result['reason'] = f'{way}: {error}'
                 break
@@ -70,24 +72,37 @@ def _tried(args: argparse.Namespace, folder: Path, tell: Callable[[str], None]) 
 
 
 def verdict(result: dict[str, Any]) -> bool:
-    """Return whether strangers get through without keys, and nobody but the driver with them."""
-    if any(way not in result or not result[way]['alive'] for way in WAYS):
+    """
+    Return whether strangers get through without keys, and nobody but the driver with them.
+
+    All nodes must have run, and ended with code 0.
+    What the nodes made of the driver's joint states without keys, they make with keys too.
+    """
+    if any(way not in result for way in WAYS):
+        return False
+    if any(not result[way]['alive'] or any(result[way]['codes']) for way in WAYS):
         return False
     free, locked = result['open'], result['enforced']
-    shown = free['heard'] > 0 and all(count > 0 for count in free['recorded'])
-    driver, *strangers = locked['recorded']
-    return bool(shown and driver > 0 and locked['heard'] == 0 and not any(strangers))
+    shown = all(count > 0 for count in (*free['heard'], *free['recorded']))
+    through = locked['heard'][0] > 0 and locked['recorded'][0] > 0
+    kept_out = not any((*locked['heard'][1:], *locked['recorded'][1:]))
+    return bool(shown and through and kept_out and set(free['topics']) <= set(locked['topics']))
 
 
 def table(result: dict[str, Any]) -> str:
-    """Return a row without keys and one with them."""
-    head = (
-        *('keys', 'all nodes ran', 'poses a stranger heard', 'joint states of the driver'),
-        *('of one without keys', 'of one with other keys'),
-    )
+    """Return a row of each party without keys and with them."""
+    head = ('keys', 'who', "twin's poses it heard", 'joint states of it that were recorded')
     rows = [
-        (way, 'yes' if made['alive'] else 'no', made['heard'], *made['recorded'])
-        for way, made in ((way, result[way]) for way in WAYS if way in result)
+        (way, who, result[way]['heard'][k], result[way]['recorded'][k])
+        for way in WAYS
+        if way in result
+        for k, who in enumerate(result['parties'])
     ]
-    reason = f'\n{result["reason"]}\n' if result['reason'] else ''
-    return markdown.table(head, *rows) + reason
+    more = [
+        f'{way}: all nodes ran: {"yes" if result[way]["alive"] else "no"}; '
+        f'topics recorded: {len(result[way]["topics"])}'
+        for way in WAYS
+        if way in result
+    ]
+    told = '\n'.join([*more, *([result['reason']] if result['reason'] else [])])
+    return f'{markdown.table(head, *rows)}\n{told}\n'

@@ -24,7 +24,7 @@ from weld_twin_core.diagnosis.advice.next_touches import next_touches
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_core.diagnosis.hypotheses.plain_causes import plain_causes
+from weld_twin_core.diagnosis.hypotheses.library import plain_causes
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files.whole_files import write_text
 

@@ -24,7 +24,7 @@ from weld_twin_core.effects.effect import Effect
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Measurements, Recording
 from weld_twin_nodes.offline.set_up_changes import FRAMES, SetUpChange, set_up_change, told
-from weld_twin_nodes.report.diagnosis_files import diagnosis_text
+from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 from ..blind.blind_cell import as_recording, of_motion, record
 from ..blind.cause_sizes import site

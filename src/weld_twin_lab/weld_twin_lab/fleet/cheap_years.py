@@ -18,9 +18,9 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.history import Observation
-from weld_twin_nodes.history import Entry, observations
-from weld_twin_nodes.history.plain_entry import entry
-from weld_twin_nodes.history.tracking import likely, named
+from weld_twin_report.history import Entry, observations
+from weld_twin_report.history.plain_entry import entry
+from weld_twin_report.history.tracking import likely, named
 
 from .life import Event, Year, moved, year
 from .scoring import WEEK, score

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from weld_twin_core.errors import DataError
-from weld_twin_nodes.history import Database
+from weld_twin_report.history import Database
 
 Rows = dict[str, tuple[Any, ...]]
 """What a database holds of every run, by its key."""

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.history import Observation
-from weld_twin_nodes.history import observations
-from weld_twin_nodes.history.plain_entry import entry, plain
-from weld_twin_nodes.history.tracking import likely, named
+from weld_twin_report.history import observations
+from weld_twin_report.history.plain_entry import entry, plain
+from weld_twin_report.history.tracking import likely, named
 
 from .life import Year, cause, moved, year
 from .scoring import WEEK, score

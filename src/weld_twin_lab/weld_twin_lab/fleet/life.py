@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from weld_twin_core.arrays import Array
-from weld_twin_nodes.history import Entry
+from weld_twin_report.history import Entry
 
 WEEKS = 52
 """Of a year of a cell."""

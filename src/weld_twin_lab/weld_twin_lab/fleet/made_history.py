@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from weld_twin_core.arm import catalog
-from weld_twin_nodes.history import Database, Entry
+from weld_twin_report.history import Database, Entry
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection

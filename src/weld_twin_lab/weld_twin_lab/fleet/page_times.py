@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from weld_twin_msgs_py.files import markdown
-from weld_twin_nodes.fleet.cell_page import cell_page
-from weld_twin_nodes.fleet.ranking_page import ranking_page
-from weld_twin_nodes.history import Database
-from weld_twin_nodes.history.runs import Runs
+from weld_twin_report.fleet.cell_page import cell_page
+from weld_twin_report.fleet.ranking_page import ranking_page
+from weld_twin_report.history import Database
+from weld_twin_report.history.runs import Runs
 
 from .made_history import fill, made
 from .postgres import NoServer, postgres

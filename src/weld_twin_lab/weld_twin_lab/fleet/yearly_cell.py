@@ -17,7 +17,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.robots import write_robot_yaml
 from weld_twin_nodes.cli.in_process import weld_twin
-from weld_twin_nodes.history import Entry, entry_of
+from weld_twin_report.history import Entry, entry_of
 
 from ..blind.blind_cell import Cell, Take, as_recording, draw_cell, record, take
 

@@ -33,7 +33,7 @@ from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.programs import read_sources
 from weld_twin_msgs_py.programs.source import Source
 from weld_twin_nodes.offline.correcting import corrected_program, program_model
-from weld_twin_nodes.report.diagnosis_files import RESULT, diagnosis_text
+from weld_twin_report.report.diagnosis_files import RESULT, diagnosis_text
 
 from ..blind.recorded_motion import RATE
 from .cells import CELLS, reader_of

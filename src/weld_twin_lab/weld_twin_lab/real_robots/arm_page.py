@@ -8,13 +8,13 @@ from base64 import b64encode
 from collections.abc import Sequence
 
 from weld_twin_core import __version__
-from weld_twin_nodes.report.cause_list import causes_section
-from weld_twin_nodes.report.footing import checks_section
-from weld_twin_nodes.report.gap_location import where_section
-from weld_twin_nodes.report.headline import opening
-from weld_twin_nodes.report.html import Child, Html, document, section, table, tag
-from weld_twin_nodes.report.quantities import millimetres, milliradians, percent
-from weld_twin_nodes.report.shrinking import shrink_section
+from weld_twin_nodes.wording.quantities import millimetres, milliradians, percent
+from weld_twin_report.report.cause_list import causes_section
+from weld_twin_report.report.footing import checks_section
+from weld_twin_report.report.gap_location import where_section
+from weld_twin_report.report.headline import opening
+from weld_twin_report.report.html import Child, Html, document, section, table, tag
+from weld_twin_report.report.shrinking import shrink_section
 
 from .data import Source
 from .figures import ripple_over_range, ripple_spectrum, workspace

@@ -12,8 +12,8 @@ from typing import Any
 from weld_twin_core import __version__
 from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.whole_files import write_text
-from weld_twin_nodes.report.diagnosis_files import diagnosis_text
-from weld_twin_nodes.report.family_table import ripples
+from weld_twin_report.report.diagnosis_files import diagnosis_text
+from weld_twin_report.report.family_table import ripples
 
 from .arm_page import robot_page
 from .data import Source, tables, ur5_splits, ur10_splits

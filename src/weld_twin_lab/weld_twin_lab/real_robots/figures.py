@@ -9,7 +9,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.effects.transmission_ripple import TransmissionRipple
-from weld_twin_nodes.sensitivity_report.figures.canvas import COLOURS, panels, svg
+from weld_twin_report.sensitivity_report.figures.canvas import COLOURS, panels, svg
 
 
 def ripple_spectrum(diagnosis: Diagnosis) -> str:

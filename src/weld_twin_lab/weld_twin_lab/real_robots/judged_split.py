@@ -11,7 +11,7 @@ from time import perf_counter
 from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis, diagnose
-from weld_twin_core.diagnosis.frames.frames_only import frames_only
+from weld_twin_core.diagnosis.frames.aligned import frames_only
 
 from .data import Split
 from .unseen_stations import ALIGN, Errors, errors, inside, residual

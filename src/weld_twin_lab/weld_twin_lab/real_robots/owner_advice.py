@@ -8,9 +8,9 @@ import numpy as np
 
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.effects import Effect
-from weld_twin_nodes.report.family_table import ripples
-from weld_twin_nodes.report.quantities import millimetres
-from weld_twin_nodes.report.words import listed
+from weld_twin_nodes.wording.quantities import millimetres
+from weld_twin_nodes.wording.words import listed
+from weld_twin_report.report.family_table import ripples
 
 _GEOMETRY = {'joint_offset', 'link_length', 'link_offset', 'link_twist', 'axis_parallelism'}
 

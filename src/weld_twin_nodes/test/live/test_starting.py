@@ -18,6 +18,7 @@ import yaml
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
 from weld_twin_nodes.live.all_nodes import MODULES, node_class
+from weld_twin_nodes.live.policy import enclave
 
 PACKAGE = Path(__file__).parents[2]
 LAUNCH = ('cell', 'demo')
@@ -35,6 +36,14 @@ def started(name, *words):
         timeout=60,
         env=AS_FOUND,
     )
+
+
+@pytest.mark.parametrize('name', ['error_injector', 'live_diagnosis'])
+def test_a_node_loads_nothing_that_it_needs_for_a_diagnosis_alone(name):
+    slow = "[m for m in ('scipy.linalg', 'matplotlib', 'weld_twin_core.diagnosis.soundness.gate')"
+    code = f'import sys, {MODULES[name]}\nprint({slow} if m in sys.modules])'
+    said = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert said.stdout == '[]\n'
 
 
 def test_a_mistyped_parameter_is_refused_with_the_one_that_was_meant():
@@ -56,8 +65,8 @@ def test_a_node_that_must_be_secured_and_cannot_does_not_run_open(tmp_path):
     """Neither without keys nor, where the middleware has no security, with an enclave of them."""
     locked = {'ROS_SECURITY_ENABLE': 'true', 'ROS_SECURITY_STRATEGY': 'Enforce'}
     (tmp_path / 'keys/enclaves/empty').mkdir(parents=True)
-    for enclave in ('/nowhere', '/empty'):
-        words = ['--ros-args', '--enclave', enclave]
+    for place in ('/nowhere', '/empty'):
+        words = ['--ros-args', '--enclave', place]
         result = subprocess.run(
             [sys.executable, '-m', MODULES['forward_kinematics_twin'], *words],
             capture_output=True,
@@ -139,6 +148,21 @@ def test_the_cell_hands_each_node_only_parameters_it_has():
         assert set(own) <= known, name.value
         assert set(own) <= set(arguments)
     assert set(ast.literal_eval(constant(tree, 'TOPICS')).values()) <= set(arguments)
+
+
+def test_each_node_gets_the_enclave_that_the_policy_names():
+    around = ast.literal_eval(constant(tree_of('cell'), 'ENCLAVES'))
+    for space in ('', 'left', '/cell/left'):
+        assert eval(space.join(around)) == enclave('', space).rstrip('/')
+    for name in LAUNCH:
+        given = [
+            keyword.value.elts[0].value
+            for node in ast.walk(tree_of(name))
+            if isinstance(node, ast.Call)
+            for keyword in node.keywords
+            if keyword.arg == 'ros_arguments'
+        ]
+        assert given == ['--enclave']
 
 
 @pytest.mark.parametrize('name', LAUNCH)

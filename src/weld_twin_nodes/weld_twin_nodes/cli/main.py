@@ -21,8 +21,13 @@ INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it: 128 and the number of the signal."""
 FIRST = ('diagnose', 'demo', 'import', 'info', 'predict', 'compensate', 'export')
 """What people come for, in the order of a first day; the list of commands begins with it."""
+PAGES = (
+    *('correct-program', 'demo', 'diagnose', 'fleet', 'history', 'investigate', 'iso9283'),
+    *('sensitivity', 'serve', 'verify'),
+)
+"""What weld_twin_report brings, a file each; named here to say so where it is not installed."""
 LAB = ('benchmark', 'blind', 'campaign', 'real-robots', 'lab')
-"""What weld_twin_lab brings, a file each; named here to say so where it is not installed."""
+"""The same of weld_twin_lab."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -63,24 +68,24 @@ def _end(*_: object) -> None:
 
 
 def _commands() -> dict[str, str]:
-    """Return the module of every subcommand, a file each: own ones, then those of the lab."""
-    own = _modules(f'{__package__}.commands', os.path.join(os.path.dirname(__file__), 'commands'))
-    lab = find_spec('weld_twin_lab')
-    proofs = {}
-    if lab is not None and lab.submodule_search_locations:
-        where = os.path.join(lab.submodule_search_locations[0], 'cli')
-        proofs = _modules('weld_twin_lab.cli', where)
+    """Return the module of every subcommand, a file each: those of the product, then the proofs."""
+    own = _modules('weld_twin_nodes', 'cli.commands')
+    own |= _modules('weld_twin_report', 'cli.commands')
     return {
-        **{name: own[name] for name in FIRST},
-        **dict(sorted((name, own[name]) for name in own.keys() - FIRST)),
-        **dict(sorted(proofs.items())),
+        **{name: own[name] for name in FIRST if name in own},
+        **dict(sorted((name, own[name]) for name in own.keys() - set(FIRST))),
+        **dict(sorted(_modules('weld_twin_lab', 'cli').items())),
     }
 
 
 def _modules(package: str, folder: str) -> dict[str, str]:
-    """Return the modules of a folder by the name of their subcommand."""
-    stems = [name[:-3] for name in os.listdir(folder) if name.endswith('.py') and name[0] != '_']
-    return {stem.rstrip('_').replace('_', '-'): f'{package}.{stem}' for stem in stems}
+    """Return the modules in a folder of a package by their subcommand; none if it is not installed."""
+    found = find_spec(package)
+    if found is None or not found.submodule_search_locations:
+        return {}
+    names = os.listdir(os.path.join(found.submodule_search_locations[0], *folder.split('.')))
+    stems = [name[:-3] for name in names if name.endswith('.py') and name[0] != '_']
+    return {stem.rstrip('_').replace('_', '-'): f'{package}.{folder}.{stem}' for stem in stems}
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
@@ -94,10 +99,14 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(required=True, metavar='COMMAND')
     commands = _commands()
     chosen = next((word for word in words if not word.startswith('-')), None)
-    if chosen in LAB and chosen not in commands:
-        parser.error(
-            f"'{chosen}' is a proof; it needs the package weld_twin_lab, which is not installed"
-        )
+    for kind, package, brought in (
+        ('writes pages', 'weld_twin_report', PAGES),
+        ('is a proof', 'weld_twin_lab', LAB),
+    ):
+        if chosen in brought and chosen not in commands:
+            parser.error(
+                f"'{chosen}' {kind}; it needs the package {package}, which is not installed"
+            )
     if chosen in commands:
         module = import_module(commands[chosen])
         add_command(subparsers, chosen, module).set_defaults(run=module.run)
@@ -109,8 +118,8 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
 
 def _docstring(module_name: str) -> str:
     """Return the docstring of a module from its code, which is not run: a list of commands."""
-    spec = find_spec(module_name)
-    code = spec.loader.get_code(module_name) if spec and spec.loader else None  # type: ignore[attr-defined]
+    loader = getattr(find_spec(module_name), 'loader', None)
+    code = loader.get_code(module_name) if loader else None
     return str(code.co_consts[0]) if code else ''
 
 

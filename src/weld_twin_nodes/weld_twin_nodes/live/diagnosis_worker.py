@@ -128,8 +128,8 @@ def find(job: Job) -> Finding:
     """Return the finding of a job."""
     from weld_twin_core.diagnosis import diagnose
 
-    from ..report.verdict import verdict
-    from ..report.words import found_name
+    from ..wording.verdict import verdict
+    from ..wording.words import found_name
 
     diagnosis = diagnose(
         [job.recording], job.robot, align=job.align, known=job.known, exclude=job.exclude

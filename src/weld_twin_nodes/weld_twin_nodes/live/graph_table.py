@@ -93,6 +93,11 @@ SPOKEN = {
     ),
     'deviation_markers': _node((t.MARKERS,), (*_MEASURED, t.TWIN_BASE, t.DEVIATION)),
     'contact_marker': _node((t.CONTACT,), (t.JOINT_STATES,), ('~/mark',)),
+    'compensator': _node(
+        (t.POSE_OUT, t.CORRECTION, t.AUDIT, *_MANAGED_SAY),
+        (*_MODEL, t.DEVIATION, t.POSE_IN),
+        ('~/reload', *_MANAGED_ANSWER),
+    ),
     'recorder': _node(
         _MANAGED_SAY,
         (*t.TOPICS, *t.AROUND, *t.FRAMES, '/parameter_events'),

@@ -64,6 +64,11 @@ def policy(
     return HEAD + ''.join(profiles) + TAIL
 
 
+def enclave(node: str, namespace: str = '') -> str:
+    """Return the enclave of a node, as the launch files give it."""
+    return f'/{namespace.strip("/") or "weld_twin"}/{node}'
+
+
 def _full(name: str, space: str) -> str:
     if name.startswith(('/', '~')):
         return name
@@ -72,9 +77,8 @@ def _full(name: str, space: str) -> str:
 
 def _profile(node: str, space: str, remaps: Mapping[str, str]) -> str:
     """Return the enclave of a node; what is remapped has its full name."""
-    path = f'{space.rstrip("/")}/{node}' if space != '/' else f'/weld_twin/{node}'
     lines = [
-        f'    <enclave path={quoteattr(path)}>',
+        f'    <enclave path={quoteattr(enclave(node, space))}>',
         '      <profiles>',
         f'        <profile ns={quoteattr(space)} node={quoteattr(node)}>',
     ]

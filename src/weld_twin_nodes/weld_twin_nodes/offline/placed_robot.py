@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.diagnosis.frames.frames_only import frames_only
+from weld_twin_core.diagnosis.frames.aligned import frames_only
 from weld_twin_core.errors import DataError
 from weld_twin_core.metrics.cycles import measured_of, pose_cycles, stops
 from weld_twin_core.recording import Recording

@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from .unit_diagonal import EMPTY, unit_diagonal
 
 Index = NDArray[np.intp]
 
 FLAT = 1e-9
 """A column whose norm falls below this share once others are projected out carries nothing new."""
+EMPTY = 1e-300
+"""Least squared norm of a column; keeps a column of zeros from a division by zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,3 +93,27 @@ class Gram:
         left[:, index] = 0.0
         right[index] = 0.0
         return replace(self, normal=left, right=right, rss=max(rss, EMPTY))
+
+
+def unit_diagonal(normal: Array, damping: float = 0.0) -> tuple[Array, Array]:
+    """
+    Return a normal matrix with ones on its diagonal, and the norms of its columns.
+
+    Parameters
+    ----------
+    normal : array, shape (P, P)
+    damping : float
+        Added to the diagonal of ones, so that columns that repeat others do no harm.
+
+    Returns
+    -------
+    scaled : array, shape (P, P)
+        ``normal / outer(size, size)``; solve it for ``right / size`` and divide by ``size``.
+    size : array, shape (P,)
+
+    """
+    size = np.sqrt(np.maximum(normal.diagonal(), EMPTY))
+    scaled = normal / (size[:, None] * size)
+    each = np.arange(size.size)
+    scaled[each, each] += damping
+    return scaled, size

@@ -1,13 +1,18 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How many rows of a residual count as independent."""
+"""Rows of a residual: their one layout, their spread, and how many count as independent."""
 
 from __future__ import annotations
+
+from typing import TypeVar
 
 import numpy as np
 
 from ...arrays import Array
-from .row_layout import by_sample
+
+Row = TypeVar('Row', bound=np.generic)
+NORMAL = 1.4826
+"""Standard deviation of normal numbers over the median of their size: 1 / 0.6745."""
 
 
 def effective_share(residual: Array, rows: tuple[int, ...], samples: tuple[int, ...]) -> float:
@@ -49,3 +54,47 @@ def _correlation_time(part: Array) -> float:
     pairs = rho[0:even:2] + rho[1:even:2]
     stop = int(np.argmax(pairs <= 0.0)) if (pairs <= 0.0).any() else len(pairs)
     return float(max(1.0, 2.0 * pairs[:stop].sum() - 1.0))
+
+
+def by_sample(
+    values: np.ndarray[tuple[int, ...], np.dtype[Row]],
+    rows: tuple[int, ...],
+    samples: tuple[int, ...],
+) -> list[np.ndarray[tuple[int, ...], np.dtype[Row]]]:
+    """
+    Return what is laid out in rows as one array per recording, shape (M, c, ...).
+
+    Parameters
+    ----------
+    values : array, shape (rows, ...)
+        As `Problem.whitened` lays it out.
+    rows, samples : tuple of int
+        Components c and samples M of every recording.
+
+    """
+    ends = np.cumsum([c * m for c, m in zip(rows, samples, strict=True)])
+    parts = np.split(values, ends[:-1])
+    return [
+        part.reshape(m, c, *values.shape[1:])
+        for part, c, m in zip(parts, rows, samples, strict=True)
+    ]
+
+
+def robust_spread(values: Array) -> float:
+    """Return the standard deviation of numbers about zero by the median of their size."""
+    return NORMAL * float(np.median(np.abs(values)))
+
+
+NOT_MEASURED = 1e-6
+"""Share of the largest size below which a coordinate is taken for one that was never measured."""
+
+
+def measured_axes(part: Array) -> Array:
+    """
+    Return the coordinates that were measured, shape (k, M) of (3, M).
+
+    A linear axis has nothing across it: exact zeros there are no sign of small noise.
+    """
+    size = np.abs(part).max(axis=1, initial=0.0)
+    live = size > NOT_MEASURED * size.max(initial=0.0)
+    return part[live] if live.any() else part

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
+from .independent_rows import measured_axes, robust_spread
 from .problem import Problem
-from .robust_spread import measured_axes, robust_spread
 
 SAME_STATION = 2e-3
 """Stations closer than this in every joint [rad, m] are repeats of one pose."""

@@ -10,7 +10,7 @@ from ...arrays import Array
 from ...contacts import Length, lengths, spreads
 from ...effects.plausible import spreads as spreads_of
 from ..algebra.problem import Model, Problem
-from ..hypotheses.plain_causes import plain_causes
+from ..hypotheses.library import plain_causes
 from ..hypotheses.search import Search
 from ..result import ContactResult, KnownLength, Touched
 from ..unseen.unseen_stretches import Unseen

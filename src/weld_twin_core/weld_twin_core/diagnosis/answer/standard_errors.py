@@ -26,9 +26,9 @@ from ...effects.effect import Effect
 from ..algebra.definite import inverted, well_conditioned
 from ..algebra.designed import Design, designed
 from ..algebra.fit import coordinates
+from ..algebra.gram import unit_diagonal
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.unit_diagonal import unit_diagonal
 from ..hypotheses.starts import profile
 
 BLOCKS = 24

@@ -10,6 +10,7 @@ from dataclasses import replace
 from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...recording import Recording
+from ..algebra.fit import fit
 from ..algebra.problem import Anchor, Model, Problem, frames_named, usable
 from .alignment import initial_frames
 from .places import posed
@@ -49,3 +50,26 @@ def aligned(
     model = Model(robot, tuple(robot.T_world_base for _ in recordings), tuple(known))
     model = initial_frames(problem, model)
     return replace(problem, anchor=Anchor(model.bases, model.robot.T_flange_tool)), model
+
+
+def frames_only(recording: Recording, robot: Robot, align: frozenset[str]) -> Model:
+    """
+    Return the robot with the frames that best agree with a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        With measurements.
+    robot : Robot
+    align : frozenset of str
+        Which frames are fitted: 'base', 'tool' or both.
+
+    Raises
+    ------
+    DataError
+        Nothing was measured, or the clocks of joints and measurements do not meet.
+
+    """
+    problem = Problem((usable(recording),), align)
+    start = initial_frames(problem, Model(robot, (robot.T_world_base,)))
+    return fit(problem, start, problem.unit_scale()).model

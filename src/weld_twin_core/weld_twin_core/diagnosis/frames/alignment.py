@@ -29,8 +29,7 @@ from ...arrays import Array
 from ...errors import DataError
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem
-from .in_turn import in_turn
-from .track import FLOOR, LEVER, TIE, Track, chord, nearest_rotation
+from .in_turn import FLOOR, LEVER, TIE, Track, bases_of, chord, in_turn, nearest_rotation
 
 NEAR = 0.02
 """Median gap [m] from which a least-squares fit finds its own way."""
@@ -164,32 +163,9 @@ def _median_gap(tracks: list[Track], bases: tuple[Array, ...], tool: Array) -> f
 
 
 def _base_only(tracks: list[Track], model: Model) -> Model:
-    bases = _bases(tracks, model.robot.T_flange_tool, model.bases, ROUNDS)
-    return replace(model, bases=bases)
-
-
-def _bases(
-    tracks: list[Track], tool: Array, starts: tuple[Array, ...], rounds: int
-) -> tuple[Array, ...]:
-    pairs = zip(tracks, starts, strict=True)
-    return tuple(_base(track, tool, start, rounds) for track, start in pairs)
-
-
-def _base(track: Track, tool: Array, start: Array, rounds: int) -> Array:
-    """Return the base frame of one recording for a given tool."""
-    base, weight = start, np.ones(len(track.position))
-    reached = track.point + track.turn @ tool[:3, 3]
-    for _ in range(rounds):
-        weight = weight / weight.sum()
-        middle, centre = weight @ track.position, weight @ reached
-        moment = np.einsum('m,mi,mj', weight, track.position - middle, reached - centre)
-        if track.rotation is not None:
-            turned = track.turn @ tool[:3, :3]
-            moment += LEVER**2 * np.einsum('m,mik,mjk', weight, track.rotation, turned)
-        rotation = nearest_rotation(moment + TIE * np.linalg.norm(moment) * start[:3, :3])
-        base = transform(rotation, middle - rotation @ centre)
-        weight = 1.0 / np.maximum(track.gap(base, tool), FLOOR)
-    return base
+    tools, starts = model.robot.T_flange_tool[None], [base[None] for base in model.bases]
+    found = bases_of([Track.side_by_side([track]) for track in tracks], starts, tools)
+    return replace(model, bases=tuple(base[0] for base in found))
 
 
 def _tool_only(tracks: list[Track], model: Model) -> Model:
@@ -204,26 +180,20 @@ def _tool_only(tracks: list[Track], model: Model) -> Model:
                 moment += np.einsum('m,mki,mkj', weight, turn, track.rotation)
         tie = max(TIE * np.linalg.norm(moment), 1e-12)
         rotation = nearest_rotation(moment + tie * start[:3, :3])
-        vector = _tool_vector(tracks, model.bases, weights, start[:3, 3], False)
+        vector = _tool_vector(tracks, model.bases, weights, start[:3, 3])
         tool = transform(rotation, vector)
         weights = _weights(tracks, model.bases, tool)
     return replace(model, robot=model.robot.with_frames(tool=tool))
 
 
 def _tool_vector(
-    tracks: list[Track], bases: tuple[Array, ...], weights: list[Array], start: Array, free: bool
+    tracks: list[Track], bases: tuple[Array, ...], weights: list[Array], start: Array
 ) -> Array:
-    """Return the tool vector for given base rotations; ``free`` leaves their origins open."""
+    """Return the tool vector for given bases."""
     normal, right = np.zeros((3, 3)), np.zeros(3)
     for track, base, weight in zip(tracks, bases, weights, strict=True):
         columns = base[:3, :3] @ track.turn
-        left = track.position - track.point @ base[:3, :3].T - columns @ start
-        if free:
-            share = weight / weight.sum()
-            columns = columns - np.einsum('m,mij', share, columns)
-            left = left - share @ left
-        else:
-            left = left - base[:3, 3]
+        left = track.position - track.point @ base[:3, :3].T - columns @ start - base[:3, 3]
         normal += np.einsum('m,mki,mkj', weight, columns, columns)
         right += np.einsum('m,mki,mk', weight, columns, left)
     total = sum(float(weight.sum()) for weight in weights)

@@ -11,18 +11,24 @@ and so do several trials, each with tracks of its own: axes are trials T, starts
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from ...arm.rotation import transform
 from ...arrays import Array
-from .track import FLOOR, LEVER, TIE, Track, nearest_rotation
 
 ROUNDS = 15
 """Times that bases and tool vector are found in turn; there is no test of convergence."""
 STEPS = 3
 """Reweighted steps of the bases in each of these rounds."""
+LEVER = 0.1
+"""Metres that a radian counts as, where turns and positions are weighed together."""
+FLOOR = 1e-5
+"""Gap [m] below which a sample gains no more weight."""
+TIE = 1e-6
+"""Pull towards the given frames, relative; decides only what the data leave open."""
 
 
 class Bases(NamedTuple):
@@ -50,14 +56,7 @@ def in_turn(
         Tool vectors to start from.
 
     """
-    starts = vectors.shape[:2]
-    found = [
-        Bases(
-            np.broadcast_to(b[:, None, :3, :3], (*starts, 3, 3)),
-            np.broadcast_to(b[:, None, :3, 3], (*starts, 3)),
-        )
-        for b in bases
-    ]
+    found = _started(bases, vectors)
     for _ in range(ROUNDS):
         found = [_based(*pair, turn, vectors, STEPS) for pair in zip(tracks, found, strict=True)]
         vectors = _vectors(tracks, found, turn, vectors)
@@ -67,6 +66,35 @@ def in_turn(
     each = np.arange(len(best)), best
     frames = tuple(transform(base.rotation[each], base.origin[each]) for base in found)
     return frames, transform(turn, vectors[each])
+
+
+def bases_of(tracks: Sequence[Track], bases: Sequence[Array], tools: Array) -> tuple[Array, ...]:
+    """
+    Return the base frames, each (T, 4, 4), of tools that are known, (T, 4, 4).
+
+    Parameters
+    ----------
+    tracks, bases
+        As `in_turn` takes them.
+    tools : array, shape (T, 4, 4)
+
+    """
+    turn, vectors = tools[:, :3, :3], tools[:, None, :3, 3]
+    pairs = zip(tracks, _started(bases, vectors), strict=True)
+    found = [_based(*pair, turn, vectors, ROUNDS) for pair in pairs]
+    return tuple(transform(base.rotation[:, 0], base.origin[:, 0]) for base in found)
+
+
+def _started(bases: Sequence[Array], vectors: Array) -> list[Bases]:
+    """Return base frames (T, 4, 4) as those of every start."""
+    starts = vectors.shape[:2]
+    return [
+        Bases(
+            np.broadcast_to(b[:, None, :3, :3], (*starts, 3, 3)),
+            np.broadcast_to(b[:, None, :3, 3], (*starts, 3)),
+        )
+        for b in bases
+    ]
 
 
 def _reached(track: Track, vectors: Array) -> Array:
@@ -141,3 +169,55 @@ def _vectors(tracks: Sequence[Track], bases: list[Bases], turn: Array, start: Ar
         total = total + whole
     system = normal + TIE * np.asarray(total)[..., None, None] * np.eye(3)
     return np.asarray(start + np.linalg.solve(system, np.asarray(right)[..., None])[..., 0])
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """
+    One recording for alignment, or the same recording in several trials, their axis in front.
+
+    ``position`` (M, 3) and ``rotation`` (M, 3, 3) or None were measured, ``point`` and ``turn``
+    are those of the flange in the base frame.
+    """
+
+    position: Array
+    rotation: Array | None
+    point: Array
+    turn: Array
+
+    @classmethod
+    def side_by_side(cls, trials: Sequence[Track]) -> Track:
+        """Return trials of one recording as one, where all have turns or none has."""
+        turns = [trial.rotation for trial in trials if trial.rotation is not None]
+        return cls(
+            np.stack([trial.position for trial in trials]),
+            np.stack(turns) if turns else None,
+            np.stack([trial.point for trial in trials]),
+            np.stack([trial.turn for trial in trials]),
+        )
+
+    def gap(self, base: Array, tool: Array) -> Array:
+        """Return how far each sample is off, position and turn together, shape (M,) [m]."""
+        turn = base[:3, :3] @ self.turn
+        reached = self.point @ base[:3, :3].T + base[:3, 3] + turn @ tool[:3, 3]
+        off: Array = np.linalg.norm(self.position - reached, axis=1)
+        if self.rotation is None:
+            return off
+        return off + LEVER * chord(self.rotation, turn @ tool[:3, :3])
+
+    @property
+    def turns(self) -> Array:
+        """Return measured rotations, none where only points were measured."""
+        return np.zeros((0, 3, 3)) if self.rotation is None else self.rotation
+
+
+def nearest_rotation(matrix: Array) -> Array:
+    """Return the rotations R that make trace(R' matrix) largest, shape (..., 3, 3)."""
+    u, _, vt = np.linalg.svd(matrix)
+    u[..., 2] *= np.linalg.det(u @ vt)[..., None]
+    return np.asarray(u @ vt)
+
+
+def chord(first: Array, second: Array) -> Array:
+    """Return 2 sin(angle / 2) of the turns between rotations, shape (..., M): small ones' angle."""
+    return np.asarray(np.linalg.norm(first - second, axis=(-2, -1)) / np.sqrt(2.0))

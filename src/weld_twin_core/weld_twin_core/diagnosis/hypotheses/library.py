@@ -4,56 +4,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
+from ...effects.view import View
 from ...twin.features import Features, joints_of
 from ..algebra.atoms import Amounts, Columns, MovedJoint, Whole, amounts, gathered, moved_joint
-from ..algebra.gram import Index
 from ..algebra.problem import Model, Problem, Scale
-from .seed_systems import SeedSystems
+from .seed_systems import SeedSystems, Unit
 from .still_joints import REASON, hardly_moves, moved_most
 
 EXCLUDED = 'excluded by the user'
-
-
-@dataclass(frozen=True, eq=False)
-class Unit:
-    """
-    One family on one joint: the smallest thing a verdict can name.
-
-    Attributes
-    ----------
-    family : str
-    joint : str or None
-    seeds : tuple of Effect
-        Instances that span it; more than one where a parameter bends the response.
-    columns : tuple of array of int
-        Column numbers of every seed.
-    trials : float
-        Among how many instances the seeds were chosen.
-
-    """
-
-    family: str
-    joint: str | None
-    seeds: tuple[Effect, ...]
-    columns: tuple[Index, ...]
-    trials: float
-
-    @property
-    def site(self) -> tuple[str, str | None]:
-        """Return family and joint."""
-        return self.family, self.joint
-
-    def __str__(self) -> str:
-        """Return family and joint as people read them."""
-        return f'{self.family} of {self.joint}' if self.joint else self.family
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,3 +198,26 @@ class _Shelf:
             made = MovedJoint.of(self.problem, self.features, self.scale, joint)
             self._joints[joint] = made
         return self._joints[joint]
+
+
+def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
+    """
+    Return causes in joints and links that depend on nothing but some quantities, at zero.
+
+    Parameters
+    ----------
+    robot : Robot
+    view : View
+        The samples that reach them.
+    on : collection of str
+        What they may depend on: 'constant', 'load'.
+
+    """
+    out: dict[tuple[str, ...], Effect] = {}
+    for kind in REGISTRY.values():
+        if kind.of not in ('joint', 'link') or not kind.cause or kind.dated:
+            continue
+        for joint in joints_of(kind, robot.joint_names):
+            if kind.applicable(view, joint) is None:
+                out |= {e.key: e for e in kind.small(view, joint, 1) if e.on in on}
+    return list(out.values())

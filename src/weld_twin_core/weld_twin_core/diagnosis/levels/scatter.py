@@ -30,7 +30,7 @@ from scipy.optimize import nnls
 from ...arrays import Array
 from ...effects.curve import QUANTITIES
 from ...twin.features import Features
-from ..algebra.robust_spread import measured_axes
+from ..algebra.independent_rows import measured_axes
 from ..hypotheses.search import Search
 from ..unseen.unseen_stretches import Unseen
 

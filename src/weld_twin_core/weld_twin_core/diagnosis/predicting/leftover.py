@@ -21,9 +21,9 @@ from ...arrays import Array
 from ..algebra.designed import Design
 from ..algebra.fit import solve_scaled
 from ..algebra.gram import Index
+from ..algebra.independent_rows import by_sample
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Problem, Scale
-from ..algebra.row_layout import by_sample
 
 HALVINGS = 3
 """Eight blocks: each leaves out an eighth, few enough for the others to stand for the fit."""

@@ -26,6 +26,7 @@ from ...twin.features import Features
 from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
+from .lag import KEPT
 from .mending import measured
 
 GEOMETRY = ('theta', 'd', 'a', 'alpha', 'beta')
@@ -43,6 +44,8 @@ GROWN = 1e-4
 """Prior spread of a link's growth [1/K], as loose as the others: aluminium grows by 2.4e-5."""
 UNIT_OFF = 1e-3
 """Prior spread of the instrument's unit of length: half of what is plausible at all."""
+CONSTANTS = np.geomspace(0.05, 0.7, 7)
+"""Time constants of settling, as shares of the recording."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +66,8 @@ class BaseChange:
         The columns of the positions, not whitened, for the size of a change.
     rows, samples : tuple of int
         Components and samples of every recording.
+    noise : float
+        Unit of the positions [m].
 
     """
 
@@ -76,6 +81,12 @@ class BaseChange:
     tool_metres: Array
     rows: tuple[int, ...]
     samples: tuple[int, ...]
+    noise: float
+
+    def left(self, k: int) -> float:
+        """Return the RMS distance [m] that frames and arm leave of recording k, as a lag counts it."""
+        own = np.sort((self.residual[self.recording == k][:, :3] ** 2).sum(axis=1))
+        return self.noise * float(np.sqrt(own[: max(int(KEPT * own.size), 1)].mean()))
 
     @cached_property
     def recording(self) -> NDArray[np.int_]:
@@ -238,6 +249,7 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
         tool_metres=tool_metres,
         rows=problem.rows,
         samples=problem.samples,
+        noise=scale.position,
     )
 
 
@@ -402,3 +414,15 @@ def _solve(normal: Array, right: Array) -> Array:
     size = np.where(live, np.sqrt(np.maximum(mass, 0.0)), np.inf)
     scaled = normal / np.outer(size, size) + 1e-6 * np.eye(len(size))
     return np.asarray(np.linalg.solve(scaled, right / size) / size)
+
+
+def other_shapes(age: Array) -> list[Array]:
+    """Return smooth shapes over age (M,), from 0 to 1, that are no settling, each (M,)."""
+    waves = [wave(n * np.pi * age) for n in (1, 2) for wave in (np.sin, np.cos)]
+    late = [np.exp(-(1.0 - age) / constant) for constant in CONSTANTS]
+    return [age, age**2, *late, *waves]
+
+
+def smooth_shapes(age: Array) -> list[Array]:
+    """Return smooth shapes over age (M,), from 0 to 1, settling among them, each (M,)."""
+    return [*(np.exp(-age / constant) for constant in CONSTANTS), *other_shapes(age)]

@@ -4,20 +4,15 @@
 
 from __future__ import annotations
 
-from .clocks import clocks
-from .computed import computed
+from .computed import computed, source
 from .evidence import Checker
-from .gravity import gravity
 from .mixups import mixups
-from .orientation import orientation
-from .outliers import outliers
+from .orientation import gravity, orientation
 from .parted import parted
-from .quantity import quantity
-from .repeats import repeats
-from .richness import motion
+from .repeats import outliers, repeats
+from .richness import motion, quantity
 from .setup_change import setup
-from .source import source
-from .stamp_regularity import stamps
+from .stamp_regularity import clocks, stamps
 from .stuck import stuck
 
 CHECKS: dict[str, tuple[Checker, str]] = {

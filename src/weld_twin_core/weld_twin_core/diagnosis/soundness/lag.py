@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ..frames.track import nearest_rotation
+from ..frames.in_turn import nearest_rotation
 
 MOST_LAG = 2.0
 """Lags up to this [s] are looked at, and up to a tenth of the recording."""

@@ -30,7 +30,7 @@ from ...effects.link_twist import LinkTwist
 from ...recording import Recording
 from ..algebra.fit import descended
 from ..algebra.problem import Model, Scale
-from ..frames.track import Track
+from ..frames.in_turn import Track
 from .mending import measured
 
 KINDS: tuple[type[JointOffset | LinkLength | LinkOffset | LinkTwist], ...] = (

@@ -23,7 +23,7 @@ from ..frames.alignment import (
     rough_frames,
     rough_together,
 )
-from ..frames.track import Track
+from ..frames.in_turn import Track
 from .limits import (
     BEYOND,
     LARGE,

@@ -21,10 +21,10 @@ from ...arrays import Array
 from ...contacts import Artefact, Contact, Contacts
 from ...recording import Recording
 from ..algebra.fit import robust_fit, robust_scale
+from ..algebra.independent_rows import robust_spread
 from ..algebra.problem import Model, Problem
-from ..algebra.robust_spread import robust_spread
 from ..frames.places import FEWEST, posed
-from ..hypotheses.plain_causes import plain_causes
+from ..hypotheses.library import plain_causes
 from ..result import Unsound
 from .evidence import Mistake
 

@@ -12,7 +12,6 @@ from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..many.weighed_families import weighed_families
 from ..result import Shrink, Site
-from ..unseen.cancelling import parts_of
 from ..unseen.leftover_structure import Structure
 from ..unseen.unseen_stretches import Unseen
 from .evidence import Evidence
@@ -59,7 +58,7 @@ def gathered(
         floor=floor.rms_m,
         fitted=unseen.rms(unseen.predict(everything)),
         independent=floor.independent,
-        parts=tuple(parts_of(unseen).tolist()),
+        parts=_parts(unseen),
         glimpsed=glimpsed(found.problem, found.final.model, beliefs),
         refused=tuple(_refused(robot, e) for e in found.refused if beyond(robot, e)),
         lacking=tuple(_lacking(e) for e in found.refused if not beyond(robot, e)),
@@ -67,6 +66,13 @@ def gathered(
         least=least,
         chance=chance,
     )
+
+
+def _parts(unseen: Unseen) -> tuple[float, ...]:
+    """Return the squared contribution of every effect over the square of their sum."""
+    parts = unseen.targets[1:]
+    total = parts.sum(axis=0)
+    return tuple(float(p @ p) / max(float(total @ total), 1e-300) for p in parts)
 
 
 def _refused(robot: Robot, effect: Effect) -> str:

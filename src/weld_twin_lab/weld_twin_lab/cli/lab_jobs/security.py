@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run the nodes under enforced security, beside strangers without keys or with others.
 
-Needs `ros2 security` and a middleware that is built with DDS security; ``--source`` builds both from
-checkouts of rmw_cyclonedds, ros2cli and sros2. Exits with 1 where it could not be shown; the file
+Needs sros2 and a middleware that is built with DDS security; ``--source`` builds both from checkouts
+of rmw_cyclonedds and sros2. Exits with 1 where it could not be shown; the file
 tells why.
 """
 

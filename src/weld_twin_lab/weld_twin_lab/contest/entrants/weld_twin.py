@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_msgs_py.files.diagnosis_model import read_model
 from weld_twin_nodes.offline.told_twin import build_twin
-from weld_twin_nodes.report.diagnosis_files import diagnosis_text
+from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 from ..open_form import Answer, Case
 

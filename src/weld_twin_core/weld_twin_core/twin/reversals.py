@@ -1,0 +1,176 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What play asks for where a joint turns around, spread over the standstill there.
+
+A gap is crossed by a step of the command. No arm makes a step, so it is spread over the time in
+which the joint is near where it turns around: the output rests meanwhile, at most as far from where
+it is wanted as the joint is from there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arm.robot import Robot
+from ..arrays import Array
+from ..effects.effect import Effect, MemoryEffect, Stage
+from ..recording import JointMotion, Recording
+from .goal_motion import Course
+from .memory import run_all
+from .twin import Twin
+
+CAME_FROM = 0.02
+"""How far a joint is taken to have come [rad or m] where the direction is known: more than any play."""
+ROUNDS = 16
+"""Each takes what is added into account for the motion that plays see. A gap is then crossed within one
+part in so many of its width, which is within the narrowest standstill that a step is spread over."""
+STEP = 1e-7
+"""What is added for play and varies by less [rad or m] has no step."""
+
+
+class Spread(NamedTuple):
+    """What is added for play at stamps (K,): values, rates and bends, each (K, n)."""
+
+    q: Array
+    qd: Array
+    qdd: Array
+
+
+def is_play(effect: Effect) -> bool:
+    """Tell whether an effect is lost motion, which hangs on where a joint came from."""
+    return isinstance(effect, MemoryEffect) and effect.stage == Stage.PLAY
+
+
+def approached(recording: Recording, came: Array | None, stands: Array | None = None) -> Recording:
+    """
+    Return a recording that begins with a motion to its first sample from where joints came.
+
+    Parameters
+    ----------
+    recording : Recording
+    came : array, shape (n,), optional
+        Sign of the last motion of every joint; 0 where it is not known.
+    stands : array, shape (n,), optional [rad or m]
+        Where that motion ended; left out, at the first sample.
+
+    """
+    motion = recording.joints
+    way = np.zeros((0, motion.q.shape[1]))
+    if came is not None and np.any(came):
+        end = motion.q[0] if stands is None else stands
+        way = np.stack([end - CAME_FROM * np.sign(came), end])
+    elif stands is not None:
+        way = stands[None]
+    if not way.size:
+        return recording
+    t = motion.t[0] - np.arange(float(len(way)), 0.0, -1.0)
+    rest = np.zeros_like(way)
+    rates = None if motion.qd is None else np.concatenate([rest, motion.qd])
+    joined = JointMotion(np.concatenate([t, motion.t]), np.concatenate([way, motion.q]), rates)
+    return replace(recording, joints=joined)
+
+
+def play_steps(
+    robot: Robot, plays: tuple[Effect, ...], recording: Recording, came: Array | None
+) -> Array:
+    """
+    Return what takes play away at every sample, as steps, shape (K, n) [rad or m].
+
+    Parameters
+    ----------
+    robot : Robot
+    plays : tuple of Effect
+    recording : Recording
+        The motion that the joints are to make behind the gaps.
+    came : array, shape (n,), optional
+        Sign of the last motion of every joint before the first sample; 0 where it is not known.
+
+    """
+    twin, motion = Twin(robot, plays), recording.joints
+    steps = np.zeros_like(motion.q)
+    for _ in range(ROUNDS):
+        moved = JointMotion(motion.t, motion.q + steps, motion.qd)
+        before = approached(replace(recording, joints=moved), came)
+        shift, _ = run_all(twin.effects, twin.joint_view(before), False)
+        if shift is None:
+            break
+        steps = -np.asarray(shift)[-motion.t.size :]
+    return steps
+
+
+def spread(
+    steps: Array,
+    course: Course,
+    share: float,
+    at: Array,
+    came: Array | None = None,
+    *,
+    rests: bool = False,
+) -> Spread:
+    """
+    Return steps spread over the standstill of each reversal, looked up at stamps.
+
+    Parameters
+    ----------
+    steps : array, shape (K, n) [rad or m]
+        From `play_steps`, at the samples of the course.
+    course : Course
+    share : float
+        How far a joint may be from where it turns around while its step is made, in units of
+        what is added for play at most.
+    at : array, shape (N,) [s]
+        Samples of the course.
+    came : array, shape (n,), optional
+        As for `play_steps`.
+    rests : bool
+        The arm stands still before the first sample, and makes its first steps there.
+
+    """
+    out = Spread(*np.zeros((3, at.size, steps.shape[1])))
+    place = np.searchsorted(course.t, at)
+    for i, column in enumerate(steps.T):
+        out.q[:, i] = column[place]
+        size = float(np.ptp(column))
+        if size < STEP:
+            continue
+        before = 0.0 if came is None else float(came[i])
+        for a, b in _standstills(course.q[:, i], before, share * size):
+            inside = (at >= course.t[a]) & (at <= course.t[b])
+            if rests and a == 0:
+                out.q[inside, i] = column[b]
+                continue
+            span = float(course.t[b] - course.t[a])
+            s = (at[inside] - course.t[a]) / span
+            way = column[b] - column[a]
+            out.q[inside, i] = column[a] + way * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+            out.qd[inside, i] = way / span * 30.0 * s**2 * (1.0 - s) ** 2
+            out.qdd[inside, i] = way / span**2 * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+    return out
+
+
+def _standstills(q: Array, before: float, near: float) -> list[tuple[int, int]]:
+    """
+    Return first and last sample about every place where a joint turns around.
+
+    Those that meet are one. A joint that came from nobody knows where turns around at its start.
+    """
+    ways = np.concatenate([[np.sign(before)], np.sign(np.diff(q))])
+    last = np.maximum.accumulate(np.where(ways != 0.0, np.arange(ways.size), 0))
+    held = ways[last]
+    turns = np.flatnonzero((held[1:] != held[:-1]) & (held[1:] != 0.0))
+    out: list[tuple[int, int]] = []
+    for k in turns:
+        away = np.flatnonzero(np.abs(q - q[k]) > near)
+        split = int(np.searchsorted(away, k))
+        a = int(away[split - 1]) + 1 if split else 0
+        b = int(away[split]) - 1 if split < away.size else q.size - 1
+        a, b = min(a, int(k)), max(b, int(k) + 1)
+        if out and a <= out[-1][1]:
+            out[-1] = out[-1][0], max(b, out[-1][1])
+        else:
+            out.append((a, b))
+    return out

@@ -1,0 +1,182 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a recording more of the same truth does to an answer, and what the order of recordings does.
+
+More data never hurts: a cause that was sure and right stays so with another recording, and no
+answer hangs on which recording was given first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from weld_twin_msgs_py.files import markdown
+
+from ..blind.ambiguous import Site
+from ..blind.blind_cell import take
+from ..blind.making import MOTIONS_OF, truth_of
+from ..blind.statistics import share
+from .levels_of_truth import alike_by_structure
+from .mix import SPANS
+from .several import several
+from .trial import diagnosed, recordings_of, said
+
+MOST = 4
+"""Recordings of a cell at the most."""
+FALL = 0.1
+"""Probability that a sure cause may lose by a recording more."""
+SAME = 1e-6
+"""Probability by which answers on the same recordings in another order may differ."""
+
+
+def grown(seed: int, number: int) -> dict[str, Any]:
+    """
+    Return what is said of a cell with one recording, two, ..., and with all in reverse.
+
+    Parameters
+    ----------
+    seed, number : int
+        Of the cell, as `several.several` takes them.
+
+    """
+    name = f'{seed}/{number}'
+    try:
+        case, _ = several(seed, number)
+    except Exception as error:
+        return {'name': name, 'error': f'not drawn: {error}'}
+    rng = np.random.default_rng([seed, 7000 + number])
+    kinds = MOTIONS_OF.get(case.lot.motion, (case.lot.motion,))
+    first = 1 + len(case.also)
+    more = [
+        take(case.cell, kinds[k % len(kinds)], float(rng.uniform(*SPANS)), rng)
+        for k in range(first, MOST)
+    ]
+    recordings = recordings_of(case, more)
+    orders = [*(range(k + 1) for k in range(MOST)), range(MOST)[::-1]]
+    try:
+        told = [said(diagnosed(case, [recordings[k] for k in order])) for order in orders]
+    except Exception as error:
+        return {'name': name, 'error': f'{type(error).__name__}: {error}'}
+    kept = [{key: one[key] for key in ('verdict', 'model', 'unsound')} for one in told]
+    truth = truth_of(name, case)
+    return {'name': name, 'error': None, 'truth': truth, 'told': kept[:-1], 'turned': kept[-1]}
+
+
+class Step(NamedTuple):
+    """
+    A cause that was sure and right, before and after a recording more.
+
+    ``after`` is 0 where no set told holds the cause any more.
+    """
+
+    name: str
+    recordings: int
+    cause: Site
+    before: float
+    after: float
+
+    @property
+    def fell(self) -> bool:
+        """Return whether it lost much."""
+        return self.after < self.before - FALL
+
+
+def steps(row: Mapping[str, Any]) -> Iterator[Step]:
+    """
+    Yield every right cause that was sure, with what a recording more made of it.
+
+    Parameters
+    ----------
+    row : mapping
+        As `grown` gives it, without an error.
+
+    """
+    truth = row['truth']
+    for effect, joint in truth['sites']:
+        alike = alike_by_structure(truth['robot'], (effect, joint))
+        held = [_of(one['verdict'], alike) for one in row['told']]
+        for k, ((before, sure), (after, _)) in enumerate(pairwise(held)):
+            if sure:
+                yield Step(row['name'], k + 1, (effect, joint), before, after)
+
+
+def _of(verdict: Mapping[str, Any], alike: frozenset[Site]) -> tuple[float, bool]:
+    """Return how probable a cause is told, by its whole set, and whether it is sure."""
+    best = (0.0, False)
+    for cause in verdict['causes']:
+        names = {(item['effect'], item['joint']) for item in cause['name']}
+        if names & alike:
+            best = max(best, (float(cause['probability']), bool(cause['sure'])))
+    return best
+
+
+def apart(row: Mapping[str, Any]) -> float:
+    """
+    Return by how much probabilities differ where only the order does; 1 where names do.
+
+    Parameters
+    ----------
+    row : mapping
+        As `grown` gives it, without an error.
+
+    """
+    one, other = (
+        {
+            (
+                frozenset((i['effect'], i['joint']) for i in cause['name']),
+                bool(cause.get('rest')),
+            ): (cause['probability'] or 0.0)
+            for cause in told['verdict']['causes']
+        }
+        for told in (row['told'][-1], row['turned'])
+    )
+    if one.keys() != other.keys() or row['told'][-1]['unsound'] != row['turned']['unsound']:
+        return 1.0
+    return max((abs(p - other[key]) for key, p in one.items()), default=0.0)
+
+
+def page(rows: Sequence[Mapping[str, Any]]) -> str:
+    """
+    Return the measures, and every sure cause that fell.
+
+    Parameters
+    ----------
+    rows : sequence of mappings
+        As `grown` gives them.
+
+    """
+    good = [row for row in rows if not row['error']]
+    every = [step for row in good for step in steps(row)]
+    measures = {
+        'sure causes that fall by more than 0.1': share([step.fell for step in every]),
+        'sure causes that lose their name': share([step.after == 0.0 for step in every]),
+        'cells whose order changes a name': share([apart(row) == 1.0 for row in good]),
+        'cells whose order moves a probability': share([apart(row) > SAME for row in good]),
+    }
+    told = [
+        (
+            key,
+            'none'
+            if v.value is None
+            else f'{v.value:.3f} ({v.low:.3f} to {v.high:.3f}; {v.cases})',
+        )
+        for key, v in measures.items()
+    ]
+    fallen = [
+        (
+            s.name,
+            s.recordings,
+            f'{s.cause[0]} of {s.cause[1]}',
+            f'{s.before:.2f}',
+            f'{s.after:.2f}',
+        )
+        for s in every
+        if s.fell
+    ]
+    lost = markdown.table(('cell', 'recordings', 'cause', 'sure with', 'one more'), *fallen)
+    return markdown.table(('measure', 'value'), *told) + ('\n' + lost if fallen else '')

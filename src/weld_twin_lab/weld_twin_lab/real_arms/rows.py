@@ -1,0 +1,218 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The recordings that are diagnosed: parts of every source, and what was recorded beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.contacts import Contacts
+from weld_twin_core.diagnosis.frames.aligned import frames_only
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+
+from ..transfer.splits import Rows, alone
+from . import sources
+from .sources import Source
+
+COUNTS = (15, 30, 60, 120)
+"""Stations of a subset: from hardly enough to plenty."""
+HALVED = 60
+"""Stations from which on the two halves of a row are diagnosed as well."""
+Make = Callable[[Source], tuple[Rows, Rows]]
+"""Returns the stations that are fitted, and those that are not."""
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """
+    One recording to diagnose, and what else was recorded of the same arm.
+
+    Attributes
+    ----------
+    name : str
+    robot : Robot
+    align : tuple of str
+    fitted : Recording
+    other : Recording or None
+        None where everything is fitted.
+
+    """
+
+    name: str
+    robot: Robot
+    align: tuple[str, ...]
+    fitted: Recording
+    other: Recording | None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a row is made: its source, which stations, and what is known or left out."""
+
+    name: str
+    source: Callable[[Path], Source]
+    make: Make
+    tool_known: bool = False
+    points_only: bool = False
+
+
+def plans() -> tuple[Plan, ...]:
+    """Return every row of the study; nothing is read yet."""
+    out = []
+    for arm in ('ur5', 'ur10'):
+        source = partial(sources.tracked, name=f'{arm}_laser_tracker')
+        for seed in (1, 2):
+            out += [
+                Plan(f'{arm} {n} stations, draw {seed}', source, partial(_drawn, n, seed))
+                for n in COUNTS
+            ]
+        out += [
+            Plan(f'{arm} {n} stations, tool known', source, partial(_drawn, n, 3), tool_known=True)
+            for n in COUNTS[1:]
+        ]
+        out += [Plan(f'{arm} quarter {k + 1}', source, partial(_quarter, k)) for k in range(4)]
+        out.append(Plan(f'{arm} all but quarter 1', source, _but_quarter))
+        out.append(Plan(f'{arm} octant 0', source, partial(_octant, 0)))
+        out.append(Plan(f'{arm} octant 7', source, partial(_octant, 7)))
+    ur10 = partial(sources.tracked, name='ur10_laser_tracker')
+    out += [
+        Plan(f'ur10 {n} points', ur10, partial(_drawn, n, 4), points_only=True) for n in COUNTS[1:]
+    ]
+    out += [
+        Plan('emps first 60 %', sources.servo, partial(_span, 0.0, 0.6)),
+        Plan('emps last 60 %', sources.servo, partial(_span, 0.4, 1.0)),
+        Plan('emps middle third', sources.servo, partial(_span, 0.33, 0.67)),
+    ]
+    for arm, count in (('panda_1', 3), ('panda_2', 3), ('kuka_14', 3)):
+        source = partial(sources.sockets, arm=arm)
+        out += [Plan(f'{arm} without place {k}', source, partial(_place, k)) for k in range(count)]
+    for name, make in _PARTS.items():
+        out.append(Plan(f'positioner {name}', sources.positioner, make))
+        out.append(Plan(f'iiwa {name}', sources.iiwa, make))
+        out.append(Plan(f'motoman {name}', partial(sources.motoman, masses=True), make))
+    out.append(Plan('motoman all, no masses', partial(sources.motoman, masses=False), _all))
+    out.append(Plan('ur5 swinging', sources.swinging, partial(_span, 0.0, 1.0)))
+    return tuple(out)
+
+
+def row(data: Path, plan: Plan) -> Row:
+    """Return a row of the study, read from its data."""
+    source = plan.source(data)
+    recording, robot, align = source.recording, source.robot, source.align
+    if plan.points_only:
+        recording = _points(recording)
+    fitted, other = plan.make(replace(source, recording=recording))
+    if plan.tool_known:
+        # As somebody has it who measured the tool apart: by everything that was recorded.
+        whole = frames_only(recording, robot, frozenset(align))
+        robot = robot.with_frames(tool=whole.robot.T_flange_tool)
+        align = ('base',)
+    rest = _part(recording, other) if other.size else None
+    return Row(plan.name, robot, align, _part(recording, fitted), rest)
+
+
+def halves(recording: Recording) -> tuple[Recording, Recording] | None:
+    """Return the odd and the even rows, each alone; None of motion, contacts and few stations."""
+    count = size(recording)
+    if not recording.joints.static or recording.contacts is not None or count < HALVED:
+        return None
+    rows = np.arange(count)
+    return _part(recording, rows[1::2]), _part(recording, rows[0::2])
+
+
+def size(recording: Recording) -> int:
+    """Return how many measurements or contacts there are."""
+    if recording.contacts is not None:
+        return int(recording.joints.t.size)
+    assert recording.measured is not None
+    return int(recording.measured.t.size)
+
+
+def _part(recording: Recording, rows: Rows) -> Recording:
+    """Return some rows of a recording, as somebody has it who measured no others."""
+    if recording.contacts is not None:
+        return _touched(recording, recording.contacts, rows)
+    assert recording.measured is not None
+    if recording.joints.static:
+        return alone(recording, rows)
+    return recording.with_measured(recording.measured.take(rows))
+
+
+def _touched(recording: Recording, contacts: Contacts, rows: Rows) -> Recording:
+    labels = tuple(contacts.labels[k] for k in rows)
+    part = contacts.artefact.part(tuple(dict.fromkeys(labels)))
+    motion = recording.joints
+    joints = JointMotion(motion.t[rows], motion.q[rows], static=True)
+    return Recording(recording.name, joints, contacts=Contacts(part, labels))
+
+
+def _points(recording: Recording) -> Recording:
+    """Return a recording of poses without their turns."""
+    measured = recording.measured
+    assert measured is not None
+    return recording.with_measured(Measurements(measured.t, measured.position))
+
+
+def _parted(source: Source, chosen: Rows) -> tuple[Rows, Rows]:
+    return np.sort(chosen), np.setdiff1d(np.arange(size(source.recording)), chosen)
+
+
+def _drawn(count: int, seed: int, source: Source) -> tuple[Rows, Rows]:
+    rng = np.random.default_rng([seed, count])
+    return _parted(source, rng.choice(size(source.recording), count, replace=False))
+
+
+def _span(low: float, high: float, source: Source) -> tuple[Rows, Rows]:
+    count = size(source.recording)
+    return _parted(source, np.arange(round(low * count), round(high * count)))
+
+
+def _all(source: Source) -> tuple[Rows, Rows]:
+    return _span(0.0, 1.0, source)
+
+
+def _odd(source: Source) -> tuple[Rows, Rows]:
+    return _parted(source, np.arange(1, size(source.recording), 2))
+
+
+def _even(source: Source) -> tuple[Rows, Rows]:
+    return _parted(source, np.arange(0, size(source.recording), 2))
+
+
+def _quarter(k: int, source: Source) -> tuple[Rows, Rows]:
+    return _span(k / 4.0, (k + 1) / 4.0, source)
+
+
+def _but_quarter(source: Source) -> tuple[Rows, Rows]:
+    return _span(0.25, 1.0, source)
+
+
+def _octant(number: int, source: Source) -> tuple[Rows, Rows]:
+    assert source.recording.measured is not None
+    place = source.recording.measured.position
+    octant = (place > np.median(place, axis=0)) @ np.array([4, 2, 1])
+    return _parted(source, np.flatnonzero(octant == number))
+
+
+def _place(k: int, source: Source) -> tuple[Rows, Rows]:
+    contacts = source.recording.contacts
+    assert contacts is not None
+    place = np.array([label.partition('/')[0] for label in contacts.labels])
+    left_out = list(dict.fromkeys(place.tolist()))[k]
+    return _parted(source, np.flatnonzero(place != left_out))
+
+
+_PARTS: dict[str, Make] = {
+    'all': _all,
+    'odd': _odd,
+    'even': _even,
+    'first half': partial(_span, 0.0, 0.5),
+    'last half': partial(_span, 0.5, 1.0),
+}
+"""Parts of the smaller tables, both ways where there are two."""

@@ -1,0 +1,188 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Third-party recordings as a user has them: a robot, and a table.
+
+Each directory is named as the data are published; docs/real_arms.md says where they come from. Where
+a maker publishes no masses of its links, round figures from the arm's weight stand in.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+
+from ..contacts.data import places_of, robot_of, touches
+from ..real_robots.data import tables
+from ..transfer.servo_axis import axis_recording, axis_robot
+
+HALF_PI = float(np.pi / 2.0)
+LEAN = float(np.radians(15.0))
+"""Lean of the S axes of the two-armed Motoman to either side [rad]."""
+GRAVITY = 9.80665
+"""Acceleration of gravity [m/s^2]."""
+POINTS_HZ = 10.0
+"""Rate at which the tracker of the swinging UR5 measures."""
+FIRST_POINT = -0.063
+"""Time of its first point on the joints' clock [s], as published."""
+HOME = {'ur5_laser_tracker': 0, 'ur10_laser_tracker': 1}
+"""Rows before this one are left out: the UR10's first is its home pose, far from the rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """
+    One arm as it was recorded.
+
+    Attributes
+    ----------
+    robot : Robot
+        The nominal model.
+    recording : Recording
+        Everything that was recorded of it.
+    align : tuple of str
+        Frames that are not known.
+
+    """
+
+    robot: Robot
+    recording: Recording
+    align: tuple[str, ...] = ('base', 'tool')
+
+
+def tracked(data: Path, name: str) -> Source:
+    """Return one of the two arms under a laser tracker."""
+    robot = name.partition('_')[0]
+    recording = tables(robot, data / name)[0].recording
+    assert recording.measured is not None
+    first = HOME[name]
+    motion = recording.joints
+    joints = JointMotion(motion.t[first:], motion.q[first:], None, motion.static)
+    rows = np.arange(first, recording.measured.t.size)
+    one = Recording(
+        name,
+        joints,
+        recording.measured.take(rows),
+        temperature=recording.temperature,
+        epoch_ns=recording.epoch_ns,
+    )
+    return Source(catalog.load(robot), one)
+
+
+def servo(data: Path) -> Source:
+    """Return the servo axis, which slides."""
+    return Source(axis_robot(), axis_recording(data / 'emps'), ())
+
+
+def sockets(data: Path, arm: str) -> Source:
+    """Return an arm whose ball rested in sockets, at all its places."""
+    places = places_of(data / 'mukca', arm)
+    return Source(
+        robot_of(data / 'mukca', arm), touches(data / 'mukca', arm, places), align=('tool',)
+    )
+
+
+def positioner(data: Path) -> Source:
+    """Return a two-axis positioner under a fixed camera."""
+    rows = _table(data / 'positioner' / 'measurements.csv')
+    joints = [_row('tilt', 0.0, 0.0, -HALF_PI, 0.0), _row('turn', 0.0, -0.475, 0.0, -HALF_PI)]
+    q = np.stack([rows['tilt [rad]'], rows['turn [rad]']], axis=1)
+    robot = Robot.from_mapping({'name': 'positioner', 'joints': joints})
+    return Source(robot, _stations('positioner', q, rows, rows['time [s]']))
+
+
+def iiwa(data: Path) -> Source:
+    """Return the seven-axis arm without load; what moves it is the load of its own links."""
+    rows = _table(data / 'iiwa7_0kg' / 'stations.csv')
+    lengths, twists = (0.34, 0.0, 0.4, 0.0, 0.4, 0.0, 0.126), (-1, 1, 1, -1, -1, 1, 0)
+    names = [f'joint_{k + 1}' for k in range(7)]
+    joints = [
+        _row(name, 0.0, d, sign * HALF_PI, 0.0)
+        for name, d, sign in zip(names, lengths, twists, strict=True)
+    ]
+    masses = (2.7, 2.7, 2.7, 2.7, 1.7, 1.6, 1.4)
+    # Centres are those of the larger arm of the same make, in frames of other twists: near the axes.
+    links = [{'mass': m, 'com': [0.0, 0.0, 0.0]} for m in masses]
+    robot = Robot.from_mapping({'name': 'iiwa7', 'joints': joints, 'links': links})
+    q = np.stack([rows[f'{name} [rad]'] for name in names], axis=1)
+    return Source(robot, _stations('iiwa7', q, rows, None))
+
+
+def motoman(data: Path, *, masses: bool) -> Source:
+    """Return the left welding arm of two on one base, under a tracker."""
+    with (data / 'motoman_left' / 'left_hand.csv').open(newline='') as stream:
+        lines = {row['pose']: row for row in csv.DictReader(stream) if row['leica_x [m]']}
+    names = [f'left_{k}' for k in 'SLURBT']
+    q = np.array([[float(row[f'{name} [rad]']) for name in names] for row in lines.values()])
+    place = np.array(
+        [[float(row[f'leica_{k} [m]']) for k in 'xyz'] for row in lines.values()], dtype=np.float64
+    )
+    table = (
+        (0.15, 1.4159, -HALF_PI, 0.0),
+        (0.614, 0.0, np.pi, -HALF_PI),
+        (0.2, 0.0, -HALF_PI, 0.0),
+        (0.0, -0.64, HALF_PI, 0.0),
+        (0.03, 0.0, HALF_PI, -HALF_PI),
+        (0.0, 0.2, 0.0, 0.0),
+    )
+    mapping: dict[str, Any] = {
+        'name': 'ma1400',
+        'joints': [_row(name, *row) for name, row in zip(names, table, strict=True)],
+        # The S axis leans to one side of the plumb line; turns about it are the base's.
+        'gravity': [0.0, GRAVITY * float(np.sin(LEAN)), -GRAVITY * float(np.cos(LEAN))],
+    }
+    if masses:  # of 130 kg that the whole arm weighs
+        each = ((50.0, -0.1), (25.0, -0.3), (30.0, -0.05), (15.0, 0.0), (4.0, 0.0), (3.0, 0.0))
+        mapping['links'] = [{'mass': m, 'com': [x, 0.0, 0.0]} for m, x in each]
+    t = np.arange(float(len(q)))
+    motion = JointMotion(t, q, static=True)
+    return Source(
+        Robot.from_mapping(mapping), Recording('motoman', motion, Measurements(t, place))
+    )
+
+
+def swinging(data: Path) -> Source:
+    """Return the UR5 that swings under a tracker, its points counted evenly as they were measured."""
+    here = data / 'ur5_bursts'
+    joints, points = _table(here / 'joints.csv'), _table(here / 'points.csv')
+    names = [name for name in joints if name.endswith('joint [rad]')]
+    robot = catalog.load('ur5')
+    q = np.stack([joints[name] for name in names], axis=1)
+    motion = JointMotion(joints['stamp [s]'], q)
+    place = np.stack([points[f'{k} [m]'] for k in 'xyz'], axis=1)
+    t = FIRST_POINT + np.arange(len(place)) / POINTS_HZ
+    inside = (t >= motion.t[0]) & (t <= motion.t[-1])
+    return Source(robot, Recording('swinging', motion, Measurements(t[inside], place[inside])))
+
+
+def _stations(name: str, q: Array, rows: dict[str, Array], t: Array | None) -> Recording:
+    """Return stations with measured poses."""
+    place = np.stack([rows[f'{k} [m]'] for k in 'xyz'], axis=1)
+    turn = Rotation.from_quat(np.stack([rows[f'q{k}'] for k in 'xyzw'], axis=1)).as_matrix()
+    t = np.arange(float(len(q))) if t is None else t
+    return Recording(name, JointMotion(t, q, static=True), Measurements(t, place, turn))
+
+
+def _row(name: str, a: float, d: float, alpha: float, theta: float) -> dict[str, Any]:
+    return {'name': name, 'a': a, 'd': d, 'alpha': alpha, 'theta_offset': theta}
+
+
+def _table(path: Path) -> dict[str, Array]:
+    """Return the columns of a table of numbers by their heads."""
+    if not path.is_file():
+        raise DataError(f"'{path}' is missing; docs/real_arms.md says where the data come from")
+    with path.open(newline='') as stream:
+        lines = list(csv.reader(stream))
+    values = np.array([[float(cell) for cell in line] for line in lines[1:]])
+    return {head.strip(): values[:, k] for k, head in enumerate(lines[0])}

@@ -1,0 +1,259 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every row diagnosed, each cause that is told held against unseen data, and the table of it all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.contacts import spreads
+from weld_twin_core.diagnosis import Diagnosis, diagnose
+from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.effects import REGISTRY
+from weld_twin_core.recording import Recording
+
+from ..real_robots.unseen_stations import residual
+from ..transfer.crash import traceback_told
+from ..transfer.plain import PLAIN, plain_fit
+from .borne_out import Borne, borne_out
+from .rows import Row, halves, plans, row, size
+
+TOLD = 0.5
+"""Probability from which on a cause counts as told: it is likelier right than wrong."""
+ELSEWHERE = ('instrument', 'base', 'clock')
+"""Places outside the arm."""
+
+
+def judged(data: str, name: str) -> dict[str, Any]:
+    """
+    Return what is told of one row, and what unseen data say of it, as plain JSON values.
+
+    Parameters
+    ----------
+    data : str
+        Directory with the sources.
+    name : str
+        Of a row.
+
+    """
+    plan = next(each for each in plans() if each.name == name)
+    one = row(Path(data), plan)
+    start = perf_counter()
+    found, error = _tried(one.fitted, one)
+    out: dict[str, Any] = {
+        'name': name,
+        'stations': size(one.fitted),
+        'seconds': round(perf_counter() - start, 1),
+        'traceback': error,
+    }
+    if found is None:
+        return out
+    out |= _said(found)
+    claims = told_claims(out)
+    if found.status != 'unsound':
+        known = [each.effect for each in found.effects]
+        kinds, borne = borne_out(one, known, [claim['kinds'] for claim in claims])
+        out['kinds'] = {kind: _plain(each) for kind, each in kinds.items()}
+        for claim, (whole, beside) in zip(claims, borne, strict=True):
+            claim |= {'against_all': _plain(whole), 'against_told': _plain(beside)}
+    out['claims'] = claims
+    out['unseen_m'] = _unseen(one, found)
+    pair = halves(one.fitted)
+    if pair is not None:
+        both = [_tried(half, one)[0] for half in pair]
+        out['halves'] = [_said(half) if half is not None else None for half in both]
+    return out
+
+
+def told_claims(said: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """
+    Return what is told by name: sets of kinds, their joints, and whether each is placed.
+
+    Names told as alike are one claim. Of many small errors every kind is a claim of its own.
+    """
+    out: dict[tuple[str, ...], dict[str, Any]] = {}
+    for cause in said['causes']:
+        names = [n for n in cause['names'] if n[0] in REGISTRY and REGISTRY[n[0]].cause]
+        if cause['probability'] <= TOLD or cause['rest'] or not names:
+            continue
+        many = said['families'] and all(p > TOLD for _, _, p in names)
+        for group in [[name] for name in names] if many else [names]:
+            kinds = tuple(sorted({kind for kind, _, _ in group}))
+            claim = out.setdefault(kinds, {'kinds': list(kinds), 'joints': [], 'share': 0.0})
+            claim['joints'] += [joint for _, joint, _ in group if joint is not None]
+            claim['share'] += cause['share'] / (len(names) if many else 1)
+    for claim in out.values():
+        joints = [REGISTRY[kind].of in ('joint', 'link') for kind in claim['kinds']]
+        claim['placed'] = bool(claim['joints']) or not any(joints)
+    return list(out.values())
+
+
+def worth(entry: Mapping[str, Any], against: str) -> float:
+    """Return what a row counts: 1 where a claim is borne out, a half where that has no joint."""
+    each = [1.0 if c['placed'] else 0.5 for c in entry.get('claims', ()) if _holds(c, against)]
+    return max(each, default=0.0)
+
+
+def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the figures of all rows together."""
+    done = [e for e in entries if 'status' in e]
+    claims = [c for e in done for c in e['claims']]
+    shown = [(e, k) for e in done for k, b in e.get('kinds', {}).items() if b['out']]
+    pairs = [e['halves'] for e in done if e.get('halves') and None not in e['halves']]
+    alike = [_alike(*(_kinds_of(told_claims(half)) for half in pair)) for pair in pairs]
+    ratios = [
+        e['unseen_m']['product'] / min(v for k, v in e['unseen_m'].items() if k != 'product')
+        for e in done
+        if e.get('unseen_m') and len(e['unseen_m']) > 1
+    ]
+    return {
+        'rows': len(entries),
+        'tracebacks': sum(e['traceback'] is not None for e in entries),
+        'unknown': sum(e['status'] == 'unknown' for e in done),
+        'unsound': sum(e['status'] == 'unsound' for e in done),
+        'told a cause borne out against all that is told': sum(
+            worth(e, 'against_told') for e in entries
+        ),
+        'told a cause borne out against all kinds': sum(worth(e, 'against_all') for e in entries),
+        'claims': len(claims),
+        'claims borne out against all that is told': sum(
+            _holds(c, 'against_told') for c in claims
+        ),
+        'claims borne out against all kinds': sum(_holds(c, 'against_all') for c in claims),
+        'kinds borne out against all others': len(shown),
+        'of these told': sum(k in _kinds_of(e['claims']) for e, k in shown),
+        'rows with something outside the arm accused': sum(_accused(e) for e in done),
+        'pairs of halves': len(pairs),
+        'halves with the same kinds': sum(a == 1.0 for a in alike),
+        'share of the kinds that halves have in common': float(np.mean(alike)) if alike else None,
+        'error over the best plain fit, median': float(np.median(ratios)) if ratios else None,
+        'error over the best plain fit, worst': float(max(ratios)) if ratios else None,
+        'seconds': sum(e['seconds'] for e in entries),
+    }
+
+
+def table(entries: Sequence[Mapping[str, Any]]) -> str:
+    """Return all rows and the figures as a page of Markdown."""
+    lines = [
+        '| row | status | told; borne out against all that is told: bold | left beside '
+        '| error over the best plain fit |',
+        '|---|---|---|---|---|',
+    ]
+    for e in entries:
+        told = ', '.join(_bold(claim) for claim in e.get('claims', ()))
+        rest = ', '.join(_rest(c) for c in e.get('causes', ()) if c['rest'])
+        unseen = e.get('unseen_m') or {}
+        plain = min((v for k, v in unseen.items() if k != 'product'), default=None)
+        ratio = f'{unseen["product"] / plain:.2f}' if plain and 'product' in unseen else ''
+        lines.append(
+            f'| {e["name"]} | {e.get("status", "traceback")} | {told} | {rest} | {ratio} |'
+        )
+    lines.append('')
+    lines += [f'- {key}: {_figure(value)}' for key, value in summary(entries).items()]
+    return '\n'.join(lines) + '\n'
+
+
+def _bold(claim: Mapping[str, Any]) -> str:
+    words = ' or '.join(claim['kinds'])
+    joints = ', '.join(dict.fromkeys(claim['joints']))
+    mark = '**' if _holds(claim, 'against_told') else ''
+    return f'{mark}{words}{mark}' + (f' ({joints})' if joints else '')
+
+
+def _holds(claim: Mapping[str, Any], against: str) -> bool:
+    return bool(claim.get(against, {'out': False})['out'])
+
+
+def _kinds_of(claims: Sequence[Mapping[str, Any]]) -> set[str]:
+    return {kind for claim in claims for kind in claim['kinds']}
+
+
+def _plain(borne: Borne) -> dict[str, Any]:
+    return {'median': borne.median, 'least': borne.least, 'out': borne.out}
+
+
+def _figure(value: float | None) -> str:
+    return '' if value is None else f'{value:.3g}' if isinstance(value, float) else str(value)
+
+
+def _rest(cause: Mapping[str, Any]) -> str:
+    place = cause['place'][0] if cause['place'] else ('somewhere', 0.0)
+    return f'{place[0]} ({100.0 * cause["share"]:.0f} %)'
+
+
+def _alike(one: set[str], two: set[str]) -> float:
+    """Return the share of the kinds of two halves that both have."""
+    return len(one & two) / len(one | two) if one | two else 1.0
+
+
+def _accused(entry: Mapping[str, Any]) -> bool:
+    """Return whether something outside the arm is told without a name, as likely as not."""
+    return any(
+        not cause['names'] and place in ELSEWHERE and p > TOLD
+        for cause in entry['causes']
+        for place, p in cause['place'][:1]
+    )
+
+
+def _tried(recording: Recording, one: Row) -> tuple[Diagnosis | None, str | None]:
+    try:
+        return diagnose([recording], one.robot, align=one.align, experiment=False), None
+    except Exception:  # what is counted here is exactly what nobody expected
+        return None, traceback_told()
+
+
+def _said(found: Diagnosis) -> dict[str, Any]:
+    """Return status and causes."""
+    causes = [
+        {
+            'probability': c.probability,
+            'sure': c.sure,
+            'share': c.share,
+            'rest': c.rest,
+            'place': [list(item) for item in c.place[:3]],
+            'dependence': [list(item) for item in c.dependence[:3]],
+            'names': [[s.effect, s.joint, p] for s, p in c.name],
+        }
+        for c in found.causes
+    ]
+    return {
+        'status': found.status,
+        'confidence': found.confidence,
+        'sure': found.sure,
+        'families': bool(found.families),
+        'reasons': list(found.reasons),
+        'causes': causes,
+        'gap_m': None if found.gap is None else found.gap.rms_m,
+        'shrink': None if found.shrink is None else found.shrink.ratio,
+    }
+
+
+def _unseen(one: Row, found: Diagnosis) -> dict[str, float] | None:
+    """Return the RMS error [m] of plain fits and of the diagnosis on what was not fitted."""
+    if one.other is None or found.status == 'unsound':
+        return None
+    models: dict[str, Model] = {'product': found.model}
+    if one.other.contacts is not None:
+        return {'product': _spread(found.model, one.other)}
+    for name, families in PLAIN.items():
+        models[name] = plain_fit(one.fitted, one.robot, families, frozenset(one.align))
+    return {
+        name: _rms(residual(model, one.fitted, one.other)[:3]) for name, model in models.items()
+    }
+
+
+def _spread(model: Model, other: Recording) -> float:
+    assert other.contacts is not None
+    points = model.twin(0).poses(other, other.joints.t).position
+    each = np.concatenate(list(spreads(other.contacts, points).values()))
+    return float(np.sqrt((each**2).mean()))
+
+
+def _rms(parts: Array) -> float:
+    return float(np.sqrt((parts**2).sum(axis=0).mean()))

@@ -1,0 +1,64 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A robot's computer has no weld_twin_report: nodes and the commands that write no page do without."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+AS_IF_MISSING = 'import sys; sys.modules["weld_twin_report"] = None\n'
+"""What a program begins with, so that the package is not found in it."""
+PAGES = {'diagnose', 'investigate', 'serve', 'history', 'fleet', 'demo', 'verify', 'sensitivity'}
+
+
+def python(code: str, *words: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, '-c', AS_IF_MISSING + code, *map(str, words)],
+        capture_output=True,
+        text=True,
+    )
+
+
+def weld_twin_alone(*words: object) -> subprocess.CompletedProcess[str]:
+    return python('from weld_twin_nodes.cli import main; sys.exit(main())', *words)
+
+
+def test_every_module_of_the_nodes_is_imported_without_the_pages():
+    pytest.importorskip('rclpy', reason='needs ROS 2')
+    done = python(
+        'from importlib import import_module\n'
+        'from pkgutil import walk_packages\n'
+        'import weld_twin_nodes\n'
+        'found = walk_packages(weld_twin_nodes.__path__, "weld_twin_nodes.")\n'
+        'names = [each.name for each in found if not each.name.endswith("__main__")]\n'
+        'for name in names: import_module(name)\n'
+        'web = {"fastapi", "starlette", "uvicorn", "sqlalchemy"} & set(sys.modules)\n'
+        'print(len(names), *web)\n'
+    )
+    assert done.returncode == 0, done.stderr
+    count, *web = done.stdout.split()
+    assert int(count) > 90
+    assert web == []
+
+
+def test_the_command_line_has_the_commands_that_write_no_page(tmp_path):
+    listed = weld_twin_alone('--help')
+    assert listed.returncode == 0, listed.stderr
+    assert ' simulate ' in listed.stdout
+    assert ' recover ' in listed.stdout
+    assert not {name for name in PAGES if f' {name} ' in listed.stdout}
+    words = ('--robot', 'ur5', '--rate', 20, '--path', 'line', '--out', tmp_path / 'bag')
+    made = weld_twin_alone('simulate', *words)
+    assert made.returncode == 0, made.stderr
+    shown = weld_twin_alone('info', tmp_path / 'bag')
+    assert 'usable for a diagnosis' in shown.stdout, shown.stderr
+
+
+@pytest.mark.parametrize('name', sorted(PAGES))
+def test_a_command_that_is_missing_says_which_package_brings_it(name):
+    done = weld_twin_alone(name)
+    assert done.returncode == 2
+    assert f"'{name}' writes pages; it needs the package weld_twin_report" in done.stderr

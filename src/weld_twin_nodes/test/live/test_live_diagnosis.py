@@ -1,0 +1,204 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The live node on streams with and without a gap."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.assembly import Role
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.to_messages import bag_messages
+from weld_twin_msgs_py.messages.topics import JOINT_STATES, MEASURED_POINT
+from weld_twin_nodes.live.diagnosis_window import LONGEST, Window
+from weld_twin_nodes.live.diagnosis_worker import Finding, Job, Worker, find
+
+START = 1_700_000_000_000_000_000
+ONE_JOINT = Robot.from_mapping(
+    {
+        'name': 'one',
+        'convention': 'standard',
+        'joints': [{'name': 'a', 'a': 0.5, 'alpha': 0.0, 'd': 0.0, 'theta_offset': 0.0}],
+    }
+)
+OFFSET = {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 2e-3}
+
+
+def wandering(seconds=12.0, rate=50.0):
+    """Return a motion in which every joint moves its own way."""
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    phase = np.arange(6)
+    q = 0.5 * np.sin(0.9 * np.outer(t, 1.0 + 0.31 * phase) + phase) + [0, -1.2, 1.4, -1, -1.5, 0]
+    return JointMotion(t, q)
+
+
+def points(effects, motion, sigma=2e-5):
+    robot = load('ur5')
+    twin = Twin(robot, tuple(effect_from_mapping(e) for e in effects))
+    exact = twin.poses(Recording('live', motion)).position
+    return exact + np.random.default_rng(3).normal(scale=sigma, size=exact.shape)
+
+
+def filled(duration=60.0, effects=(OFFSET,), seconds=12.0):
+    make, motion = bag_messages(), wandering(seconds)
+    window = Window(load('ur5'), duration)
+    for t, q, p in zip(motion.t, motion.q, points(effects, motion), strict=True):
+        stamp = START + round(t * 1e9)
+        window.take(Role.JOINTS, make.joint_state(stamp, load('ur5').joint_names, q))
+        window.take(Role.POINT, make.point(stamp, p))
+    return window
+
+
+def test_the_window_holds_its_duration_and_no_more():
+    recording = filled(duration=4.0).recording(least=3.0)
+    assert recording.joints.t[-1] - recording.joints.t[0] == pytest.approx(4.0, abs=0.03)
+    assert recording.measured.t.size == recording.joints.t.size == pytest.approx(201, abs=1)
+    assert recording.epoch_ns + round(recording.joints.t[-1] * 1e9) == START + 11_980_000_000
+
+
+def test_a_stream_without_stamps_moving_on_is_bounded_by_number():
+    window, make = Window(ONE_JOINT, 1e6), bag_messages()
+    for k in range(1, LONGEST + 100):
+        window.take(Role.JOINTS, make.joint_state(k, ('a',), np.zeros(1)))
+    assert len(window._streams[Role.JOINTS]) == LONGEST
+
+
+def test_a_resting_arm_gives_nothing_to_diagnose():
+    window, make, names = Window(ONE_JOINT, 60.0), bag_messages(), ('a',)
+    for k in range(1000):
+        window.take(Role.JOINTS, make.joint_state(START + k * 10_000_000, names, np.ones(1)))
+        window.take(Role.POINT, make.point(START + k * 10_000_000, np.zeros(3)))
+    assert window.recording(least=1.0) is None
+
+
+def test_a_bag_played_again_starts_a_new_window():
+    window = filled()
+    make, motion = bag_messages(), wandering()
+    for t, q in zip(motion.t, motion.q, strict=True):
+        stamp = START - 3_600_000_000_000 + round(t * 1e9)
+        try:
+            window.take(Role.JOINTS, make.joint_state(stamp, load('ur5').joint_names, q))
+        except Exception as error:  # the first few are refused, as a late sample would be
+            assert 'not after the last one' in str(error)
+    assert window.last is None
+
+
+def test_a_job_runs_elsewhere_while_the_caller_goes_on():
+    worker, job = Worker(), Job(filled(duration=4.0).recording(least=3.0), load('ur5'))
+    worker.start(job)
+    assert worker.busy and worker.take() is None  # the caller is back before the answer
+    while worker.busy:
+        time.sleep(0.05)
+    finding = worker.take()
+    assert isinstance(finding, Finding)
+    assert finding.stamp == START + 11_980_000_000
+    assert finding.status != 'none'
+    assert finding.values['gap_rms_m'] > 1e-4
+    assert worker.take() is None
+
+
+def test_a_job_that_cannot_be_done_answers_with_a_sentence():
+    recording = filled().recording(least=3.0)
+    worker = Worker()
+    worker.start(Job(recording.with_measured(None), load('ur5')))
+    while worker.busy:
+        time.sleep(0.05)
+    assert 'holds no measured poses' in worker.take()
+
+
+def test_what_the_other_process_says_of_its_end_is_told():
+    said = []
+    worker = Worker(said.append)
+    worker.start(Job('no recording', load('ur5')))
+    while worker.busy:
+        time.sleep(0.05)
+    assert worker.take() == 'the diagnosis ended with code 1'
+    assert said[0].startswith('the diagnosis says: Traceback')
+    assert "'str' object has no attribute" in said[0]
+
+
+def test_a_job_under_way_can_be_ended():
+    worker = Worker()
+    worker.start(Job(filled().recording(least=3.0), load('ur5')))
+    worker.stop()
+    assert not worker.busy
+
+
+def test_the_node_is_quiet_until_it_has_evidence_and_then_tells_its_end_too(tmp_path):
+    pytest.importorskip('rclpy', reason='needs ROS 2')
+    from weld_twin_nodes.harness import Cell
+    from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
+
+    nothing = Finding(START, 'none', 'No gap.', {'gap_rms_m': 1e-5})
+    gap = Finding(START + 1, 'identified', 'A gap.', {'gap_rms_m': 1e-3})
+    with Cell(tmp_path / 'cell') as cell:
+        node = cell.add(LiveDiagnosis)
+        said = cell.collect('/diagnosis')
+        cell.wait(lambda: node._verdict.get_subscription_count() > 0, 'a listener')
+        for finding in (nothing, None, gap, nothing):
+            node._tell(finding)
+        cell.wait(lambda: len(said) == 2, 'two verdicts')
+        assert [m.status[0].level for m in said.messages] == [b'\x01', b'\x00']
+        assert [m.status[0].message for m in said.messages] == ['A gap.', 'No gap.']
+
+
+def test_unsound_data_are_an_error_on_both_topics_until_they_are_mended(tmp_path):
+    pytest.importorskip('rclpy', reason='needs ROS 2')
+    from weld_twin_nodes.harness import Cell
+    from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
+
+    window = filled()
+    recording = window.recording(least=3.0)
+    q = np.array(recording.joints.q)
+    q[:, [3, 5]] = q[:, [5, 3]]
+    swapped = replace(recording, joints=replace(recording.joints, q=q))
+    unsound = find(Job(swapped, load('ur5')))
+    assert unsound.status == 'unsound' and 'swapped' in unsound.values['unsound: joints_swapped']
+    with Cell(tmp_path / 'cell') as cell:
+        node = cell.add(LiveDiagnosis)
+        said, health = cell.collect('/diagnosis'), cell.collect('/diagnostics')
+        cell.wait(lambda: node._verdict.get_subscription_count() > 0, 'a listener')
+
+        def own():
+            return [s for m in health.messages for s in m.status if s.name == '/live_diagnosis']
+
+        node._tell(unsound)
+        cell.wait(lambda: len(said) == 1, 'a verdict')
+        assert said.last.status[0].level == b'\x02' and 'swapped' in said.last.status[0].message
+        cell.wait(lambda: any(s.level == b'\x02' and 'swapped' in s.message for s in own()), 'it')
+        node._tell(Finding(START + 1, 'none', 'No gap.', {}))
+        cell.wait(lambda: own()[-1].level != b'\x02', 'that it is over')
+
+
+@pytest.mark.cells
+@pytest.mark.slow
+def test_the_node_tells_a_gap_from_the_streams(tmp_path):
+    pytest.importorskip('rclpy', reason='needs ROS 2')
+    from weld_twin_nodes.harness import Cell
+
+    motion, names = wandering(), load('ur5').joint_names
+    measured = points((OFFSET,), motion)
+    with Cell(tmp_path / 'cell') as cell:
+        # One diagnosis, of nearly all that is sent.
+        cell.start('live_diagnosis', least=11.0, every=1.0, reliable_inputs=True)
+        said = cell.collect('/diagnosis')
+        states, where = cell.publisher(JOINT_STATES), cell.publisher(MEASURED_POINT)
+        for k in range(motion.t.size):
+            stamp = START + round(motion.t[k] * 1e9)
+            states.publish(cell.messages.joint_state(stamp, names, motion.q[k]))
+            where.publish(cell.messages.point(stamp, measured[k]))
+            time.sleep(0.002)
+        cell.wait(lambda: len(said) > 0, 'a verdict', limit=90.0)
+        status = said.last.status[0]
+        assert status.level == b'\x01'
+        assert float({pair.key: pair.value for pair in status.values}['gap_rms_m']) > 1e-4
+        assert from_messages.stamp_ns(said.last) <= START + round(motion.t[-1] * 1e9)

@@ -1,0 +1,56 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Modules that lie elsewhere now: their old names go on for one release, and say the new ones."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+
+_WORDING = ('leading', 'mending', 'quantities', 'switches', 'verdict', 'words')
+_ROOMS = ('demo', 'fleet', 'guarded', 'history', 'report', 'sensitivity_report', 'serve')
+MOVED = {
+    **{f'weld_twin_nodes.report.{name}': f'weld_twin_nodes.wording.{name}' for name in _WORDING},
+    **{f'weld_twin_nodes.{name}': f'weld_twin_report.{name}' for name in _ROOMS},
+}
+"""Where a module lies now; what lies in a package that moved has moved with it."""
+
+
+def new_name(name: str) -> str | None:
+    """Return where a module lies now, None where it has not moved."""
+    package = name
+    while package:
+        if package in MOVED:
+            return MOVED[package] + name[len(package) :]
+        package = package.rpartition('.')[0]
+    return None
+
+
+class Moved:
+    """A finder and loader of modules by their old names: it gives the modules themselves, no copies."""
+
+    @staticmethod
+    def find_spec(
+        name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """Return how a module that moved is loaded; None of any other."""
+        return None if new_name(name) is None else ModuleSpec(name, Moved)  # type: ignore[arg-type]
+
+    @staticmethod
+    def create_module(spec: ModuleSpec) -> None:
+        """Leave it to the import system to make a module; the real one takes its place."""
+
+    @staticmethod
+    def exec_module(module: ModuleType) -> None:
+        """Put the module under its new name in the place of the old one."""
+        old, new = module.__name__, str(new_name(module.__name__))
+        warnings.warn(
+            f"'{old}' is '{new}' now; the old name goes with the next release",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        sys.modules[old] = import_module(new)

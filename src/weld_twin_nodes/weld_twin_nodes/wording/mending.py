@@ -1,0 +1,235 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What mending one cause or several leaves, and where that would make the seam worse."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from itertools import combinations
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from weld_twin_core.diagnosis.result import Diagnosis
+
+from .quantities import STAYS, UNCHANGED, millimetres
+from .switches import as_it_is, parted, switches, trusted
+from .words import (
+    depending,
+    leading,
+    likely,
+    listed,
+    not_to_be_tried,
+    unnamed,
+    untried_in_short,
+)
+
+_GROWS = 1.02
+"""Ratio of the largest deviation after to before from which it is told as grown: less than that is
+a matter of which sample has the largest noise."""
+_APART = 0.02
+"""Share of the squared gap by which a curve may fall short of its place before both are told."""
+_EVERY = 3
+"""Switches of which every combination is told; of more, each alone and all together."""
+_LOOK = {
+    'constant': 'zeros and frames',
+    'angle': 'gear and encoder',
+    'direction': 'gear, belt and bearing (play, friction)',
+    'speed': 'gains and feed-forward of the drive',
+    'acceleration': 'what is loose or soft',
+    'load': 'what yields (gear, bearing, mount)',
+    'temperature': 'what grows warm',
+    'time': 'what creeps, slips or wears',
+    'place': 'the line of sight',
+}
+"""Where a fitter looks first when a cause has no name, by what it depends on."""
+_CLOCKS = 'clocks'
+"""Name of the check of the clocks: what is late by a clock grows with the speed, as a lag does."""
+
+
+class Left(NamedTuple):
+    """RMS and largest deviation [m], as it is and with one cause mended."""
+
+    rms: float
+    rms_after: float
+    largest: float
+    largest_after: float
+
+    @property
+    def grows(self) -> bool:
+        """Tell whether the worst spot gets worse."""
+        return self.largest_after > _GROWS * self.largest
+
+    @property
+    def rises(self) -> bool:
+        """Tell whether the whole gets worse."""
+        return self.rms_after > (1.0 + UNCHANGED) * self.rms
+
+
+_KEPT: WeakKeyDictionary[Diagnosis, dict[tuple[int, ...], Left]] = WeakKeyDictionary()
+"""What was asked for, by diagnosis and by the switches thrown."""
+
+
+def left_without(diagnosis: Diagnosis, k: int) -> Left | None:
+    """Return what is left with cause ``k`` alone mended; None where it cannot be thought away."""
+    for at, switch in enumerate(switches(diagnosis)):
+        if switch.members == (k,):
+            return left_with(diagnosis, (at,))
+    return None
+
+
+def left_with(diagnosis: Diagnosis, mended: Collection[int]) -> Left:
+    """
+    Return what is left with some of the `switches` thrown, counted from 0.
+
+    The page has these figures from nowhere else, so that one is the same wherever it stands; they are
+    kept as long as the diagnosis is, as many parts of the page ask.
+    """
+    kept = _KEPT.setdefault(diagnosis, {})
+    key = tuple(sorted(mended))
+    if key not in kept:
+        kept[key] = _left_with(diagnosis, key)
+    return kept[key]
+
+
+def _left_with(diagnosis: Diagnosis, mended: tuple[int, ...]) -> Left:
+    runs: list[tuple[np.ndarray, np.ndarray]] = []
+    for run, (left, parts) in enumerate(zip(*parted(diagnosis), strict=True)):
+        good = trusted(diagnosis, run)
+        there = [k for k in range(len(parts)) if k not in mended]
+        before, after = as_it_is(diagnosis, run), left + parts[there].sum(axis=0)
+        runs.append((_sizes(before[good]), _sizes(after[good])))
+    sides = zip(*runs, strict=True) if runs else ((), ())
+    both = [np.concatenate([np.zeros(0), *side]) for side in sides]
+    (rms, largest), (rms_after, largest_after) = (
+        (float(np.sqrt((s**2).mean())) if s.size else 0.0, float(s.max(initial=0.0))) for s in both
+    )
+    return Left(rms, rms_after, largest, largest_after)
+
+
+def _sizes(vectors: np.ndarray) -> np.ndarray:
+    return np.asarray(np.linalg.norm(vectors, axis=1))
+
+
+def thought_mended(diagnosis: Diagnosis) -> list[tuple[int, ...]]:
+    """Return which switches are thrown together where the page says what is left: none first."""
+    count = len(switches(diagnosis))
+    sizes = range(count + 1) if count <= _EVERY else (0, 1, count)
+    return [mended for size in sizes for mended in combinations(range(count), size)]
+
+
+def advised(diagnosis: Diagnosis) -> tuple[int, ...]:
+    """Return the `switches` that may be thrown: all but those of curves that are advised against."""
+    return tuple(
+        at
+        for at, switch in enumerate(switches(diagnosis))
+        if not any(k < len(diagnosis.causes) and curve_fault(diagnosis, k) for k in switch.members)
+    )
+
+
+def correctable(diagnosis: Diagnosis) -> bool:
+    """Tell whether anything was found that may be corrected."""
+    return bool(diagnosis.effects or diagnosis.families or advised(diagnosis))
+
+
+def taken_by_curve(diagnosis: Diagnosis, k: int) -> float | None:
+    """
+    Return the share of the squared gap that the curve of a cause without a name takes off.
+
+    None where the cause has a name, or where its curve takes off what its place holds.
+    """
+    cause = diagnosis.causes[k]
+    left = left_without(diagnosis, k) if unnamed(cause) else None
+    if left is None:
+        return None
+    taken = max(1.0 - (left.rms_after / max(left.rms, 1e-300)) ** 2, 0.0)
+    # Beside the interval of its share, what the curve falls short by is no news.
+    return taken if taken < cause.share_ci90[0] - _APART else None
+
+
+def warning(diagnosis: Diagnosis, k: int) -> str:
+    """Return that mending a cause makes the worst spot of the seam worse; nothing where not."""
+    left = left_without(diagnosis, k)
+    if left is None or not (left.grows or left.rises):
+        return ''
+    told = (
+        f'the largest deviation would grow from {_both(left)}'
+        if left.grows
+        else f'the RMS would rise from {millimetres(left.rms)} to {millimetres(left.rms_after)}'
+    )
+    if unnamed(diagnosis.causes[k]):
+        return f'Do not correct programs by its curve: {told}.'
+    return f'Not this alone: {told}; mend it together with the others.'
+
+
+def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
+    """Return where to look for a cause without a name, and whether its curve helps so long."""
+    cause = diagnosis.causes[k]
+    where = likely(cause.place) or 'the whole cell'
+    first = f'Look at {where}: {_no_effect(diagnosis)} gives what is found there.'
+    if cause.dependence:
+        # Where two fit alike, both are told: the first alone would send a fitter to the wrong part.
+        on = [name for name, _ in leading(cause.dependence)]
+        at = [_LOOK.get(name, 'all that moves') for name in on]
+        at += ['the clocks'] * ('speed' in on and not _one_clock(diagnosis))
+        first = (
+            f'Look at {where}, first at {"; then at ".join(dict.fromkeys(at))}: what is found there '
+            f'{depending(*on)}, and {_no_effect(diagnosis)} gives it.'
+        )
+    left = left_without(diagnosis, k)
+    if left is None:
+        return [first]
+    if left.grows or left.rises:
+        return [first, warning(diagnosis, k)]
+    fault = curve_fault(diagnosis, k)
+    if fault:
+        return [first, f'Its curve {fault}: do not correct programs by it.']
+    others = against(diagnosis)
+    without = f', without that of {others}' if others else ''
+    return [
+        first,
+        f'Until that is found, programs can be corrected by its curve{without} (weld-twin '
+        f'correct-program): the largest deviation goes from {_both(left)}.',
+    ]
+
+
+def against(diagnosis: Diagnosis) -> str:
+    """Return of which places no curve is to be in a correction; nothing where all may."""
+    taken = advised(diagnosis)
+    return listed(
+        [
+            likely(diagnosis.causes[switch.members[0]].place)
+            for at, switch in enumerate(switches(diagnosis))
+            if at not in taken
+        ]
+    )
+
+
+def _no_effect(diagnosis: Diagnosis) -> str:
+    """Return that no effect gives it, and of how many that can be said."""
+    if not not_to_be_tried(diagnosis):
+        return 'no known effect'
+    return f'no effect that was tried ({untried_in_short(diagnosis)}, as asked)'
+
+
+def curve_fault(diagnosis: Diagnosis, k: int) -> str:
+    """Return why programs are not to be corrected by the curve of a cause; nothing where they can."""
+    left = left_without(diagnosis, k)
+    if left is None or not unnamed(diagnosis.causes[k]):
+        return ''
+    if left.grows:
+        return 'makes the worst spot worse'
+    if left.rises:
+        return 'makes the whole worse'
+    return 'takes hardly anything off' if left.rms_after > STAYS * left.rms else ''
+
+
+def _one_clock(diagnosis: Diagnosis) -> bool:
+    """Tell whether the clocks were looked at and nothing was found."""
+    levels = [check.level for check in diagnosis.checks if check.name == _CLOCKS]
+    return bool(levels) and set(levels) == {'ok'}
+
+
+def _both(left: Left) -> str:
+    return f'{millimetres(left.largest)} to {millimetres(left.largest_after)}'

@@ -1,0 +1,102 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The causes that a reader can think away."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.result import Cause, Diagnosis, Site
+
+from .words import CURVES, listed, open_sets, site_name, someplace
+from .words import cause as called
+
+MOST = 8
+"""Causes with a switch of their own; the others share one."""
+OTHERS = 'all smaller ones together'
+_NAMED = 3
+"""Names in a heading; more are counted."""
+
+
+class Switch(NamedTuple):
+    """One switch: its name, and the causes (as the contributions count them) that it mends."""
+
+    label: str
+    members: tuple[int, ...]
+
+
+def cause_name(diagnosis: Diagnosis, cause: Cause) -> str:
+    """Return a cause as a heading: every name it may have, or its place where it has none."""
+    named = [site for site, _ in cause.name if site.effect not in CURVES]
+    if not named:
+        return someplace(cause)
+    if diagnosis.families and len(named) > 1:
+        return _together(named)
+    alike = alternatives(diagnosis, cause) or tuple(named[:1])
+    more = [f'{len(alike) - _NAMED} more'] if len(alike) > _NAMED else []
+    return listed([*map(site_name, alike[:_NAMED]), *more], 'or')
+
+
+def _together(sites: Sequence[Site]) -> str:
+    """Return small errors of one place, which are there together and are no alternatives."""
+    joints = {site.joint for site in sites}
+    if len(joints) > 1:
+        return listed([site_name(site) for site in sites[:_NAMED]])
+    kinds = [called(site.effect, None) for site in sites]
+    if all(kind.startswith('link ') and kind.endswith(' error') for kind in kinds):
+        own = [kind.removeprefix('link ').removesuffix(' error') for kind in kinds]
+        return f'errors of link {listed(own)} of {joints.pop()}'
+    more = [f'{len(kinds) - _NAMED} more'] if len(kinds) > _NAMED else []
+    return f'{listed([*kinds[:_NAMED], *more])} of {joints.pop() or "the robot"}'
+
+
+def alternatives(diagnosis: Diagnosis, cause: Cause) -> tuple[Site, ...]:
+    """Return what these data cannot tell apart, the most probable first; nothing where one is."""
+    found = [effect for k, effect in enumerate(diagnosis.model.found) if k in cause.members]
+    own = {Site(effect.name, effect.site) for effect in found} | {s for s, _ in cause.name[:1]}
+    return next((group for group in open_sets(diagnosis) if own & set(group)), ())
+
+
+def switches(diagnosis: Diagnosis) -> tuple[Switch, ...]:
+    """Return the switches, largest share first; none where no cause can be thought away."""
+    told = diagnosis.contributions
+    if told is None or not told.parts or diagnosis.contacts is not None:
+        return ()
+    count = told.parts[0].shape[0]
+    own = [k for k, cause in enumerate(diagnosis.causes) if cause.members]
+    out = [Switch(cause_name(diagnosis, diagnosis.causes[k]), (k,)) for k in own[:MOST]]
+    rest = tuple(own[MOST:]) + tuple(range(len(diagnosis.causes), count))
+    return (*out, *([Switch(OTHERS, rest)] if rest else []))
+
+
+def parted(diagnosis: Diagnosis) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+    """
+    Return what is left, (M, 3), and what each switch adds to it, (S, M, 3), for every recording.
+
+    Without switches what is left is the residual after, and nothing is added to it.
+    """
+    traces, told, all_switches = diagnosis.traces, diagnosis.contributions, switches(diagnosis)
+    if told is None or not all_switches:
+        return traces.after, tuple(np.zeros((0, *part.shape)) for part in traces.after)
+    return told.left, tuple(
+        np.array([part[list(switch.members)].sum(axis=0) for switch in all_switches])
+        for part in told.parts
+    )
+
+
+def as_it_is(diagnosis: Diagnosis, k: int) -> Array:
+    """Return the deviation of a recording before anything is mended, (M, 3) [m]."""
+    left, parts = (item[k] for item in parted(diagnosis))
+    return left + parts.sum(axis=0) if parts.size else diagnosis.traces.before[k]
+
+
+def trusted(diagnosis: Diagnosis, k: int) -> np.ndarray:
+    """Return which samples of a recording to draw: a gross outlier would hide all the others."""
+    traces = diagnosis.traces
+    if traces.trusted:
+        return traces.trusted[k]
+    return np.ones(traces.t[k].size, dtype=bool)

@@ -1,0 +1,28 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+from setuptools import find_packages, setup
+
+NAME = 'weld_twin_report'
+
+setup(
+    name=NAME,
+    version='0.1.0',
+    packages=find_packages(),
+    package_data={NAME: ['py.typed', '**/*.css', '**/*.js', '**/LICENSE']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
+        ('share/' + NAME, ['package.xml']),
+    ],
+    install_requires=['setuptools', 'numpy', 'PyYAML', 'rich', 'matplotlib'],
+    extras_require={
+        'history': ['sqlalchemy'],
+        'postgresql': ['psycopg[binary]'],
+        'serve': ['fastapi', 'starlette', 'uvicorn', 'h11', 'python-multipart', 'sqlalchemy'],
+        'test': ['pytest'],
+    },
+    zip_safe=False,
+    maintainer='weld_twin contributors',
+    maintainer_email='maintainers@example.org',
+    description='Diagnoses as people read them: pages, history, fleet and server of the twin.',
+    license='Apache-2.0',
+)

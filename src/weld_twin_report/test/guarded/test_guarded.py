@@ -1,0 +1,90 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Commands in processes of their own: what goes wrong in one is told, and harms no other."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from weld_twin_report.guarded import Guarded, Limits
+
+BAG = Path(__file__).parents[4] / 'bags/elbow_play'
+
+
+@pytest.fixture(scope='module')
+def warm():
+    with Guarded() as guarded:
+        yield guarded
+
+
+def children(pid):
+    return Path(f'/proc/{pid}/task/{pid}/children').read_text().split()
+
+
+def test_a_command_runs_and_tells_its_steps(warm, tmp_path):
+    steps = []
+    done = warm.run(['diagnose', BAG, '--robot', 'ur5', '--out', tmp_path / 'found'], steps.append)
+    assert (done.code, done.said) == (0, steps[-1])
+    assert steps[0] == f'reading {BAG}' and len(steps) > 3
+    assert 50e6 < done.memory < 2e9
+    told = json.loads((tmp_path / 'found/diagnosis.json').read_text())
+    assert told['verdict']['effects'][0]['effect'] == 'backlash'
+
+
+def test_a_refusal_is_its_sentence(warm):
+    done = warm.run(['info', '/nowhere/at/all'])
+    assert done.code == 2 and "'/nowhere/at/all'" in done.said
+    assert warm.run(['info', '--robots']).code == 0
+
+
+@pytest.mark.parametrize(
+    ('limits', 'said'),
+    [(Limits(memory=250_000_000), 'more memory'), (Limits(wall_s=0.5), 'more than 0.5 s')],
+)
+def test_what_takes_too_much_is_ended_and_the_next_one_runs(limits, said, tmp_path):
+    with Guarded(limits) as guarded:
+        words = ['diagnose', BAG, '--robot', 'ur5']
+        done = guarded.run([*words, '--out', tmp_path / 'found'])
+        assert done.code != 0 and said in done.said
+        assert not (tmp_path / 'found').exists()
+        if limits.memory > 1e9:
+            assert guarded.run(['info', '--robots']).code == 0
+
+
+def test_a_command_that_is_killed_from_outside_is_told_so(tmp_path):
+    with Guarded(Limits(cpu_s=180)) as guarded:
+        assert guarded.run(['info', '--robots']).code == 0
+
+        def kill(step):
+            (warm_pid,) = [str(guarded._process.pid)]
+            os.kill(int(children(warm_pid)[0]), signal.SIGKILL)
+
+        words = ['diagnose', BAG, '--robot', 'ur5', '--out', tmp_path / 'found']
+        done = guarded.run(words, kill)
+        assert 'killed from outside' in done.said and '180' not in done.said
+        assert guarded.run(['info', '--robots']).code == 0
+
+
+def test_a_process_that_is_killed_is_told_and_started_again(tmp_path):
+    with Guarded() as guarded:
+        assert guarded.run(['info', '--robots']).code == 0
+        (warm_pid,) = [
+            pid
+            for pid in children(os.getpid())
+            if b'weld_twin_report.cli.warm' in Path(f'/proc/{pid}/cmdline').read_bytes()
+            and Path(f'/proc/{pid}/stat').read_text().split()[2] != 'Z'
+        ][-1:]
+        killed = threading.Timer(0.5, os.kill, (int(warm_pid), signal.SIGKILL))
+        killed.start()
+        words = ['diagnose', BAG, '--robot', 'ur5', '--out', tmp_path / 'found']
+        assert 'has ended' in guarded.run(words).said
+        assert guarded.run(['info', '--robots']).code == 0
+        time.sleep(0.1)
+        assert not Path(f'/proc/{warm_pid}').exists()

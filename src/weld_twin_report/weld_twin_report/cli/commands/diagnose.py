@@ -1,0 +1,371 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Say where the gap lies, which effect causes it, and how far it shrinks.
+
+Writes diagnosis.json, a page to read (report.html) and the corrected model to the directory. Ends
+with 3 where data or set-up are wrong (units, joints swapped, another robot): page and
+diagnosis.json then say what, and no model is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from weld_twin_nodes.cli.options import (
+    add_output,
+    add_robot,
+    add_topics,
+    given_urdf,
+    output,
+    robot_of,
+    topics_of,
+    twin_of,
+)
+
+if TYPE_CHECKING:
+    from weld_twin_core.diagnosis import Diagnosis
+    from weld_twin_core.diagnosis.advice import Limits
+    from weld_twin_core.recording import Recording
+    from weld_twin_msgs_py.files.input_files import InputFile
+    from weld_twin_nodes.offline.set_up_changes import SetUpChange
+
+    from ...report.diagnosis_page import Sheet
+
+LINES = 'WELD_TWIN_PROGRESS'
+"""Variable of the environment: 'lines' has every step told as a line on stderr."""
+BRANDS = ('abb', 'fanuc', 'kuka', 'ur', 'yaskawa')
+"""Makers whose controllers the page knows; the page has their names."""
+UNSOUND = 3
+"""Exit code where data or set-up are wrong."""
+MEASUREMENTS = 40_000
+"""Diagnosed together; eleven minutes at 60 Hz."""
+JOINT_STATES = 150_000
+"""The same; twenty minutes at 125 Hz."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument(
+        'bags', nargs='+', metavar='BAG', help='recordings of the cell, of one robot'
+    )
+    add_robot(parser)
+    _add_setup(parser)
+    _add_next(parser)
+    _add_causes(parser)
+    _add_sheet(parser)
+    add_output(parser, 'directory for the results')
+    add_topics(parser)
+
+
+def _add_setup(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        '--holdout',
+        action='append',
+        default=[],
+        metavar='BAG',
+        help='a recording that is not fitted; the shrink is judged on it; may be given again',
+    )
+    parser.add_argument(
+        '--align',
+        default='',
+        metavar='FRAMES',
+        help='frames that are not known, and are fitted: base, tool, or base,tool',
+    )
+    parser.add_argument(
+        '--changed',
+        nargs=2,
+        action='append',
+        default=[],
+        metavar=('BAG', 'WHAT'),
+        help='what was changed in the cell for one of the bags: load=KG hung from the tool point '
+        '(load=KG,X,Y,Z: there in the tool frame [m]; below 0: taken off), another tool, or the '
+        'instrument moved; may be given again',
+    )
+    parser.add_argument(
+        '--apply',
+        action='store_true',
+        help='if data or set-up are wrong and one correction explains it, make it and go on',
+    )
+
+
+def _add_next(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        '--experiment-minutes',
+        type=float,
+        metavar='MIN',
+        help='that the next experiment may take, with what has to be set up (default: 60)',
+    )
+    parser.add_argument(
+        '--confirm',
+        action='store_true',
+        help='where the question is closed, but some joints did not move widely, plan an '
+        'experiment in which they do',
+    )
+    parser.add_argument(
+        '--cell-box',
+        default='',
+        metavar='NUMBERS',
+        help='x,y,z of the lower and of the upper corner [m], in the measuring frame: the arm stays '
+        'between them in the next experiment',
+    )
+
+
+def _add_causes(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        '--contacts',
+        metavar='ARTEFACT.yaml',
+        help='describes what the contacts of the bags touched, where they were not imported with it',
+    )
+    parser.add_argument(
+        '--effects-known',
+        default='',
+        metavar='FILE',
+        help='effects file or diagnosis.json; the twin has these effects from the start',
+    )
+    parser.add_argument(
+        '--exclude-effect',
+        action='extend',
+        nargs='+',
+        default=[],
+        metavar='NAME',
+        help='effects that cannot be the cause',
+    )
+    parser.add_argument(
+        '--may-change',
+        default='',
+        metavar='NAMES',
+        help='errors that may differ between the recordings, such as '
+        'joint_offset,tool_pose,base_pose; the result says what changed since the first',
+    )
+
+
+def _add_sheet(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        '--tolerance',
+        type=float,
+        metavar='MM',
+        help='largest deviation allowed; the page says by ISO 14253-1 whether the robot passes',
+    )
+    parser.add_argument(
+        '--uncertainty',
+        type=float,
+        metavar='MM',
+        help='standard uncertainty of a measured position, from the certificate of the instrument',
+    )
+    parser.add_argument(
+        '--joint-names',
+        default='',
+        metavar='A|J|FILE',
+        help='what joints are called on the page: a prefix (A1, A2, ...), or a YAML file with '
+        'lines "joint: name"',
+    )
+    parser.add_argument(
+        '--controller',
+        choices=BRANDS,
+        help='whose controller it is, if the name of the robot does not tell',
+    )
+    parser.add_argument(
+        '--pdf', action='store_true', help='print the page to report.pdf, to sign; needs Chromium'
+    )
+
+
+def _sheet(args: argparse.Namespace) -> Sheet:
+    """Return what the page is to show; checked before anything is computed."""
+    from ...report.acceptance import Demand
+    from ...report.diagnosis_page import Sheet
+    from ...report.joint_names import joint_labels
+    from ...report.pdf import browser
+
+    if args.pdf:
+        browser()
+    labels = joint_labels(args.joint_names, robot_of(args).joint_names) if args.joint_names else {}
+    sizes = [_metres(getattr(args, name), f'--{name}') for name in ('tolerance', 'uncertainty')]
+    return Sheet(Demand(*sizes), labels, args.controller)
+
+
+def _metres(value: float | None, option: str) -> float | None:
+    from weld_twin_core.errors import ModelError
+
+    if value is not None and not 0.0 < value < 1000.0:
+        raise ModelError(f'{option} {value:g}: give millimetres above 0 and below 1000')
+    return None if value is None else 1e-3 * value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose, write the results, print the verdict."""
+    from rich.console import Console
+
+    from ...report import print_summary
+    from ...report.diagnosis_files import PAGE, PDF, RESULT, write_results
+    from ...report.pdf import print_page
+
+    sheet = _sheet(args)
+    with output(args, RESULT) as place:
+        diagnosis = _diagnosis(args)
+        write_results(place, diagnosis, _inputs(args), given_urdf(args), sheet)
+        if args.pdf:
+            print_page(place / PAGE, place / PDF)
+    console = Console(highlight=False)
+    print_summary(diagnosis, console, sheet.demand)
+    console.print(f'report: {Path(args.out) / PAGE}', markup=False)
+    return UNSOUND if diagnosis.status == 'unsound' else 0
+
+
+def _diagnosis(args: argparse.Namespace) -> Diagnosis:
+    from weld_twin_core.diagnosis import diagnose
+    from weld_twin_core.diagnosis.algebra.problem import frames_named
+    from weld_twin_core.diagnosis.frames.changes import families_named
+    from weld_twin_core.errors import ModelError
+    from weld_twin_msgs_py.bags import read_recording
+    from weld_twin_nodes.offline.set_up_changes import told
+
+    align, excluded = frames_named(args.align, '--align'), _families(args.exclude_effect)
+    changing = families_named(args.may_change, '--may-change')
+    if changing and len(args.bags) < 2:
+        raise ModelError('--may-change compares recordings; give two or more bags of one arm')
+    changes = _changes(args)
+    twin = twin_of(robot_of(args), args.effects_known)
+    topics = topics_of(args)
+    with _progress() as tell:
+        recordings = []
+        for path in (*args.bags, *args.holdout):
+            tell(f'reading {path}')
+            # Two clocks are for the checks of the data to name.
+            recording = read_recording(
+                path, twin.robot, topics, one_clock=False, needs_measurements=True
+            )
+            recordings.append(_described(recording, args.contacts))
+        count = len(args.bags)
+        fitted, more = told(_bounded(recordings[:count]), changes, twin.robot)
+        return diagnose(
+            fitted,
+            twin.robot,
+            align=align,
+            known=twin.effects,
+            exclude=excluded,
+            holdout=_bounded(recordings[count:]),
+            apply=args.apply,
+            may_change=tuple(dict.fromkeys([*changing, *more])),
+            limits=_limits(args),
+            progress=tell,
+        )
+
+
+def _changes(args: argparse.Namespace) -> dict[int, SetUpChange]:
+    """Return what was changed for which bag, counted from 0."""
+    from weld_twin_core.errors import DataError
+    from weld_twin_nodes.offline.set_up_changes import set_up_change
+
+    out = {}
+    for bag, what in args.changed:
+        if bag not in args.bags:
+            raise DataError(f"--changed: '{bag}' is none of the recordings")
+        out[args.bags.index(bag)] = set_up_change(what)
+    return out
+
+
+def _limits(args: argparse.Namespace) -> Limits:
+    """Return what the next experiment may cost, and where it has to stay."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from weld_twin_core.diagnosis.advice import Limits
+    from weld_twin_core.diagnosis.advice.limits import USUAL_MINUTES
+    from weld_twin_core.errors import DataError
+
+    minutes = USUAL_MINUTES if args.experiment_minutes is None else args.experiment_minutes
+    limits = Limits(minutes, confirm=args.confirm)
+    if not args.cell_box:
+        return limits
+    try:
+        numbers = [float(part) for part in args.cell_box.split(',')]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 6:
+        raise DataError(f"--cell-box takes six numbers with commas, got '{args.cell_box}'")
+    return replace(limits, box=np.array(numbers).reshape(2, 3))
+
+
+def _described(recording: Recording, artefact: str | None) -> Recording:
+    """Return the recording with its contacts as an artefact file describes them."""
+    from weld_twin_core.contacts import Contacts
+    from weld_twin_msgs_py.files.artefact_file import read_artefact
+
+    contacts = recording.contacts
+    if artefact is None or contacts is None:
+        return recording
+    told = Contacts(read_artefact(artefact), contacts.labels, contacts.value, contacts.sigma)
+    return replace(recording, contacts=told)
+
+
+def _bounded(recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the recordings, together within what memory allows; each says what was left out."""
+    moving = [r for r in recordings if r.measured is not None and not r.joints.static]
+    measured = sum(r.measured.t.size for r in moving if r.measured is not None)
+    states = sum(r.joints.t.size for r in moving)
+    return [
+        r.thinned(
+            _share(0 if r.measured is None else r.measured.t.size, measured, MEASUREMENTS),
+            _share(r.joints.t.size, states, JOINT_STATES),
+        )
+        for r in recordings
+    ]
+
+
+def _share(own: int, total: int, most: int) -> int:
+    return max(ceil(own * min(most / max(total, 1), 1.0)), 2)
+
+
+def _families(names: Sequence[str]) -> tuple[str, ...]:
+    from weld_twin_core.effects import REGISTRY
+    from weld_twin_core.errors import ModelError
+
+    for name in names:
+        if name not in REGISTRY:
+            raise ModelError(
+                f'--exclude-effect: there is no effect {name!r}; known effects are '
+                + ', '.join(sorted(REGISTRY))
+            )
+    return tuple(names)
+
+
+def _inputs(args: argparse.Namespace) -> list[InputFile]:
+    from weld_twin_msgs_py.files.input_files import hashed
+
+    out = [hashed('recording', path) for path in args.bags]
+    out += [hashed('held out', path) for path in args.holdout]
+    if Path(args.robot).is_file():
+        out.append(hashed('robot', args.robot))
+    if args.effects_known:
+        out.append(hashed('effects known', args.effects_known))
+    return out
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], None]]:
+    """
+    Yield where to tell progress; it shows on a terminal and leaves other streams alone.
+
+    A program that shows it elsewhere asks for lines.
+    """
+    from rich.console import Console
+    from rich.markup import escape
+
+    if os.environ.get(LINES) == 'lines':
+        yield lambda text: print(text, file=sys.stderr, flush=True)
+        return
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda text: None
+        return
+    with console.status('starting') as status:
+        yield lambda text: status.update(escape(text))

@@ -1,0 +1,138 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Pose and path accuracy and repeatability by ISO 9283, from poses or paths that are repeated.
+
+Finds the poses that the arm stopped at twice or more, and the path that it went twice or more.
+Writes iso9283.json and a page to read (report.html) to the directory.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from weld_twin_nodes.cli.options import (
+    add_output,
+    add_robot,
+    add_topics,
+    output,
+    robot_of,
+    topics_of,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.metrics.performance import Performance
+    from weld_twin_core.recording import Recording
+
+SCHEMA = 'weld_twin/iso9283/1'
+RESULT, PAGE = 'iso9283.json', 'report.html'
+WIDTH = 100
+"""Columns of the table, whatever the terminal has."""
+FAR = 0.1
+"""Accuracy [m] from which two frames are mixed up rather than an arm inaccurate."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('bag', metavar='BAG', help='recording of the cell')
+    add_robot(parser)
+    parser.add_argument(
+        '--align',
+        default='',
+        metavar='FRAMES',
+        help='frames that are not known, and are fitted: base, tool, or base,tool',
+    )
+    add_output(parser, 'directory for the results')
+    add_topics(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Find the cycles, evaluate them, write the results, print a table."""
+    from rich.console import Console
+
+    from weld_twin_core.diagnosis.algebra.problem import frames_named
+    from weld_twin_core.metrics.performance import performance_of
+    from weld_twin_msgs_py.bags import read_recording
+    from weld_twin_nodes.offline.placed_robot import placed
+
+    nominal = robot_of(args)
+    align = frames_named(args.align, '--align')
+    recording = read_recording(args.bag, nominal, topics_of(args))
+    robot, notes = placed(recording, nominal, align)
+    found = performance_of(recording, robot)
+    notes += _warnings(found, align)
+    with output(args, RESULT) as place:
+        _write(place, found, recording, robot, notes, args)
+    _print(found, notes, Console(width=WIDTH, highlight=False, markup=False))
+    print(f'report: {Path(args.out) / PAGE}')
+    return 0
+
+
+def _write(
+    place: Path,
+    found: Performance,
+    recording: Recording,
+    robot: Robot,
+    notes: Sequence[str],
+    args: argparse.Namespace,
+) -> None:
+    from weld_twin_core import __version__
+    from weld_twin_msgs_py.files.input_files import hashed
+    from weld_twin_msgs_py.files.whole_files import write_text
+
+    from ...report.performance_page import performance_page
+
+    inputs = [hashed('recording', args.bag)]
+    if Path(args.robot).is_file():
+        inputs.append(hashed('robot', args.robot))
+    result = {
+        'schema': SCHEMA,
+        'version': __version__,
+        'robot': robot.name,
+        'recording': recording.name,
+        'align': args.align,
+        **found.as_dict(),
+        'notes': [*notes, *recording.notes],
+        'inputs': [item.as_dict() for item in inputs],
+    }
+    write_text(place / PAGE, performance_page(found, recording, robot.name, notes, inputs))
+    write_text(place / RESULT, json.dumps(result, indent=1, allow_nan=False) + '\n')
+
+
+def _warnings(found: Performance, align: frozenset[str]) -> list[str]:
+    """Return a sentence where the measuring frame cannot be that of the robot."""
+    sizes = [pose.performance.ap_m for pose in found.poses]
+    sizes += [] if found.path is None else [found.path.performance.at_m]
+    if max(sizes) < FAR or len(align) == 2:
+        return []
+    return [
+        f'measurements and commands are {max(sizes):.2f} m apart, so the measuring frame is '
+        'hardly that of the robot; --align base or base,tool fits it'
+    ]
+
+
+def _print(found: Performance, notes: Sequence[str], console: Console) -> None:
+    from rich.table import Table
+
+    from ...report.performance_table import PATH_HEADS, POSE_HEADS, path_row, pose_rows, sentence
+
+    console.print(sentence(found))
+    paths = [] if found.path is None else [path_row(found.path)]
+    for heads, rows in ((POSE_HEADS, pose_rows(found)), (PATH_HEADS, paths)):
+        if rows:
+            table = Table(box=None, pad_edge=False)
+            for head in heads:
+                table.add_column(head, header_style='dim')
+            for row in rows:
+                table.add_row(*row)
+            console.print(table)
+    for text in found.lacking:
+        console.print(f'lacking: {text}')
+    for text in notes:
+        console.print(f'note: {text}')

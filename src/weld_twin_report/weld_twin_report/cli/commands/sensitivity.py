@@ -1,0 +1,312 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which tolerance to tighten: the paper's sensitivity study and the global one.
+
+For a robot on a seam, or for the motion of a bag. Writes sensitivity.json, indices, figures with
+their data and a page to read (sensitivity.html) to the directory; run again, it continues where
+it was stopped. --figure draws one figure only; --claims measures the paper's claims on several
+robots and seams.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from weld_twin_nodes.cli.options import add_output, add_robot, add_topics, robot_of, topics_of
+
+if TYPE_CHECKING:
+    from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.recording import Recording
+    from weld_twin_core.sensitivity.tolerance import Tolerance
+
+    from ...sensitivity_report import Setting
+
+_WORK = 'weld_twin_report.sensitivity_report.work'
+"""What the processes that work need: they import it while this one gets their tasks ready."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('bag', nargs='?', metavar='BAG', help='study the motion recorded in a bag')
+    add_robot(parser, required=False)
+    add_output(parser, 'directory for the results')
+    _add_question(parser.add_argument_group('what is studied'))
+    _add_effort(parser.add_argument_group('how much is run, and where'))
+    add_topics(parser)
+
+
+def _add_question(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
+    add(
+        '--path',
+        metavar='P',
+        default='line',
+        help='path file, or a bundled seam: line, arc, circle, polyline, spline, weave',
+    )
+    add(
+        '--tolerances',
+        metavar='FILE',
+        help='tolerance file (default: typical magnitudes of '
+        'joint_offset, link_length, link_twist, backlash and base_pose)',
+    )
+    add(
+        '--effects-known',
+        metavar='FILE',
+        default='',
+        help='effects file or diagnosis.json; the twin has these effects from the start',
+    )
+    add(
+        '--tool',
+        type=float,
+        nargs=6,
+        metavar=('X', 'Y', 'Z', 'RX', 'RY', 'RZ'),
+        help="tool frame in the flange [m, rotation vector rad], instead of the model's",
+    )
+    _add_seam(group)
+    _add_choice(group)
+
+
+def _add_choice(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
+    add(
+        '--figure',
+        action='append',
+        default=[],
+        metavar='K',
+        help='draw figure 6 to 14, posture or recorded, and nothing else; may be given again',
+    )
+    add('--claims', action='store_true', help='measure the claims of the paper')
+    add(
+        '--claims-robots',
+        nargs='+',
+        metavar='R',
+        help='robots of the claims (default: seven builds)',
+    )
+
+
+def _add_seam(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
+    add('--points', type=int, default=200, metavar='N', help='path points (default: 200)')
+    add(
+        '--across',
+        type=float,
+        default=5e-4,
+        metavar='M',
+        help='weld tolerance across the seam (default: 0.0005)',
+    )
+    add(
+        '--stickout',
+        type=float,
+        default=1e-3,
+        metavar='M',
+        help='weld tolerance of the stick-out (default: 0.001)',
+    )
+    add(
+        '--normal',
+        type=float,
+        nargs=3,
+        metavar=('X', 'Y', 'Z'),
+        help='direction out of the work, for a recorded motion (default: against the wire)',
+    )
+
+
+def _add_effort(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
+    add(
+        '--samples',
+        type=int,
+        default=1024,
+        metavar='N',
+        help='Sobol base samples, a power of two (default: 1024)',
+    )
+    add(
+        '--runs',
+        type=int,
+        default=20_000,
+        metavar='N',
+        help='runs of the tolerance stack (default: 20,000)',
+    )
+    add(
+        '--trajectories',
+        type=int,
+        default=50,
+        metavar='N',
+        help='trajectories of the Morris screening (default: 50)',
+    )
+    add(
+        '--placements',
+        type=int,
+        default=32,
+        metavar='N',
+        help='placements tried for the advice (default: 32)',
+    )
+    add('--seed', type=int, default=0, help='seed of all draws (default: 0)')
+    add('--workers', type=int, default=0, metavar='N', help='processes (default: one a core)')
+    add('--scheduler', default='', metavar='ADDRESS', help='Dask scheduler to run on instead')
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the study and say where the page is."""
+    from weld_twin_nodes.offline.task_pool import pool_of
+
+    setting = _setting(args)
+    if args.figure:
+        from ...sensitivity_report import make_figures
+        from ...sensitivity_report.make_study import study_files
+        from ...sensitivity_report.study_files import FIGURES, study_directory
+
+        assert setting is not None
+        place = study_directory(args.out)
+        with study_files(place, args.force) as made:
+            drawings = make_figures(made / FIGURES, setting, args.figure)
+        for drawing in drawings:
+            print(f'{place / FIGURES / drawing.name}.svg: {drawing.caption}')
+        return 0
+    robots = _claims_robots(args)
+    with closing(pool_of(args.scheduler, args.workers, ahead=_WORK)) as pool, _progress() as tell:
+        from ...sensitivity_report import make_study
+
+        page = make_study(
+            args.out,
+            pool,
+            setting,
+            claims_on=robots,
+            tell=tell,
+            seed=args.seed,
+            force=args.force,
+        )
+    _print_summary(Path(args.out))
+    print(f'page: {page}')
+    return 0
+
+
+def _setting(args: argparse.Namespace) -> Setting | None:
+    from weld_twin_core.errors import DataError
+    from weld_twin_core.motion.paths import KINDS, default_seam
+    from weld_twin_core.sensitivity import WeldTolerance
+    from weld_twin_msgs_py.files.path_file import read_path
+    from weld_twin_nodes.offline.told_twin import build_twin
+
+    from ...sensitivity_report import Effort, Setting
+
+    if not args.robot and not args.bag:
+        if args.claims and not args.figure:
+            return None
+        raise DataError('give --robot R or a BAG to study, or --claims')
+    twin = build_twin(_robot(args), args.effects_known)
+    common = {
+        'robot': twin.robot,
+        'tolerances': _tolerances(args, twin.robot),
+        'known': twin.effects,
+        'points': args.points,
+        'weld': WeldTolerance(args.across, args.stickout),
+        'effort': Effort(args.samples, args.runs, args.trajectories, args.placements, args.seed),
+    }
+    if args.bag:
+        return Setting(
+            seam=Path(args.bag).name,
+            recording=_recording(args, twin.robot),
+            normal=args.normal,
+            **common,
+        )
+    if args.path in KINDS:
+        return Setting(seam=args.path, path=default_seam(twin.robot, args.path), **common)
+    path, torch = read_path(args.path)
+    return Setting(seam=Path(args.path).stem, path=path, torch=torch, **common)
+
+
+def _robot(args: argparse.Namespace) -> Robot:
+    import numpy as np
+
+    from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.arm.rotation import rotation_matrix, transform
+    from weld_twin_core.errors import DataError
+
+    if args.robot:
+        robot = robot_of(args)
+    else:
+        from weld_twin_msgs_py.bags import provenance  # the readers of bags take their time
+
+        model = provenance(args.bag).get('robot')
+        if not isinstance(model, dict):
+            raise DataError(f"bag '{args.bag}' holds no robot model; give --robot R")
+        robot = Robot.from_mapping(model)
+    if args.tool is None:
+        return robot
+    tool = transform(rotation_matrix(args.tool[3:]), np.array(args.tool[:3]))
+    return robot.with_frames(tool=tool)
+
+
+def _tolerances(args: argparse.Namespace, robot: Robot) -> tuple[Tolerance, ...]:
+    from weld_twin_core.errors import ModelError
+    from weld_twin_core.sensitivity import default_tolerances, tolerances_from_list
+    from weld_twin_msgs_py.files.yaml_file import read_yaml
+
+    if not args.tolerances:
+        return default_tolerances(robot)
+    try:
+        return tolerances_from_list(read_yaml(args.tolerances, 'tolerance file'), robot)
+    except ModelError as error:
+        raise ModelError(f"tolerance file '{args.tolerances}': {error}") from None
+
+
+def _recording(args: argparse.Namespace, robot: Robot) -> Recording:
+    from weld_twin_msgs_py.bags import read_recording
+
+    return read_recording(args.bag, robot, topics_of(args))
+
+
+def _claims_robots(args: argparse.Namespace) -> list[Robot]:
+    from weld_twin_msgs_py.robots import load_robot
+
+    from ...sensitivity_report.claims_table import ROBOTS
+
+    return [load_robot(name) for name in args.claims_robots or ROBOTS] if args.claims else []
+
+
+def _print_summary(place: Path) -> None:
+    import json
+
+    from ...sensitivity_report.fitter_words import advised, parameter_words
+    from ...sensitivity_report.study_files import CLAIMS, RESULT
+
+    if (place / RESULT).is_file():
+        for motion, found in json.loads((place / RESULT).read_text())['motions'].items():
+            inside = found['global']['stack']['inside']['both']
+            rows = found['global']['sobol']['parameter']['d_norm']['indices']
+            best = sorted(rows, key=lambda row: -row['ST'])[:3]
+            for first in advised(found['local']['parameters'], 1):
+                print(
+                    f'{motion}: {first.instruction} first: from {first.now} to {first.wanted}, '
+                    f'gains {1e3 * first.gain_m:.3f} mm'
+                )
+            print(
+                f'{motion}: what drives the largest deviation: '
+                + ', '.join(f'{parameter_words(r["name"])} ({r["ST"]:.2f})' for r in best)
+            )
+            print(
+                f'{motion}: inside the weld tolerance with probability {inside["value"]:.3f} '
+                f'({inside["low"]:.3f} to {inside["high"]:.3f})'
+            )
+    if (place / CLAIMS).is_file():
+        for claim in json.loads((place / CLAIMS).read_text())['claims']:
+            print(f'{claim["statement"]}: {claim["verdict"]}')
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[int, int, str], None]]:
+    """Yield where to tell progress; it shows on a terminal and leaves other streams alone."""
+    from rich.console import Console
+    from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (*Progress.get_default_columns()[:2], MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task('starting', total=None)
+        yield lambda done, total, label: bar.update(
+            task, completed=done, total=total, description=label
+        )

@@ -1,0 +1,143 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Measure again after a correction: was the promise kept, and which cause did not go away?
+
+Give the recording made after the correction. With --program, the folder of correct-program, the tool
+is held against where the program meant it. Without, the robot itself was mended (zeros mastered,
+constants entered, a gear serviced), and is held against its nominal model. Ends with 0 where the
+promise was kept, with 4 where it was not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from weld_twin_nodes.cli.options import add_force, add_robot, add_topics, output, topics_of
+
+if TYPE_CHECKING:
+    from weld_twin_core.arm.robot import Robot
+    from weld_twin_nodes.offline.verifying import Verification
+
+RESULT, PAGE, CORRECTION = 'verification.json', 'report.html', 'correction.json'
+NOT_KEPT = 4
+"""Exit code where less was reached than promised."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('bag', metavar='AFTER_BAG', help='recorded after the correction')
+    parser.add_argument(
+        '--model', required=True, metavar='FILE', help='diagnosis.json that the correction is from'
+    )
+    parser.add_argument(
+        '--program', metavar='DIR', help='folder of correct-program, where a program was corrected'
+    )
+    add_robot(parser, required=False)
+    parser.add_argument(
+        '--align',
+        default='',
+        metavar='FRAMES',
+        help='frames that were set up anew since the diagnosis, and are fitted: base, tool, or '
+        'base,tool (default: both are as they were)',
+    )
+    parser.add_argument(
+        '--setup', type=int, default=1, metavar='N', help='which recording of the diagnosis'
+    )
+    parser.add_argument('--out', metavar='DIR', help='folder for verification.json and a page')
+    add_force(parser)
+    add_topics(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compare, say what was promised and what was measured, write it where asked."""
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.bags import read_recording
+    from weld_twin_msgs_py.files.diagnosis_model import mended_source, read_diagnosis, read_model
+    from weld_twin_nodes.offline.verifying import verified
+
+    from ...report.verification_page import told
+
+    content = read_diagnosis(args.model)
+    robot = _robot(args, content)
+    model = read_model(robot, args.model)
+    if not 0 < args.setup <= len(model.bases):
+        raise DataError(f'the diagnosis has {len(model.bases)} set-up(s), not {args.setup}')
+    recording = read_recording(
+        args.bag, robot, topics_of(args), one_clock=False, needs_measurements=True
+    )
+    recording, mended = mended_source(model, robot, recording, args.setup - 1)
+    found = verified(
+        content,
+        model,
+        recording,
+        correction=None if args.program is None else _correction(args.program),
+        align=args.align,
+        setup=args.setup - 1,
+    )
+    if mended:
+        print(f'note: {mended}')
+    for line in told(found):
+        print(line)
+    if args.out:
+        _write(args, content, recording.epoch_ns, found)
+    return 0 if found.kept else NOT_KEPT
+
+
+def _write(
+    args: argparse.Namespace, content: dict[str, Any], epoch_ns: int, found: Verification
+) -> None:
+    """Write verification.json and the page."""
+    from weld_twin_msgs_py.files.input_files import hashed
+    from weld_twin_msgs_py.files.whole_files import write_text
+
+    from ...report.verification_page import verification_page
+
+    inputs = [hashed('recording', args.bag), hashed('model', args.model)]
+    entry = found.as_dict() | {
+        'robot': content['model']['robot'],
+        'kinematics': content['model']['kinematics'],
+        'epoch_ns': epoch_ns,
+        'inputs': [item.as_dict() for item in inputs],
+    }
+    with output(args, RESULT) as place:
+        write_text(place / PAGE, verification_page(found, str(entry['robot']), inputs))
+        write_text(place / RESULT, json.dumps(entry, indent=1, allow_nan=False) + '\n')
+    print(f'report: {Path(args.out) / PAGE}')
+
+
+def _robot(args: argparse.Namespace, content: dict[str, Any]) -> Robot:
+    """Return the robot that was named, else the one that the diagnosis was made with."""
+    from weld_twin_core.errors import ModelError
+    from weld_twin_msgs_py.robots import load_robot
+
+    if args.robot:
+        return load_robot(args.robot, args.base_link, args.tip_link)
+    files = [item['path'] for item in content.get('inputs', []) if item.get('use') == 'robot']
+    name = files[0] if files else str((content.get('model') or {}).get('robot'))
+    try:
+        return load_robot(name, args.base_link, args.tip_link)
+    except ModelError:
+        raise ModelError(
+            f'the robot of the diagnosis, {name!r}, is not to be found here; give it with --robot'
+        ) from None
+
+
+def _correction(folder: str) -> dict[str, Any]:
+    from weld_twin_core.errors import DataError
+
+    path = Path(folder)
+    path = path / CORRECTION if path.is_dir() else path
+    try:
+        content = json.loads(path.read_text(encoding='utf-8'))
+    except OSError as error:
+        raise DataError(f"'{path}' cannot be read: {error.strerror}") from None
+    except ValueError:
+        content = None
+    if not isinstance(content, dict) or not isinstance(content.get('expected'), dict):
+        raise DataError(
+            f"'{path}' is no correction; give the folder that weld-twin correct-program --model wrote"
+        )
+    return content

@@ -1,0 +1,96 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The steps of the demo in their order.
+
+A further step is one more entry of `STEPS`: a title and a function that takes the job and a
+function to report progress with; it leaves its files in ``job.folder`` and its words in
+``job.lines``.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+from weld_twin_core.arm import catalog
+from weld_twin_core.effects import effects_from_list
+from weld_twin_nodes.offline.output_directory import new_directory
+from weld_twin_nodes.offline.seam_motion import plan_motion
+
+from .analysis import analyse
+from .demo_diagnosis import find_causes, leave_open
+from .deviation_table import MARK, write_table
+from .hand_over import Job, Step
+from .live_run import run_live
+from .picture import draw
+from .ranking import rank
+
+ROBOT = 'ur5'
+SEAM = 'polyline'
+RATE = 50.0
+"""Hz of the joint states: enough for the seam, and the demo stays short."""
+SEED = 1
+"""Of the noise; any other does as well."""
+EFFECTS = [
+    {'effect': 'backlash', 'joint': 'shoulder_pan_joint', 'width': 8e-4},
+    {'effect': 'joint_compliance', 'joint': 'shoulder_lift_joint', 'compliance': 8e-6},
+    {'effect': 'measurement_noise', 'sigma': 2e-5},
+]
+"""What is wrong with the robot; one seam tells these from everything else."""
+
+
+def plan_seam(job: Job, _: object) -> None:
+    """Plan the seam as joint motion."""
+    job.plan = plan_motion(job.robot, job.seam, 'smooth', job.rate)
+
+
+STEPS = (
+    Step('plan the seam', plan_seam),
+    Step('weld it with five live nodes and record', run_live),
+    Step('compare the bag with the twin', analyse),
+    Step('rank what matters on this seam', rank),
+    Step('draw the seam', draw),
+    Step('find what the twin does not know', find_causes),
+    Step('do the same where one seam cannot tell', leave_open),
+    Step('write the table', write_table),
+)
+
+
+def run_demo(out: Path | str, steps: tuple[Step, ...] = STEPS, *, force: bool = False) -> None:
+    """
+    Run the steps into a directory that appears when all are done.
+
+    Parameters
+    ----------
+    out : Path or str
+    steps : tuple of Step
+    force : bool
+        As `new_directory` takes it.
+
+    Raises
+    ------
+    TwinError
+        The directory cannot be made, or a step fails.
+
+    """
+    console = Console()
+    robot = catalog.load(ROBOT)
+    with new_directory(out, mark=MARK, force=force) as folder:
+        job = Job(folder, robot, effects_from_list(EFFECTS, robot), SEAM, RATE, SEED)
+        columns = TextColumn('{task.description:<40}'), BarColumn(), TimeElapsedColumn()
+        with Progress(*columns, console=console) as bars:
+            for step in steps:
+                bar = bars.add_task(step.title, total=1.0)
+                step.run(job, partial(_advance, bars, bar))
+                bars.update(bar, completed=1.0)
+    for line in job.lines:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    console.print(f'results in {out}', highlight=False)
+
+
+def _advance(bars: Progress, bar: TaskID, part: float) -> None:
+    bars.update(bar, completed=part)

@@ -1,0 +1,225 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The page of one cell: what changed, its control charts, its last diagnoses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime, timezone
+from typing import Any
+
+import numpy as np
+
+from weld_twin_nodes.wording.quantities import counted, millimetres, odds
+from weld_twin_nodes.wording.words import cause
+
+from ..history.coordinate_words import coordinate
+from ..history.database import Database
+from ..history.entry import Entry
+from ..history.runs import NEWEST, Run, Runs
+from ..report.charts import Axis
+from ..report.html import Child, Html, document, section, table, tag
+from .control_chart import control_chart
+
+CHARTS = 8
+"""Charts of single values: those that changed first, then those that are named as causes."""
+ROWS = 20
+"""Diagnoses listed, the newest first."""
+TROUBLES = 10
+"""Recordings without a verdict listed, the newest first."""
+MILLI = 1e3
+"""Millimetres of a metre."""
+STYLE = (
+    'a { color: var(--accent); } th[scope=row] { white-space: nowrap; }'
+    'nav { display: flex; flex-wrap: wrap; gap: .25rem 1.25rem; padding-bottom: .6rem; }'
+    '@media print { nav { display: none; } }'
+)
+"""What pages of cells have besides: links, and dates and names in one line."""
+
+
+def cell_page(
+    database: Database, cell: str, home: str | None = None, ways: Html | None = None
+) -> str:
+    """
+    Return the page of a cell.
+
+    Parameters
+    ----------
+    database : Database
+    cell : str
+    home : str, optional
+        Address of the page of all cells.
+    ways : Html, optional
+        The way to other pages.
+
+    Raises
+    ------
+    DataError
+        There is no such cell.
+
+    """
+    entries = database.entries(cell, NEWEST)
+    runs = Runs(database)
+    changes = runs.look(cell, entries)
+    back = None if home is None else tag('p', tag('a', 'All cells', href=home))
+    body = tag(
+        'main',
+        tag(
+            'header',
+            ways,
+            tag('p', 'History of ', tag('b', cell), class_='kind'),
+            tag('p', f'{entries[-1].robot} · {_span(entries)}', class_='subject'),
+            back,
+        ),
+        tag('section', tag('h1', _headline(entries, changes)), _figures(entries), id_='verdict'),
+        _changed(changes),
+        _charts(entries, changes),
+        _diagnoses(entries),
+        troubles_section(runs.troubles(cell)[:TROUBLES]),
+    )
+    return document(f'{cell} · history', body, charts=True, style=STYLE)
+
+
+def damaged_page(cell: str, why: str, home: str | None = None, ways: Html | None = None) -> str:
+    """Return the page of a cell whose rows cannot be read: it says why, and the others have theirs."""
+    back = None if home is None else tag('p', tag('a', 'All cells', href=home))
+    head = tag('header', ways, tag('p', 'History of ', tag('b', cell), class_='kind'), back)
+    said = tag('section', tag('h1', 'This cell cannot be read.'), tag('p', why), id_='damaged')
+    return document(f'{cell} · history', tag('main', head, said), style=STYLE)
+
+
+def _span(entries: Sequence[Entry]) -> str:
+    """Return how many diagnoses there are, and of when."""
+    count = len(entries)
+    told = counted(count, 'diagnosis', 'diagnoses')
+    first, last = entries[0].at.date(), entries[-1].at.date()
+    more = 'the last ' if count == NEWEST else ''
+    return f'{more}{told}, {first}' + (f' to {last}' if last != first else '')
+
+
+def _headline(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> str:
+    if len(entries) == 1:
+        return 'One diagnosis so far: the next ones tell what changes.'
+    if not changes:
+        return 'Nothing changed by more than chance.'
+    latest = max(changes, key=lambda change: str(change['date']))
+    more = f' {len(changes) - 1} more below.' if len(changes) > 1 else ''
+    return f'{str(latest["sentence"]).capitalize()}{more}'
+
+
+def _figures(entries: Sequence[Entry]) -> Html:
+    """Return the newest diagnosis in figures."""
+    last = entries[-1]
+    sure = '' if last.confidence is None else f'{odds(last.confidence)} sure'
+    cells = [
+        ('Verdict', last.status, sure),
+        ('Gap', millimetres(last.gap_m), 'without what was found'),
+        ('Left', millimetres(last.unexplained_m), 'with it'),
+        ('Recorded', str(last.at.date()), causes_of(last.effects)),
+    ]
+    return tag(
+        'dl',
+        *(
+            tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
+            for name, value, note in cells
+        ),
+        class_='figures',
+    )
+
+
+def causes_of(effects: Sequence[Mapping[str, Any]], most: int = 3) -> str:
+    """Return what was named, the strongest first; many are counted."""
+    names = [cause(str(each['effect']), each.get('joint')) for each in effects]
+    more = f' and {len(names) - most} more' if len(names) > most else ''
+    return ', '.join(names[:most]) + more
+
+
+def _changed(changes: Sequence[Mapping[str, Any]]) -> Html | None:
+    if not changes:
+        return None
+    said = [tag('li', str(each['sentence']).capitalize()) for each in changes]
+    lead = 'More than chance does in a year of weekly looks. The surest comes first.'
+    return section('What changed', tag('ul', *said, class_='sentences'), id_='changed', lead=lead)
+
+
+def _charts(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> Html | None:
+    """Return the control charts: the gap, and single values; None for a single diagnosis."""
+    if len(entries) == 1:
+        return None
+    seconds = np.array([entry.at.timestamp() for entry in entries])
+    gaps = np.array([_number(entry.gap_m) for entry in entries])
+    charts: list[Child] = [
+        control_chart('Gap', seconds, MILLI * gaps, Axis('gap', 'mm'), from_zero=True)
+    ]
+    begins: dict[str, float] = {}
+    for change in changes:
+        day = datetime.fromisoformat(str(change['date'])).replace(tzinfo=timezone.utc)
+        name = str(change['coordinate'])
+        begins[name] = min(begins.get(name, np.inf), day.timestamp())
+    for name in _shown(entries, begins):
+        what = coordinate(name)
+        before = int(np.searchsorted(seconds, begins[name])) if name in begins else None
+        values = what.factor * np.array([_value(entry, name) for entry in entries])
+        title = what.words[:1].upper() + what.words[1:]
+        axis = Axis('value', what.unit)
+        charts.append(control_chart(title, seconds, values, axis, before=before))
+    lead = (
+        'Shaded is what is usual for this cell: three standard deviations of its own first '
+        'diagnoses, before anything changed.'
+    )
+    return section('Control charts', *charts, id_='charts', lead=lead)
+
+
+def _shown(entries: Sequence[Entry], begins: Mapping[str, float]) -> list[str]:
+    """Return the coordinates that are drawn."""
+    named = [
+        f'{each["effect"]} {each["joint"]} 0'
+        for each in entries[-1].effects
+        if each.get('joint') is not None
+    ]
+    known = {name for entry in entries for name in entry.names}
+    return [name for name in dict.fromkeys([*begins, *named]) if name in known][:CHARTS]
+
+
+def _value(entry: Entry, name: str) -> float:
+    return float(entry.value[entry.names.index(name)]) if name in entry.names else np.nan
+
+
+def _number(value: float | None) -> float:
+    return np.nan if value is None else value
+
+
+def _diagnoses(entries: Sequence[Entry]) -> Html:
+    """Return the newest diagnoses as a table."""
+    rows = [
+        (
+            str(entry.at.date()),
+            entry.status,
+            '' if entry.confidence is None else odds(entry.confidence),
+            millimetres(entry.gap_m),
+            millimetres(entry.unexplained_m),
+            causes_of(entry.effects),
+        )
+        for entry in entries[: -ROWS - 1 : -1]
+    ]
+    heads = ('recorded', 'verdict', 'sure', 'gap', 'left', 'causes')
+    return section('Last diagnoses', table(heads, rows), id_='diagnoses')
+
+
+def troubles_section(
+    troubles: Sequence[Run], link: Callable[[str], str] | None = None
+) -> Html | None:
+    """Return the recordings without a verdict, and why; None for none."""
+    if not troubles:
+        return None
+    rows = [
+        (
+            tag('a', run.cell, href=link(run.cell)) if link else run.cell,
+            run.recording.rsplit('/', 1)[-1],
+            run.state,
+            run.sentence,
+        )
+        for run in troubles
+    ]
+    heads = ('cell', 'recording', 'state', 'why')
+    return section('Recordings without a verdict', table(heads, rows), id_='troubles')

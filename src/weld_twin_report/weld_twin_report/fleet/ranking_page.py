@@ -1,0 +1,119 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The page of all cells, the worst first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from weld_twin_nodes.wording.quantities import counted, millimetres
+
+from ..history.database import Database
+from ..history.runs import Run, Runs
+from ..report.html import Child, Html, document, section, table, tag
+from .cell_page import STYLE, causes_of, troubles_section
+
+ROWS = 500
+"""Cells listed; more are counted."""
+TROUBLES = 50
+"""Recordings without a verdict listed, the newest first."""
+
+
+def ranking_page(database: Database, link: Callable[[str], str], ways: Html | None = None) -> str:
+    """
+    Return the page that ranks cells by the gap of their newest diagnosis.
+
+    Parameters
+    ----------
+    database : Database
+    link : callable
+        Address of the page of a cell.
+    ways : Html, optional
+        The way to other pages.
+
+    """
+    runs = Runs(database)
+    newest = runs.newest()
+    damaged = [row for row in newest if 'damaged' in row]
+    rows = [row for row in newest if 'damaged' not in row]
+    rows.sort(key=lambda row: -(row['gap_m'] or 0.0))
+    troubles = runs.troubles()
+    body = tag(
+        'main',
+        tag(
+            'header',
+            ways,
+            tag('p', 'All cells', class_='kind'),
+            tag('p', _span(rows), class_='subject'),
+        ),
+        tag('section', tag('h1', _headline(rows)), _figures(rows, troubles), id_='verdict'),
+        _cells(rows, link),
+        _damaged(damaged),
+        troubles_section(troubles[:TROUBLES]),
+    )
+    return document('All cells', body, style=STYLE)
+
+
+def _damaged(rows: Sequence[Mapping[str, Any]]) -> Html | None:
+    if not rows:
+        return None
+    said = table(('cell', 'why'), [(row['name'], row['damaged']) for row in rows])
+    return section('Cells that cannot be read', said, id_='damaged')
+
+
+def _span(rows: Sequence[Mapping[str, Any]]) -> str:
+    count = sum(row['diagnoses'] for row in rows)
+    return f'{counted(len(rows), "cell")}, {counted(count, "diagnosis", "diagnoses")}'
+
+
+def _headline(rows: Sequence[Mapping[str, Any]]) -> str:
+    if not rows:
+        return 'No cell has a diagnosis yet.'
+    worst = rows[0]
+    causes = causes_of(worst['effects'], 1)
+    by = f', mostly from {causes}' if causes else ''
+    return f'{worst["name"]} has the largest gap: {millimetres(worst["gap_m"])}{by}.'
+
+
+def _figures(rows: Sequence[Mapping[str, Any]], troubles: Sequence[Run]) -> Html:
+    changed = sum(bool(row['changes']) for row in rows)
+    unknown = sum(row['status'] == 'unknown' for row in rows)
+    cells = [
+        ('Cells', str(len(rows)), 'with a diagnosis'),
+        ('Changed', str(changed), 'by more than chance'),
+        ('Unknown', str(unknown), 'something is left that nothing explains'),
+        ('No verdict', str(len(troubles)), 'recordings: unsound, refused or failed'),
+    ]
+    return tag(
+        'dl',
+        *(
+            tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
+            for name, value, note in cells
+        ),
+        class_='figures',
+    )
+
+
+def _cells(rows: Sequence[Mapping[str, Any]], link: Callable[[str], str]) -> Html:
+    heads = ('cell', 'verdict', 'gap', 'left', 'causes', 'last change', 'recorded', 'robot')
+    lead = 'The newest diagnosis of each cell, the largest gap first.'
+    if len(rows) > ROWS:
+        lead += f' {counted(len(rows) - ROWS, "cell")} with smaller gaps left out.'
+    told = [_row(row, link) for row in rows[:ROWS]]
+    return section('Cells', table(heads, told), id_='cells', lead=lead)
+
+
+def _row(row: Mapping[str, Any], link: Callable[[str], str]) -> tuple[Child, ...]:
+    changes = row['changes'] or []
+    latest = max(changes, key=lambda change: str(change['date']), default=None)
+    return (
+        tag('a', row['name'], href=link(row['name'])),
+        tag('span', row['status'], class_=f'status {row["status"]}'),
+        millimetres(row['gap_m']),
+        millimetres(row['unexplained_m']),
+        causes_of(row['effects'], 2),
+        '' if latest is None else latest['sentence'],
+        tag('span', str(row['at'].date()), style='white-space: nowrap'),
+        row['robot'],
+    )

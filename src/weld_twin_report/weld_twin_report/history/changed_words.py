@@ -1,0 +1,125 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What changed, as sentences and as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timezone
+from math import isfinite
+from typing import Any
+
+from weld_twin_core.history import Change, Observation, outlook, reaches
+from weld_twin_nodes.wording.quantities import uncertain
+
+from .coordinate_words import coordinate
+from .tracking import DAY
+
+WEEK = 7.0
+"""Days."""
+ALIKE = 3
+"""Alternatives in a sentence; more are counted."""
+
+
+def date(day: float) -> str:
+    """Return a day as a date."""
+    return datetime.fromtimestamp(day * DAY, timezone.utc).date().isoformat()
+
+
+def sentence(change: Change) -> str:
+    """Return what changed, when, and by how much."""
+    what = coordinate(change.name)
+    first, last = (date(day) for day in change.between)
+    when = f'between {first} and {last}' if first != last else f'on {last}'
+    if change.kind == 'step':
+        size = uncertain(change.size, change.std, what.factor, what.unit)
+        said = f'{what.words}: stepped by {size} {when}'
+        if change.since is not None:
+            slowly = f'slowly since {date(change.since)}'
+            said = f'{what.words}: changed by {size}, at once {when} or {slowly}'
+    elif change.kind == 'trend':
+        size = uncertain(change.size * WEEK, change.std * WEEK, what.factor, what.unit)
+        said = f'{what.words}: moves by {size} a week since {date(change.day)}'
+    else:
+        size = uncertain(change.size, change.std, what.factor, what.unit)
+        said = f'{what.words}: swings by {size} with the seasons'
+    others = [coordinate(name).words for name in change.alike]
+    if others:
+        more = f' or {len(others) - ALIKE} more' if len(others) > ALIKE else ''
+        said += f'; as well it may be {", ".join(others[:ALIKE])}{more}'
+    return f'{said}.'
+
+
+def forecast(
+    change: Change,
+    seen: Sequence[Observation],
+    found: Sequence[Change],
+    limits: Mapping[str, float],
+) -> dict[str, Any] | None:
+    """
+    Return when a trend reaches its limit; None where there is no trend or no limit.
+
+    Parameters
+    ----------
+    change : Change
+    seen : sequence of Observation
+        All diagnoses of the cell.
+    found : sequence of Change
+        All that changed.
+    limits : mapping of str to float
+        Largest value allowed of an effect, SI units.
+
+    """
+    what = coordinate(change.name)
+    if change.kind != 'trend' or what.effect not in limits:
+        return None
+    now = outlook(seen, found, change.name)
+    if now is None:
+        return None
+    days = reaches(limits[what.effect], now)
+    weeks = [each / WEEK if isfinite(each) else None for each in days]
+    return {
+        'limit': limits[what.effect],
+        'weeks_5': weeks[0],
+        'weeks': weeks[1],
+        'weeks_95': weeks[2],
+    }
+
+
+def forecast_sentence(change: Change, told: Mapping[str, Any]) -> str:
+    """Return when the limit is reached, in words."""
+    what = coordinate(change.name)
+    limit = f'{told["limit"] * what.factor:g} {what.unit}'.rstrip()
+    low, high = told['weeks_5'], told['weeks_95']
+    if low is None:
+        return f'{what.words} does not come near {limit}.'
+    if high == 0.0:
+        return f'{what.words} is beyond {limit} already.'
+    end = f'to {high:.0f} weeks' if high is not None else 'weeks or more'
+    return f'{what.words} reaches {limit} in {low:.0f} {end} (90 %).'
+
+
+def as_dict(change: Change) -> dict[str, Any]:
+    """Return a change as plain data; a trend's size is that of a day."""
+    what = coordinate(change.name)
+    return {
+        'effect': what.effect,
+        'joint': what.joint,
+        'coordinate': change.name,
+        'kind': change.kind,
+        'date': date(change.day),
+        'between': [date(day) for day in change.between],
+        'slowly_since': None if change.since is None else date(change.since),
+        'size': change.size,
+        'std': change.std,
+        'nats': change.nats,
+        'alike': list(change.alike),
+        'sentence': sentence(change),
+    }
+
+
+def since(found: Sequence[Change], day: float | None) -> list[Change]:
+    """Return the changes that may have come after a day; seasons always."""
+    if day is None:
+        return list(found)
+    return [each for each in found if each.kind == 'season' or each.between[1] > day]

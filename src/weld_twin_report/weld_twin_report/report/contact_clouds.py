@@ -1,0 +1,158 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The clouds of the predicted tool point about every contact, before and after, magnified."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.result import ContactResult, Diagnosis
+from weld_twin_nodes.wording.quantities import millimetres
+
+from .html import Html, section, table, tag
+
+_MOST = 24
+"""Contacts that are drawn; more would make a page of pictures."""
+_SIZE = 100.0
+"""Half the width of a picture, in its own units."""
+_STEPS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+"""What half a picture may stand for [mm]: lengths that are easy to read."""
+
+
+def contacts_section(diagnosis: Diagnosis) -> Html | None:
+    """Return the clouds and figures of contacts; None where an instrument measured."""
+    result = diagnosis.contacts
+    if result is None:
+        return None
+    return section(
+        'Contacts',
+        _table(result),
+        _lengths(result),
+        tag('div', *_pictures(diagnosis), class_='clouds', style=_GRID),
+        _not_seen(result),
+        id_='contacts',
+        lead='How far the predicted tool point is from the middle of what it touched, on average. '
+        '"Left out" is predicted from the other places alone. In the pictures each dot is a '
+        'posture, seen from above: hollow before, full after, the same scale for all of one size.',
+    )
+
+
+def contacts_told(result: ContactResult) -> str:
+    """Return how far the tool point is from what it touched, in one sentence."""
+    before, after, held = (
+        millimetres(v)
+        for v in (result.spread_before_m, result.spread_after_m, result.held_out_spread_m)
+    )
+    return (
+        f'The tool point is {before} from what it touched on average, {after} after the fit, and '
+        f'{held} where it was foretold from the others: that is what to expect elsewhere.'
+    )
+
+
+_GRID = 'display:grid;grid-template-columns:repeat(auto-fill,minmax(11rem,1fr));gap:1rem'
+
+
+def _table(result: ContactResult) -> Html:
+    rows = [
+        (
+            item.label,
+            str(item.postures),
+            *(millimetres(v) for v in (item.before_m, item.after_m, item.held_out_m)),
+        )
+        for item in result.touched
+    ]
+    every = (result.spread_before_m, result.spread_after_m, result.held_out_spread_m)
+    postures = sum(item.postures for item in result.touched)
+    rows.append(('all', str(postures), *(millimetres(v) for v in every)))
+    return table(('contact', 'postures', 'before', 'after', 'left out'), rows)
+
+
+def _lengths(result: ContactResult) -> Html | None:
+    distances = [item for item in result.lengths if item.kind == 'distance']
+    if not distances:
+        return None
+    rows = [
+        (
+            ' to '.join(item.between),
+            f'{millimetres(item.value)} ± {millimetres(item.sigma)}',
+            millimetres(item.before),
+            millimetres(item.after),
+        )
+        for item in distances
+    ]
+    return table(('distance', 'known', 'before', 'after'), rows)
+
+
+def _not_seen(result: ContactResult) -> Html | None:
+    if not result.not_seen:
+        return None
+    return tag('p', f'No contact shows: {"; ".join(result.not_seen)}.', class_='note')
+
+
+def _pictures(diagnosis: Diagnosis) -> list[Html]:
+    """Return a picture per contact."""
+    out: list[Html] = []
+    traces = diagnosis.traces
+    for recording, before, after in zip(
+        diagnosis.recordings, traces.before, traces.after, strict=True
+    ):
+        contacts = recording.contacts
+        if contacts is None:
+            continue
+        for label in dict.fromkeys(contacts.labels):
+            index = contacts.of(label)
+            if before.shape[1] == 3 and len(out) < _MOST:
+                out.append(_picture(label, before[index], after[index]))
+    return out
+
+
+def _picture(label: str, before: Array, after: Array) -> Html:
+    """Return the clouds of one contact, seen from above, about their own middles."""
+    clouds = [(cloud - cloud.mean(axis=0))[:, :2] * 1e3 for cloud in (before, after)]
+    most = float(max(np.abs(cloud).max(initial=0.0) for cloud in clouds))
+    half = next((step for step in _STEPS if step >= most), most)
+    dots = [
+        dot
+        for cloud, filled in zip(clouds, (False, True), strict=True)
+        for dot in _dots(cloud * (_SIZE / half), filled)
+    ]
+    edge = _SIZE * 1.05
+    picture = tag(
+        'svg',
+        *_cross(edge),
+        *dots,
+        viewBox=f'{-edge} {-edge} {2 * edge} {2 * edge}',
+        role='img',
+        aria_label=f'predicted tool point about {label}, before and after',
+    )
+    return tag(
+        'figure',
+        picture,
+        tag('figcaption', f'{label}: from the middle to the edge {half:g} mm'),
+    )
+
+
+def _dots(cloud: Array, filled: bool) -> list[Html]:
+    """Return the dots of a cloud, (m, 2) in units of the picture."""
+    colour = 'var(--after)' if filled else 'var(--before)'
+    return [
+        tag(
+            'circle',
+            cx=f'{x:.1f}',
+            cy=f'{-y:.1f}',
+            r='3',
+            fill=colour if filled else 'none',
+            stroke=colour,
+        )
+        for x, y in cloud
+    ]
+
+
+def _cross(edge: float) -> list[Html]:
+    """Return faint lines through the middle."""
+    ends = ((-edge, 0.0, edge, 0.0), (0.0, -edge, 0.0, edge))
+    return [
+        tag('line', x1=a, y1=b, x2=c, y2=d, stroke='currentColor', opacity='.2')
+        for a, b, c, d in ends
+    ]

@@ -1,0 +1,115 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The files a diagnosis leaves behind."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core import __version__
+from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_msgs_py.files.input_files import InputFile
+from weld_twin_msgs_py.files.joint_file import write_joint_motion
+from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
+from weld_twin_nodes.offline.exports import write_all
+from weld_twin_nodes.offline.where_it_holds import where_it_holds
+
+from .diagnosis_page import Sheet, report_page
+from .untried import weighed
+
+RESULT = 'diagnosis.json'
+PAGE = 'report.html'
+PDF = 'report.pdf'
+NEXT = 'next_experiment.yaml'
+"""The motion to measure next, where one decides; the trajectory generator runs it."""
+TOUCHES = 'next_touches.csv'
+"""Postures to touch in next: a table to guide the arm by, and no motion, which would tear the ball
+from one posture to the next while it rests in its socket."""
+
+
+def write_results(
+    directory: Path,
+    diagnosis: Diagnosis,
+    inputs: Sequence[InputFile],
+    given: GivenUrdf | None = None,
+    sheet: Sheet | None = None,
+) -> None:
+    """
+    Write diagnosis.json, the page, the model in every form, and what to measure next.
+
+    Where the data are unsound there is no model: the page and diagnosis.json say what is wrong.
+
+    Parameters
+    ----------
+    directory : Path
+    diagnosis : Diagnosis
+    inputs : sequence of InputFile
+        What it was made from.
+    given : GivenUrdf, optional
+        The URDF that the robot was read from; ``robot.urdf`` then keeps its names.
+    sheet : Sheet, optional
+        What the reader wants of the page.
+
+    """
+    wanted = diagnosis.next_experiment
+    if wanted is not None and wanted.get('motion') is not None:
+        file = NEXT if 'contact' not in wanted['motion'] else TOUCHES
+        if file == NEXT:
+            write_joint_motion(directory / file, wanted['motion'], wanted['sentence'])
+        else:
+            from weld_twin_msgs_py.tables import write_touches  # loads much that few need
+
+            write_touches(directory / file, wanted['motion'])
+        diagnosis = replace(diagnosis, next_experiment={**wanted, 'file': file})
+    write_text(directory / PAGE, report_page(diagnosis, inputs, sheet))
+    if diagnosis.status != 'unsound':
+        posterior = diagnosis.posterior
+        notes = [] if posterior is None else where_it_holds(posterior)
+        write_all(directory, diagnosis.model, notes, given)
+    write_text(directory / RESULT, diagnosis_text(diagnosis, inputs))
+
+
+def diagnosis_text(diagnosis: Diagnosis, inputs: Sequence[InputFile]) -> str:
+    """Return the text of diagnosis.json; what is not a finite number is null."""
+    content = diagnosis.as_dict()
+    if content['candidates'] is not None:
+        content['candidates'] = _candidates(diagnosis, content['candidates'])
+    content['inputs'] = [item.as_dict() for item in inputs]
+    content['version'] = __version__
+    return json.dumps(_plain(content), indent=1, allow_nan=False) + '\n'
+
+
+def _candidates(diagnosis: Diagnosis, told: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """
+    Return the candidates without effects that were asked to be left out.
+
+    Where one of those is the same error as what is named, on any motion, it stands in
+    ``indistinguishable``; then it stays here too, marked as excluded.
+    """
+    tried = set(weighed(diagnosis))
+    named = {site for group in diagnosis.indistinguishable for site in group}
+    return [
+        item if own in tried else {**item, 'excluded': True}
+        for own, item in zip(diagnosis.candidates, told, strict=True)
+        if own in tried or own.site in named
+    ]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not isfinite(value):
+        return None
+    return value

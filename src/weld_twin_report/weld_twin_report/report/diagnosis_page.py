@@ -1,0 +1,156 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The sheet of a diagnosis: one HTML file that needs nothing else, and prints on a side or two."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.metrics.conformity import Rule
+from weld_twin_msgs_py.files.input_files import InputFile
+from weld_twin_nodes.wording.quantities import counted
+from weld_twin_nodes.wording.words import status_word
+
+from .acceptance import (
+    Demand,
+    acceptance_section,
+    judged_words,
+    largest,
+    most_data,
+    on_what,
+    rule_data,
+    rule_of,
+)
+from .cause_cards import causes_cards
+from .cause_list import causes_section
+from .changed_section import changed_section
+from .charts import embedded
+from .circle_plot import circle_data, circles_section
+from .contact_clouds import contacts_section
+from .controllers import brand_of
+from .footing import checks_section, inputs_section, next_section
+from .gap_location import where_section
+from .headline import header, opening
+from .html import Html, document, joined, own_file, tag
+from .joint_names import renamed
+from .page_data import page_data
+from .printed import printed_section
+from .seam_view import left_out, seam_section
+from .shrinking import shrink_section
+
+SCRIPTS = ('sheet.js', 'seam.js', 'polar.js')
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """
+    What a reader wants of the sheet.
+
+    Attributes
+    ----------
+    demand : Demand
+        Tolerance, and uncertainty of the instrument.
+    joints : mapping from str to str
+        What joints are called on the controller; those not in it keep their name.
+    brand : str, optional
+        Whose controller it is, as `controllers.BRANDS` has it; None and the robot's name tells.
+
+    """
+
+    demand: Demand = field(default_factory=Demand)
+    joints: Mapping[str, str] = field(default_factory=dict)
+    brand: str | None = None
+
+
+def report_page(
+    diagnosis: Diagnosis, inputs: Sequence[InputFile] = (), sheet: Sheet | None = None
+) -> str:
+    """
+    Return the page.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    inputs : sequence of InputFile
+        What it was made from, as the page lists it.
+    sheet : Sheet, optional
+
+    """
+    sheet = sheet or Sheet()
+    rule = rule_of(diagnosis, sheet.demand)
+    sound = diagnosis.status != 'unsound'
+    judged = _judged(diagnosis, rule) if sound else None
+    brand = sheet.brand or brand_of(diagnosis.model.robot.name)
+    body = joined(
+        [
+            header(diagnosis),
+            opening(diagnosis, judged, rule if sound else None, brand),
+            *(_causes(diagnosis, sheet, rule, brand) if sound else ()),
+            checks_section(diagnosis),
+            _engineers(diagnosis) if sound else None,
+            printed_section(diagnosis, inputs, judged),
+        ]
+    )
+    title = f'{status_word(diagnosis)} · {diagnosis.model.robot.name} · diagnosis'
+    foot = tag('div', inputs_section(inputs), class_='detail')
+    main = tag('main', Html(renamed(body, sheet.joints)), foot)
+    if not sound:
+        return document(title, main)
+    data = {
+        **page_data(diagnosis),
+        'most': most_data(diagnosis),
+        'rule': rule_data(rule),
+        'circles': circle_data(diagnosis),
+    }
+    told = Html(renamed(embedded(data, 'data'), sheet.joints))
+    scripts = [tag('script', own_file(name)) for name in SCRIPTS]
+    return document(title, main, told, charts=True, scripts=scripts)
+
+
+def _causes(
+    diagnosis: Diagnosis, sheet: Sheet, rule: Rule, brand: str | None
+) -> tuple[Html | None, ...]:
+    """Return what causes the gap, whether it passes, where it lies, and what to measure next."""
+    return (
+        acceptance_section(diagnosis, sheet.demand),
+        causes_cards(diagnosis, brand, rule),
+        seam_section(diagnosis) if diagnosis.contacts is None else contacts_section(diagnosis),
+        circles_section(diagnosis),
+        where_section(diagnosis),
+        next_section(diagnosis),
+    )
+
+
+def _engineers(diagnosis: Diagnosis) -> Html:
+    """Return rivals, changes and the way the gap shrinks: whom the answer is enough need none of it."""
+    return tag(
+        'details',
+        tag('summary', 'For engineers: what else it could be, and how far each effect shrinks it'),
+        causes_section(diagnosis),
+        changed_section(diagnosis),
+        shrink_section(diagnosis),
+        class_='detail',
+    )
+
+
+def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
+    """Return the verdict on the tolerance; it stays hidden until one is given, here or there."""
+    if diagnosis.contacts is not None or not diagnosis.traces.t:
+        return None
+    size = largest(diagnosis)
+    verdict = rule.judged(size)
+    where = f'as it is, {on_what(diagnosis)}'
+    out, _ = left_out(diagnosis)
+    if out:
+        verb = 'is' if out == 1 else 'are'
+        where += f'; {counted(out, "sample")} {verb} left out of it'
+    return tag(
+        'p',
+        f'{judged_words(rule, size)}, {where}',
+        class_=f'status judged {verdict}',
+        hidden='' if rule.tolerance_m is None else None,
+        data_top=f'{1e3 * size:.9f}',
+        data_where=where,
+    )

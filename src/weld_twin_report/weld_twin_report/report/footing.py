@@ -1,0 +1,228 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the answer stands on and where to go from it: next measurement, data checks, inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from weld_twin_core import __version__
+from weld_twin_core.diagnosis.result import Diagnosis, Site
+from weld_twin_msgs_py.files.input_files import InputFile
+from weld_twin_nodes.wording.quantities import counted, odds
+from weld_twin_nodes.wording.words import (
+    CURVES,
+    cause,
+    depending,
+    in_words,
+    listed,
+    open_sets,
+    place_name,
+    site_name,
+)
+
+from .html import Child, Html, joined, section, table, tag
+from .to_do import made_for, minutes
+from .untried import untried
+
+_APART = (
+    *('kind', 'motion', 'between', 'cost', 'robot_minutes', 'expected_separation_sigma'),
+    *('changes', 'promise', 'skipped'),
+)
+"""What programs need of a measurement, or the page says in words."""
+_ENOUGH = (
+    'No further measurement is needed for this verdict.',
+    'Between what was tried, no further measurement is needed.',
+)
+"""What is said where none is proposed: all effects were tried, or some could not be."""
+_SURER = 'The verdict stands without it; who wants to be surer measures this.'
+_ORDER = {'unsound': 0, 'warning': 1, 'note': 2, 'ok': 3}
+"""What needs attention comes first."""
+
+
+def next_section(diagnosis: Diagnosis) -> Html:
+    """Return the measurement that would decide, or that none is needed."""
+    wanted = diagnosis.next_experiment
+    if wanted is not None:
+        sure = diagnosis.status == 'identified'
+        content = joined([
+            tag('p', _SURER) if sure else None,
+            _wanted(wanted, _sites(diagnosis)),
+            *_left_open(diagnosis, wanted),
+        ])  # fmt: skip
+    elif diagnosis.status == 'unknown' or open_sets(diagnosis):
+        content = tag('p', 'No measurement that would decide has been found.')
+    else:
+        text = f'{_ENOUGH[bool(untried(diagnosis))]} {untried(diagnosis)}'.rstrip()
+        content = tag('p', text)
+    return section('What to measure next', content, id_='next')
+
+
+def measured_next(diagnosis: Diagnosis) -> str | None:
+    """Return the measurement that would decide in a sentence; None where none is proposed."""
+    wanted = diagnosis.next_experiment
+    if wanted is None or not wanted.get('sentence'):
+        return None
+    return in_words(wanted['sentence'], _sites(diagnosis))
+
+
+def _sites(diagnosis: Diagnosis) -> set[Site]:
+    """Return the sites that sentences may speak of."""
+    named = {site for group in diagnosis.indistinguishable for site in group}
+    return named | {candidate.site for candidate in diagnosis.candidates}
+
+
+def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
+    """Return what to measure, why, and what it takes."""
+    told = {'sentence', 'reason', *_APART}
+    rest = {key: value for key, value in wanted.items() if key not in told}
+    if wanted.get('motion'):
+        rest['as a program'] = (
+            'weld-twin export-program next_experiment.yaml writes it in the language of the '
+            'controller, with a sheet on how to load it'
+        )
+    if minutes(wanted):
+        rest['takes'] = minutes(wanted)
+    if wanted.get('promise'):
+        rest['chance that it decides'] = odds(wanted['promise'])
+    elif wanted.get('expected_separation_sigma'):
+        sigma = f'{wanted["expected_separation_sigma"]:.0f}'
+        rest['tells them apart by'] = f'{sigma} standard deviations, as far as can be foreseen'
+    lines = [tag('p', in_words(wanted['sentence'], sites))] if wanted.get('sentence') else []
+    why = parts_what(wanted) or (in_words(wanted['reason'], sites) if wanted.get('reason') else '')
+    lines += [tag('p', why, class_='note')] if why else []
+    entries = _entries(rest)
+    return joined([*lines, tag('dl', *entries, class_='pairs') if entries else None])
+
+
+def parts_what(wanted: Mapping[str, Any]) -> str:
+    """
+    Return what a measurement is to tell apart, in a sentence; nothing where it parts nothing.
+
+    What an explanation without a name depends on is told only where the two differ in that alone:
+    the curves that stand for it may run over something else than what it was found to depend on.
+    """
+    one, other = wanted.get('between') or ((), ())
+    if not one or not other:
+        return ''
+    same = {item.get('at') for item in one} == {item.get('at') for item in other}
+    sides = [listed(list(dict.fromkeys(_side(item, same) for item in side)))
+             for side in (one, other)]  # fmt: skip
+    if sides[0] == sides[1]:
+        return ''
+    if not same and all(item['effect'] in CURVES for item in (*one, *other)):
+        # Both may be there side by side.
+        return f'It tells {sides[0]} from {sides[1]}.'
+    return f'It shows whether it is {sides[0]} or {sides[1]}.'
+
+
+def _side(item: Mapping[str, Any], same: bool) -> str:
+    """Return one part of an explanation in words, with what it depends on at the same place."""
+    if item['effect'] not in CURVES:
+        return cause(item['effect'], item.get('joint'))
+    at = f'something at {place_name(str(item.get("at")))}'
+    return f'{at} that {depending(str(item.get("on")))}' if same else at
+
+
+def _left_open(diagnosis: Diagnosis, wanted: dict[str, Any]) -> list[Html]:
+    """Return which open questions a measurement is not made for: motion may never part them."""
+    out = []
+    for group in open_sets(diagnosis):
+        if not made_for(wanted, group):
+            names = listed([site_name(site) for site in group], 'or')
+            told = f'It is not made to tell whether it is {names}: see what to do first.'
+            out.append(tag('p', told, class_='note'))
+    return out
+
+
+def _entries(mapping: dict[str, Any]) -> list[Html]:
+    out = []
+    for key, value in mapping.items():
+        if value in (None, '') or _is_bulk(value):
+            continue
+        out += [tag('dt', key.replace('_', ' ').capitalize()), tag('dd', _plain(value))]
+    return out
+
+
+def _is_bulk(value: Any) -> bool:
+    """Tell lists of numbers, which belong into a file and not onto a page."""
+    return isinstance(value, list) and len(value) > 12
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, float):
+        return f'{value:.4g}'
+    if isinstance(value, list | tuple):
+        return ', '.join(_plain(item) for item in value)
+    if isinstance(value, dict):
+        return '; '.join(f'{key.replace("_", " ")}: {_plain(v)}' for key, v in value.items())
+    return str(value)
+
+
+def checks_section(diagnosis: Diagnosis) -> Html:
+    """Return the checks of the data, those that need attention first."""
+    ordered = sorted(diagnosis.checks, key=lambda check: _ORDER.get(check.level, 1))
+    items = [
+        tag(
+            'li',
+            tag('span', check.level, class_=f'level {check.level}'),
+            tag('span', tag('b', check.name.replace('_', ' ')), ' ', check.sentence),
+        )
+        for check in ordered
+    ]
+    notes = [
+        tag(
+            'li',
+            tag('span', 'note', class_='level note'),
+            tag('span', tag('b', recording.name), ' ', note),
+        )
+        for recording in diagnosis.recordings
+        for note in recording.notes
+    ]
+    found = tag('ul', *items, *_left_out(diagnosis), *notes, class_='checks')
+    return section(
+        'Are the data sound',
+        found if items or notes else tag('p', 'Nothing stood out.'),
+        id_='checks',
+        lead='Looked at before any cause was.',
+    )
+
+
+def _left_out(diagnosis: Diagnosis) -> list[Html]:
+    """Return how many samples the figures leave out though the instrument is not at fault."""
+    out = []
+    for recording, good in zip(diagnosis.recordings, diagnosis.traces.trusted, strict=False):
+        count = int((~good).sum())
+        if count:
+            verb = 'lies' if count == 1 else 'lie'
+            text = (
+                f'{count} of {counted(good.size, "sample")} of {recording.name} {verb} far from '
+                'what the fitted model says. They count little in the fit, and figures and '
+                'pictures are without them. They need not be slips of the instrument: a motion '
+                'that no effect describes looks like this too.'
+            )
+            out.append(
+                tag(
+                    'li',
+                    tag('span', 'left out', class_='level note'),
+                    tag('span', text),
+                )
+            )
+    return out
+
+
+def inputs_section(inputs: Sequence[InputFile]) -> Html:
+    """Return inputs and version, so that the answer can be had again."""
+    rows: list[list[Child]] = [
+        [item.use, tag('code', item.path), tag('code', item.sha256, class_='hash')]
+        for item in inputs
+    ]
+    return section(
+        'Made from',
+        table(('Use', 'Path', 'SHA-256'), rows, 'inputs')
+        if rows
+        else tag('p', 'No files: the recordings were handed over by a program, not read.'),
+        tag('p', f'weld_twin {__version__}', class_='note'),
+        id_='inputs',
+    )

@@ -1,0 +1,136 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the page of a diagnosis draws from, so that it follows at once what a reader thinks away."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.recording import Recording
+from weld_twin_nodes.wording.switches import as_it_is, parted, switches, trusted
+
+from .charts import thinned
+
+_POINTS = 6000
+"""Points of all recordings and lines together: half a megabyte on the page."""
+
+
+def static(diagnosis: Diagnosis, k: int) -> bool:
+    """Tell whether a recording is of stations at rest."""
+    return k < len(diagnosis.recordings) and bool(diagnosis.recordings[k].joints.static)
+
+
+def drawn(diagnosis: Diagnosis, k: int) -> np.ndarray:
+    """Return which samples of a recording the page shows, the largest deviations among them."""
+    left, parts = parted(diagnosis)
+    good = np.flatnonzero(trusted(diagnosis, k))
+    if not good.size:
+        return good
+    each = max(_POINTS // (len(left) * (2 + parts[k].shape[0])), 60)
+    sizes = [np.linalg.norm(v[good], axis=1) for v in (as_it_is(diagnosis, k), left[k])]
+    return np.asarray(good[thinned(sizes, each)])
+
+
+def along(diagnosis: Diagnosis, k: int) -> Array:
+    """Return the time [s] of every sample along the recording; the number of a station at rest."""
+    t = diagnosis.traces.t[k]
+    return np.arange(1.0, t.size + 1.0) if static(diagnosis, k) else t - t[:1]
+
+
+def squares(diagnosis: Diagnosis) -> list[list[float]]:
+    """
+    Return the mean products [mm^2] of what is left and what each switch adds, over good samples.
+
+    With ones for what is there and zeros for what is mended, v' S v is the mean square deviation:
+    the page has exact figures though it holds few samples.
+    """
+    if diagnosis.contacts is not None:
+        return [[0.0]]
+    left, parts = parted(diagnosis)
+    stacked = [
+        np.concatenate([one[None], more])[:, trusted(diagnosis, k)]
+        for k, (one, more) in enumerate(zip(left, parts, strict=True))
+    ]
+    if not stacked:
+        return [[0.0]]
+    fields = 1e3 * np.concatenate(stacked, axis=1)
+    count = max(fields.shape[1], 1)
+    return [[float(v) for v in row] for row in np.einsum('imc,jmc->ij', fields, fields) / count]
+
+
+def page_data(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return what the scripts of the page draw from; lengths in um, angles in degrees."""
+    left, parts = parted(diagnosis)
+    shown = range(0 if diagnosis.contacts is not None else len(left))
+    runs = [_run(diagnosis, k, left[k], parts[k]) for k in shown]
+    top, floor = _large(diagnosis), diagnosis.gap.noise_floor_m
+    return {
+        'runs': runs,
+        'joints': list(diagnosis.model.robot.joint_names),
+        'found': bool(diagnosis.model.found),
+        'switches': [switch.label for switch in switches(diagnosis)],
+        'squares': squares(diagnosis),
+        'top': round(1e6 * top, 1),
+        'stretch': _stretch(diagnosis.traces.measured, top),
+        # Unsound stations have none.
+        'floor': round(1e3 * floor, 5) if np.isfinite(floor) else None,
+    }
+
+
+def _run(diagnosis: Diagnosis, k: int, left: Array, parts: Array) -> dict[str, Any]:
+    traces, index = diagnosis.traces, drawn(diagnosis, k)
+    recording = diagnosis.recordings[k] if k < len(diagnosis.recordings) else None
+    bare = {} if parts.size else {'before': _micrometres(traces.before[k][index])}
+    return {
+        **bare,
+        'name': recording.name if recording is not None else f'recording {k + 1}',
+        'dots': static(diagnosis, k),
+        't': [round(float(t), 3) for t in along(diagnosis, k)[index]],
+        'path': _micrometres((traces.measured[k] - traces.before[k])[index]),
+        'left': _micrometres(left[index]),
+        'parts': [_micrometres(part[index]) for part in parts],
+        'joints': [] if recording is None else _joints(diagnosis, recording, traces.t[k][index]),
+    }
+
+
+def _joints(diagnosis: Diagnosis, recording: Recording, t: Array) -> list[list[float]]:
+    """Return the joint positions at some times, by joint: degrees, or mm where it slides."""
+    motion, robot = recording.joints, diagnosis.model.robot
+    factors = [1e3 if slides else 180.0 / np.pi for slides in robot.prismatic]
+    return [
+        [round(factor * float(v), 2) for v in np.interp(t, motion.t, motion.q[:, i])]
+        for i, factor in enumerate(factors)
+    ]
+
+
+def _micrometres(points: Array) -> list[float]:
+    return [round(float(value), 2) for value in np.nan_to_num(1e6 * points).ravel()]
+
+
+def _large(diagnosis: Diagnosis) -> float:
+    """Return a deviation [m] that hardly any sample exceeds, never quite nothing."""
+    if diagnosis.contacts is not None:
+        return 1e-6
+    sizes = [
+        np.linalg.norm(as_it_is(diagnosis, k)[trusted(diagnosis, k)], axis=1)
+        for k in range(len(diagnosis.traces.t))
+    ]
+    every = np.concatenate([np.zeros(0), *sizes])
+    return max(float(np.percentile(every, 98)), 1e-6) if every.size else 1e-6
+
+
+_SHOWN = 0.04
+"""Part of the seam's extent that a large deviation is drawn at."""
+
+
+def _stretch(measured: tuple[Array, ...], top: float) -> int:
+    """Return how much larger than life deviations are drawn: 1, 2 or 5 times a power of ten."""
+    points = np.concatenate([*measured, np.zeros((0, 3))])
+    extent = float(np.ptp(points, axis=0).max()) if points.size else 1.0
+    wanted = max(_SHOWN * extent / top, 1.0)
+    power = 10 ** int(np.floor(np.log10(wanted)))
+    return int(power * max(step for step in (1, 2, 5) if step * power <= wanted * 1.0001))

@@ -1,0 +1,69 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a print needs beside its signatures: what it was made from, and what it leaves open."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import PurePath
+
+from weld_twin_core import __version__
+from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_msgs_py.files.input_files import InputFile
+from weld_twin_nodes.wording.words import listed, open_sets, passed, site_name, status_word
+
+from .footing import measured_next
+from .html import Child, Html, tag
+
+_SHORT = 12
+"""Digits of a hash that tell files apart on paper; the page has all."""
+_FILES = 4
+"""Files told on paper; the page has all."""
+_FINDINGS = 3
+"""Checks told on paper, the gravest; the page has all."""
+
+
+def printed_section(
+    diagnosis: Diagnosis, inputs: Sequence[InputFile], judged: Html | None
+) -> Html:
+    """Return what only a print shows, with the lines to sign on: a side may part from the other."""
+    rows: list[tuple[str, Child]] = [
+        ('Data', _data(diagnosis)),
+        ('Cannot be told apart', _alike(diagnosis)),
+        ('Measure next', measured_next(diagnosis)),
+        ('Made from', _files(inputs)),
+    ]
+    pairs = [part for head, text in rows if text for part in (tag('dt', head), tag('dd', text))]
+    lines = [tag('span', text) for text in ('Checked by', 'Date', 'Signature')]
+    status = tag('span', status_word(diagnosis), class_=f'status {diagnosis.status}')
+    return tag(
+        'section',
+        tag('dl', *pairs, class_='pairs'),
+        tag('div', status, judged),
+        tag('p', *lines, class_='signatures'),
+        class_='printed',
+    )
+
+
+def _data(diagnosis: Diagnosis) -> str:
+    """Return what stood out of the data; warnings before notes."""
+    open_ones = [c for level in ('unsound', 'warning', 'note') for c in diagnosis.checks
+                 if c.level == level]  # fmt: skip
+    fine = len(diagnosis.checks) - len(open_ones)
+    told = [f'{check.level}: {check.sentence}' for check in open_ones[:_FINDINGS]]
+    if len(open_ones) > _FINDINGS:
+        told.append(f'{len(open_ones) - _FINDINGS} more are on the page.')
+    return ' '.join([f'{passed(fine, len(diagnosis.checks)).capitalize()}.', *told])
+
+
+def _alike(diagnosis: Diagnosis) -> str | None:
+    told = [listed([site_name(site) for site in group], 'or') for group in open_sets(diagnosis)]
+    return '; '.join(told) or None
+
+
+def _files(inputs: Sequence[InputFile]) -> Html:
+    """Return files, the start of their hashes, the version, and when it was printed."""
+    told = [f'{PurePath(item.path).name} (SHA-256 {item.sha256[:_SHORT]}…)' for item in inputs]
+    more = [f'{len(told) - _FILES} more'] if len(told) > _FILES else []
+    named = '; '.join([*told[:_FILES], *more, f'weld_twin {__version__}'])
+    return tag('span', named, tag('span', id_='printed-at'))

@@ -1,0 +1,220 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The seam in space, coloured by deviation, as it is and with what is thought mended."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_nodes.wording.mending import left_with
+from weld_twin_nodes.wording.quantities import counted, millimetres, percent
+from weld_twin_nodes.wording.switches import as_it_is, parted, switches, trusted
+from weld_twin_nodes.wording.words import listed
+
+from .charts import Axis, Line, chart
+from .html import Child, Html, joined, section, tag
+from .page_data import along, drawn, static
+
+_LINE = (
+    'The thin line is where the model of the robot has the tool, the coloured one where it was '
+    'measured, its deviation enlarged.'
+)
+_STATIONS = (
+    'Each line goes from where the model of the robot has the tool to a dot where it was measured, '
+    'its deviation enlarged.'
+)
+_LISTED = 3
+"""Samples that are named where they are not drawn, the farthest off first chosen."""
+_TENTH = 0.1
+"""Part of the gap below which what is left is told with a decimal."""
+_RECORDINGS = 6
+"""Recordings drawn over time."""
+
+
+def at_rest(diagnosis: Diagnosis) -> bool:
+    """Tell whether all that was recorded are stations at rest."""
+    return bool(diagnosis.recordings) and all(r.joints.static for r in diagnosis.recordings)
+
+
+def seam_section(diagnosis: Diagnosis) -> Html:
+    """Return switches, the two views, and the deviation over time; scripts draw them."""
+    stations = at_rest(diagnosis)
+    changes = bool(switches(diagnosis)) or bool(diagnosis.model.found)
+    return section(
+        'What if' if switches(diagnosis) else ('The stations' if stations else 'The seam'),
+        _switches(diagnosis),
+        _figures(diagnosis) if switches(diagnosis) else None,
+        tag('div', *_panels(diagnosis, changes), class_='panels' if changes else 'panels one'),
+        _controls(stations),
+        tag('p', class_='instant', id_='instant'),
+        tag('noscript', tag('p', 'The pictures need scripts switched on.')),
+        _charts(diagnosis),
+        id_='seam',
+        lead=f'{_STATIONS if stations else _LINE} Drag to turn; click it first, then the wheel '
+        'or two fingers zoom.',
+    )
+
+
+def _switches(diagnosis: Diagnosis) -> Html | None:
+    """Return a box to tick for every cause."""
+    found = switches(diagnosis)
+    if not found:
+        return None
+    boxes = [
+        tag('label', tag('input', type='checkbox', data_switch=k, checked=''), ' ', switch.label)
+        for k, switch in enumerate(found)
+    ]
+    buttons = [
+        tag('button', text, type='button', data_all=value)
+        for text, value in (('as it is', 'off'), ('all mended', 'on'))
+    ]
+    return tag(
+        'fieldset',
+        tag('legend', 'Take as mended:'),
+        *boxes,
+        tag('span', *buttons, class_='views'),
+        class_='switches',
+    )
+
+
+def _figures(diagnosis: Diagnosis) -> Html:
+    """Return the figures that follow the switches."""
+    left = left_with(diagnosis, range(len(switches(diagnosis))))
+    share = left.rms_after / max(left.rms, 1e-300)
+    cells: tuple[tuple[str, str, str, Child], ...] = (
+        ('Left then', 'now-rms', millimetres(left.rms_after), 'RMS, on data not used for fitting'),
+        ('At the worst spot', 'now-max', millimetres(left.largest_after), joined([
+            f'of {_counting(diagnosis)}', tag('span', id_='now-verdict', data_before=': ')])),
+        ('Of the gap', 'now-share', percent(share, int(share < _TENTH)), 'of its RMS is left'),
+    )  # fmt: skip
+    return tag(
+        'dl',
+        *(
+            tag('div', tag('dt', name), tag('dd', value, id_=key), tag('dd', note, class_='note'))
+            for name, key, value, note in cells
+        ),
+        class_='figures',
+    )
+
+
+def left_out(diagnosis: Diagnosis) -> tuple[int, int]:
+    """Return how many samples no figure counts, and how many there are."""
+    good = [trusted(diagnosis, k) for k in range(len(diagnosis.traces.t))]
+    return sum(int((~g).sum()) for g in good), sum(g.size for g in good)
+
+
+def _counting(diagnosis: Diagnosis) -> str:
+    out, every = left_out(diagnosis)
+    return f'the {every - out} samples that count' if out else 'all samples'
+
+
+def _panels(diagnosis: Diagnosis, changes: bool) -> list[Html]:
+    after = (
+        'With what is ticked mended'
+        if switches(diagnosis)
+        else _after_words(diagnosis).capitalize()
+    )
+    told = [('before', 'As it is', 'Seam coloured by deviation as it is')]
+    if changes:
+        told.append(('after', after, 'Seam coloured by deviation with causes mended'))
+    return [
+        tag(
+            'figure',
+            tag('figcaption', title, ', deviation ', tag('span', class_='times'), ' larger'),
+            tag('canvas', data_side=side, tabindex='0', role='img', aria_label=label),
+        )
+        for side, title, label in told
+    ]
+
+
+def _controls(stations: bool) -> Html:
+    views = [
+        tag('button', name.capitalize(), type='button', data_view=name)
+        for name in ('angled', 'top', 'front', 'side')
+    ]
+    slider = tag(
+        'label',
+        'Deviation drawn ',
+        tag('output', id_='times', class_='times'),
+        ' larger ',
+        tag('input', type='range', id_='stretch', min='0', max='1', step='0.01'),
+    )
+    signs = '○ the instant looked at'
+    return tag(
+        'div',
+        tag('canvas', id_='legend', role='img', aria_label='Colour scale'),
+        tag('div', *views, class_='views'),
+        slider,
+        tag(
+            'span',
+            signs
+            if stations
+            else f'▲ direction of travel (both ways where it goes to and fro)   {signs}',
+            class_='signs',
+        ),
+        class_='controls',
+    )
+
+
+def _charts(diagnosis: Diagnosis) -> Html:
+    """Return the deviation over time, a chart for each recording."""
+    count = len(diagnosis.traces.t)
+    charts = [_chart(diagnosis, k) for k in range(min(count, _RECORDINGS))]
+    more = count - len(charts)
+    note = tag('p', f'{more} more recordings are not drawn.', class_='note') if more > 0 else None
+    title = 'Deviation by station' if at_rest(diagnosis) else 'Deviation along the recording'
+    return joined([tag('h3', title), *charts, note])
+
+
+def _chart(diagnosis: Diagnosis, k: int) -> Html:
+    index = drawn(diagnosis, k)
+    if not index.size:
+        return tag('p', 'No samples.')
+    left, before = parted(diagnosis)[0][k], as_it_is(diagnosis, k)
+    dots = static(diagnosis, k)
+    lines = [Line('as it is', _size(before[index]), 'before', points=dots)]
+    if switches(diagnosis) or diagnosis.model.found:
+        lines.append(Line(_after_words(diagnosis), _size(left[index]), 'after', points=dots))
+    floor = np.full(index.size, 1e3 * diagnosis.gap.noise_floor_m)
+    lines.append(Line('measuring noise', floor, 'soft', dashed=True))
+    axes = (Axis('station') if dots else Axis('time', 's'), Axis('deviation', 'mm'))
+    recording = diagnosis.recordings[k] if k < len(diagnosis.recordings) else None
+    title = recording.name if recording is not None else f'recording {k + 1}'
+    title += _left_out(diagnosis, k)
+    return chart(title, along(diagnosis, k)[index], lines, axes, key=f'run{k}', from_zero=True)
+
+
+def _left_out(diagnosis: Diagnosis, k: int) -> str:
+    """Return which samples of a recording are not drawn, for they would hide all the others."""
+    out = np.flatnonzero(~trusted(diagnosis, k))
+    if not out.size:
+        return ''
+    size = np.linalg.norm(diagnosis.traces.before[k], axis=1)
+    worst = sorted(out[np.argsort(-size[out])][:_LISTED].tolist())
+    told = [seen_at(diagnosis, k, sample, float(size[sample])) for sample in worst]
+    if out.size > _LISTED:
+        told.append(f'{out.size - _LISTED} more')
+    return f' ({counted(out.size, "sample")} left out: {listed(told)})'
+
+
+def _after_words(diagnosis: Diagnosis) -> str:
+    """Return what the second line and picture show: what may be mended, or what only fits best."""
+    named = diagnosis.effects or diagnosis.families or switches(diagnosis)
+    return 'with that mended' if named else 'as far as what fits best leaves it'
+
+
+def _size(deviation: np.ndarray) -> np.ndarray:
+    return np.asarray(1e3 * np.linalg.norm(deviation, axis=1))
+
+
+def seen_at(diagnosis: Diagnosis, k: int, sample: int, size: float) -> str:
+    """Return where along a recording a deviation [m] is, in words."""
+    return f'{millimetres(size)} at {instant(diagnosis, k, sample)}'
+
+
+def instant(diagnosis: Diagnosis, k: int, sample: int) -> str:
+    """Return when a sample of a recording was taken, or which station it is."""
+    if static(diagnosis, k):
+        return f'station {sample + 1}'
+    return f'{along(diagnosis, k)[sample]:.1f} s'

@@ -1,0 +1,192 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What to do, in its order: at the top of the page and on the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from weld_twin_core.diagnosis.advice import actions
+from weld_twin_core.diagnosis.advice.experiment import ELSE, way
+from weld_twin_core.diagnosis.result import Diagnosis, Site
+from weld_twin_core.metrics.conformity import PASS, Rule
+from weld_twin_nodes.wording.leading import in_order
+from weld_twin_nodes.wording.mending import left_without, look_at, warning
+from weld_twin_nodes.wording.quantities import millimetres
+from weld_twin_nodes.wording.words import (
+    cause_by_site,
+    found_name,
+    listed,
+    not_to_be_tried,
+    open_sets,
+    open_sites,
+    same_words,
+    share_by_site,
+    site_name,
+    site_of,
+    unnamed,
+    untried_in_short,
+)
+
+from .controllers import gearing
+
+_LARGEST = 3
+"""Actions told; the others are counted."""
+TOGETHER = (
+    'Take them in together, by corrected programs (weld-twin correct-program), or by the corrected '
+    'robot.yaml or robot.urdf, whose head says what it leaves by itself: one by one they are not '
+    'certain, their sum is.'
+)
+
+
+def worth_doing(diagnosis: Diagnosis, rule: Rule | None = None) -> list[str]:
+    """
+    Return what to do first: mend what is certain and large, tell apart what is open; or look.
+
+    What is certain and smaller comes first only if the tolerance of ``rule`` is met by it alone.
+    """
+    again = _again(diagnosis) if diagnosis.status == 'unknown' else []
+    # The first step names them all.
+    short = f' ({untried_in_short(diagnosis)}, as asked)' if again else ''
+    steps = _with_these(diagnosis, rule)
+    return [*again, *(step.replace(short, '') if short else step for step in steps)]
+
+
+def _with_these(diagnosis: Diagnosis, rule: Rule | None) -> list[str]:
+    """Return what to do with what was found."""
+    if diagnosis.status == 'unknown' and not diagnosis.actions:
+        return _looking(diagnosis)
+    if diagnosis.families and len(diagnosis.actions) > _LARGEST:
+        more = len(diagnosis.actions) - _LARGEST
+        smaller = f'{more} smaller ones are in diagnosis.json.'
+        return [TOGETHER, *diagnosis.actions[:_LARGEST], smaller]
+    if len(diagnosis.actions) != len(diagnosis.effects) or diagnosis.families:
+        return list(diagnosis.actions)
+    if diagnosis.status != 'ambiguous':
+        return _mending(diagnosis)
+    share = share_by_site(diagnosis)
+    sites = [site_of(found) for found in diagnosis.effects]
+    order = sorted(range(len(sites)), key=lambda k: -share.get(sites[k], 0.0))
+    mending = _mending(diagnosis)
+    first = _settled(diagnosis, rule)
+    others = [mending[k] for k in order if sites[k] not in first]
+    now = [f'{mending[k]} {first[sites[k]]}'.rstrip() for k in order if sites[k] in first]
+    return [*now, *_telling(diagnosis), *others]
+
+
+def _settled(diagnosis: Diagnosis, rule: Rule | None) -> dict[Site, str]:
+    """
+    Return which effects are certain and worth mending before it is known what the others are.
+
+    They are larger than all that is open, or enough by themselves: then with what they leave.
+    """
+    share, unsure = share_by_site(diagnosis), open_sites(diagnosis)
+    most = max((share.get(site, 0.0) for site in unsure), default=0.0)
+    held = cause_by_site(diagnosis)
+    out = {}
+    for site in map(site_of, diagnosis.effects):
+        if site in unsure:
+            continue
+        left = left_without(diagnosis, held[site]) if site in held else None
+        if share.get(site, 0.0) > most:
+            out[site] = ''
+        elif left is not None and rule is not None and rule.judged(left.largest_after) == PASS:
+            out[site] = f'That alone leaves {millimetres(left.largest_after)} at most.'
+    return out
+
+
+def _telling(diagnosis: Diagnosis) -> list[str]:
+    """Return what tells the open ones apart."""
+    out = []
+    for group in open_sets(diagnosis):
+        told = f'Find out whether it is {listed([site_name(site) for site in group], "or")}'
+        by = way(sorted({site.effect for site in group}))
+        if by != ELSE:
+            out.append(f'{told}: {by}.')
+        elif diagnosis.contacts is not None or made_for(diagnosis.next_experiment, group):
+            out.append(f'{told}: measure what {_proposed(diagnosis)} proposes{_takes(diagnosis)}.')
+        else:
+            out.append(
+                f'{told}: record other postures and motions than these, and diagnose all together.'
+            )
+    return out
+
+
+def made_for(wanted: Mapping[str, Any] | None, group: Sequence[Site]) -> bool:
+    """Tell whether a proposed measurement is to part two of a set that cannot be told apart."""
+    sides = (wanted or {}).get('between') or ()
+    asked = {(site['effect'], site['joint']) for side in sides for site in side}
+    return sum((site.effect, site.joint) in asked for site in group) > 1
+
+
+def _mending(diagnosis: Diagnosis) -> list[str]:
+    """
+    Return what mends each effect; of those that stand in an open set, under a condition.
+
+    Where mending one alone makes the worst spot worse, that is said beside it.
+    """
+    unsure = open_sites(diagnosis)
+    held = cause_by_site(diagnosis)
+    out = []
+    for named, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
+        if site_of(named) in unsure:
+            action = f'Should it be {found_name(named)}: {action[:1].lower()}{action[1:]}'
+        twins = ' '.join(same_words(diagnosis, site_of(named)))
+        action = ' '.join(filter(None, [action, gearing(named.effect), twins]))
+        worse = warning(diagnosis, held[site_of(named)]) if site_of(named) in held else ''
+        out.append(f'{action} {worse}'.rstrip())
+    return out
+
+
+def _looking(diagnosis: Diagnosis) -> list[str]:
+    """Return where to look, and what to measure, while no cause has a name."""
+    told = [_at(diagnosis, k) for k in in_order(diagnosis)[:_LARGEST]]
+    told = [text for text in told if text]
+    if diagnosis.next_experiment is not None:
+        told.append(
+            f'Measure what {_proposed(diagnosis)} proposes{_takes(diagnosis)}, and diagnose all '
+            'together.'
+        )
+    return told
+
+
+def _again(diagnosis: Diagnosis) -> list[str]:
+    """Return to diagnose with what was left out; nothing where all was tried."""
+    names = not_to_be_tried(diagnosis)
+    if not names:
+        return []
+    one = len(names) == 1
+    return [
+        f'Diagnose again with {listed(names)}: {"it was" if one else "they were"} left out as asked '
+        '(option --exclude-effect of weld-twin diagnose), and '
+        f'{"it" if one else "one of them"} may be the cause.'
+    ]
+
+
+def _at(diagnosis: Diagnosis, k: int) -> str:
+    """Return where to look for a cause, or what mends it where it has a name of its own."""
+    cause = diagnosis.causes[k]
+    if unnamed(cause):
+        return ' '.join(look_at(diagnosis, k))
+    found = diagnosis.model.found
+    held = [found[m] for m in cause.members if m < len(found)]
+    model = diagnosis.model
+    return ' '.join(actions(held, model.robot, model.mends))
+
+
+def minutes(wanted: Mapping[str, Any] | None) -> str:
+    """Return how long a proposed measurement takes; nothing where that is not known."""
+    cost = (wanted or {}).get('cost')
+    return f'about {max(cost, 1.0):.0f} min' if cost else ''
+
+
+def _takes(diagnosis: Diagnosis) -> str:
+    told = minutes(diagnosis.next_experiment)
+    return f' ({told})' if told else ''
+
+
+def _proposed(diagnosis: Diagnosis) -> str:
+    """Return the file that holds the next experiment."""
+    touches = (diagnosis.next_experiment or {}).get('kind') == 'touches'
+    return 'next_touches.csv' if touches else 'next_experiment.yaml'

@@ -1,0 +1,393 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The study as one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Sequence
+from typing import Any
+
+from weld_twin_core import __version__
+from weld_twin_core.effects.registry import REGISTRY
+from weld_twin_nodes.wording.quantities import millimetres
+
+from ..report.html import Html, bars, document, joined, section, table, tag
+from .figures import Drawing
+from .fitter_words import Advice, advised, parameter_words, sized, spread_of
+
+_ALLOWED = 'img-src data:'
+_STYLE = """
+figure { margin: 0 0 1.5rem; } figure img { width: 100%; height: auto; background: #fff; }
+@media screen and (prefers-color-scheme: dark) {
+  figure img { filter: invert(.91) hue-rotate(180deg); }
+}
+.advice th[scope=row] { min-width: 9rem; }
+.claims td:nth-child(4) { font-weight: 600; min-width: 9rem; }
+.claims { font-size: .85rem; } table { margin-bottom: 1rem; }
+"""
+_ADVISED = 5
+"""Tolerances to tighten that are told; the others gain less than these."""
+_SHOWN = 12
+"""Bars shown; the file has all."""
+
+
+def study_page(
+    study: dict[str, Any] | None, claims: dict[str, Any] | None, drawings: Sequence[Drawing]
+) -> str:
+    """Return the page of a study, of a claims table, or of both."""
+    parts: list[Html] = [] if study is None else [*_study(study)]
+    if drawings:
+        parts.append(section('Figures', *(_figure(d) for d in drawings), id_='figures'))
+    if claims is not None:
+        parts.append(_claims(claims))
+    if study is not None:
+        parts.append(_setting(study['setting']))
+    title = (
+        'The claims of the paper'
+        if study is None
+        else (f'Sensitivity of {study["setting"]["robot"]} on {study["setting"]["seam"]}')
+    )
+    foot = tag('p', f'weld_twin {__version__}', class_='note')
+    main = tag('main', tag('h1', title), *parts, foot)
+    return document(title, main, allowed=_ALLOWED, style=_STYLE)
+
+
+def _study(study: dict[str, Any]) -> list[Html]:
+    motions = study['motions']
+    first = next(iter(motions))
+    out = [
+        _answer(first, motions[first]),
+        _tighten(motions),
+        _stack(motions),
+        _local(motions[first]),
+    ]
+    if 'advice' in study:
+        out.append(_advice(study['advice']))
+    if study.get('recorded'):
+        out.append(_recorded(study['recorded']))
+    return out
+
+
+def _answer(motion: str, study: dict[str, Any]) -> Html:
+    found = study['global']
+    indices = found['sobol']['parameter']['d_norm']
+    rows = sorted(indices['indices'], key=lambda row: -row['ST'])
+    settled = 'converged' if indices['converged'] else 'not converged yet'
+    first, *others = advised(study['local']['parameters'], _ADVISED)
+    return section(
+        'Which tolerance to tighten',
+        tag('p', _told(first), class_='second'),
+        _advised([first, *others]),
+        tag('h3', f'What drives the largest deviation, {motion} motion'),
+        _bars(rows[:_SHOWN]),
+        tag(
+            'p',
+            f'Total Sobol indices of the largest deviation with 95 % intervals; '
+            f'N = {indices["base_samples"]}, {indices["runs"]} runs, seed {indices["seed"]}, '
+            f'{settled} (widest half-width '
+            f'{indices["largest_ST_half"]:.3f}, change from half of N '
+            f'{indices["largest_ST_change"]:.3f}); sum of first-order indices '
+            f'{indices["sum_S1"]:.2f}. The fast model is within {found["model_error"]:.0e} of the '
+            'exact twin.',
+            class_='note',
+        ),
+        id_='answer',
+    )
+
+
+def _told(advice: Advice) -> str:
+    text = advice.instruction
+    return (
+        f'{text[:1].upper()}{text[1:]} first: to {advice.wanted}, gains '
+        f'{millimetres(advice.gain_m)}.'
+    )
+
+
+def _advised(rows: Sequence[Advice]) -> Html:
+    heads = ('What to do', 'tolerance now', 'to', 'gains', 'deviation then')
+    cells = [
+        [
+            f'{row.instruction[:1].upper()}{row.instruction[1:]}',
+            row.now,
+            row.wanted,
+            millimetres(row.gain_m),
+            f'{millimetres(row.then_m)} RMS',
+        ]
+        for row in rows
+    ]
+    note = (
+        'The gain is in the RMS deviation that is to be expected along the seam, if this tolerance '
+        'alone is kept five times tighter. Tolerances are independent, so their squares add up.'
+    )
+    return joined([table(heads, cells, 'advice'), tag('p', note, class_='note')])
+
+
+def _index(row: dict[str, Any]) -> str:
+    return f'{row["ST"]:.3f} ± {row["ST_half"]:.3f}'
+
+
+def _bars(rows: Sequence[dict[str, Any]]) -> Html:
+    scale = max(1.0, *(row['ST'] for row in rows))
+    return bars(
+        [(parameter_words(row['name']), row['ST'] / scale, _index(row)) for row in rows], 'wide'
+    )
+
+
+def _tighten(motions: dict[str, Any]) -> Html:
+    parts: list[Html] = []
+    for motion, found in motions.items():
+        sobol = found['global']['sobol']
+        columns = [
+            tag(
+                'div',
+                tag('h3', f'By {by}, {motion}'),
+                _bars(sorted(outputs['d_norm']['indices'], key=lambda row: -row['ST'])),
+            )
+            for by, outputs in sobol.items()
+            if by != 'parameter'
+        ]
+        parts.append(tag('div', *columns, class_='columns'))
+    return section('Groups', *parts, id_='groups')
+
+
+def _stack(motions: dict[str, Any]) -> Html:
+    parts: list[Html] = []
+    for motion, found in motions.items():
+        stack = found['global']['stack']
+        heads = (
+            'of all runs',
+            *(f'{row["percent"]:.0f} %' for row in stack['percentiles']['max_m']),
+        )
+        names = {
+            'max_m': 'largest deviation',
+            'across_m': 'across the seam',
+            'stickout_m': 'stick-out',
+        }
+        rows = [
+            [name, *(f'{1e3 * row["value"]:.3f} mm' for row in stack['percentiles'][key])]
+            for key, name in names.items()
+        ]
+        d_norm = [f'{row["value"]:.2e}' for row in stack['percentiles']['d_norm']]
+        inside = [['as given', *_inside(stack)]]
+        inside += [
+            [f'{k.replace("_", " ")} halved', *_inside(v)]
+            for k, v in found['global']['halved'].items()
+        ]
+        limits = stack['tolerance']
+        parts += [
+            tag('h3', f'{motion}, {stack["runs"]} runs'),
+            table(heads, [*rows, ['D_norm', *d_norm]]),
+            table(
+                (
+                    'probability that the whole seam is inside',
+                    f'across ± {1e3 * limits["across_m"]:.2f} mm',
+                    f'stick-out ± {1e3 * limits["stickout_m"]:.2f} mm',
+                    'both',
+                ),
+                inside,
+            ),
+        ]
+    return section('The tolerance stack', *parts, id_='stack')
+
+
+def _inside(stack: dict[str, Any]) -> list[str]:
+    return [
+        f'{100 * p["value"]:.1f} % ({100 * p["low"]:.1f} to {100 * p["high"]:.1f})'
+        for p in (stack['inside'][key] for key in ('across', 'stickout', 'both'))
+    ]
+
+
+def _local(motion: dict[str, Any]) -> Html:
+    heads = (
+        'parameter',
+        'S analytic',
+        'S by difference',
+        'differ by',
+        'at one tolerance',
+        'S of D_norm',
+        'one tolerance makes',
+    )
+    rows = [
+        [
+            parameter_words(r['name']),
+            f'{r["S_analytic_peak_m"]:.4f} m/{r["unit"]}',
+            f'{r["S_difference_peak_m"]:.4f}',
+            f'{r["disagreement"]:.0e}',
+            f'{r["disagreement_at_tolerance"]:.0e}',
+            f'{r["S_norm"]:.3f} /{r["unit"]}',
+            f'{1e3 * r["contribution_m"]:.3f} mm rms',
+        ]
+        for r in motion['local']['parameters']
+    ]
+    lead = (
+        'Slope of the largest deviation at no error, where D is the tip of a cone and only the '
+        'slope to one side exists, and agreement of dD/dp at an error of one tolerance.'
+    )
+    return section('One error at a time', table(heads, rows), id_='local', lead=lead)
+
+
+def _advice(advice: dict[str, Any]) -> Html:
+    return section(
+        'Trajectory advice',
+        tag('h3', 'Time laws on the same seam, over equal arc length'),
+        _time_laws(advice['profiles']),
+        tag('h3', 'Free torch rotation and base placement'),
+        _placements(advice['placement']),
+        id_='advice',
+    )
+
+
+def _time_laws(profiles: list[dict[str, Any]]) -> Html:
+    laws = [
+        [
+            r['profile'],
+            f'{r["duration_s"]:.1f} s',
+            f'{1e3 * r["expected_without_lag_m"]:.3f} mm',
+            f'{1e3 * r["expected_m"]:.3f} mm',
+            f'{1e3 * r["same_time_m"]:.3f} mm',
+        ]
+        for r in profiles
+    ]
+    return table(
+        (
+            'time law',
+            'takes',
+            'expected, geometry and play',
+            'and a lag of every joint',
+            'the same, all as slow as the slowest',
+        ),
+        laws,
+    )
+
+
+def _placements(placements: list[dict[str, Any]]) -> Html:
+    given = placements[0]['expected_m']
+    places = [
+        [
+            r['free'],
+            f'{57.29578 * r["rotation_rad"]:+.1f} deg',
+            f'{1e3 * r["x_m"]:+.0f} mm',
+            f'{1e3 * r["y_m"]:+.0f} mm',
+            f'{57.29578 * r["yaw_rad"]:+.1f} deg',
+            f'{1e3 * r["expected_m"]:.3f} mm',
+            f'{100 * (1 - r["expected_m"] / given):.1f} %',
+        ]
+        for r in placements
+    ]
+    return table(
+        ('free', 'torch about the wire', 'base x', 'base y', 'base yaw', 'expected', 'gain'),
+        places,
+    )
+
+
+def _recorded(recorded: dict[str, Any]) -> Html:
+    below = recorded['share_of_runs_below']
+    rows = [
+        [
+            'largest deviation',
+            f'{1e3 * recorded["max_m"]:.3f} mm',
+            f'{100 * below["max"]:.1f} % of the runs stay below',
+        ],
+        [
+            'rms',
+            f'{1e3 * recorded["rms_m"]:.3f} mm',
+            f'{100 * below["rms"]:.1f} % of the runs stay below',
+        ],
+        [
+            'across the seam',
+            f'{1e3 * recorded["across_m"]:.3f} mm',
+            'inside' if recorded['inside']['across'] else 'outside the tolerance',
+        ],
+        [
+            'stick-out',
+            f'{1e3 * recorded["stickout_m"]:.3f} mm',
+            'inside' if recorded['inside']['stickout'] else 'outside the tolerance',
+        ],
+    ]
+    return section(
+        'What was recorded',
+        table(('what', 'recorded', 'beside the tolerances'), rows),
+        id_='recorded',
+    )
+
+
+def _figure(drawing: Drawing) -> Html:
+    # As an image, neither the page's style nor another figure's glyphs can get into it.
+    data = b64encode(drawing.svg.encode()).decode()
+    picture = tag('img', src=f'data:image/svg+xml;base64,{data}', alt=drawing.caption)
+    return tag('figure', picture, tag('figcaption', drawing.caption))
+
+
+def _claims(claims: dict[str, Any]) -> Html:
+    rows = [
+        [c['statement'], c['where'], f'{c["held"]} of {c["cases"]}', c['verdict'], c['reason']]
+        for c in claims['claims']
+    ]
+    heads = ('claim', 'in the paper', 'holds as written', 'verdict', 'why, as measured')
+    lead = f'Measured on {", ".join(claims["robots"])}; seams {", ".join(claims["seams"])}.'
+    content = table(heads, rows, 'claims')
+    return section('The claims of the paper', content, id_='claims', lead=lead)
+
+
+def _setting(setting: dict[str, Any]) -> Html:
+    tolerances = [
+        [
+            parameter_words(_name_of(t)),
+            sized(spread_of(t), _unit_of(t)),
+            t['distribution'],
+        ]
+        for t in setting['tolerances']
+    ]
+    plain = [
+        [_ASKED.get(k, k.replace('_', ' ')), _plain(k, v)]
+        for k, v in setting.items()
+        if k != 'tolerances'
+    ]
+    return section(
+        'What was asked',
+        table(('asked', 'value'), plain),
+        tag('h3', f'The {len(tolerances)} tolerances'),
+        table(('tolerance', 'size', 'distribution'), tolerances),
+        tag(
+            'p',
+            'The size is the standard deviation of a normal distribution, and half the width of '
+            'a uniform one.',
+            class_='note',
+        ),
+        id_='setting',
+    )
+
+
+def _name_of(tolerance: dict[str, Any]) -> str:
+    parts = [tolerance['effect'], tolerance.get('joint'), tolerance['parameter']]
+    at = f'[{tolerance["index"]}]' if 'index' in tolerance else ''
+    return '.'.join(part for part in parts if part) + at
+
+
+def _unit_of(tolerance: dict[str, Any]) -> str:
+    parameters = REGISTRY[tolerance['effect']].parameters
+    return next(p.unit for p in parameters if p.name == tolerance['parameter'])
+
+
+_ASKED = {
+    'tool': 'tool of the cell, in the flange',
+    'length_m': 'length of the seam',
+    'across_m': 'allowed across the seam',
+    'stickout_m': 'allowed in stick-out',
+}
+_LENGTHS = ('length_m', 'across_m', 'stickout_m')
+
+
+def _plain(key: str, value: Any) -> str:
+    if key in _LENGTHS and isinstance(value, float):
+        return f'{1e3 * value:.4g} mm'
+    if key == 'tool' and isinstance(value, dict):
+        x, y, z = (f'{1e3 * v:.4g}' for v in value['xyz'])
+        turn = ', '.join(f'{v:.4g}' for v in value['quat_xyzw'])
+        return f'({x}, {y}, {z}) mm, quaternion x y z w ({turn})'
+    if isinstance(value, dict):
+        return '; '.join(f'{name} {_plain("", item)}' for name, item in value.items())
+    if isinstance(value, list):
+        return ', '.join(_plain('', item) for item in value) or 'none'
+    return f'{value:.6g}' if isinstance(value, float) else str(value)

@@ -1,0 +1,204 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The tasks of a sensitivity study; each a function of plain arguments to plain data."""
+
+from __future__ import annotations
+
+from base64 import b64decode, b64encode
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core import sensitivity
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.motion.paths import Path, Torch, default_seam
+from weld_twin_core.sensitivity import (
+    Model,
+    MorrisDesign,
+    Outcomes,
+    SobolDesign,
+    Study,
+    Tolerance,
+)
+from weld_twin_core.sensitivity.outcome import joined
+from weld_twin_nodes.offline.content_hash import digest
+from weld_twin_nodes.offline.task_pool import Runner, Task
+
+BLOCK = 32_768
+"""Runs of one task: with their results they take some ten megabytes and a part of a second."""
+_KEPT = 2
+"""Models that a worker keeps: one for each motion of a seam."""
+_models: dict[str, Model] = {}
+"""What a worker made last, by content: it sees the same study many times."""
+
+
+def _model(study: Study, tolerances: tuple[Tolerance, ...]) -> Model:
+    key = digest(study, tolerances)
+    if key not in _models:
+        while len(_models) >= _KEPT:
+            del _models[next(iter(_models))]
+        _models[key] = sensitivity.model(study, tolerances)
+    return _models[key]
+
+
+@dataclass(frozen=True)
+class StackDesign:
+    """Which runs a tolerance stack needs: independent ones, as many as were asked for."""
+
+    runs: int
+    inputs: int
+    seed: int = 0
+
+    def samples(self) -> Array:
+        """Return probabilities of every input, shape (runs, P)."""
+        return sensitivity.probabilities(self.runs, self.inputs, self.seed)
+
+
+Design = SobolDesign | MorrisDesign | StackDesign
+"""Which runs are wanted: small to send, where its samples are not."""
+
+
+def count_of(design: Design) -> int:
+    """Return how many runs a design has."""
+    if isinstance(design, SobolDesign):
+        return design.base_samples * (len(design.labels) + 2)
+    if isinstance(design, MorrisDesign):
+        return design.trajectories * (len(design.names) + 1)
+    return design.runs
+
+
+@lru_cache(maxsize=1)
+def _samples(design: Design) -> Array:
+    return design.samples()
+
+
+def run_packed(
+    study: Study,
+    tolerances: tuple[Tolerance, ...],
+    design: Design,
+    start: int,
+    drawn: tuple[Tolerance, ...] | None = None,
+) -> dict[str, Any]:
+    """
+    Return what a block of a design's runs comes to, `packed`, and how exact the model is.
+
+    ``drawn`` are narrower tolerances of the same errors that the runs are drawn from: the model of
+    the wider ones holds for them.
+    """
+    model = _model(study, tolerances)
+    block = _samples(design)[start : start + BLOCK]
+    found = model(sensitivity.draws_at(drawn or tolerances, block))
+    return {'model_error': model.error, 'outcomes': packed(found)}
+
+
+def packed(found: Outcomes) -> str:
+    """Return outcomes as text, without the digits that take most of the time of a fast model."""
+    return b64encode(np.ascontiguousarray(found, dtype='<f8').tobytes()).decode()
+
+
+def unpacked(text: str) -> Outcomes:
+    """Return the outcomes that were `packed`, exactly."""
+    rows = np.frombuffer(b64decode(text), dtype='<f8').reshape(len(Outcomes._fields), -1)
+    return Outcomes(*rows)
+
+
+def local(study: Study, tolerances: tuple[Tolerance, ...]) -> dict[str, Any]:
+    """Return the local sensitivities, and how the arm stands."""
+    found = sensitivity.local_sensitivity(study, tolerances)
+    stand = sensitivity.posture(study)
+    return {
+        **found.as_dict(),
+        'posture': {'s_m': study.s, **asdict(stand)},
+        'expected_m': sensitivity.expected_deviation(study, tolerances),
+    }
+
+
+def sweeps(study: Study, tolerances: tuple[Tolerance, ...]) -> list[dict[str, Any]]:
+    """Return the deviation over the size of every error, and where it stops being linear."""
+    out = []
+    for tolerance in tolerances:
+        found = sensitivity.sweep(study, tolerance, sensitivity.default_values(tolerance))
+        end = None
+        if tolerance.unit == 'rad' and tolerance.effect != 'backlash':
+            end = sensitivity.end_of_linearity(study, tolerance)
+        out.append({**found.as_dict(), 'linear_up_to': end})
+    return out
+
+
+def profiles(robot: Robot, path: Path, tolerances: tuple[Tolerance, ...]) -> list[dict[str, Any]]:
+    """Return what the time laws do to the seam, with a lag of every joint besides."""
+    lag = sensitivity.default_tolerances(robot, ('servo_lag',))
+    wanted = {t.name: t for t in (*lag, *tolerances)}
+    found = sensitivity.compare_profiles(robot, path, tuple(wanted.values()))
+    still = sensitivity.compare_profiles(robot, path, tolerances)
+    return [
+        {**asdict(a), 'expected_without_lag_m': b.expected_m}
+        for a, b in zip(found, still, strict=True)
+    ]
+
+
+def placement(
+    robot: Robot,
+    path: Path,
+    tolerances: tuple[Tolerance, ...],
+    torch: Torch,
+    tries: int,
+    seed: int,
+) -> list[dict[str, Any]]:
+    """Return the best torch rotation and base placement."""
+    found = sensitivity.advise(robot, path, tolerances, torch=torch, tries=tries, seed=seed)
+    return [result.as_dict() for result in found]
+
+
+def claim_case(robot: Robot, seam: str, seed: int) -> dict[str, float]:
+    """Return the measurements of a robot on a bundled seam that decide the claims."""
+    # A study without claims does without what they bring along.
+    from weld_twin_core.sensitivity.claims import measure_case
+
+    return measure_case(robot, default_seam(robot, seam), seed)
+
+
+Job = tuple[Study, tuple[Tolerance, ...], Design, tuple[Tolerance, ...] | None]
+"""A study, its tolerances, its runs, and what they are drawn from if from narrower ones."""
+
+
+def run_all(
+    runner: Runner,
+    jobs: dict[str, Job],
+    pieces: Sequence[Task] = (),
+    meanwhile: Callable[[], object] | None = None,
+) -> tuple[dict[str, tuple[Outcomes, float]], list[Any]]:
+    """
+    Return what the runs of every job come to with the largest error of its model, and the pieces.
+
+    Parameters
+    ----------
+    runner : Runner
+    jobs : mapping from label to Job
+    pieces : sequence of Task
+        Begun first, the longest in front: what is left for the end is short then.
+    meanwhile : callable, optional
+        What this process does once the workers have their tasks.
+
+    """
+    tasks, owners = list(pieces), []
+    for label, (study, tolerances, design, drawn) in jobs.items():
+        count = count_of(design)
+        for start in range(0, count, BLOCK):
+            text = f'{label}: runs {start} to {min(start + BLOCK, count)}'
+            tasks.append(Task(run_packed, (study, tolerances, design, start, drawn), text))
+            owners.append(label)
+    parts: dict[str, list[dict[str, Any]]] = {label: [] for label in jobs}
+    results = runner.run(tasks, meanwhile)
+    for label, result in zip(owners, results[len(pieces) :], strict=True):
+        parts[label].append(result)
+    found = {label: (_joined(own), own[0]['model_error']) for label, own in parts.items()}
+    return found, results[: len(pieces)]
+
+
+def _joined(parts: list[dict[str, Any]]) -> Outcomes:
+    return joined([unpacked(part['outcomes']) for part in parts])

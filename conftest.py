@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What holds for the tests of every package, and which of them run side by side."""
 
+import gc
 import os
 import shutil
 import sys
@@ -14,6 +15,16 @@ os.environ.setdefault('OMP_NUM_THREADS', '1')
 # The tests start hundreds of processes; without files of bytecode each compiles all it imports.
 os.environ.pop('PYTHONDONTWRITEBYTECODE', None)
 sys.dont_write_bytecode = False
+
+# Thousands of tests are collected and stay; looking through them for garbage costs a tenth.
+gc.disable()
+
+
+def pytest_collection_finish():
+    """Look for garbage from now on, and only in what is made from now on."""
+    gc.freeze()
+    gc.enable()
+
 
 CELLS = 'cells'
 

@@ -284,7 +284,7 @@ def test_goals_are_corrected_refused_and_passed_through(cell, tmp_path):
 def test_poses_are_corrected_and_in_the_shadow_nothing_is_sent(cell, tmp_path):
     model = tmp_path / 'diagnosis.json'
     write_model(model)
-    planner = Planner(cell, model, apply=False)
+    planner = Planner(cell, model, apply=False, executor='single_threaded')
     handle, _ = planner.send(planner.goal(sway()))
     assert not handle.accepted  # not active
     planner.go('configure', 'activate')

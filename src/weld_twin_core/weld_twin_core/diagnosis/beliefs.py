@@ -143,9 +143,13 @@ class Beliefs:
     looks. Chance reaches 25 once in 3000 looks; the rest is a judgement, as what no model of the
     arm has looks like a motion of the set-up too."""
 
-    family_worth: float = _verdict(1.0)
-    """Share of the squared unseen error by which it must grow without a family to name it: it
-    doubles. A judgement."""
+    family_worth: float = _verdict(0.1)
+    """Share by which the RMS error on unseen data grows without a kind, in the median part left out,
+    from which on the kind is named; a tenth is what a calibration is worth doing for."""
+
+    joint_worth: float = _verdict(0.1)
+    """Share of a kind from which on a joint of it is told, and how nearly as well as the kind another
+    must do to be told beside it. A judgement."""
 
     member_least_m: float = _verdict(1e-6)
     """RMS at the tool [m] below which a member is not listed: no instrument sees it."""
@@ -174,10 +178,8 @@ class Beliefs:
     a model that leaves e times as much elsewhere fits neither."""
 
     returns: float = _unseen(0.8, most=1.0)
-    """Share of the halves of the data on which the search must find again what is named, and of the
-    stretches and regions of posture left out by which a family must be missed: what is named comes
-    back. Odd and even halves of recordings of two real arms then name the same families in 27 of
-    30 pairs, and in 26 at three parts in four; by the mean over the parts in 19."""
+    """Share of the halves of the data on which the search must find again what is named: what is
+    named comes back."""
 
     # The verdict -----------------------------------------------------------------------------
 
@@ -280,10 +282,6 @@ class Beliefs:
     noise_unseen: float = _verdict(0.6)
     """Belief in 'none' where nothing on the recordings shows the noise by itself and what
     remains is not spread as noise is. Moved: nothing changes."""
-
-    likelier: float = _verdict(0.5)
-    """Probability below which families are more likely wrong than right, and are not named. By the
-    meaning of a probability."""
 
     families: float = _verdict(0.75)
     """Belief in the families named where nothing is left: dozens of errors at once are seldom

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pairing by stamp, against curves whose value between samples is known."""
 
+import time
 from contextlib import suppress
 
 import numpy as np
@@ -14,6 +15,9 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.metrics.deviation import deviation_metrics
 from weld_twin_core.metrics.running import RunningMetrics
 from weld_twin_msgs_py.assembly.stamp_order import RESTART_AFTER, Forward
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import MEASURED_POSE, TWIN_BASE, TWIN_POSE
+from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.streams.deviation_stream import Deviations
 from weld_twin_nodes.streams.pairing import Pairing
 
@@ -189,6 +193,23 @@ def test_metrics_begin_anew_where_the_twin_does():
     run(0, near)
     assert told.metrics()['max'] == pytest.approx(1e-4)
     assert 0 < told.samples <= RESTART_AFTER
+
+
+def test_the_last_metrics_of_a_run_are_told_once(cell):
+    cell.add(DeviationAnalyzer, reliable_inputs=True, metrics_idle=0.05)
+    metrics, base = cell.collect('/deviation/metrics'), cell.publisher(TWIN_BASE)
+    each = cell.publisher(TWIN_POSE), cell.publisher(MEASURED_POSE)
+    base.publish(cell.messages.pose(1, np.zeros(3), np.eye(3)))
+    for k in range(1, 4):
+        for out in each:
+            out.publish(cell.messages.pose(k * 10 * MS, np.zeros(3), np.eye(3)))
+    cell.wait(
+        lambda: len(metrics) > 0 and from_messages.metrics(metrics.last)['samples'] == 3,
+        'the last metrics',
+    )
+    count, end = len(metrics), time.monotonic() + 0.4
+    cell.wait(lambda: time.monotonic() > end, 'some more looks')
+    assert len(metrics) == count
 
 
 def test_running_metrics_are_those_of_the_whole_run():

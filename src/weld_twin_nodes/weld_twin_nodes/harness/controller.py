@@ -39,6 +39,8 @@ class Controller(Node):
     ----------
     goals : list
         Those it was given, in their order.
+    track : list of (int, float)
+        Stamps [ns] of the joint states on the way of the latest goal, and its time there [s].
     accepts : bool
         Whether it takes goals.
     answers : float [s]
@@ -60,6 +62,7 @@ class Controller(Node):
         self._kind, self._names, self._pace = FollowJointTrajectory, tuple(joint_names), pace
         self.q = np.array(q, dtype=np.float64)
         self.goals: list[Any] = []
+        self.track: list[tuple[int, float]] = []
         self.accepts, self.answers = True, 0.0
         self._encode = JointStateEncoder(self._names)
         self._states = self.create_publisher(
@@ -105,7 +108,7 @@ class Controller(Node):
         if goal.t[0] > 0.0:
             rates = [None if r is None else np.vstack([np.zeros_like(r[:1]), r]) for r in goal[2:]]
             goal = Goal(np.append(0.0, goal.t), np.vstack([self.q, goal.q]), *rates)
-        self._now = (handle, goal, time.monotonic(), done)
+        self._now, self.track = (handle, goal, time.monotonic(), done), []
         end = await done
         if end == 'done':
             handle.succeed()
@@ -125,7 +128,7 @@ class Controller(Node):
         t = min((time.monotonic() - begun) * self._pace, float(goal.t[-1]))
         way = course(goal, np.array([t]))
         self.q = way.q[0]
-        self._tell(way.qd[0])
+        self.track.append((self._tell(way.qd[0]), t))
         feedback = self._kind.Feedback(joint_names=list(self._names))
         feedback.desired.positions = self.q.tolist()
         handle.publish_feedback(feedback)
@@ -133,8 +136,9 @@ class Controller(Node):
             self._now = None
             done.set_result('cancelled' if handle.is_cancel_requested else 'done')
 
-    def _tell(self, qd: Array | None = None) -> None:
+    def _tell(self, qd: Array | None = None) -> int:
         stamp = self.get_clock().now().nanoseconds
         self._states.publish(
             self._encode(stamp, self.q, np.zeros_like(self.q) if qd is None else qd)
         )
+        return int(stamp)

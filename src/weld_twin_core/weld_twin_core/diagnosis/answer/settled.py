@@ -25,8 +25,8 @@ def settled(verdict: Verdict, causes: Sequence[Cause]) -> Verdict:
         With the probabilities that they have earned, and with what is left.
 
     """
-    named = sum(c.share for c in causes if c.slot is not None and c.probability > LIKELIER)
-    left = sum(c.share for c in causes if c.slot is None)
+    named = sum(c.share for c in causes if c.effect is not None and c.probability > LIKELIER)
+    left = sum(c.share for c in causes if c.effect is None)
     if verdict.status in ('identified', 'ambiguous') and causes and named <= left:
         return replace(verdict, status='unknown')
     if verdict.status != 'unknown' or not verdict.sets or left >= named:

@@ -56,7 +56,9 @@ def level_group_of(status: str, signs: Mapping[str, float], *, named: bool) -> s
     """
     if signs.get('partly', 0.0) > 0.0:
         return PARTLY if named else 'unknown'
-    return status if status == 'unknown' else group_of(status, signs)
+    if not named and status == 'unknown':
+        return status
+    return group_of(status, signs)
 
 
 def trusted(
@@ -129,7 +131,10 @@ def trusted_cause(cause: Cause, status: str, signs: Mapping[str, float], trust: 
     trust : Trust
 
     """
-    group = level_group_of(status, signs, named=cause.slot is not None)
+    # Of many small errors a cause is a kind, and none was found one by one.
+    many = bool(cause.name) and signs.get('families', 0.0) > 0.0
+    named = cause.slot is not None or many
+    group = level_group_of(status, signs, named=named)
     place, dependence, name = (
         trust.learned(level, group, signs) for level in ('place', 'dependence', 'name')
     )
@@ -142,7 +147,6 @@ def trusted_cause(cause: Cause, status: str, signs: Mapping[str, float], trust: 
         dependence=_led(cause.dependence, dependence),
         name=_scaled(cause.name, name),
     )
-    named = cause.slot is not None or group == 'families'
     told = sum(p for _, p in out.name) if named else max((p for _, p in out.place), default=0.0)
     sure = trust.sure('name' if named else 'place', group, signs)
     return replace(out, probability=float(min(told, 1.0)), sure=sure)

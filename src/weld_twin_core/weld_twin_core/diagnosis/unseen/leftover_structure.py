@@ -88,6 +88,8 @@ def _generic(problem: Problem, model: Model, scale: Scale) -> Iterator[tuple[str
         motion = _column_group(problem, features, scale, i, _motion)
         if motion is not None:
             yield f'the speed and acceleration of {joint}', motion
+    if problem.untracked and not problem.placed:
+        return  # no instrument measured, and nothing shows where the base stands
     yield 'time', _pose_group(problem, features, scale, _time)
     yield 'a step in time', _pose_group(problem, features, scale, _steps)
     yield 'the place in the workspace', _pose_group(problem, features, scale, _place)

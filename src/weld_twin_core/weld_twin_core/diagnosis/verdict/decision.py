@@ -16,10 +16,6 @@ from ..result import Family, Site
 from .evidence import Evidence
 from .weighing import TINY, Weighed
 
-_MANY_IMITATE = (
-    'many small errors together fit best, but leave so much that they rather imitate a cause that '
-    'is not in the library'
-)
 _CANCEL = (
     'the effects that fit best nearly cancel each other: together they imitate a cause that is '
     'not in the library'
@@ -114,28 +110,37 @@ def _of_nothing(case: Weighed) -> Verdict:
 
 
 def _of_families(case: Weighed) -> Verdict:
-    """Return the families that earn their place on unseen data, each with its members."""
+    """Return the families that unseen data need, each with the joints that they need it on."""
     beliefs = case.beliefs
     families = []
     for told in case.evidence.families or ():
         members = tuple(item for item in told.members if item[1] > beliefs.member_least_m)
-        named = told.returns(beliefs.family_worth) >= beliefs.returns
         if members:
-            families.append(Family(told.effect, named, told.rms_m, members))
+            named = told.named(beliefs.family_worth)
+            needed = tuple(item for item in told.needed if item[1] >= beliefs.joint_worth)
+            like = tuple(item for item in told.like if item[1] >= beliefs.joint_worth)
+            more = told.median, needed, like, told.share
+            families.append(Family(told.effect, named, told.rms_m, members, *more))
     families.sort(key=lambda family: -family.rms_m)
-    sets = tuple((site,) for family in families if family.named for site, _ in family.members)
+    sets = tuple(group for family in families if family.named for group in _sets_of(family))
     reason = (
-        'many small errors act together; members of one family are fitted jointly and only their '
-        'sum is certain'
+        'many small errors act together; a kind is named where unseen data get worse without it, '
+        'whatever the others do in its place'
     )
     if not sets:
         return Verdict('unknown', beliefs.doubted, (), (reason, _NO_KIND), tuple(families))
-    sure = beliefs.families * case.complete
-    if case.left <= beliefs.unexplained and sure < beliefs.likelier:
-        # As likely as not something else: members are kept in the model, and none is named.
-        return Verdict('unknown', beliefs.doubted, (), (_MANY_IMITATE,), tuple(families))
-    status = 'unknown' if case.left > beliefs.unexplained else 'identified'
-    return Verdict(status, sure, sets, (reason,), tuple(families))
+    alone = all(len(group) == 1 for group in sets)
+    status = 'identified' if alone else 'ambiguous'
+    if case.left > beliefs.unexplained:
+        status = 'unknown'
+    return Verdict(status, beliefs.families * case.complete, sets, (reason,), tuple(families))
+
+
+def _sets_of(family: Family) -> list[tuple[Site, ...]]:
+    """Return a set for every joint of a kind; what would do as well as the kind is in the first."""
+    sites = [site for site, _ in family.needed]
+    like = tuple(site for site, _ in family.like)
+    return [(sites[0], *like), *((site,) for site in sites[1:])] if sites else []
 
 
 def _confidence(case: Weighed, sets: tuple[tuple[Site, ...], ...]) -> float:

@@ -167,7 +167,7 @@ def _explained(
     verdict = decide(evidence, beliefs)
     rival = curved(found, beliefs)
     verdict, missed = formulas(found, unseen, verdict, rival, beliefs)
-    verdict, rival = standing(found, verdict, rival, beliefs)
+    rival = standing(found, verdict, rival, beliefs)
     back = came_back(found, verdict, stability)
     each = signs_of_found(found, unseen, evidence, verdict, back, holdout)
     own = signs_of_answer(found, unseen, evidence, verdict, rival, examined.checks, each)

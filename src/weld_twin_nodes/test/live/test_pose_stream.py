@@ -23,9 +23,7 @@ LIMITS = GoalLimits(rate=5e-3)
 
 
 def stream(**options):
-    cause = effect_from_mapping(
-        {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 6e-4}
-    )
+    cause = effect_from_mapping({'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 6e-4})
     found = PoseCorrection(ProgramModel(UR5, (cause,)), UR5.T_flange_tool)
     return PoseStream(found, LIMITS, **options)
 

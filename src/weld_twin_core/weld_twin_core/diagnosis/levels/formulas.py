@@ -157,8 +157,7 @@ def held_against(
     Return the verdict, or 'unknown' where a free form predicts clearly better than the names.
 
     There is no 'none' where a free form predicts what looks like noise, whether or not a curve can
-    carry it to another motion. What is named stays told; `standing` says whether it holds beside
-    what is left.
+    carry it to another motion. What is named stays told, beside what is left.
 
     Parameters
     ----------

@@ -42,6 +42,7 @@ SECONDS, RATE = 40.0, 50.0
 NOISE = (2e-5, 1e-4)
 """Standard deviation of a measured coordinate there [m]: a laser tracker, a good camera."""
 TRIES = 200
+"""Goals that are drawn for an arm before it is given up: many are out of its reach."""
 
 
 class DrawnGoal(NamedTuple):

@@ -71,6 +71,8 @@ class Search:
         What would explain the rest best, but no machine has.
     ruled_out : frozenset of Site
         What is alike on the recordings fitted, and fails on held-out ones.
+    many : Search or None
+        All kinds fitted together, where that predicts as well as the few do.
 
     """
 
@@ -87,6 +89,7 @@ class Search:
     dense: bool = False
     refused: tuple[Effect, ...] = ()
     ruled_out: frozenset[Site] = frozenset()
+    many: Search | None = None
 
     @property
     def library(self) -> Library:

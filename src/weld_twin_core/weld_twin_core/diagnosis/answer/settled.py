@@ -25,11 +25,16 @@ def settled(verdict: Verdict, causes: Sequence[Cause]) -> Verdict:
         With the probabilities that they have earned, and with what is left.
 
     """
-    named = sum(c.share for c in causes if c.effect is not None and c.probability > LIKELIER)
-    left = sum(c.share for c in causes if c.effect is None)
+    named = sum(c.share for c in causes if _found(c) and c.probability > LIKELIER)
+    left = sum(c.share for c in causes if not _found(c))
     if verdict.status in ('identified', 'ambiguous') and causes and named <= left:
         return replace(verdict, status='unknown')
     if verdict.status != 'unknown' or not verdict.sets or left >= named:
         return verdict
     alone = all(len(group) == 1 for group in verdict.sets)
     return replace(verdict, status='identified' if alone else 'ambiguous')
+
+
+def _found(cause: Cause) -> bool:
+    """Return whether a cause is an effect that was found, or a kind of many small ones."""
+    return cause.slot is not None or cause.effect is not None

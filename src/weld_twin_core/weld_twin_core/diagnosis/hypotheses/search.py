@@ -72,7 +72,7 @@ class Search:
     ruled_out : frozenset of Site
         What is alike on the recordings fitted, and fails on held-out ones.
     many : Search or None
-        All kinds fitted together, where that predicts as well as the few do.
+        All kinds fitted together, where that predicts about as well as the few do.
 
     """
 

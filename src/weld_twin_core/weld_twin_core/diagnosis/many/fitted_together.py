@@ -90,7 +90,7 @@ def fitted_together(
             return trial
     if better:
         return best
-    return replace(found, many=best) if left < few else found
+    return replace(found, many=best) if left < CHOSEN * few else found
 
 
 def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:

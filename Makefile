@@ -9,8 +9,14 @@ RUN := tools/in_env
 demo: setup
 	@$(RUN) weld-twin demo --out out
 
-test: lint
-	@$(RUN) python -m pytest -n auto --dist loadscope --no-loadscope-reorder
+# Types are checked beside the tests, which wait for nodes half of their time.
+test: setup-test
+	@$(RUN) ruff check .
+	@$(RUN) ruff format --check .
+	@mkdir -p build
+	@nice $(RUN) mypy > build/types.txt 2>&1 & types=$$!; \
+	$(RUN) python -m pytest -n auto --dist loadscope --no-loadscope-reorder; tests=$$?; \
+	wait $$types; types=$$?; cat build/types.txt; exit $$((tests | types))
 	@tools/browser why
 
 docs: setup-docs

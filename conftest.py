@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What holds for the tests of every package, and which of them run side by side."""
 
+import gc
 import os
 import shutil
 import sys
@@ -14,6 +15,16 @@ os.environ.setdefault('OMP_NUM_THREADS', '1')
 # The tests start hundreds of processes; without files of bytecode each compiles all it imports.
 os.environ.pop('PYTHONDONTWRITEBYTECODE', None)
 sys.dont_write_bytecode = False
+
+# Thousands of tests are collected and stay; looking through them for garbage costs a tenth.
+gc.disable()
+
+
+def pytest_collection_finish():
+    """Look for garbage from now on, and only in what is made from now on."""
+    gc.freeze()
+    gc.enable()
+
 
 CELLS = 'cells'
 
@@ -33,6 +44,10 @@ FIRST_LINE = ('/recording/', '/install/')
 BESIDE = 5
 """How much less the other tests weigh for the scheduler than those of cells, which stand in line one
 after the other and would else end last; 5 is a third of the weight."""
+
+
+SOLVED = 'test/diagnosis: solved('
+"""Folder, and what its files call for a diagnosis that is made once in a process."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -56,7 +71,8 @@ def pytest_xdist_make_scheduler(config, log):
 
     Files with the mark `cells` stand in two lines, those that record or install and the others, so
     that no more than two cells of nodes compete for the processor. Any other file goes to the next
-    process that is free, and stays whole, so that its fixtures are made once.
+    process that is free, and stays whole, so that its fixtures are made once; files that ask
+    `SOLVED` for the same diagnoses stay together.
     """
     from xdist.scheduler import LoadScopeScheduling
 
@@ -66,7 +82,8 @@ def pytest_xdist_make_scheduler(config, log):
             file = nodeid.partition('::')[0]
             text = (config.rootpath / file).read_text(encoding='utf-8')
             if f'mark.{CELLS}' not in text:
-                return file
+                folder, call = SOLVED.split(': ')
+                return SOLVED if file.startswith(folder) and call in text else file
             return f'{CELLS} {any(part in file for part in FIRST_LINE)}'
 
     return ByFile(config, log)

@@ -11,6 +11,7 @@ from sphinx.application import Sphinx
 
 from weld_twin_msgs_py.messages.topics import TOPICS, VOLATILE, Qos
 from weld_twin_nodes.live.cell_node import CellNode
+from weld_twin_nodes.live.compensator import Compensator
 from weld_twin_nodes.live.contact_marker import ContactMarker
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.deviation_markers import DeviationMarkers
@@ -29,6 +30,7 @@ NODES: dict[str, type[CellNode]] = {
     'deviation_analyzer': DeviationAnalyzer,
     'deviation_markers': DeviationMarkers,
     'contact_marker': ContactMarker,
+    'compensator': Compensator,
     'live_diagnosis': LiveDiagnosis,
     'recorder': Recorder,
 }
@@ -74,6 +76,8 @@ def _section(
             ('hears', spoken.hears),
             ('answers', spoken.answers),
             ('asks', spoken.asks),
+            ('offers the action', spoken.does),
+            ('sends goals to', spoken.sends),
         ):
             own = [n for n in names if n not in COMMON]
             if own:

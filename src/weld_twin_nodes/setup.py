@@ -38,6 +38,7 @@ setup(
             'live_diagnosis = weld_twin_nodes.live.live_diagnosis:main',
             'deviation_markers = weld_twin_nodes.live.deviation_markers:main',
             'contact_marker = weld_twin_nodes.live.contact_marker:main',
+            'compensator = weld_twin_nodes.live.compensator:main',
         ]
     },
 )

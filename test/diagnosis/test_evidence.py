@@ -10,9 +10,7 @@ from scipy.stats import norm
 
 from weld_twin_core.diagnosis.algebra.gram import Gram
 from weld_twin_core.diagnosis.algebra.independent_rows import effective_share
-from weld_twin_core.diagnosis.hypotheses.choices import ranking
-from weld_twin_core.diagnosis.hypotheses.library import Unit
-from weld_twin_core.diagnosis.hypotheses.seed_systems import SeedSystems, evidence
+from weld_twin_core.diagnosis.hypotheses.seed_systems import SeedSystems, Unit, evidence, ranking
 
 
 def wandering(rho, samples, components, seed=0):

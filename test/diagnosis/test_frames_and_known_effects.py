@@ -39,7 +39,7 @@ def holds(found, truth=1.2e-5):
 
 def test_arbitrary_base_and_tool_frames_are_found_and_the_cause_with_them():
     robot, base, tool = load('ur5'), frame(1), frame(11)
-    recording = recorded(robot.with_frames(base=base, tool=tool), [SPRING], static=120)
+    recording = recorded(robot.with_frames(base=base, tool=tool), [SPRING], static=70)
     answer = diagnose([recording], robot, align=frozenset({'base', 'tool'}))
     assert {('joint_compliance', 'shoulder_lift_joint')} in sites(answer)
     assert holds(spring(answer))
@@ -65,7 +65,7 @@ def test_two_recordings_each_have_a_base_frame_of_their_own():
 def test_an_effect_known_beforehand_is_not_diagnosed_again():
     robot = load('ur5')
     known = effect('joint_compliance', joint='shoulder_lift_joint', compliance=1.2e-5)
-    recording = recorded(robot, [SPRING], static=120, richness=0.0)
+    recording = recorded(robot, [SPRING], static=70, richness=0.0)
     answer = diagnose([recording], robot, known=[known])
     assert (answer.status, answer.effects) == ('none', ())
     assert answer.gap.rms_m == pytest.approx(FLOOR, rel=0.1)
@@ -76,7 +76,7 @@ def test_held_out_recordings_judge_the_shrink():
     robot = load('ur5')
     seen, unseen = (
         recorded(robot, [SPRING], seed, static=n, name=name)
-        for seed, n, name in ((1, 120, 'seen'), (2, 60, 'unseen'))
+        for seed, n, name in ((1, 70, 'seen'), (2, 50, 'unseen'))
     )
     answer = diagnose([seen], robot, holdout=[unseen])
     shrink = answer.shrink

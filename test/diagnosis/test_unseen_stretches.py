@@ -30,7 +30,8 @@ def made_up(columns, blocks, seed=0, rows=640, parts=3, prior=0.0):
     slices = tuple(slice(lo, hi) for lo, hi in pairwise(bounds))
     precision = np.concatenate([np.zeros(2), rng.uniform(0.0, prior, columns - 2)])
     pull = precision * rng.normal(size=columns)
-    return Unseen(None, None, labels, Design.of(a), slices, targets, precision, pull)
+    told = targets[0], lambda: targets[1:]
+    return Unseen(None, None, labels, Design.of(a), slices, *told, precision, pull)
 
 
 def refitted(unseen, kept, extra=None, ridge=0.0):
@@ -84,7 +85,8 @@ def test_a_model_without_frames_and_effects_predicts_its_target():
         unseen.labels,
         Design.of(np.zeros((0, unseen.labels.size))),
         (),
-        unseen.targets[:1],
+        unseen.residual,
+        lambda: np.zeros((0, unseen.labels.size)),
         np.zeros(0),
         np.zeros(0),
     )
@@ -168,6 +170,7 @@ def test_what_one_stretch_alone_shows_stays_put_elsewhere():
     spikes = rng.normal(size=(60, labels.size)) * np.where(labels == 0, 1e6, 1e-6)
     columns, target = np.concatenate([steady[None], spikes]), 2.0 * steady
     none = np.zeros(len(columns))
-    unseen = Unseen(None, None, labels, Design.of(columns), (), target[None], none, none)
+    told = target, lambda: np.zeros((0, labels.size))
+    unseen = Unseen(None, None, labels, Design.of(columns), (), *told, none, none)
     left = unseen.base([]).residual
     np.testing.assert_allclose(left[labels > 0], 0.0, atol=1e-6)

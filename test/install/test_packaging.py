@@ -7,6 +7,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
+from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -55,6 +56,7 @@ ROS = {
     'rosidl_typesupport_fastrtps_c',
     'rosidl_typesupport_introspection_c',
     'sensor_msgs',
+    'sros2',
     'std_srvs',
 }
 
@@ -104,15 +106,23 @@ def test_both_ways_of_installing_have_the_same_programs():
     assert programs == PROJECT['scripts']
 
 
+@cache
 def imported(package, *, at_once=False):
-    """Yield the modules a package imports, or only those importing it brings in at once."""
+    """Return the modules a package imports, or only those importing it brings in at once."""
+    out = set()
     for file in (ROOT / 'src' / package / package).rglob('*.py'):
-        tree = ast.parse(file.read_text())
+        tree = parsed(file)
         for node in tree.body if at_once else ast.walk(tree):
             if isinstance(node, ast.Import):
-                yield from (name.name.split('.')[0] for name in node.names)
+                out |= {name.name.split('.')[0] for name in node.names}
             elif isinstance(node, ast.ImportFrom) and node.level == 0:
-                yield node.module.split('.')[0]
+                out.add(node.module.split('.')[0])
+    return frozenset(out)
+
+
+@cache
+def parsed(file):
+    return ast.parse(file.read_text())
 
 
 KEYS = {'urdf_parser_py': 'urdfdom_py'}

@@ -11,7 +11,10 @@ import weld_twin_core as wt
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie, places, spreads
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Scale
+from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
+from weld_twin_core.diagnosis.unseen import leftover_structure
+from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.errors import DataError
 
 SIGMA = 1e-4
@@ -54,6 +57,18 @@ def test_three_touches_of_a_pin_tell_the_elbow_offset():
 
     assert found.coordinates[0] == pytest.approx(-(up + down) / 2, abs=1e-9)
     assert found.rss < 1e-9
+
+
+def test_what_is_left_of_touches_depends_on_joints_alone(monkeypatch):
+    """No instrument measured that could err from place to place, and a touch has no time."""
+    monkeypatch.setattr(leftover_structure, 'TOLD', 99)
+    postures = np.random.default_rng(1).uniform(0.5, 0.9, (24, 2))
+    problem, model = aligned(touching(two_links(), postures, ['a', 'b'] * 12), two_links(), '', ())
+    scale = Scale(SIGMA, 1.0, tuple(np.ones(m) for m in problem.samples))
+    unseen = Unseen.of(problem, scale, fit(problem, model, scale), np.zeros(0))
+    everything = Beliefs(dependence_gain=-np.inf, dependence_sure=-np.inf)
+    told = leftover_structure.structure(unseen, model, everything).depends_on
+    assert told and all(name.endswith((' of shoulder', ' of elbow')) for name in told)
 
 
 def test_the_shoulder_offset_is_not_seen_by_a_pin():

@@ -11,7 +11,7 @@ from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.frames.changes import told, untold, with_changes
-from weld_twin_core.effects import REGISTRY, JointOffset, LinkTwist, ToolPose
+from weld_twin_core.effects import REGISTRY, Backlash, JointOffset, LinkTwist, ToolPose
 from weld_twin_core.errors import ModelError
 
 NOISE = 3e-5
@@ -24,10 +24,10 @@ def robot():
     return wt.load('ur5')
 
 
-def day(robot, seed, *changed, base=(0.0, 0.0, 0.0), turned=False):
+def day(robot, seed, *changed, base=(0.0, 0.0, 0.0), turned=False, near=0.0):
     """Return sixty stations of one arm on one day."""
     rng = np.random.default_rng(seed)
-    middle = np.array([0.0, -1.2, 1.3, -1.2, -1.5, 0.0])
+    middle = np.array([0.0, -1.2, 1.3, -1.2 + near, -1.5, near])
     t = 5.0 * np.arange(60)
     stations = wt.JointMotion(t, middle + rng.uniform(-0.8, 0.8, (60, 6)), static=True)
     placed = np.array(robot.T_world_base)
@@ -123,3 +123,14 @@ def test_a_whole_diagnosis(robot):
     assert (entry['recording'], entry['joint']) == (1, 'elbow_joint')
     assert entry['value'] == pytest.approx(1e-3, abs=5e-5)
     assert 0.0 < entry['std'] < 5e-5
+
+
+def test_a_change_shows_once_the_play_that_hid_it_is_found(robot):
+    """What differs is asked for again after the search: before it, play is larger than a change."""
+    play, anew = Backlash('shoulder_lift_joint', 5e-3), JointOffset('elbow_joint', 3e-4)
+    pair = [day(robot, 1, play), day(robot, 2, play, anew, near=0.5)]
+    rest = [name for name in REGISTRY if name not in ('joint_offset', 'link_twist', 'backlash')]
+    found = wt.diagnose(pair, robot, exclude=rest, may_change='joint_offset', experiment=False)
+    (entry,) = found.as_dict()['changed']
+    assert (entry['recording'], entry['joint']) == (1, 'elbow_joint')
+    assert entry['value'] == pytest.approx(3e-4, abs=3e-5)

@@ -11,15 +11,18 @@ import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.levels.held_against import held_against
+from weld_twin_core.diagnosis.levels.formulas import Missed, no_noise
+from weld_twin_core.diagnosis.levels.groups import Group
 from weld_twin_core.diagnosis.levels.sparse_groups import (
     Choosing,
     Folds,
     Member,
-    steadiness,
+    choosing,
+    chosen,
     worth,
 )
 from weld_twin_core.diagnosis.unseen.regions import posture_regions
+from weld_twin_core.diagnosis.unseen.unseen_stretches import steadiness
 from weld_twin_core.diagnosis.verdict.decision import Verdict
 from weld_twin_core.effects.curve import basis
 from weld_twin_core.effects.joint_curve import JointCurve
@@ -181,8 +184,8 @@ def test_a_curve_that_is_none_is_refused_in_a_sentence(change, words):
 def test_a_gap_that_something_predicts_is_no_noise(gain, steady, status):
     part = SimpleNamespace(group='tool, depending on load')
     rival = SimpleNamespace(form=SimpleNamespace(parts=(part,), gain=gain, steady=steady))
-    nothing = Verdict('none', 0.95, (), ())
-    verdict = held_against(nothing, None, rival, Beliefs())
+    nothing = Verdict('none')
+    verdict = no_noise(nothing, rival, Missed(), Beliefs())
     assert verdict.status == status
     assert (verdict == nothing) or 'tool, depending on load' in verdict.reasons[0]
 
@@ -204,8 +207,38 @@ def test_what_groups_are_worth_adds_up():
     assert told.shares[0] / told.shares[1] == pytest.approx(4.0, rel=0.3)
 
 
+def picked(target, ways, *groups):
+    """Return which of some groups of columns are chosen."""
+    told = [Group(str(k), '', (), np.atleast_2d(g), np.ones(1)) for k, g in enumerate(groups)]
+    work = choosing(told, np.zeros((0, target.size)), np.zeros(0), target, ways)
+    return sorted(member.group for member in chosen(work, Beliefs()))
+
+
+def test_what_carries_over_in_time_alone_is_not_chosen():
+    rng = np.random.default_rng(8)
+    regions, minutes = np.repeat(np.arange(6), 500), np.arange(3000) % 10
+    bent, small = rng.standard_normal((2, 3000))
+    # One shape a region: known from the minutes before and after, and of no use elsewhere.
+    shapes = np.where(regions == np.arange(6)[:, None], bent, 0.0)
+    target = bent + 0.2 * small + 0.1 * rng.standard_normal(3000)
+    both = np.concatenate([shapes, small[None]])
+    assert picked(target, [minutes], both) == [0]
+    assert picked(target, [minutes, regions], both) == []
+    assert picked(target, [minutes, regions], bent) == [0]
+
+
+def test_what_stood_in_for_two_goes_once_both_are_there():
+    rng = np.random.default_rng(9)
+    one, other, noise = rng.standard_normal((3, 600))
+    stand_in = one + other + 0.5 * noise
+    target = one + other + 0.05 * rng.standard_normal(600)
+    ways = [np.arange(600) % 10, np.repeat(np.arange(6), 100)]
+    assert picked(target, ways, stand_in) == [0]
+    assert picked(target, ways, stand_in, one, other) == [1, 2]
+
+
 def test_a_wrong_unit_that_no_effect_stands_for_is_placed_at_the_instrument():
-    recording = recorded(lambda angle: 0.0 * angle)
+    recording = recorded(lambda angle: 0.0 * angle, seconds=16.0)
     measured = recording.measured
     stretched = wt.Measurements(measured.t, 1.0004 * measured.position)
     told = wt.diagnose(

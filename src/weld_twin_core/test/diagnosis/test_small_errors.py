@@ -12,7 +12,7 @@ from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.hypotheses.search import search
 from weld_twin_core.diagnosis.many import fitted_together as together
-from weld_twin_core.diagnosis.many.beside_few import members_beside
+from weld_twin_core.diagnosis.many.fitted_together import members_beside
 from weld_twin_core.diagnosis.many.small_errors import many_small
 from weld_twin_core.effects import REGISTRY, LinkTwist, MeasurementScale, TransmissionRipple
 

@@ -72,6 +72,50 @@ def test_every_robot_names_its_source_and_has_limits_and_says_where_masses_are_m
         assert (robot.mass > 0.0).all()
 
 
+def test_every_file_of_the_catalogue_is_a_robot_of_its_name():
+    folder = Path(catalog.__file__).parent
+    assert sorted(file.stem for file in folder.glob('*.yaml')) == sorted(catalog.names())
+    assert all(catalog.load(name).name == name for name in catalog.names())
+
+
+QUARTER = np.pi / 2
+PUBLISHED = {
+    # a and d [m] and alpha [rad] of the rows, as UR's article 45257 has them
+    'ur5e': (
+        [0.0, -0.425, -0.3922, 0.0, 0.0, 0.0],
+        [0.1625, 0.0, 0.0, 0.1333, 0.0997, 0.0996],
+        [QUARTER, 0.0, 0.0, QUARTER, -QUARTER, 0.0],
+    ),
+    'ur10e': (
+        [0.0, -0.6127, -0.57155, 0.0, 0.0, 0.0],
+        [0.1807, 0.0, 0.0, 0.17415, 0.11985, 0.11655],
+        [QUARTER, 0.0, 0.0, QUARTER, -QUARTER, 0.0],
+    ),
+    # as Franka's interface specification has them (Craig), the flange in the last row
+    'franka_panda': (
+        [0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088],
+        [0.333, 0.0, 0.316, 0.0, 0.384, 0.0, 0.107],
+        [0.0, -QUARTER, QUARTER, QUARTER, -QUARTER, QUARTER, QUARTER],
+    ),
+}
+
+
+@pytest.mark.parametrize('name', PUBLISHED)
+def test_rows_are_those_that_the_maker_publishes(name):
+    arm = catalog.load(name)
+    for own, published in zip((arm.a, arm.d, arm.alpha), PUBLISHED[name], strict=True):
+        np.testing.assert_allclose(own, published, rtol=0.0, atol=1e-15)
+
+
+def test_ranges_and_speeds_of_an_arm_are_those_of_its_data_sheet_in_degrees():
+    arm = catalog.load('abb_irb120')  # ABB, product specification 3HAC035960
+    lower, upper = [-165, -110, -110, -160, -120, -400], [165, 110, 70, 160, 120, 400]
+    np.testing.assert_allclose(arm.lower, np.radians(lower), rtol=1e-15)
+    np.testing.assert_allclose(arm.upper, np.radians(upper), rtol=1e-15)
+    speed = np.radians([250, 250, 250, 320, 320, 420])
+    np.testing.assert_allclose(arm.max_velocity, speed, rtol=1e-15)
+
+
 def test_the_file_form_round_trips(robot):
     again = type(robot).from_mapping(robot.to_mapping())
     q = np.linspace(0.1, 0.9, robot.n)

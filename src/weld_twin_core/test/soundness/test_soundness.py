@@ -3,7 +3,6 @@
 """Each way to spoil data is found and named; sound data raise no warning."""
 
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -26,7 +25,8 @@ from weld_twin_core.diagnosis.soundness import (
     examine,
 )
 from weld_twin_core.diagnosis.soundness.evidence import Case
-from weld_twin_core.diagnosis.soundness.setup_change import Settling, Step, changes_of
+from weld_twin_core.diagnosis.soundness.setup_change import setup
+from weld_twin_core.diagnosis.soundness.slips import KNOCKED, Settling, Slip
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
@@ -173,6 +173,31 @@ def test_clocks_that_are_not_synchronised_are_named_with_the_lag(ur5, run, late,
     assert words in found and said == pytest.approx(abs(late) * 1e3, abs=8.0)
 
 
+def test_a_clock_that_was_late_is_late_in_that_recording_alone(ur5, run):
+    """What is mended of all recordings of a cell is mended of others too, a clock is not."""
+    late = remeasured(run, t=run.measured.t + 0.3)
+    (other,) = looked_at(ur5, late, apply=True).mended((run,))
+    np.testing.assert_array_equal(other.joints.t, run.joints.t)
+    long = remeasured(run, position=1e3 * run.measured.position)
+    (other,) = looked_at(ur5, long, apply=True).mended((long,))
+    np.testing.assert_allclose(other.measured.position, run.measured.position)
+
+
+@pytest.mark.parametrize(('joint', 'sweep', 'back'), [(1, -0.08, 2.4), (2, 0.07, 2.1)])
+def test_play_on_a_way_out_and_back_is_no_clock(ur5, rng, joint, sweep, back):
+    """The arm trails behind by half the play both ways: later where it is slower."""
+    t = np.arange(0.0, 2.2 + back, 0.008)
+    s = np.interp(t, [0.0, 1.2, 2.2, 2.2 + back], [0.0, 1.0, 1.0, 0.0])
+    q = np.tile([0.24, -1.05, 1.23, -1.07, -1.27, 0.38], (t.size, 1))
+    q[:, joint] += sweep * s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+    real, arm = q.copy(), q[0, joint]
+    for k, commanded in enumerate(q[:, joint]):
+        arm = float(np.clip(arm, commanded - 1e-3, commanded + 1e-3))
+        real[k, joint] = arm
+    seen = recorded(ur5, JointMotion(t, real), rng, points=True)
+    assert looked_at(ur5, replace(seen, joints=JointMotion(t, q)), align=()).unsound == ()
+
+
 def test_clocks_that_run_apart_are_named(ur5, run):
     bad = remeasured(run, t=run.measured.t * 1.005)
     assert 'run apart' in wrong(ur5, 'clock', bad)
@@ -275,8 +300,8 @@ def test_a_step_of_the_base_is_found_where_it_happened(ur5, request, kind):
     bad = spoilt(recording, 5e-4 * (t >= when))
     problem, model = asked(ur5, bad)
     model = initial_frames(problem, model)
-    (step,) = changes_of(*Case(problem, model).change)
-    assert isinstance(step, Step)
+    (step,) = Case(problem, model).changes
+    assert step.kind == KNOCKED
     assert step.time == pytest.approx(when, abs=0.02 * t[-1])
     assert step.size == pytest.approx(5e-4, rel=0.1)
     (slip,) = looked_at(ur5, bad).slips
@@ -291,7 +316,7 @@ def test_warming_up_is_settling_and_a_steady_drift_is_neither(ur5, request, kind
     warm = spoilt(recording, 5e-4 * np.exp(-age / 0.2))
     problem, model = asked(ur5, warm)
     model = initial_frames(problem, model)
-    (found,) = changes_of(*Case(problem, model).change)
+    (found,) = Case(problem, model).changes
     assert isinstance(found, Settling)
     assert found.time_constant == pytest.approx(0.2 * recording.measured.t[-1], rel=0.3)
     drift = spoilt(recording, 5e-4 * age)
@@ -311,10 +336,9 @@ def test_a_set_up_moved_between_recordings_is_named_unless_each_has_its_own_base
 def test_a_step_larger_than_any_gap_shows_did_not_happen(ur5, run, monkeypatch, times, named):
     case = Case(*asked(ur5, spoilt(run, np.full(run.measured.t.size, 5e-4)), align=()))
     largest = float(np.linalg.norm(case.residuals[0][:3], axis=0).max())
-    step = Step(run.name, 5.0, times * largest, 500.0)
-    module = import_module('weld_twin_core.diagnosis.soundness.setup_change')
-    monkeypatch.setattr(module, 'changes_of', lambda *_: [step])
-    assert bool(module.setup(case)) is named
+    step = Slip(KNOCKED, None, 0, 5.0, times * largest, 500.0, dated=False)
+    monkeypatch.setattr(Case, 'changes', [step])
+    assert bool(setup(case)) is named
 
 
 # No false alarms -------------------------------------------------------------------------------

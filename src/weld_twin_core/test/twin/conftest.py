@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots and recordings of the core's tests, and kinematics written a second time, plainly."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -101,9 +102,13 @@ def arm():
 
 def elementary(axis, angle=0.0, slide=0.0):
     """Return a turn about and a slide along one coordinate axis, shape (4, 4)."""
+    k = 'xyz'.index(axis)
+    i, j = (k + 1) % 3, (k + 2) % 3
     out = np.eye(4)
-    out[:3, :3] = Rotation.from_euler(axis, angle).as_matrix()
-    out['xyz'.index(axis), 3] = slide
+    out[i, i] = out[j, j] = math.cos(angle)
+    out[j, i] = math.sin(angle)
+    out[i, j] = -out[j, i]
+    out[k, 3] = slide
     return out
 
 
@@ -159,12 +164,17 @@ def potential_energy(robot, q, extra_mass=0.0, extra_com=(0.0, 0.0, 0.0)):
     return energy
 
 
-def load_torque(robot, q, wrench=None, frame='tool', **extra):
-    """Return the load torque by virtual work, with central differences of textbook kinematics."""
+def load_torque(robot, q, wrench=None, frame='tool', joints=None, **extra):
+    """
+    Return the load torque by virtual work, with central differences of textbook kinematics.
+
+    That of other ``joints`` than those asked for, where not all are, is left at zero.
+    """
     step, out = 1e-6, np.zeros(robot.n)
     here = textbook_pose(robot, q)
     turn = here[:3, :3] if frame == 'tool' else robot.T_world_base[:3, :3]
-    for i, dq in enumerate(np.eye(robot.n) * step):
+    for i in range(robot.n) if joints is None else joints:
+        dq = step * np.eye(robot.n)[i]
         out[i] = -(
             potential_energy(robot, q + dq, **extra) - potential_energy(robot, q - dq, **extra)
         ) / (2 * step)

@@ -134,12 +134,14 @@ def settled(cell, torque):
 
 
 def joint_compliance(cell):
-    settled(cell, lambda q: cell.textbook.load_torque(cell.robot, q, cell.wrench))
+    settled(cell, lambda q: cell.textbook.load_torque(cell.robot, q, cell.wrench, joints=[1]))
 
 
 def payload(cell):
     extra = {'extra_mass': 1.5, 'extra_com': SMALL * 50}
-    settled(cell, lambda q: cell.textbook.load_torque(cell.robot, q, cell.wrench, **extra))
+    settled(
+        cell, lambda q: cell.textbook.load_torque(cell.robot, q, cell.wrench, joints=[1], **extra)
+    )
 
 
 def cartesian_compliance(cell):
@@ -237,14 +239,13 @@ def hose_pull(cell):
 
     def torque(q):
         pull = (energy(q + step) - energy(q - step)) / 2e-5
-        return cell.textbook.load_torque(cell.robot, q, cell.wrench) - pull
+        return cell.textbook.load_torque(cell.robot, q, cell.wrench, joints=[1]) - pull
 
     settled(cell, torque)
 
 
 def refraction(cell):
     """Half the square of the way across the gradient to the warmth; as much nearer along it."""
-
     less = 7.86e-4 * 101.325 * (1.0 / 293.14 - 1.0 / 293.16) / 0.02
 
     def move(pose):

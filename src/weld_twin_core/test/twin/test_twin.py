@@ -176,11 +176,19 @@ def test_every_registered_effect_is_drawn_here():
     assert bundled == set(DRAWN)
 
 
-@pytest.mark.parametrize('draws', [3, 4])
 @pytest.mark.parametrize('name', DRAWN)
-def test_draws_of_an_effect_are_a_loop_over_draws(name, draws, robot, make_recording, stamps):
-    # Three draws are as many as coordinates, where a wrong broadcast would go unnoticed.
-    recording = make_recording(robot)
+def test_draws_of_an_effect_are_a_loop_over_draws(name, robot, make_recording, stamps):
+    # Three draws would be as many as coordinates: a wrong broadcast would go unnoticed.
+    looped(name, robot, 4, make_recording(robot), stamps)
+
+
+@pytest.mark.parametrize('name', DRAWN)
+def test_as_many_draws_as_coordinates_are_a_loop_too(name, arm, make_recording, stamps):
+    looped(name, arm, 3, make_recording(arm), stamps)
+
+
+def looped(name, robot, draws, recording, stamps):
+    """Compare draws of an effect that are taken together with one after the other."""
     one = effect(name, **DRAWN[name])
     values = one.vector() * np.linspace(0.4, 1.0, draws)[:, None]
     drawn = one.with_vector(values)

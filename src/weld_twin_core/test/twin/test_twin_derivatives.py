@@ -90,25 +90,33 @@ def effect(name, **more):
 
 
 def differences(robot, effects, recording, at):
-    """Yield each component with the derivative of position and of orientation by it."""
-    twin = Twin(robot, tuple(effects))
-    for component in twin.components():
-        chosen = effects[component.effect]
-        place = [(p.name, i) for p, i in chosen.components()].index(
-            (component.parameter.name, component.index)
-        )
-        # A response rings through many periods, so it bends quickly with frequency.
-        step = component.parameter.typical * (1e-5 if component.parameter.unit == 'Hz' else 1e-4)
-        ends = []
-        for way in (step, -step):
-            vector = np.array(chosen.vector())
-            vector[place] += way
-            changed = list(effects)
-            changed[component.effect] = chosen.with_vector(vector)
-            ends.append(Twin(robot, tuple(changed)).poses(recording, at))
-        turn = ends[0].rotation @ np.swapaxes(ends[1].rotation, -1, -2)
-        spin = Rotation.from_matrix(turn).as_rotvec() / (2 * step)
-        yield component, (ends[0].position - ends[1].position) / (2 * step), spin
+    """
+    Yield each component with the derivative of position and of orientation by it.
+
+    The steps of one effect are draws of it; `test_twin` compares draws with a loop over them.
+    """
+    components = Twin(robot, tuple(effects)).components()
+    for number, chosen in enumerate(effects):
+        own = [each for each in components if each.effect == number]
+        places = [(p.name, i) for p, i in chosen.components()]
+        rows = np.tile(chosen.vector(), (2 * len(own), 1))
+        for k, component in enumerate(own):
+            place = places.index((component.parameter.name, component.index))
+            rows[2 * k : 2 * k + 2, place] += np.array([1.0, -1.0]) * step_of(component)
+        if own:
+            drawn = [*effects[:number], chosen.with_vector(rows), *effects[number + 1 :]]
+            poses = Twin(robot, tuple(drawn)).poses(recording, at)
+        for k, component in enumerate(own):
+            after, before = poses.rotation[2 * k], poses.rotation[2 * k + 1]
+            spin = Rotation.from_matrix(after @ np.swapaxes(before, -1, -2)).as_rotvec()
+            way = poses.position[2 * k] - poses.position[2 * k + 1]
+            yield component, way / (2 * step_of(component)), spin / (2 * step_of(component))
+
+
+def step_of(component):
+    """Return the step of a central difference."""
+    # A response rings through many periods, so it bends quickly with frequency.
+    return component.parameter.typical * (1e-5 if component.parameter.unit == 'Hz' else 1e-4)
 
 
 def worst(robot, effects, recording, at, relative, absolute=0.0):

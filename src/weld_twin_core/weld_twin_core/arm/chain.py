@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array
 from ..errors import DataError
 from .bulk import kernel_of
-from .channels import NO_SHIFT, ROW_CHANNELS, Channel, Shift
+from .channels import AXIS, NO_SHIFT, ROW_CHANNELS, ROW_ORDER, TURNS, Channel, Shift
 from .robot import Robot
 from .rotation import left_jacobian, rotation_matrix, transform
 from .vectors import components, cross, pad, samples_first
@@ -120,7 +120,6 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
     x, y, z, p = (
         pad(components(v), axes) for v in (*(base_rotation[..., k] for k in range(3)), base_point)
     )
-    row = _standard_row if robot.convention == 'standard' else _modified_row
     rows = []
     for i in range(robot.n):
         values: dict[str, Any] = {key: getattr(robot, key)[i] for key in ROW_CHANNELS}
@@ -129,7 +128,7 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
         for key, channel in ((moved, ('q', i)), *((key, (key, i)) for key in ROW_CHANNELS)):
             if channel in shift:
                 values[key] = values[key] + shift[channel]
-        x, y, z, p, row_axes = row(x, y, z, p, values)
+        (x, y, z), p, row_axes = _row(robot.convention, (x, y, z), p, values)
         rows.append(row_axes)
     flange = np.stack([samples_first(v) for v in np.broadcast_arrays(x, y, z)], axis=-1)
     tool_rotation, tool_point = tool_frame(robot, shift)
@@ -146,33 +145,23 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
     )
 
 
-def _standard_row(
-    x: Array, y: Array, z: Array, p: Array, v: dict[str, Any]
-) -> tuple[Array, Array, Array, Array, RowAxes]:
-    z_row, z_point = z, p
-    x, y = _turn(x, y, v['theta'])
-    p = _slid(_slid(p, z, v['d']), x, v['a'])
-    x_row, x_point = x, p
-    y, z = _turn(y, z, v['alpha'])
-    y_row, y_point = y, p
-    z, x = _turn(z, x, v['beta'])
-    return x, y, z, p, RowAxes(z_row, z_point, x_row, x_point, y_row, y_point)
-
-
-def _modified_row(
-    x: Array, y: Array, z: Array, p: Array, v: dict[str, Any]
-) -> tuple[Array, Array, Array, Array, RowAxes]:
-    alpha_axis, start = x, p
-    y, z = _turn(y, z, v['alpha'])
-    y_row = y
-    z, x = _turn(z, x, v['beta'])
-    p = _slid(p, x, v['a'])
+def _row(
+    convention: str, axes: tuple[Array, Array, Array], p: Array, values: dict[str, Any]
+) -> tuple[tuple[Array, Array, Array], Array, RowAxes]:
+    """Return axes and origin behind a row, and where each of its motions began."""
+    moving, met = list(axes), {}
+    for kind in ROW_ORDER[convention]:
+        k = AXIS[kind]
+        met[kind] = moving[k], p
+        if kind in TURNS:
+            i, j = (k + 1) % 3, (k + 2) % 3
+            moving[i], moving[j] = _turn(moving[i], moving[j], values[kind])
+        else:
+            p = _slid(p, moving[k], values[kind])
     # alpha turns about the x before beta and a moves along the x after it; the two differ only
     # when beta is not zero, so RowAxes keeps alpha's axis and `column` rebuilds a's from y and z.
-    z_row, z_point = z, p
-    x, y = _turn(x, y, v['theta'])
-    p = _slid(p, z, v['d'])
-    return x, y, z, p, RowAxes(z_row, z_point, alpha_axis, start, y_row, start)
+    x, y, z = moving
+    return (x, y, z), p, RowAxes(*met['theta'], *met['alpha'], *met['beta'])
 
 
 def displaced_robot(robot: Robot, shift: Mapping[Channel, float]) -> Robot:

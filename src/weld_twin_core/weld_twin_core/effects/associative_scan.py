@@ -29,7 +29,7 @@ STILL = 1e-9
 
 def play(q: Array, width: Array | float, start: Array) -> Array:
     r"""
-    Return the output of the play (dead-zone hysteresis) operator.
+    Return the output of the operator of play, which is dead-zone hysteresis.
 
     .. math:: w_k = \min(q_k + \delta/2, \max(q_k - \delta/2, w_{k-1}))
 

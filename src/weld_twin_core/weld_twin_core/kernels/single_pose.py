@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arm.channels import row_factors
 from ..arm.robot import Robot
 from ..arrays import Array
 
@@ -113,12 +114,14 @@ def _rows(robot: Robot) -> list[_Row]:
         a, alpha, beta = float(robot.a[i]), float(robot.alpha[i]), float(robot.beta[i])
         slides = bool(robot.prismatic[i])
         joint = _Row(i, slides, float(robot.theta[i]), float(robot.d[i]), 0.0, 1.0, 0.0)
-        if robot.convention == 'standard':
-            parts = [joint, _link(a, alpha), *_turn_about_y(beta)]
-        elif beta == 0.0:
-            parts = [_link(a, alpha), joint]
-        else:
-            parts = [_link(0.0, alpha), *_turn_about_y(beta), _link(a, 0.0), joint]
+        parts: list[_Row] = []
+        for kinds in row_factors(robot.convention, without='' if beta else 'beta'):
+            if 'theta' in kinds:
+                parts.append(joint)
+            elif 'beta' in kinds:
+                parts += _turn_about_y(beta)
+            else:
+                parts.append(_link(a if 'a' in kinds else 0.0, alpha if 'alpha' in kinds else 0.0))
         for part in parts:
             if rows and part.joint < 0 and part.theta == 0.0 and rows[-1][4:] == (0.0, 1.0, 0.0):
                 part = rows.pop()._replace(a=part.a, cosine=part.cosine, sine=part.sine)
@@ -132,8 +135,6 @@ def _link(a: float, alpha: float) -> _Row:
 
 def _turn_about_y(beta: float) -> list[_Row]:
     """Return Ry(beta) as Rz(90 deg) Rx(beta) Rz(-90 deg)."""
-    if beta == 0.0:
-        return []
     quarter = 0.5 * np.pi
     first, last = _link(0.0, beta), _link(0.0, 0.0)
     return [first._replace(theta=quarter), last._replace(theta=-quarter)]

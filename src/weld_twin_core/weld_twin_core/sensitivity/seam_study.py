@@ -72,7 +72,7 @@ class Study:
         return (self.axes @ vectors[..., None])[..., 0]
 
     def deviations(self, effects: tuple[Effect, ...]) -> Array:
-        """Return the deviations (..., N, 3) [m] that effects make, in seam axes."""
+        """Return by how much effects displace the tool, (..., N, 3) [m], in seam axes."""
         position = Twin(self.robot, effects).poses(self.recording, self.at).position
         return self.on_seam(position - self.nominal.position)
 

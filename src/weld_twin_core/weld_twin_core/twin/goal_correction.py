@@ -12,7 +12,7 @@ are left: they hang on how the controller follows.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -184,6 +184,14 @@ def not_corrected(model: ProgramModel) -> list[str]:
     return list(dict.fromkeys(e.name for e in left))
 
 
+def too_large(length: float, turn: float, limits: GoalLimits) -> str:
+    """Return that a point would move by more than is allowed [m, rad]."""
+    return (
+        f'a point would move by {length * 1e3:.3f} mm and {np.degrees(turn):.3f} degrees, at most '
+        f'{limits.length * 1e3:g} mm and {np.degrees(limits.turn):g} degrees are allowed'
+    )
+
+
 def _mended(effect: Effect) -> bool:
     return commandable(effect) and effect.stage != Stage.SERVO
 
@@ -191,9 +199,7 @@ def _mended(effect: Effect) -> bool:
 class _Work:
     """One goal on its way."""
 
-    def __init__(
-        self, model: ProgramModel, goal: Goal, limits: GoalLimits, start: Start
-    ) -> None:
+    def __init__(self, model: ProgramModel, goal: Goal, limits: GoalLimits, start: Start) -> None:
         self.model, self.goal, self.limits, self.start = model, goal, limits, start
         mended = [e for e in model.effects if _mended(e)]
         self.real = Twin(model.robot, mended)
@@ -221,7 +227,13 @@ class _Work:
         added = self._added(found, self.goal.t)
         waits = self._waits(found)
         if waits:
-            more = [*more, f'the correction sets in before the goal, which begins {waits:.3f} s later']
+            more.append(
+                f'the correction sets in before the goal, which begins {waits:.3f} s later'
+            )
+        if self.start.q is None:
+            more.append(
+                'where the arm stands is not known: the correction sets in at the first point'
+            )
         return CorrectedGoal(
             found.later(waits),
             added,
@@ -268,7 +280,7 @@ class _Work:
             came = self.start.came
             steps = play_steps(self.model.robot, self.plays, recording, came)
             for share in SHARES:
-                more = spread(steps, fine, share, self.goal.t, came)
+                more = spread(steps, fine, share, self.goal.t, came, rests=self._rests)
                 yield (
                     Goal(
                         still.t,
@@ -311,7 +323,8 @@ class _Work:
 
     def _missing(self, way: Course) -> Array:
         """Return what is missing to the real tool on a course, shape (K, 6) [m, rad]."""
-        recording = approached(self._recording(way), self.start.came)
+        stands = self.start.q if self._rests else None
+        recording = approached(self._recording(way), self.start.came, stands)
         position, rotation = self.real.poses(recording)
         real = np.zeros((way.t.size, 4, 4))
         real[:, :3, 3], real[:, :3, :3] = position[-way.t.size :], rotation[-way.t.size :]
@@ -350,8 +363,8 @@ class _Work:
 
     def _waits(self, found: Goal) -> float:
         """Return how much later the goal has to begin [s] for its correction to set in smoothly."""
-        here, first = self.start.q, self.goal.q[0]
-        if here is None or self.start.moving or np.abs(first - here).max() > NEAR:
+        here = self.start.q
+        if here is None or not self._rests:
             return 0.0
         step = found.q[0] - here
         if np.abs(step).max() < HERE:
@@ -363,7 +376,15 @@ class _Work:
             SMOOTH_SPEED * turn / self.limits.turn_rate,
             float(np.sqrt(SMOOTH_PEAK * np.abs(step) / most).max()),
         )
-        return max(0.0, needed - float(self.goal.t[0]))
+        return float(max(0.0, needed - float(self.goal.t[0])))
+
+    @property
+    def _rests(self) -> bool:
+        """Return whether the arm stands where the goal begins."""
+        here = self.start.q
+        if here is None or self.start.moving:
+            return False
+        return bool(np.abs(self.goal.q[0] - here).max() <= NEAR)
 
     def _between(self, here: Array, there: Array) -> Array:
         chain = forward(self.bare, np.stack([here, there]))
@@ -402,11 +423,7 @@ class _Work:
     def _refuse_large(self, added: Array) -> None:
         length, turn = _largest(added)
         if length > self.limits.length or turn > self.limits.turn:
-            raise _RefusedError(
-                f'a point would move by {length * 1e3:.3f} mm and {np.degrees(turn):.3f} degrees, at '
-                f'most {self.limits.length * 1e3:g} mm and {np.degrees(self.limits.turn):g} degrees '
-                'are allowed'
-            )
+            raise _RefusedError(too_large(length, turn, self.limits))
 
     def _refuse_quick(self, found: Goal) -> None:
         if self.meant.t.size < 2:

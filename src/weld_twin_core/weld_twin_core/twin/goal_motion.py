@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -79,7 +80,7 @@ def fine_times(goal: Goal) -> Array:
     step = max(FINE, float(t[-1] - t[0]) / MOST)
     parts = [
         np.linspace(a, b, max(int(np.ceil((b - a) / step)), 1), endpoint=False)
-        for a, b in zip(t[:-1], t[1:], strict=True)
+        for a, b in pairwise(t)
     ]
     return np.concatenate([*parts, t[-1:]])
 

@@ -45,15 +45,33 @@ def is_play(effect: Effect) -> bool:
     return isinstance(effect, MemoryEffect) and effect.stage == Stage.PLAY
 
 
-def approached(recording: Recording, came: Array | None) -> Recording:
-    """Return a recording that begins with a motion to its first sample from where joints came."""
-    if came is None or not np.any(came):
-        return recording
+def approached(recording: Recording, came: Array | None, stands: Array | None = None) -> Recording:
+    """
+    Return a recording that begins with a motion to its first sample from where joints came.
+
+    Parameters
+    ----------
+    recording : Recording
+    came : array, shape (n,), optional
+        Sign of the last motion of every joint; 0 where it is not known.
+    stands : array, shape (n,), optional [rad or m]
+        Where that motion ended; left out, at the first sample.
+
+    """
     motion = recording.joints
-    t = np.concatenate([motion.t[:1] - 1.0, motion.t])
-    q = np.concatenate([motion.q[:1] - CAME_FROM * np.sign(came), motion.q])
-    rates = None if motion.qd is None else np.concatenate([motion.qd[:1], motion.qd])
-    return replace(recording, joints=JointMotion(t, q, rates))
+    way = np.zeros((0, motion.q.shape[1]))
+    if came is not None and np.any(came):
+        end = motion.q[0] if stands is None else stands
+        way = np.stack([end - CAME_FROM * np.sign(came), end])
+    elif stands is not None:
+        way = stands[None]
+    if not way.size:
+        return recording
+    t = motion.t[0] - np.arange(float(len(way)), 0.0, -1.0)
+    rest = np.zeros_like(way)
+    rates = None if motion.qd is None else np.concatenate([rest, motion.qd])
+    joined = JointMotion(np.concatenate([t, motion.t]), np.concatenate([way, motion.q]), rates)
+    return replace(recording, joints=joined)
 
 
 def play_steps(
@@ -85,7 +103,13 @@ def play_steps(
 
 
 def spread(
-    steps: Array, course: Course, share: float, at: Array, came: Array | None = None
+    steps: Array,
+    course: Course,
+    share: float,
+    at: Array,
+    came: Array | None = None,
+    *,
+    rests: bool = False,
 ) -> Spread:
     """
     Return steps spread over the standstill of each reversal, looked up at stamps.
@@ -102,6 +126,8 @@ def spread(
         Samples of the course.
     came : array, shape (n,), optional
         As for `play_steps`.
+    rests : bool
+        The arm stands still before the first sample, and makes its first steps there.
 
     """
     out = Spread(*np.zeros((3, at.size, steps.shape[1])))
@@ -114,6 +140,9 @@ def spread(
         before = 0.0 if came is None else float(came[i])
         for a, b in _standstills(course.q[:, i], before, share * size):
             inside = (at >= course.t[a]) & (at <= course.t[b])
+            if rests and a == 0:
+                out.q[inside, i] = column[b]
+                continue
             span = float(course.t[b] - course.t[a])
             s = (at[inside] - course.t[a]) / span
             way = column[b] - column[a]

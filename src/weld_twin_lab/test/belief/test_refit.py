@@ -3,6 +3,7 @@
 """The belief that the diagnosis reads is the one that the kept cases teach, and says so."""
 
 import json
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -20,8 +21,14 @@ KEPT = Path(__file__).parents[4] / 'docs/results/belief'
 SHIPPED = json.loads(files(trust).joinpath(FILE).read_text(encoding='utf-8'))
 
 
+@cache
+def kept(name):
+    """Return the rows of a table that is kept; some thousand."""
+    return read_rows(KEPT / name)
+
+
 def test_the_shipped_belief_is_what_the_kept_cases_teach():
-    rows = read_rows(KEPT / belief.LEARNED)
+    rows = kept(belief.LEARNED)
     # Answers as a whole, whose bound is the one that counts; causes take four times as long.
     whole = [e for e in examples_of(cases_of(rows)) if e.level.startswith('answer ')]
     taught = learned(whole, {}, SHIPPED['card']['risk'])
@@ -33,12 +40,12 @@ def test_the_shipped_belief_is_what_the_kept_cases_teach():
 
 
 def test_nothing_is_judged_on_cases_that_were_learned_from():
-    taught = {row['name'] for row in read_rows(KEPT / belief.LEARNED)}
-    assert not taught & {row['name'] for row in read_rows(KEPT / belief.JUDGED)}
+    taught = {row['name'] for row in kept(belief.LEARNED)}
+    assert not taught & {row['name'] for row in kept(belief.JUDGED)}
 
 
 def test_belief_is_fitted_anew_from_tables_by_one_command(tmp_path, capsys):
-    few, others = (read_rows(KEPT / name)[:40] for name in (belief.LEARNED, belief.JUDGED))
+    few, others = (kept(name)[:40] for name in (belief.LEARNED, belief.JUDGED))
     write_rows(tmp_path / 'learn.jsonl', few)
     write_rows(tmp_path / 'judge.jsonl', others)
     asked = ['--learn-from', str(tmp_path / 'learn.jsonl'), '--judge-on']

@@ -18,8 +18,9 @@ from weld_twin_lab.cli.lab import proofs
 from weld_twin_nodes.cli.in_process import weld_twin
 
 TOPICS = {'/joint_states': 9, '/twin/tool_pose': 9}
-OPEN = {'heard': [9, 8, 7, 6], 'recorded': [9, 8, 7, 6], 'alive': True, 'topics': TOPICS}
-LOCKED = {'heard': [9, 0, 0, 0], 'recorded': [9, 0, 0, 0], 'alive': True, 'topics': TOPICS}
+WELL = {'alive': True, 'topics': TOPICS, 'codes': [0, 0]}
+OPEN = {'heard': [9, 8, 7, 6], 'recorded': [9, 8, 7, 6], **WELL}
+LOCKED = {'heard': [9, 0, 0, 0], 'recorded': [9, 0, 0, 0], **WELL}
 
 
 def test_security_is_shown_when_strangers_get_through_without_keys_alone():
@@ -38,6 +39,7 @@ def test_security_is_shown_when_strangers_get_through_without_keys_alone():
         ('enforced', {'recorded': [0, 0, 0, 0]}),
         ('enforced', {'heard': [0, 0, 0, 0]}),  # nobody hears: the policy lets too little through
         ('enforced', {'alive': False}),
+        ('enforced', {'codes': [0, 1]}),
         ('enforced', {'topics': {'/joint_states': 9}}),
     ],
 )

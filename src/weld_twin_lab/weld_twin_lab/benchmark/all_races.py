@@ -47,8 +47,9 @@ QUICK = Effort(3, 0.01, (1000,), 500, 16, 100, 100_000, (0.2, 0.5), True)
 
 def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
     """
-    Run everything; write ``benchmark.json``, two tables of it (``benchmark.md``, ``brief.md``) and
-    ``growth.png``.
+    Run everything; write the results.
+
+    They are ``benchmark.json``, two tables of it (``benchmark.md``, ``brief.md``) and ``growth.png``.
 
     Raises
     ------

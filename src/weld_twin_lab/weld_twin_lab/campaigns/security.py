@@ -75,9 +75,12 @@ def verdict(result: dict[str, Any]) -> bool:
     """
     Return whether strangers get through without keys, and nobody but the driver with them.
 
+    All nodes must have run, and ended with code 0.
     What the nodes made of the driver's joint states without keys, they make with keys too.
     """
-    if any(way not in result or not result[way]['alive'] for way in WAYS):
+    if any(way not in result for way in WAYS):
+        return False
+    if any(not result[way]['alive'] or any(result[way]['codes']) for way in WAYS):
         return False
     free, locked = result['open'], result['enforced']
     shown = all(count > 0 for count in (*free['heard'], *free['recorded']))

@@ -246,7 +246,7 @@ class _Columns:
             return np.concatenate(parts, axis=1) / step
 
         frames = [
-            column(([], [REGISTRY[f'{frame}_pose'](**{key: unit})]), STEP)  # type: ignore[call-arg]
+            column(([], [REGISTRY[f'{frame}_pose'](**{key: unit})]), STEP)
             for frame in row.align
             for key in ('xyz', 'rotvec')
             for unit in (STEP * FRAMES * np.eye(3)).tolist()

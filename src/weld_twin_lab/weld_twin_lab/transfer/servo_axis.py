@@ -62,7 +62,6 @@ def axis_recording(directory: Path) -> Recording:
 
 def judge_axis(directory: Path) -> dict[str, Any]:
     """Return what is named of the axis, and what is left on the part not fitted on."""
-
     recording, robot = axis_recording(directory), axis_robot()
     measured = recording.measured
     assert measured is not None

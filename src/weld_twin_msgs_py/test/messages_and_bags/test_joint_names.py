@@ -87,3 +87,28 @@ def test_a_recording_keeps_the_velocities_it_has():
     for k in range(60):
         sample = states.take(state(k, np.full(6, 0.01 * k), qd=np.zeros(6)))
         assert sample.qd is not None
+
+
+def test_a_message_that_is_refused_tells_nothing_of_joints_beside():
+    """Its places are not those of the messages after it, either."""
+    states, q = JointStates(ROBOT), np.full(6, 0.1)
+    states.take(state(0, q))
+    odd = [*ROBOT.joint_names[:5], 'misspelt']
+    for k in range(1, 9):
+        with pytest.raises(DataError, match='has no joint'):
+            states.take(state(2 * k, q + 0.05 * k, odd))
+        np.testing.assert_array_equal(states.take(state(2 * k + 1, q + 0.05 * k)).q, q + 0.05 * k)
+    assert (states.beside.remark, states.beside.warning()) == ('', '')
+
+
+@pytest.mark.parametrize(
+    ('names', 'carries'),
+    [(('rail',), True), (('tilt', 'turn'), True), (THEIRS, False), ((*THEIRS, 'A7'), False)],
+)
+def test_what_carries_an_arm_has_fewer_axes_than_one(names, carries):
+    """Another arm on the topic moves without a warning that it carries this one."""
+    states = JointStates(ROBOT)
+    for k in range(9):
+        states.take(state(2 * k, np.full(6, 0.1)))
+        assert states.take(state(2 * k + 1, np.full(len(names), 0.05 * k), names)) is None
+    assert bool(states.beside.warning()) == carries

@@ -43,7 +43,7 @@ B, TURN_B = (-0.5, 0.1, 0.4), (-1.0, 0.4, 0.2)
 
 @pytest.fixture
 def tree():
-    """world has tracker and base_link, which has tool0."""
+    """A world with tracker and base_link, which has tool0."""
     out = TransformTree()
     out.take(told('world', 'tracker', A, TURN_A), static=True)
     out.take(told('/world', 'base_link', B, TURN_B), static=True)

@@ -215,7 +215,10 @@ class JointStates:
                 raise Missing('the joint state names no joint')
             if not (self._take_own_names(message) or self._take_prefix(message.name)):
                 self.others += 1
-                self.beside.take(message.name, message.position)
+                if len(message.name) < len(
+                    self._names
+                ):  # what carries an arm has fewer axes than it
+                    self.beside.take(message.name, message.position)
                 self.strangers.update(dict.fromkeys(message.name))
                 return None
             present = self._names
@@ -227,7 +230,7 @@ class JointStates:
         self._pick = _picker([list(message.name).index(name) for name in self._names])
         own = set(self._names)
         self._apart = tuple(k for k, name in enumerate(message.name) if name not in own)
-        self._take_beside(message)
+        self._take_beside(message, self._apart)
         return JointSample(stamp, q, from_messages.joint_velocities(message, self._names))
 
     def _take_own_names(self, message: Any) -> bool:
@@ -287,7 +290,7 @@ class JointStates:
             return None
         # What runs in C runs as fast after two idle milliseconds; bytecode takes five times as long.
         if self._apart:
-            self._take_beside(message)
+            self._take_beside(message, self._apart)
         q = self._pick(position)
         qd = self._pick(velocity) if len(velocity) else ()
         if not (all(map(ge, q, self._low)) and all(map(le, q, self._high))):
@@ -296,10 +299,10 @@ class JointStates:
             return None
         return JointSample(stamp, np.array(q), np.array(qd) if qd else None)
 
-    def _take_beside(self, message: Any) -> None:
-        """Take what a message with all joints of the robot has beside them."""
+    def _take_beside(self, message: Any, apart: Sequence[int]) -> None:
+        """Take what a message with joints of the robot has beside them, at these places."""
         name, position = message.name, message.position
-        self.beside.take([name[k] for k in self._apart], [position[k] for k in self._apart])
+        self.beside.take([name[k] for k in apart], [position[k] for k in apart])
 
     def _check(self, q: Array) -> None:
         """Refuse what lies beyond the limits; the robot has the sentence."""
@@ -319,12 +322,11 @@ class JointStates:
             for name, a, b in zip(present, q, unknown if qd is None else qd, strict=True)
         }
         self._spread.update(present)
-        self._apart = tuple(k for k, name in enumerate(message.name) if name not in present)
-        self._take_beside(message)
         if len(self._spread) < len(self._names):
             missing = next(name for name in self._names if name not in self._spread)
             listed = ', '.join(message.name)
             raise Missing(f'the joint state has no joint {missing!r}; it has {listed}')
+        self._take_beside(message, [k for k, x in enumerate(message.name) if x not in present])
         if stamp != before and 0 < len(left) < len(self._names):
             raise Incomplete(
                 f'joint {left[0]!r} never came with the stamp {before * 1e-9:.6f} s; publish all '

@@ -245,7 +245,7 @@ def _let_go(error: BaseException | None) -> None:
 
 
 def _refuse_truncated(path: Path) -> None:
-    """SQLite reads a file that lacks its last pages and says nothing; its header knows better."""
+    """Refuse a file that lacks its last pages: SQLite reads it without a word; the header tells."""
     with path.open('rb') as file:
         head = file.read(32)
     if len(head) < 32:

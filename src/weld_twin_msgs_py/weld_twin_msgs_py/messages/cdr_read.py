@@ -123,9 +123,10 @@ class JointStateDecoder:
                 sec, nanosec = _STAMP.unpack_from(data, HEADER)
                 values = body.unpack_from(data, at)
                 n = len(name)
-                if values[n] == n and data[1] == 1 and data[0] == 0:
+                velocity = values[n + 2 :]
+                if values[n] == len(velocity) and data[1] == 1 and data[0] == 0:
                     header = Header(Time(sec, nanosec), frame)
-                    return JointState(header, name, values[:n], values[n + 2 :])
+                    return JointState(header, name, values[:n], velocity)
         state: JointState = decoded('sensor_msgs/msg/JointState', self._slow, data)
         return state
 
@@ -140,16 +141,16 @@ class JointStateDecoder:
     def _remember(
         self, data: bytes, end: int, frame: str, name: tuple[str, ...], q: int, qd: int
     ) -> None:
-        """Keep the bytes of frame, names and count, for a usual state: one position per name."""
+        """Keep the bytes of frame, names and count: of one position per name, one velocity or none."""
         n = len(name)
-        if q != n or qd != n or data[1] != 1:
+        if q != n or qd not in (0, n) or data[1] != 1:
             return
         counted = end + -(end - HEADER) % 4 + 4
         at = counted + -(counted - HEADER) % 8
         if len(self._known) >= self._KEPT:
             self._known.clear()
         # The velocities' count lies on a multiple of 8; behind it four bytes of padding.
-        body = Struct(f'<{n}dII{n}d')
+        body = Struct(f'<{n}dII{n}d' if qd else f'<{n}dI')
         self._known[bytes(data[_STAMP_END:counted])] = (frame, name, body, at)
 
 

@@ -84,6 +84,24 @@ class Vector3Encoder:
         return self._body.pack(b'\0\1\0\0', *divmod(ns, NANOSECONDS), self._head, *vector.tolist())
 
 
+class TwistEncoder:
+    """
+    Serialises TwistStamped messages of one frame.
+
+    Parameters
+    ----------
+    frame_id : str
+
+    """
+
+    def __init__(self, frame_id: str) -> None:
+        self._head, self._body = _stamped(frame_id, '6d')
+
+    def __call__(self, ns: int, twist: Array) -> bytes:
+        """Return the message of a stamp [ns] and a way and turn (6,), linear part first."""
+        return self._body.pack(b'\0\1\0\0', *divmod(ns, NANOSECONDS), self._head, *twist.tolist())
+
+
 class JointStateEncoder:
     """
     Serialises joint states of one set of joints, without frame or effort.

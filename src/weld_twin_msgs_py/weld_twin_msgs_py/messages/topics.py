@@ -255,6 +255,37 @@ DIAGNOSTICS = _result(
     'health of every node: each input with its rate, age, refusals and the last reason',
 )
 
+POSE_IN = _stream(
+    '~/pose_in',
+    'geometry_msgs/msg/PoseStamped',
+    DEEP,
+    "where the controller is to have the tool, in the robot's base [m]",
+)
+POSE_OUT = _result(
+    '~/pose_out',
+    'geometry_msgs/msg/PoseStamped',
+    DEEP,
+    'the same, corrected so that the real tool goes there [m]',
+)
+CORRECTION = _result(
+    '~/correction',
+    'geometry_msgs/msg/TwistStamped',
+    DEEP,
+    "what was or would be added to a pose or to a point of a goal: way and turn in the robot's base "
+    '[m, rad]',
+    steady=False,
+)
+AUDIT = Topic(
+    '~/audit',
+    'std_msgs/msg/String',
+    Qos(RELIABLE, 100, LATCHED),
+    Qos(RELIABLE, 100, LATCHED),
+    'a line of JSON for every goal: time, model, largest correction, verdict',
+    steady=False,
+)
+COMPENSATED = (POSE_IN, POSE_OUT, CORRECTION, AUDIT)
+"""What the compensator takes and gives, under its own name."""
+
 TF = _stream(
     '/tf',
     'tf2_msgs/msg/TFMessage',

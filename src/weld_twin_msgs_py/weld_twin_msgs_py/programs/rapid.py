@@ -317,7 +317,7 @@ class _Reader:
         return Ref(point, after=pose, leads=False)
 
     def _switches(self, start: int, end: int) -> dict[str, float] | None:
-        """Return the numbers of ``\\Rx:=5`` and the like; None where one is worked out."""
+        r"""Return the numbers of ``\Rx:=5`` and the like; None where one is worked out."""
         out = {}
         text = self.text[start:end]
         for found in re.finditer(r'\\(\w+)\s*:=\s*([^\\]*)', text):

@@ -14,6 +14,7 @@ from weld_twin_core.errors import ModelError
 
 from ..files.whole_files import write_text
 from ..files.yaml_file import read_yaml, yaml_text
+from .own_robots import as_file, looked_in
 from .urdf_read import read_urdf
 from .wrong_units import refuse_wrong_units
 
@@ -33,7 +34,7 @@ def load_robot(
     Parameters
     ----------
     spec : str or Path
-        Name of a bundled model, or path of a YAML or URDF file.
+        Name of a bundled model or of one of your own (`own_robots`), or path of a YAML or URDF file.
     base_link, tip_link : str, optional
         Ends of the chain in a URDF; left out, its root and its only leaf (or ``tool0``).
     flange_link : str, optional
@@ -42,10 +43,10 @@ def load_robot(
     Raises
     ------
     ModelError
-        Neither a bundled name nor a file, or a file that cannot be used.
+        Neither a known name nor a file, a name that several have, or a file that cannot be used.
 
     """
-    spec = str(spec)
+    spec = as_file(str(spec))
     path = Path(spec)
     suffix = path.suffix.lower()
     if suffix == '.xacro':
@@ -59,7 +60,7 @@ def load_robot(
     else:
         raise ModelError(
             f'{spec!r} is neither a bundled robot ({", ".join(catalog.names())}) nor a .yaml or '
-            '.urdf file'
+            f'.urdf file, nor is there one of that name in {looked_in()}'
         )
     if any(link is not None for link in (base_link, tip_link, flange_link)):
         raise ModelError(

@@ -38,8 +38,11 @@ class GivenUrdf(NamedTuple):
 
 
 class Hand(NamedTuple):
-    """Frames in the base at joint position zero: of the last joint, of the tip, and of the tip with
-    the tool as it was given, (4, 4) each."""
+    """
+    Frames in the base at joint position zero, (4, 4) each.
+
+    Of the last joint, of the tip, and of the tip with the tool as it was given.
+    """
 
     carrier: Array
     plain: Array

@@ -188,7 +188,8 @@ def test_the_node_tells_a_gap_from_the_streams(tmp_path):
     motion, names = wandering(), load('ur5').joint_names
     measured = points((OFFSET,), motion)
     with Cell(tmp_path / 'cell') as cell:
-        cell.start('live_diagnosis', least=3.0, every=1.0, reliable_inputs=True)
+        # One diagnosis, of nearly all that is sent.
+        cell.start('live_diagnosis', least=11.0, every=1.0, reliable_inputs=True)
         said = cell.collect('/diagnosis')
         states, where = cell.publisher(JOINT_STATES), cell.publisher(MEASURED_POINT)
         for k in range(motion.t.size):

@@ -2,15 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pairing by stamp, against curves whose value between samples is known."""
 
+import time
+from contextlib import suppress
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from weld_twin_core.arm.catalog import load
 from weld_twin_core.errors import DataError
 from weld_twin_core.metrics.deviation import deviation_metrics
 from weld_twin_core.metrics.running import RunningMetrics
 from weld_twin_msgs_py.assembly.stamp_order import RESTART_AFTER, Forward
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import MEASURED_POSE, TWIN_BASE, TWIN_POSE
+from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
+from weld_twin_nodes.streams.deviation_stream import Deviations
 from weld_twin_nodes.streams.pairing import Pairing
 
 MS = 1_000_000
@@ -157,6 +165,51 @@ def test_a_stream_that_starts_again_is_believed_after_a_few_stamps():
             order.restarted_at(k)
     assert order.restarted_at(RESTART_AFTER)
     assert not order.restarted_at(RESTART_AFTER + 1)
+
+
+def test_measurements_that_a_new_start_leaves_unpaired_are_counted():
+    pairing = Pairing()
+    for k in range(3):
+        pairing.add_measured(10**9 + k * MS, np.zeros(3))
+    for k in range(1, RESTART_AFTER + 1):
+        with suppress(DataError):
+            pairing.add_measured(k * MS, np.zeros(3))
+    assert (pairing.waiting, pairing.dropped) == (1, 3)
+
+
+def test_metrics_begin_anew_where_the_twin_does():
+    told = Deviations(load('ur5'))
+    far, near = np.array([1e-3, 0.0, 0.0]), np.array([1e-4, 0.0, 0.0])
+
+    def run(start, off):
+        for k in range(1, 2 * RESTART_AFTER):
+            with suppress(DataError):
+                list(told.add_twin(start + 10 * k * MS, np.zeros(3)))
+            with suppress(DataError):
+                list(told.add_measured(start + 10 * k * MS, off))
+
+    run(10**12, far)
+    assert told.metrics()['max'] == pytest.approx(1e-3)
+    run(0, near)
+    assert told.metrics()['max'] == pytest.approx(1e-4)
+    assert 0 < told.samples <= RESTART_AFTER
+
+
+def test_the_last_metrics_of_a_run_are_told_once(cell):
+    cell.add(DeviationAnalyzer, reliable_inputs=True, metrics_idle=0.05)
+    metrics, base = cell.collect('/deviation/metrics'), cell.publisher(TWIN_BASE)
+    each = cell.publisher(TWIN_POSE), cell.publisher(MEASURED_POSE)
+    base.publish(cell.messages.pose(1, np.zeros(3), np.eye(3)))
+    for k in range(1, 4):
+        for out in each:
+            out.publish(cell.messages.pose(k * 10 * MS, np.zeros(3), np.eye(3)))
+    cell.wait(
+        lambda: len(metrics) > 0 and from_messages.metrics(metrics.last)['samples'] == 3,
+        'the last metrics',
+    )
+    count, end = len(metrics), time.monotonic() + 0.4
+    cell.wait(lambda: time.monotonic() > end, 'some more looks')
+    assert len(metrics) == count
 
 
 def test_running_metrics_are_those_of_the_whole_run():

@@ -16,11 +16,15 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from rosgraph_msgs.msg import Clock
 
+from weld_twin_core.errors import ModelError
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_nodes.harness import Cell, CellTimeout
 from weld_twin_nodes.harness.process import MODULES
+from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
+from weld_twin_nodes.live.error_injector import ErrorInjector
+from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 
 pytestmark = pytest.mark.cells
 
@@ -59,6 +63,7 @@ BAD_STARTS = {
     'out of range': ('trajectory_generator', {'rate': -5.0}, 'rate'),
     'wrong type': ('error_injector', {'seed': 1.5}, 'seed'),
     'no bag': ('recorder', {}, "needs the parameter 'out'"),
+    'no topic': ('recorder', {'out': 'x', 'topics': ['not a topic']}, "'not a topic' is no name"),
     'no storage': ('recorder', {'out': 'x', 'storage': 'tape'}, "got 'tape'"),
 }
 
@@ -181,6 +186,27 @@ def test_topics_can_be_remapped(cell, robot):
 
     cell.wait(told, 'a pose on the new topic')
     assert from_messages.stamp_ns(poses.last) > 0
+
+
+@pytest.mark.parametrize(
+    ('kind', 'remap', 'sentence'),
+    [
+        (
+            ForwardKinematicsTwin,
+            'joint_states:=twin/tool_pose',
+            'which this node publishes itself',
+        ),
+        (ErrorInjector, 'actual/joint_states:=joint_states', 'which this node publishes itself'),
+        (
+            DeviationAnalyzer,
+            'measured/tool_pose:=twin/tool_pose',
+            'which is another input of this',
+        ),
+    ],
+)
+def test_a_remap_onto_what_the_node_has_already_is_refused(cell, kind, remap, sentence):
+    with pytest.raises(ModelError, match=sentence):
+        kind(context=cell.node.context, cli_args=['--ros-args', '-r', remap])
 
 
 def test_a_bag_is_played_into_the_cell(cell, robot):

@@ -38,6 +38,14 @@ def started(name, *words):
     )
 
 
+@pytest.mark.parametrize('name', ['error_injector', 'live_diagnosis'])
+def test_a_node_loads_nothing_that_it_needs_for_a_diagnosis_alone(name):
+    slow = "[m for m in ('scipy.linalg', 'matplotlib', 'weld_twin_core.diagnosis.soundness.gate')"
+    code = f'import sys, {MODULES[name]}\nprint({slow} if m in sys.modules])'
+    said = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert said.stdout == '[]\n'
+
+
 def test_a_mistyped_parameter_is_refused_with_the_one_that_was_meant():
     result = started('forward_kinematics_twin', '--ros-args', '-p', 'rbot:=ur5')
     assert result.returncode == 2

@@ -118,8 +118,8 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
 
 def _docstring(module_name: str) -> str:
     """Return the docstring of a module from its code, which is not run: a list of commands."""
-    spec = find_spec(module_name)
-    code = spec.loader.get_code(module_name) if spec and spec.loader else None  # type: ignore[attr-defined]
+    loader = getattr(find_spec(module_name), 'loader', None)
+    code = loader.get_code(module_name) if loader else None
     return str(code.co_consts[0]) if code else ''
 
 

@@ -31,8 +31,10 @@ def add_robot(parser: argparse.ArgumentParser, *, required: bool = True) -> None
     parser.add_argument(
         '--robot',
         required=required,
+        type=_robot_file,
         metavar='R',
-        help='a bundled robot (weld-twin info --robots lists them), a robot file or a URDF',
+        help='a bundled robot or one of your own (weld-twin info --robots lists them), a robot file '
+        'or a URDF',
     )
     parser.add_argument(
         '--base-link',
@@ -46,6 +48,13 @@ def add_robot(parser: argparse.ArgumentParser, *, required: bool = True) -> None
         help='link of a URDF where the controller has its flange; left out, tool0, flange or the '
         'last one that moves, as the file has it',
     )
+
+
+def _robot_file(spec: str) -> str:
+    """Return the file of a robot of one's own that is named; what else was given as it is."""
+    from weld_twin_msgs_py.robots.own_robots import as_file
+
+    return as_file(spec)
 
 
 def robot_of(args: argparse.Namespace) -> Robot:

@@ -111,7 +111,7 @@ class Cell:
         ----------
         node : str or sequence of str
             A node of this package, or a whole command.
-        parameters
+        **parameters
             Its ROS parameters.
 
         """
@@ -140,7 +140,7 @@ class Cell:
             Its other arguments.
         cli_args : list of str, optional
             Such as remappings.
-        parameters
+        **parameters
             Its ROS parameters.
 
         """

@@ -24,6 +24,7 @@ MODULES = {
     'live_diagnosis': 'weld_twin_nodes.live.live_diagnosis',
     'deviation_markers': 'weld_twin_nodes.live.deviation_markers',
     'contact_marker': 'weld_twin_nodes.live.contact_marker',
+    'compensator': 'weld_twin_nodes.live.compensator',
 }
 ROS_OWN = ('use_sim_time', 'start_type_description_service')
 """Parameters that every node of ROS 2 takes; so are those of `QosOverrides`."""

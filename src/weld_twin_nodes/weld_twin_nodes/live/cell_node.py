@@ -16,7 +16,7 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.errors import TwinError
+from weld_twin_core.errors import ModelError, TwinError
 from weld_twin_msgs_py.assembly.beside import Beside
 from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, FedBack, plain_messages
 from weld_twin_msgs_py.messages.to_messages import ros_messages
@@ -252,8 +252,23 @@ class CellNode(Node):
         held : bool
             Its last value counts until the next one comes; that it does so without a source is told.
 
+        Raises
+        ------
+        ModelError
+            By a remap the node publishes the topic itself, or has it as another input.
+
         """
         name = self.resolve_topic_name(topic.relative)
+        if any(output.topic == name for output in self._outputs):
+            raise ModelError(
+                f"{topic.name} is remapped to '{name}', which this node publishes itself; it would "
+                'answer its own messages'
+            )
+        if name in self.health.inputs:
+            raise ModelError(
+                f"{topic.name} is remapped to '{name}', which is another input of this node: it would "
+                'be compared with itself'
+            )
         state = self.watch(name, required=required, steady=topic.steady)
         if held:
             self._held.append(state)
@@ -277,6 +292,7 @@ class CellNode(Node):
                 at = message.header.stamp
                 state.stamped(at.sec * 1_000_000_000 + at.nanosec)
             callback(message)
+            state.used = state.last
 
         def guarded(kind: str, data: bytes) -> None:
             state.arrived()
@@ -497,13 +513,14 @@ class CellNode(Node):
         now = time.monotonic()
         for state in self._held:
             key, silent = f'held from {state.topic}', state.silent(now)
-            if not silent:
+            if not (silent and state.used):  # what was refused counts for nothing
                 self.health.lasting.pop(key, None)
                 continue
             if key not in self.health.lasting:
                 self.get_logger().warning(f'{state.topic}: silent; its last value still counts')
             self.health.lasting[key] = (
-                f'{state.topic}: the value that counts is {silent:.1f} s old, nothing came since'
+                f'{state.topic}: the value that counts is {now - state.used:.1f} s old, nothing usable '
+                'came since'
             )
 
     def _tell_last_losses(self) -> None:

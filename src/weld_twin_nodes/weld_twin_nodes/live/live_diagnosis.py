@@ -65,12 +65,7 @@ class LiveDiagnosis(ManagedNode):
         super().__init__('live_diagnosis', **kwargs)
         self._twin = placed_twin(self, build_twin(robot_of(self), self.setting('model')))
         self._align = frames_named(self.setting('align'))
-        self._window = Window(
-            self._twin.robot,
-            self.setting('window'),
-            self.setting('measuring_frame'),
-            self.joint_names,
-        )
+        self._window = self._empty_window()
         self._worker = Worker(self.get_logger().warning)
         self._begun = -float('inf')
         self._seen: int | None = None
@@ -101,8 +96,18 @@ class LiveDiagnosis(ManagedNode):
             self.destroy_timer(self._looking)
         self._worker.stop()
         self._worker = Worker(self.get_logger().warning)
-        self.time_went_back()
+        self._measured, self._seen = None, None
+        self._window = self._empty_window()
         self._begun = -float('inf')
+
+    def _empty_window(self) -> Window:
+        """Return a window that has heard nothing; after a jump of the clock one is reset instead."""
+        return Window(
+            self._twin.robot,
+            self.setting('window'),
+            self.setting('measuring_frame'),
+            self.joint_names,
+        )
 
     def destroy_node(self) -> None:
         """End the diagnosis under way."""

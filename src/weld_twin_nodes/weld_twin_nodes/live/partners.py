@@ -36,7 +36,7 @@ def unheard_publishers(
 
     """
     out = []
-    for info in node.get_publishers_info_by_topic(topic):
+    for info in _named(node.get_publishers_info_by_topic(topic)):
         if info.topic_type != kind and info.topic_type in understood:
             reason = f'sends {info.topic_type} where another sends {kind}, which is taken'
         elif info.topic_type != kind:
@@ -97,7 +97,7 @@ class Senders:
     def changed(self, node: Node, topic: str) -> str:
         """Return in a sentence that others publish it than before, empty where they do not."""
         infos = node.get_publishers_info_by_topic(topic)
-        now = frozenset(_name(info) for info in infos if UNKNOWN not in info.node_name)
+        now = frozenset(map(_name, _named(infos)))
         if not now or len(now) < len({info.node_name for info in infos}):
             return ''  # the graph does not have their names yet
         before = self._before
@@ -113,7 +113,7 @@ class Senders:
 def unreached_subscribers(node: Node, topic: str, kind: str, offered: Qos) -> list[str]:
     """Return a sentence for every subscriber that receives nothing; as `unheard_publishers`."""
     out = []
-    for info in node.get_subscriptions_info_by_topic(topic):
+    for info in _named(node.get_subscriptions_info_by_topic(topic)):
         if info.topic_type != kind:
             reason = f'expects {info.topic_type}, this node sends {kind}'
         else:
@@ -137,6 +137,11 @@ def _gap(offered: QoSProfile, asked: QoSProfile) -> str:
     ):
         said.append('durability: volatile is offered, transient_local asked for')
     return f'does not match in quality of service ({"; ".join(said)})' if said else ''
+
+
+def _named(infos: Sequence[Any]) -> list[Any]:
+    """Return those whose names the graph has; the others' follow in a moment."""
+    return [info for info in infos if UNKNOWN not in info.node_name]
 
 
 def _name(info: Any) -> str:

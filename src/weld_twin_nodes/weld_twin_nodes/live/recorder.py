@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.parameter import Parameter
+from rclpy.validate_topic_name import validate_topic_name
 from std_srvs.srv import Trigger
 
 from weld_twin_core.errors import DataError, TwinError
@@ -57,8 +59,22 @@ class Recorder(ManagedNode):
         self.start()
 
     def own_topics(self) -> Sequence[str]:
-        """Return what it is told to record."""
+        """
+        Return what it is told to record.
+
+        Raises
+        ------
+        DataError
+            A name is none that a topic can have.
+
+        """
         topics: list[str] = self.setting('topics')
+        for name in topics:
+            try:
+                validate_topic_name(name)
+            except InvalidTopicNameException as error:
+                said = str(error).splitlines()[0].removeprefix('Invalid topic name: ')
+                raise DataError(f"topics: '{name}' is no name of a topic: {said}") from None
         return topics
 
     def prepare(self) -> None:

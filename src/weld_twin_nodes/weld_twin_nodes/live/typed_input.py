@@ -28,6 +28,9 @@ AGAIN = 0.05
 Seconds until a subscription of another type is tried (again). Fast DDS knows one type of a topic
 in a process, and forgets it when the executor has let go of the subscription before: a turn later.
 """
+SELDOM = 5.0
+"""Longest time from one try to the next [s], each twice the one before: each failure is a dozen lines
+of the middleware on the terminal."""
 
 
 class TypedInput:
@@ -80,7 +83,7 @@ class TypedInput:
         self._missing: set[str] = set()
         self._subscription: Any = None
         self._trying: Any = None
-        self._delay = ''
+        self._delay, self._pause = '', AGAIN
         self._subscribe()
 
     def adapt(self) -> None:
@@ -134,9 +137,11 @@ class TypedInput:
 
     def _try_again(self) -> None:
         """Subscribe in a later turn of the executor."""
-        if self._trying is None:
-            steady = Clock(clock_type=ClockType.STEADY_TIME)
-            self._trying = self._node.create_timer(AGAIN, self._subscribe, clock=steady)
+        if self._trying is not None:
+            self._node.destroy_timer(self._trying)
+            self._pause = min(2.0 * self._pause, SELDOM)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._trying = self._node.create_timer(self._pause, self._subscribe, clock=steady)
 
     def _subscribe(self) -> None:
         """Take the type that the publishers have; try again later where it cannot be done yet."""
@@ -160,7 +165,7 @@ class TypedInput:
             return
         if self._trying is not None:
             self._node.destroy_timer(self._trying)
-        self._trying, self._delay = None, ''
+        self._trying, self._delay, self._pause = None, '', AGAIN
         if kind != self._kinds[0]:
             self._remark(f'{self.name} is taken as {kind}')
         self.kind = kind

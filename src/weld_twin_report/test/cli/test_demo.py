@@ -67,9 +67,9 @@ def test_the_demo_leaves_bag_table_and_picture_that_agree(tmp_path):
         assert not missing, f'{page}: run tools/in_env python tools/demo_page.py'
 
 
-def test_the_demo_does_not_replace_what_it_did_not_make(tmp_path):
+def test_the_demo_does_not_replace_what_it_did_not_make(tmp_path, weld_twin):
     (tmp_path / 'thesis.tex').touch()
-    result = demo(tmp_path)
-    assert result.returncode == 2
-    assert 'holds something else already' in result.stderr
+    result = weld_twin('demo', '--out', tmp_path)
+    assert result.code == 2
+    assert 'holds something else already' in result.err
     assert [p.name for p in tmp_path.iterdir()] == ['thesis.tex']

@@ -96,3 +96,17 @@ def test_a_request_is_known_by_what_is_asked_not_by_its_names(plant):
     assert read_list(plant / 'list.csv')[0].key() == key
     (plant / 'moved/more').write_bytes(b'x')
     assert read_list(plant / 'list.csv')[0].key() != key
+
+
+def test_a_robot_of_ones_own_is_its_file_so_that_a_changed_one_runs_again(plant, monkeypatch):
+    monkeypatch.setenv('WELD_TWIN_ROBOTS', str(plant / 'robots'))
+    (plant / 'robots').mkdir()
+    file = plant / 'robots/cell7.yaml'
+    file.write_text('joints: [{name: one, a: 0.3}]\n')
+    (plant / 'list.csv').write_text('cell,recording,robot\nline 1,sound,cell7\nline 2,sound,ur5\n')
+    own, bundled = read_list(plant / 'list.csv')
+    assert (own.robot, bundled.robot) == (str(file), 'ur5')
+    before = own.key(), bundled.key()
+    file.write_text('joints: [{name: one, a: 0.4}]\n')
+    after = own.key(), bundled.key()
+    assert (before[0] == after[0], before[1] == after[1]) == (False, True)

@@ -13,6 +13,7 @@ from pathlib import Path
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.files.input_files import hashed
+from weld_twin_msgs_py.robots.own_robots import as_file
 from weld_twin_nodes.offline.content_hash import digest
 
 from ..history.entry import instant
@@ -141,6 +142,8 @@ def _line(file: Path, number: int, row: Mapping[str | None, str | None]) -> List
             told[name] = str(file.parent / told[name])
     if (file.parent / told['robot']).is_file():
         told['robot'] = str(file.parent / told['robot'])
+    else:
+        told['robot'] = as_file(told['robot'])
     apply = YES.get(told.pop('apply', '').lower())
     if apply is None:
         raise DataError(f"'{file}' line {number}: apply is yes or no")

@@ -11,7 +11,7 @@ from time import localtime, strftime
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
-from weld_twin_core.arm import catalog
+from weld_twin_msgs_py.robots import robot_names
 
 from ..report.html import Child, Html, document, section, table, tag
 from .fields import CORRECT, FIELDS, sentence
@@ -89,7 +89,7 @@ def page(title: str, *body: Child, site: Site, refresh: int | None = None) -> st
 
 def start_page(site: Site, said: str = '') -> str:
     """Return the page on which a recording is dropped."""
-    robots = [('', 'choose, or drop its file'), *((n, n) for n in catalog.names())]
+    robots = [('', 'choose, or drop its file'), *((n, n) for n in robot_names())]
     form = tag(
         'form',
         tag(
@@ -326,12 +326,12 @@ def _ask_again(job: Job) -> Html:
     """Return the questions once more, for the same files."""
     asked = job.asked
     if job.kind == PROGRAM:
-        own = [(asked.robot, asked.robot)] if asked.robot not in catalog.names() else []
+        own = [(asked.robot, asked.robot)] if asked.robot not in robot_names() else []
         more: list[Child] = [tag('div', *_fields(HOW, asked.told), class_='fields')]
     else:
         own = [(n, n) for n in job.names if n == asked.robot]
         more = [tag('div', *_fields(FIRST, asked.told), class_='fields'), _details(asked)]
-    robots = [*own, *((n, n) for n in catalog.names())]
+    robots = [*own, *((n, n) for n in robot_names())]
     robots = robots if asked.robot else [('', 'choose'), *robots]
     form = tag(
         'form',
@@ -364,7 +364,7 @@ def program_page(jobs: Sequence[Job], of: str, site: Site, said: str = '') -> st
 
     """
     models = _models(jobs)
-    robots = [('', "the diagnosis', or the file dropped"), *((n, n) for n in catalog.names())]
+    robots = [('', "the diagnosis', or the file dropped"), *((n, n) for n in robot_names())]
     form = tag(
         'form',
         tag(

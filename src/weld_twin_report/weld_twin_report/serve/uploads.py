@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from weld_twin_core.arm import catalog
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.programs.languages import LANGUAGES
+from weld_twin_msgs_py.robots import robot_names
 
 from ..history.entry import instant
 from .fields import CORRECT, DIAGNOSE, IMPORT, given
@@ -185,8 +185,10 @@ def asked_of_program(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
 def _robot(form: Mapping[str, Any], names: Sequence[str]) -> str:
     own = [name for name in names if name.lower().endswith(OTHERS)]
     robot = _text(form, 'robot') or (own[0] if own else '')
-    if robot and robot not in own and robot.lower() not in catalog.names():
-        raise DataError('the robot is none of those bundled; drop its file with the recording')
+    if robot and robot not in own and robot.lower() not in map(str.lower, robot_names()):
+        raise DataError(
+            'the robot is none of those bundled or on this machine; drop its file with the recording'
+        )
     return robot
 
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
+from ..channels import AXIS, TURNS, row_factors
 from ..robot import Robot
 from ..rotation import skew
 
@@ -65,14 +66,24 @@ def _joint(robot: Robot, i: int) -> Array:
 
 def factors(robot: Robot, i: int) -> list[Factor]:
     """Return the factors of a row, from the base outward."""
-    beta = _turn(1, np.cos(robot.beta[i]), np.sin(robot.beta[i]))
-    alpha = _turn(0, np.cos(robot.alpha[i]), np.sin(robot.alpha[i]))
-    joint = Factor(('theta', 'd'), 2, _joint(robot, i))
-    if robot.convention == 'standard':
-        link = Factor(('a', 'alpha'), 0, (_slide(0, robot.a[i]) @ alpha)[None])
-        return [joint, link, Factor(('beta',), 1, beta[None])]
-    twist, turn = Factor(('alpha',), 0, alpha[None]), Factor(('beta',), 1, beta[None])
-    return [twist, turn, Factor(('a',), 0, _slide(0, robot.a[i])[None]), joint]
+    out = []
+    for kinds in row_factors(robot.convention):
+        axis = AXIS[kinds[0]]
+        out.append(Factor(kinds, axis, _joint(robot, i) if axis == 2 else _link(robot, i, kinds)))
+    return out
+
+
+def _link(robot: Robot, i: int, kinds: tuple[str, ...]) -> Array:
+    """Return a constant factor of a row, shape (1, 4, 4): a slide, a turn or both on one axis."""
+    out = np.eye(4)
+    for kind in kinds:
+        value = getattr(robot, kind)[i]
+        turn = kind in TURNS
+        own = (
+            _turn(AXIS[kind], np.cos(value), np.sin(value)) if turn else _slide(AXIS[kind], value)
+        )
+        out = out @ own
+    return out[None]
 
 
 def product(first: Array, second: Array) -> Array:

@@ -1,7 +1,11 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Bundled robots, each a module whose DATA is the mapping that a robot file holds.
+Bundled robots, a file each, with the source of its numbers.
+
+They are robot files as users write them: YAML, in the form that JSON has in common with it, so that
+the core reads them without a library for YAML. A comment begins with ``#`` at the start of a line or
+after a blank.
 
 Examples
 --------
@@ -15,37 +19,22 @@ Examples
 
 from __future__ import annotations
 
-from importlib import import_module
+import json
+import re
+from importlib.resources import files
 
 from ...errors import ModelError
 from ..robot import Robot
 
 _NAMES = (
-    'ur5',
-    'ur10',
-    'kuka_kr6_r900',
-    'abb_irb120',
-    'abb_irb1600',
-    'fanuc_m10ia',
-    'franka_panda',
-    'ur3e',
-    'ur5e',
-    'ur10e',
-    'ur16e',
-    'ur20',
-    'yaskawa_ma1440',
-    'yaskawa_ma2010',
-    'yaskawa_ar2010',
-    'fanuc_m10id12',
-    'fanuc_m20id25',
-    'abb_irb2600_12_165',
-    'abb_irb4600_40_255',
-    'staubli_tx2_90l',
-    'kuka_iiwa14',
-    'kuka_kr16_2',
-    'kuka_kr16_r1610_2',
-    'mecademic_meca500',
+    *('ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb120', 'abb_irb1600', 'fanuc_m10ia', 'franka_panda'),
+    *('ur3e', 'ur5e', 'ur10e', 'ur16e', 'ur20'),
+    *('yaskawa_ma1440', 'yaskawa_ma2010', 'yaskawa_ar2010', 'fanuc_m10id12', 'fanuc_m20id25'),
+    *('abb_irb2600_12_165', 'abb_irb4600_40_255', 'staubli_tx2_90l', 'kuka_iiwa14'),
+    *('kuka_kr16_2', 'kuka_kr16_r1610_2', 'mecademic_meca500'),
 )
+"""The files, in the order in which arms are listed and drawn; a new one comes last."""
+_COMMENT = re.compile(r'(?m)(?:^|\s)#.*$')
 
 
 def names() -> tuple[str, ...]:
@@ -77,4 +66,5 @@ def load(name: str) -> Robot:
     """
     if name not in _NAMES:
         raise ModelError(f'no bundled robot is called {name!r}; there are ' + ', '.join(_NAMES))
-    return Robot.from_mapping(import_module(f'.{name}', __name__).DATA)
+    text = (files(__package__) / f'{name}.yaml').read_text('utf-8')
+    return Robot.from_mapping(json.loads(_COMMENT.sub('', text)))

@@ -4,28 +4,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import erfc, sqrt
 from typing import Any
 
 import numpy as np
 
+from ...arrays import Array
 from ...effects import REGISTRY
+from ...effects.curve import basis
 from ...effects.effect import Effect
+from ...effects.joint_curve import JointCurve
+from ..algebra.fit import fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Scale
-from ..hypotheses.choices import ranking
 from ..hypotheses.search import Search
+from ..hypotheses.seed_systems import ranking
 from ..hypotheses.still_joints import narrow
 from ..levels.curved import Curved
+from ..levels.free_form import Part
+from ..levels.groups import Group
 from ..verdict.decision import Verdict
 from .chosen_pieces import DECIDES
 from .experiment import confirming, next_experiment
 from .limits import Limits
 from .next_touches import next_touches
 from .postures import Room
-from .without_names import without_names
 
 TOUCHED = 4
 """The same where contacts measured: every touch that could be made is tried with each."""
@@ -45,6 +50,14 @@ EVEN = 0.5
 experiments were seen to promise more than an even chance."""
 MOST = 6
 """Explanations compared at most; each is predicted for every measurement that could be made."""
+RIVALS = 2
+"""Other places or dependences that are compared with the one that fits best."""
+ROWS = 2000
+"""Rows that a rival's curves are fitted on: only its shape counts."""
+MOST_KNOTS = 40
+"""Knots of a curve that is carried on over the whole range of an experiment."""
+
+Explanation = tuple[Effect, ...]
 
 
 def next_step(
@@ -177,3 +190,68 @@ def _beside(found: Search) -> list[tuple[Effect, ...]]:
     taken = {(effect.name, effect.site) for effect in model.found}
     more = [choice for choice in ranked if choice.unit.site not in taken]
     return [(*model.found, choice.effect()) for choice in more[: MOST - 1]]
+
+
+def without_names(
+    found: Search, rival: Curved | None, low: Array, high: Array
+) -> list[Explanation]:
+    """
+    Return the free-form explanation and the nearest other ones, likeliest first.
+
+    Parameters
+    ----------
+    found : Search
+    rival : Curved or None
+        What explains the gap without a formula; None where nothing does.
+    low, high : array, shape (n,) [rad, m]
+        What joints may reach in an experiment: curves over an angle go on there, free to bend.
+
+    """
+    if rival is None:
+        return []
+    fitted = rival.found.final.model.found
+    parts = [part for part in rival.form.parts if part.group.carried]
+    if not parts:
+        return []
+    robot = rival.found.final.model.robot
+    ends = {name: (low[i], high[i]) for i, name in enumerate(robot.joint_names)}
+    out = [fitted]
+    kept = fitted[: len(rival.kept)]
+    for group in _others(rival.form.parts):
+        curves = [
+            c for p in rival.form.parts for c in (group if p is parts[0] else p.group).carried
+        ]
+        out.append(_fitted(rival.found, (*kept, *curves)))
+    return [tuple(_wide(effect, ends) for effect in effects) for effects in out]
+
+
+def _others(parts: Sequence[Part]) -> list[Group]:
+    """Return the likeliest rivals of the first group that curves stand for, at other sites."""
+    part = next(part for part in parts if part.group.carried)
+    taken = {(p.group.at, p.group.on) for p in parts}
+    out: list[Group] = []
+    for group, _ in sorted(part.rivals, key=lambda item: -item[1]):
+        if (group.at, group.on) not in taken and group.carried:
+            taken.add((group.at, group.on))
+            out.append(group)
+    return out[:RIVALS]
+
+
+def _fitted(found: Search, effects: Explanation) -> Explanation:
+    few = found.problem.thinned(ROWS)
+    scale = replace(found.scale, weights=tuple(np.ones(m) for m in few.samples))
+    return fit(few, found.final.model.with_found(effects), scale, None, 3).model.found
+
+
+def _wide(effect: Effect, ends: dict[str, tuple[float, float]]) -> Effect:
+    """Return a curve over an angle with knots as dense as they are over all that may be reached."""
+    if not isinstance(effect, JointCurve) or effect.over != 'angle':
+        return effect
+    knots = np.asarray(effect.knots, dtype=float)
+    low, high = ends[effect.joint]
+    low, high = min(low, knots[0]), max(high, knots[-1])
+    step = float(np.diff(knots).mean())
+    count = min(int(np.ceil((high - low) / step)) + 1, MOST_KNOTS)
+    wide = np.linspace(low, high, count)
+    values = np.asarray(effect.values, dtype=float) @ basis(effect.knots, wide)
+    return replace(effect, values=tuple(values.tolist()), knots=tuple(wide.tolist()))

@@ -13,8 +13,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.problem import PLACES, Model, Problem, Scale
 from ..hypotheses.library import plain_causes
-from .touch_design import Design, Touchable, chosen, scatter
-from .touch_postures import SECONDS, again, beside
+from .touch_design import SECONDS, Design, Touchable, again, beside, chosen, scatter
 
 COUNT = 12
 """Touches that are proposed: a quarter of an hour by hand."""

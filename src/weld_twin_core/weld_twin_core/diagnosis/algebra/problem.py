@@ -368,25 +368,32 @@ class Problem:
         """
         Return a block number for every row: contiguous stretches, at least one per recording.
 
-        Recordings count by their length; a stretch never spans two recordings. Where each has a
-        base of its own, block k is the k-th part of every one: left out whole, a short recording
-        would lose its base. Of contacts each place is a stretch, where there are at least
-        `PLACES`.
+        The numbers are the same whichever recording was given first. Recordings count by their
+        length; a stretch never spans two recordings. Where each has a base of its own, block k is
+        the k-th part of every one: left out whole, a short recording would lose its base. Of
+        contacts each place is a stretch, where there are at least `PLACES`.
         """
         if self.own_bases:
             parts = [(np.arange(m) * blocks) // max(m, 1) for m in self.samples]
             return np.concatenate([np.repeat(p, c) for p, c in zip(parts, self.rows, strict=True)])
         whole = self.places >= PLACES
         total = max(sum(self.samples), 1)
-        out, start = [], 0
-        for k, (c, m) in enumerate(zip(self.rows, self.samples, strict=True)):
+        out, start = [np.empty(0, int) for _ in self.recordings], 0
+        for k in self._by_content:
+            c, m = self.rows[k], self.samples[k]
             count = max(1, round(blocks * m / total))
             if whole and self.contact(k) is not None:
                 count = 1
             labels = start + (np.arange(m) * count) // max(m, 1)
-            out.append(np.repeat(labels, c))
+            out[k] = np.repeat(labels, c)
             start += count
         return np.concatenate(out)
+
+    @property
+    def _by_content(self) -> list[int]:
+        """Return the recordings in an order that does not hang on which was given first."""
+        keys = [(r.epoch_ns, _measured(r).position.tobytes()) for r in self.recordings]
+        return sorted(range(len(keys)), key=keys.__getitem__)
 
     def thinned(self, most_rows: int) -> Problem:
         """Return the problem with evenly fewer measurements when it has too many rows."""

@@ -16,46 +16,11 @@ from ...effects.registry import REGISTRY
 from ...effects.view import View
 from ...twin.features import Features, joints_of
 from ..algebra.atoms import Amounts, Columns, MovedJoint, Whole, amounts, gathered, moved_joint
-from ..algebra.gram import Index
 from ..algebra.problem import Model, Problem, Scale
-from .seed_systems import SeedSystems
+from .seed_systems import SeedSystems, Unit
 from .still_joints import REASON, hardly_moves, moved_most
 
 EXCLUDED = 'excluded by the user'
-
-
-@dataclass(frozen=True, eq=False)
-class Unit:
-    """
-    One family on one joint: the smallest thing a verdict can name.
-
-    Attributes
-    ----------
-    family : str
-    joint : str or None
-    seeds : tuple of Effect
-        Instances that span it; more than one where a parameter bends the response.
-    columns : tuple of array of int
-        Column numbers of every seed.
-    trials : float
-        Among how many instances the seeds were chosen.
-
-    """
-
-    family: str
-    joint: str | None
-    seeds: tuple[Effect, ...]
-    columns: tuple[Index, ...]
-    trials: float
-
-    @property
-    def site(self) -> tuple[str, str | None]:
-        """Return family and joint."""
-        return self.family, self.joint
-
-    def __str__(self) -> str:
-        """Return family and joint as people read them."""
-        return f'{self.family} of {self.joint}' if self.joint else self.family
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,7 @@ import numpy as np
 
 from ..algebra.fit import Fit, fit
 from ..result import Site
-from .choices import Choice, ranking
-from .seed_systems import evidence
+from .seed_systems import Choice, evidence, ranking
 from .selection import Workspace, fitted_with, implausible
 
 SHORTLIST = 7

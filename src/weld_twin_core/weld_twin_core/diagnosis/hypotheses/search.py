@@ -22,7 +22,6 @@ from .rivals import Rival, rivals
 from .selection import (
     Workspace,
     backward,
-    consolidated,
     forward,
     implausible,
     possible_part,
@@ -242,7 +241,7 @@ def _chosen(
         if steps:
             now = steps[-1].fit
             now = backward(work, now, effective)
-            now = without_negligible(work, consolidated(work, now, effective))
+            now = without_negligible(work, now)
             now = without_misfit(work, now)
         # Of what enters one by one, what came later may stand for some that came before.
         crowded = small.at_rest and len(now.model.found) >= beliefs.many

@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Normal equations of every seed by itself: all that a ranking asks for.
+Normal equations of every seed by itself, and the ranking of units that asks for no more.
 
 A ranking asks what each seed would explain beside the model, never what two seeds would explain
 together. So each seed has a small system of its own, and those of one size are one array.
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
+from ...effects.effect import Effect
 from ..algebra.gram import EMPTY, FLAT, Index, unit_diagonal
 
 SINGULAR = 1e-11
@@ -26,6 +27,40 @@ PERFECT = 1e-12
 """Share of the sum of squares that counts as left at the least; keeps a logarithm finite."""
 FEWEST = 3.0
 """Independent rows at the least: a position has three coordinates."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unit:
+    """
+    One family on one joint: the smallest thing a verdict can name.
+
+    Attributes
+    ----------
+    family : str
+    joint : str or None
+    seeds : tuple of Effect
+        Instances that span it; more than one where a parameter bends the response.
+    columns : tuple of array of int
+        Column numbers of every seed.
+    trials : float
+        Among how many instances the seeds were chosen.
+
+    """
+
+    family: str
+    joint: str | None
+    seeds: tuple[Effect, ...]
+    columns: tuple[Index, ...]
+    trials: float
+
+    @property
+    def site(self) -> tuple[str, str | None]:
+        """Return family and joint."""
+        return self.family, self.joint
+
+    def __str__(self) -> str:
+        """Return family and joint as people read them."""
+        return f'{self.family} of {self.joint}' if self.joint else self.family
 
 
 class Alike(NamedTuple):
@@ -198,10 +233,10 @@ def _projected(left: Array, pull: Array, k: Index) -> tuple[Array, Array]:
 
 
 def evidence(rss: float, gain: float, freedom: float, effective: float) -> float:
-    """
+    r"""
     Return the nats that a fall of the sum of squares is worth, noise level unknown.
 
-    .. math:: \\tfrac{n}{2} \\log\\frac{RSS}{RSS - gain} - \\tfrac{p}{2} \\log n
+    .. math:: \tfrac{n}{2} \log\frac{RSS}{RSS - gain} - \tfrac{p}{2} \log n
 
     Parameters
     ----------
@@ -242,3 +277,72 @@ def evidences(rss: float, gain: Array, freedom: Array | float, effective: float)
     left = np.maximum(rss - gain, PERFECT * rss) / rss if rss > 0.0 else np.ones_like(gain)
     count = max(effective, FEWEST)
     return np.asarray(-0.5 * count * np.log(left) - 0.5 * freedom * np.log(count))
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """
+    A unit with the seed and columns that serve it best.
+
+    Attributes
+    ----------
+    unit : Unit
+    seed : int
+    columns : array of int
+        Of the seed, those that earn their place.
+    nats : float
+        Log of the evidence ratio against leaving the unit out (Schwarz's approximation).
+    coefficients : array, shape (K,)
+        Of all the seed's columns, zero for those left out.
+
+    """
+
+    unit: Unit
+    seed: int
+    columns: Index
+    nats: float
+    coefficients: Array
+
+    def effect(self) -> Effect:
+        """Return the effect that the linear coefficients stand for."""
+        return self.unit.seeds[self.seed].from_atoms(self.coefficients)
+
+
+def ranking(systems: SeedSystems, units: Sequence[Unit], effective: float) -> list[Choice]:
+    """
+    Return every unit's best choice, most evidence first.
+
+    Parameters
+    ----------
+    systems : SeedSystems
+        Normal equations of all seeds, with the model projected out.
+    units : sequence of Unit
+        What may enter, each as a whole.
+    effective : float
+        Number of independent rows.
+
+    """
+    nats = np.full(sum(len(unit.seeds) for unit in units), -np.inf)
+    where: dict[int, tuple[Alike, int, Index]] = {}
+    for alike, grown in zip(systems.alike, systems.grown(effective), strict=True):
+        nats[alike.seeds] = grown.nats
+        where.update(
+            (int(s), (alike, k, np.flatnonzero(grown.chosen[k])))
+            for k, s in enumerate(alike.seeds)
+        )
+    found, at = [], 0
+    for unit in units:
+        best = at + int(np.argmax(nats[at : at + len(unit.seeds)]))
+        if np.isfinite(nats[best]):
+            worth = float(nats[best] - np.log(unit.trials))
+            found.append(_choice(unit, best - at, worth, *where[best]))
+        at += len(unit.seeds)
+    return sorted(found, key=lambda choice: -choice.nats)
+
+
+def _choice(unit: Unit, seed: int, nats: float, alike: Alike, k: int, chosen: Index) -> Choice:
+    """Return a choice with the least-squares coefficients of its columns."""
+    scaled, size = unit_diagonal(alike.normal[k][np.ix_(chosen, chosen)], SINGULAR)
+    coefficients = np.zeros(alike.columns.shape[1])
+    coefficients[chosen] = np.linalg.solve(scaled, alike.right[k][chosen] / size) / size
+    return Choice(unit, seed, alike.columns[k][chosen], nats, coefficients)

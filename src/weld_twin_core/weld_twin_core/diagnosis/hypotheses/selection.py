@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -16,9 +15,8 @@ from ...effects.plausible import beyond
 from ..algebra.fit import Fit, design, fit
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
-from .choices import Choice, ranking
-from .library import Library, Unit
-from .seed_systems import SeedSystems, evidence
+from .library import Library
+from .seed_systems import Choice, SeedSystems, Unit, evidence, ranking
 from .starts import searched, started
 
 SHORTLIST = 4
@@ -332,54 +330,3 @@ def _size(work: Workspace, now: Fit, less: Model) -> float:
     """Return the RMS change [noise] of the residual that a model with less makes."""
     change = work.problem.whitened(work.problem.residuals(less), work.scale) - now.residual
     return float(np.sqrt((change**2).mean()))
-
-
-def consolidated(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fit:
-    """
-    Return the fit with two effects replaced by one wherever one explains as much.
-
-    Selection one at a time can enter through a neighbour of the cause and then mend the rest
-    with a second effect.
-
-    Parameters
-    ----------
-    work : Workspace
-        The problem with its library, multiplied out.
-    now : Fit
-        The fit so far.
-    effective : callable
-        From a fit to the number of its independent rows.
-
-    """
-    improved = True
-    while improved and len(now.model.found) > 1:
-        improved = False
-        for a, b in combinations(range(len(now.model.found)), 2):
-            one = _one_for_two(work, now, a, b, effective)
-            if one is not None:
-                now, improved = one, True
-                break
-    return now
-
-
-def _one_for_two(
-    work: Workspace, now: Fit, a: int, b: int, effective: Callable[[Fit], float]
-) -> Fit | None:
-    rest = fit(work.problem, now.model.without(b).without(a), work.scale, None, 4)
-    systems = work.beside(rest.model, rest.residual)
-    count = effective(now)
-    ranked = ranking(systems, work.library.units, count)
-    taken = {(e.name, e.site) for e in rest.model.found}
-    freedom = now.coordinates.size - rest.coordinates.size
-    wanted = evidence(rest.rss, rest.rss - now.rss, freedom, count)
-    for choice in [c for c in ranked if c.unit.site not in taken][:SHORTLIST]:
-        if choice.nats < wanted - work.beliefs.replacing_slack * abs(wanted):
-            break
-        one = fitted_with(work, rest.model, choice.effect())
-        free = one.coordinates.size - rest.coordinates.size
-        nats = evidence(rest.rss, rest.rss - one.rss, free, count) - float(
-            np.log(choice.unit.trials)
-        )
-        if nats >= wanted and not implausible(one.model):
-            return one
-    return None

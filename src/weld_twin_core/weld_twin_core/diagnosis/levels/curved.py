@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The model with curves in place of names: fitted, and judged as any model is."""
+"""The model with curves in place of names: fitted, judged as any model is, and carried or not."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...effects.effect import Effect
+from ...recording import Recording
 from ..algebra.fit import fit, robust_fit, robust_scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..result import Site
-from ..unseen.unseen_stretches import Unseen
+from ..result import Shrink, Site
+from ..unseen.held_out_shrink import held_out_shrink
+from ..unseen.unseen_stretches import Unseen, steadiness
 from ..verdict.decision import Verdict
 from .free_form import FreeForm, free_form
-from .sparse_groups import steadiness
 
 ROWS = 6000
 """Rows that groups are chosen on; the curves are fitted on all."""
@@ -69,12 +70,9 @@ def curved(found: Search, beliefs: Beliefs) -> Curved | None:
 
 def standing(
     found: Search, verdict: Verdict, alone: Curved | None, beliefs: Beliefs
-) -> tuple[Verdict, Curved | None]:
+) -> Curved | None:
     """
-    Return an 'unknown' verdict with the names that stand, and curves for what is left beside them.
-
-    Names stand beside what has no name, unless curves alone predict unseen stretches clearly
-    better than names and curves together: then the names imitate.
+    Return curves for what an 'unknown' verdict leaves beside the names that it tells.
 
     Parameters
     ----------
@@ -87,7 +85,7 @@ def standing(
 
     """
     if verdict.status != 'unknown' or found.dense:
-        return verdict, alone
+        return alone
     told = {site for group in verdict.sets for site in group}
     named = [
         effect
@@ -96,28 +94,16 @@ def standing(
     ]
     if not named:
         wandering = None if alone else _beside(found, _setup(found), beliefs, wandering=True)
-        return verdict, alone or wandering
+        return alone or wandering
     kept = [*_setup(found), *named]
     beside = _beside(found, kept, beliefs)
-    if alone is not None and _beaten(found, beside, alone, beliefs):
-        return replace(verdict, sets=()), alone
     if beside is None and found.final.model.found != tuple(kept):
         beside = _beside(found, kept, beliefs, wandering=True)
-    return verdict, beside
+    return beside
 
 
 def _setup(found: Search) -> list[Effect]:
     return [effect for effect in found.final.model.found if not effect.cause]
-
-
-def _beaten(found: Search, beside: Curved | None, alone: Curved, beliefs: Beliefs) -> bool:
-    """Return whether curves alone predict clearly better than names, with curves or without."""
-    if beside is None:
-        named = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    else:
-        named = beside.unseen
-    gain, steady = gain_of(named, alone.unseen)
-    return gain >= beliefs.beaten_share and steady >= beliefs.beaten_steady
 
 
 def _beside(
@@ -158,3 +144,54 @@ def gain_of(named: Unseen, rival: Unseen) -> tuple[float, float]:
     one = np.array([before[labels == n].mean() for n in names])
     two = np.array([after[others == n].mean() for n in names])
     return gain, steadiness(one, two)
+
+
+def carried(
+    found: Search,
+    unseen: Unseen,
+    shrink: Shrink,
+    verdict: Verdict,
+    rival: Curved | None,
+    holdout: Sequence[Recording],
+    beliefs: Beliefs,
+) -> tuple[Search, Unseen, Shrink, Verdict]:
+    """
+    Return the model to carry on with, its predictions on unseen stretches, its shrink, the verdict.
+
+    Parameters
+    ----------
+    found, unseen, shrink
+        Of the effects found.
+    verdict : Verdict
+    rival : Curved or None
+        The free-form explanation; carried where the verdict is 'unknown' and it predicts as well.
+        What makes unseen data worse than the nominal robot does is not carried at all, nor told.
+    holdout : sequence of Recording
+    beliefs : Beliefs
+
+    """
+    if verdict.status != 'unknown':
+        return found, unseen, shrink, verdict
+    if rival is not None and _worth(unseen, rival, verdict, beliefs):
+        found, unseen = rival.found, rival.unseen
+        shrink = held_out_shrink(found, unseen, holdout, beliefs)
+    if shrink.rms_after_m <= shrink.rms_before_m:
+        return found, unseen, shrink, verdict
+    # Without a name there is no reason to carry what makes unseen data worse.
+    found = replace(found, final=found.baseline, precision=np.zeros(0), slots=(), dense=False)
+    unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
+    shrink = held_out_shrink(found, unseen, holdout, beliefs)
+    return found, unseen, shrink, replace(verdict, sets=())
+
+
+def _worth(named: Unseen, rival: Curved, verdict: Verdict, beliefs: Beliefs) -> bool:
+    """
+    Return whether curves are carried: instead of names that do not stand, or clearly beside others.
+
+    Curves that hardly help beside names would put places under suspicion for nothing.
+    """
+    if verdict.sets:
+        gain, steady = gain_of(named, rival.unseen)
+        return gain >= beliefs.beaten_share and steady >= beliefs.beaten_steady
+    left = named.rms(named.predict(range(len(named.parts))))
+    return rival.rms_m <= beliefs.curve_room * left

@@ -1,23 +1,61 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Do the formulas of the names hold? Free forms at their own places, and noise from a joint."""
+"""
+Do the formulas of the names hold? Free forms instead of them and at their places, and noise.
+
+At their places a joint may lose motion by any law; what the instrument and the frames do is a free
+smooth field over the workspace. They are added to everything that is named, so that they need to
+find no more than what the name misses.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from ...arrays import Array
+from ...twin.features import Features
+from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..result import NAMING, Site
-from ..unseen.unseen_stretches import Unseen
+from ..unseen.regions import posture_regions
+from ..unseen.unseen_stretches import Taken, Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
-from .held_against import held_against
-from .own_place import Beside, beside_names
+from .groups import smooth_field, spanned
 from .scatter import Scatter, scatter
+from .whole_arm import lost_motion, moves
+
+FIELD = 'instrument'
+"""A free field over the workspace speaks against every formula: it is what each of them bends to."""
+
+
+class Beside(NamedTuple):
+    """
+    What a free form predicts that the names do not.
+
+    Attributes
+    ----------
+    at, on : str
+        Place and dependence of the free form.
+    gain : float
+        Share of the squared error that it takes off on unseen data, by the way of leaving out,
+        stretches of time or regions of posture, that shows less.
+    steady : float
+        The same in standard errors between the parts left out.
+    share : float
+        RMS of what it takes off over that of the largest effect named at this place.
+
+    """
+
+    at: str
+    on: str
+    gain: float
+    steady: float
+    share: float
 
 
 class Missed(NamedTuple):
@@ -27,67 +65,80 @@ class Missed(NamedTuple):
     Attributes
     ----------
     scattered : tuple of Scatter
-        Joints that noise comes from, largest first.
+        Joints that noise comes from beyond doubt, largest first.
     forms : tuple of Beside
-        Free forms that predict what a name should.
+        Free forms that predict beyond doubt what a name should.
+    sizes : mapping from str to float
+        The largest effect at every place, RMS in units of noise.
 
     """
 
     scattered: tuple[Scatter, ...] = ()
     forms: tuple[Beside, ...] = ()
+    sizes: dict[str, float] = {}
+
+    def by_forms(self, at: str) -> float:
+        """Return the RMS that free forms take off at a place, as a share of the largest effect."""
+        return max((one.share for one in self.forms if one.at in (at, FIELD)), default=0.0)
+
+    def by_noise(self, at: str) -> float:
+        """Return the RMS of the noise that comes from a place, as a share of the largest effect."""
+        own = [one.size for one in self.scattered if one.joint == at]
+        return max(own, default=0.0) / max(self.sizes.get(at, 0.0), 1e-12)
 
 
-def formulas(
-    found: Search, unseen: Unseen, verdict: Verdict, rival: Curved | None, beliefs: Beliefs
-) -> tuple[Verdict, Missed]:
+def missed(found: Search, unseen: Unseen, beliefs: Beliefs) -> Missed:
     """
-    Return the verdict, or 'unknown' where what it names leaves what its formula should not.
-
-    A free form that takes off much less than the effect itself, or than the noise, only mends a
-    formula; so does scatter.
+    Return what the formulas of the effects found miss, as far as it is beyond doubt.
 
     Parameters
     ----------
     found : Search
     unseen : Unseen
         Of its final model.
-    verdict : Verdict
-    rival : Curved or None
-        The free-form explanation in place of the names.
     beliefs : Beliefs
 
     """
-    verdict = held_against(verdict, unseen, rival, beliefs)
     if found.dense:
-        return verdict, Missed()
+        return Missed()
     loose = [
         one
         for one in sorted(scatter(found, unseen), key=lambda one: -one.share)
         if one.share >= beliefs.beaten_share and one.steady >= beliefs.scatter_sure
     ]
-    if verdict.status not in (*NAMING, 'none'):
-        return verdict, Missed(tuple(loose))
-    sizes = _sizes(found, unseen)
+    forms = tuple(one for one in beside_names(found, unseen) if _clear(one, beliefs))
+    return Missed(tuple(loose), forms, _sizes(found, unseen))
+
+
+def no_noise(verdict: Verdict, rival: Curved | None, left: Missed, beliefs: Beliefs) -> Verdict:
+    """
+    Return 'unknown' in the place of 'none' where what looks like noise follows something.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        Of any other status, nothing changes.
+    rival : Curved or None
+        The free-form explanation, whether or not it can be carried to another motion.
+    left : Missed
+    beliefs : Beliefs
+
+    """
+    if verdict.status != 'none':
+        return verdict
     reasons = [
         f'what remains is no noise of the instrument: {100.0 * one.share:.0f} % of it lies along '
         f'the motion of {one.joint}'
-        for one in loose
-        if one.size >= beliefs.scatter_misses * sizes.get(one.joint, 0.0)
+        for one in left.scattered
     ]
-    told = beside_names(found, unseen) if verdict.status in NAMING else []
-    missed = tuple(one for one in told if _fails(one, beliefs))
-    reasons += [_misses(one) for one in _clearest(missed)]
-    if not reasons:
-        return verdict, Missed()
-    doubted = {one.at for one in missed} | {one.joint for one in loose}
-    sets = () if 'instrument' in doubted else _but_at(verdict, doubted)
-    unknown = Verdict('unknown', beliefs.beaten_belief, sets, tuple(reasons))
-    return unknown, Missed(tuple(loose), missed)
-
-
-def _but_at(verdict: Verdict, doubted: Set[str]) -> tuple[tuple[Site, ...], ...]:
-    """Return what is named but for the places where a formula does not hold."""
-    return tuple(group for group in verdict.sets if not {s.joint for s in group} & doubted)
+    form = None if rival is None else rival.form
+    if form and form.gain >= beliefs.beaten_share and form.steady >= beliefs.beaten_steady:
+        places = ' and '.join(str(part.group) for part in form.parts)
+        reasons.append(
+            f'no effect in the library explains the gap, but it is no noise: {places} predicts '
+            f'{100.0 * form.gain:.0f} % of it on unseen stretches'
+        )
+    return replace(verdict, status='unknown', reasons=tuple(reasons)) if reasons else verdict
 
 
 def _sizes(found: Search, unseen: Unseen) -> dict[str, float]:
@@ -98,27 +149,62 @@ def _sizes(found: Search, unseen: Unseen) -> dict[str, float]:
     return out
 
 
-def _clearest(missed: Sequence[Beside]) -> list[Beside]:
-    """Return one free form for each place, that which predicts most."""
-    out: dict[str, Beside] = {}
-    for one in missed:
-        if one.at not in out or one.gain > out[one.at].gain:
-            out[one.at] = one
-    return list(out.values())
-
-
-def _fails(one: Beside, beliefs: Beliefs) -> bool:
-    """Return whether a free form takes off more than what a formula may miss."""
+def _clear(one: Beside, beliefs: Beliefs) -> bool:
+    """Return whether a free form takes off more than chance would."""
     if one.on == 'place':
-        clear = one.gain >= beliefs.dependence_gain and one.steady >= beliefs.dependence_sure
-        return clear and one.share >= beliefs.field_misses
-    clear = one.gain >= beliefs.group_share and one.steady >= beliefs.structure_sure
-    return clear and one.share >= beliefs.misfit_share
+        return one.gain >= beliefs.dependence_gain and one.steady >= beliefs.dependence_sure
+    return one.gain >= beliefs.group_share and one.steady >= beliefs.structure_sure
 
 
-def _misses(one: Beside) -> str:
-    return (
-        f'a free curve at {one.at}, depending on {one.on}, still predicts '
-        f'{100.0 * one.gain:.0f} % of what is left on unseen stretches: the formula of what was '
-        'found does not hold'
-    )
+def beside_names(found: Search, unseen: Unseen) -> list[Beside]:
+    """
+    Return what free forms at the places of the effects found predict beside all of them.
+
+    Parameters
+    ----------
+    found : Search
+    unseen : Unseen
+        Of its final model.
+
+    """
+    problem, model = unseen.problem, found.final.model
+    if problem.touched or not model.found:
+        return []
+    features = problem.features(model)
+    sizes = [unseen.rms(part) for part in unseen.targets[1:]]
+    whole = range(len(unseen.parts))
+    bases = [u.base(whole) for u in (unseen, unseen.by(posture_regions(problem)))]
+    out = []
+    for at, on, columns in _forms(problem, unseen.scale, features, {e.at for e in model.found}):
+        own = [s for e, s in zip(model.found, sizes, strict=True) if at in (e.at, 'instrument')]
+        told = worse_of([base.taken(columns) for base in bases])
+        share = float(np.sqrt(max(told.fall, 0.0))) / max([*own, 1e-12])
+        out.append(Beside(at, on, told.gain, told.steady, share))
+    return out
+
+
+def _forms(
+    problem: Problem, scale: Scale, features: list[Features], places: set[str]
+) -> Iterator[tuple[str, str, Array]]:
+    """Yield place, dependence and columns, whitened and of unit mean square, (E, rows)."""
+    field = [smooth_field(problem, k, maker) for k, maker in enumerate(features)]
+    # Where noise hides the squares of the place, its linear part may still show.
+    linear = [np.concatenate([part[k : k + 3] for k in range(0, len(part), 9)]) for part in field]
+    named = [('instrument', 'place', field), ('instrument', 'place', linear)]
+    moving = not problem.at_rest
+    for i, joint in enumerate(features[0].twin.robot.joint_names if moving else ()):
+        if joint in places and moves(features, i):
+            ways = [
+                lost_motion(problem, k, maker, features, i) for k, maker in enumerate(features)
+            ]
+            named.append((joint, 'direction', ways))
+    for at, on, parts in named:
+        columns = spanned(problem, scale, at, on, (), parts).columns
+        if columns.size:
+            yield at, on, columns
+
+
+def worse_of(ways: Sequence[Taken]) -> Taken:
+    """Return the least that columns take off over the ways of leaving out, and the most left."""
+    gains, steadies, falls, left = zip(*ways, strict=True)
+    return Taken(min(gains), min(steadies), min(falls), max(left))

@@ -1,6 +1,12 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where an unknown gap sits and what it depends on, curves or none that could carry it."""
+"""
+Where an unknown gap sits and what it depends on, curves or none that could carry it.
+
+Where the tool keeps one direction, the joints are a function of the place, and errors of the arm
+and a field over the workspace are one and the same. An arm is off by tenths of a millimetre as it
+is delivered, an instrument is not: the arm is to be looked at first.
+"""
 
 from __future__ import annotations
 
@@ -8,22 +14,35 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from ..algebra.fit import robust_fit, robust_scale
+from ..algebra.fit import Fit, robust_fit, robust_scale
+from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Site
+from ..unseen.regions import posture_regions
+from ..unseen.unseen_stretches import Base, Unseen
 from ..verdict.decision import Verdict
-from .arm_or_field import arm_first
 from .curved import ROWS, Curved
-from .formulas import Missed
+from .formulas import Missed, worse_of
 from .free_form import FreeForm, Part, free_form
-from .groups import Group
+from .groups import Group, all_groups, smooth_field, spanned
 from .scatter import Scatter
 
 ROUNDED, JUMPING = 0.6, 0.4
 """Belief that noise from a joint is an encoder that rounds its angle, or a link that jumps as its
 direction has it, where nothing else is found there. A judgement."""
+AS_GOOD = 0.9
+"""Share of what a field takes off unseen data that an arm must take off to be one with it. Of two
+that are one they take the same to a few hundredths."""
+TILT = 0.2
+"""Tilt of the tool [rad], RMS about its mean, up to which it keeps one direction: a hand that is held
+level by eye, or a torch that follows a seam's slope."""
+FIELD = 0.2
+"""Belief left for the instrument then: trackers and cameras are checked, and arms are not."""
+STATIC = ('constant', 'load')
+"""What an arm is off by at rest, whatever it did before."""
 
 
 def placed(
@@ -55,7 +74,7 @@ def placed(
     if verdict.status != 'unknown':
         return None
     form = _grouped(found, verdict, rival, beliefs)
-    if any(one.on == 'place' for one in missed.forms):
+    if any(one.on == 'place' and one.share >= beliefs.field_misses for one in missed.forms):
         form = _with_field(form, beliefs)
     form = arm_first(found, form, ROWS, beliefs)
     return _with_scatter(form, missed.scattered)
@@ -117,3 +136,85 @@ def _scattering(one: Scatter) -> Part:
         Group(one.joint, on, (), np.zeros((0, 0)), np.zeros(0)) for on in ('angle', 'direction')
     )
     return Part(rounded, 1.0, ((rounded, ROUNDED), (jumping, JUMPING)), one.share)
+
+
+def arm_first(found: Search, form: FreeForm, rows: int, beliefs: Beliefs) -> FreeForm:
+    """
+    Return a form whose field of the instrument is a set with the joints, where they are one.
+
+    Parameters
+    ----------
+    found : Search
+    form : FreeForm
+    rows : int
+        Rows that the two are compared on.
+    beliefs : Beliefs
+
+    """
+    fields = [part for part in form.parts if part.group.at == 'instrument']
+    if not fields or _tilt(found.problem, found.baseline.model) > TILT:
+        return form
+    small = found.problem.thinned(rows)
+    start = found.baseline.model
+    bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)
+    joints, bases = _joints(small, bare, scale), _bases(small, bare, scale)
+    every = [group for each in joints.values() for group in each]
+    arm = _gain(bases, every) if every else 0.0
+    if arm <= 0.0 or arm < AS_GOOD * _gain(bases, [_field(small, bare, scale)]):
+        return form
+    gains = {name: max(_gain(bases, groups), 0.0) for name, groups in joints.items()}
+    rest = tuple(part for part in form.parts if part not in fields)
+    whole = sum(gains.values())
+    if whole <= 0.0:
+        return form
+    sizes = {name: (1.0 - FIELD) * gain / whole for name, gain in gains.items()}
+    part = _shared(fields, joints, sizes)
+    return replace(form, parts=tuple(sorted((part, *rest), key=lambda each: -each.share)))
+
+
+def _tilt(problem: Problem, model: Model) -> float:
+    """Return how far the tool turns about more than one axis of the world, RMS [rad]."""
+    features = problem.features(model)
+    turns = Rotation.concatenate([Rotation.from_matrix(f.run.poses.rotation) for f in features])
+    vectors = (turns * turns.mean().inv()).as_rotvec()
+    about = np.linalg.svd(vectors, compute_uv=False)
+    return float(np.linalg.norm(about[1:]) / np.sqrt(len(vectors)))
+
+
+def _shared(
+    fields: Sequence[Part], joints: dict[str, list[Group]], sizes: dict[str, float]
+) -> Part:
+    """Return one part of all the joints and, last, the instrument."""
+    ordered = sorted(sizes, key=lambda name: -sizes[name])
+    rivals = ((joints[name][0], sizes[name]) for name in ordered)
+    share = sum(part.share for part in fields)
+    every = (*rivals, (fields[0].group, FIELD))
+    return Part(joints[ordered[0]][0], fields[0].ridge, every, share)
+
+
+def _joints(problem: Problem, bare: Fit, scale: Scale) -> dict[str, list[Group]]:
+    """Return what every joint and its link can be off by at rest."""
+    names = bare.model.robot.joint_names
+    out: dict[str, list[Group]] = {}
+    for group in all_groups(problem, bare.model, scale):
+        if group.at in names and group.on in STATIC:
+            out.setdefault(group.at, []).append(group)
+    return out
+
+
+def _field(problem: Problem, bare: Fit, scale: Scale) -> Group:
+    features = problem.features(bare.model)
+    parts = [smooth_field(problem, k, maker) for k, maker in enumerate(features)]
+    return spanned(problem, scale, 'instrument', 'place', (), parts)
+
+
+def _bases(problem: Problem, bare: Fit, scale: Scale) -> list[Base]:
+    unseen = Unseen.of(problem, scale, bare, np.zeros(bare.coordinates.size))
+    whole = range(len(unseen.parts))
+    return [one.base(whole) for one in (unseen, unseen.by(posture_regions(problem)))]
+
+
+def _gain(bases: Sequence[Base], groups: Sequence[Group]) -> float:
+    """Return the share of the squared unseen error that groups take off together."""
+    columns = np.concatenate([group.columns for group in groups])
+    return worse_of([base.taken(columns) for base in bases]).gain

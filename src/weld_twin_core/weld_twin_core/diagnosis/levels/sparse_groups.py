@@ -22,6 +22,7 @@ from scipy.linalg import cho_factor, cho_solve
 from ...arrays import Array
 from ..algebra.gram import Index
 from ..beliefs import Beliefs
+from ..unseen.unseen_stretches import steadiness
 from .groups import Group
 
 RIDGES = (1e-1, 1e1, 1e3)
@@ -277,13 +278,6 @@ def _worst_gain(before: list[Array], after: list[Array]) -> float:
     return min(
         1.0 - float(b.sum() / max(a.sum(), 1e-300)) for a, b in zip(before, after, strict=True)
     )
-
-
-def steadiness(before: Array, after: Array) -> float:
-    """Return the mean fall over the folds in its standard errors."""
-    fall = before - after
-    error = float(fall.std(ddof=1) / np.sqrt(fall.size)) if fall.size > 1 else np.inf
-    return float(fall.mean() / max(error, 1e-300))
 
 
 def _pruned(work: Choosing, members: list[Member], beliefs: Beliefs) -> list[Member]:

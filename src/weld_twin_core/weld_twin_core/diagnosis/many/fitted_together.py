@@ -19,12 +19,13 @@ from ...arm.robot import Robot
 from ...effects.effect import Effect, Stage
 from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
+from ..algebra.fit import design
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Unseen
-from .beside_few import members_beside
+from .shrinkage import believed, groups, learned_precision, projected
 from .small_errors import many_small
 
 BEAR = (10, 30, 100)
@@ -254,3 +255,42 @@ def unseen_rms(found: Search) -> float:
         parts.append(unseen.by(posture_regions(found.problem)))
     squares = [each.rms(each.base(everything).residual) ** 2 for each in parts]
     return float(np.sqrt(np.mean(squares)))
+
+
+def members_beside(few: Search, many: Search, beliefs: Beliefs) -> int:
+    """
+    Return how many of many effects move the tool by much of what all of them leave.
+
+    Parameters
+    ----------
+    few, many : Search
+        What was found one by one, and all kinds fitted together.
+    beliefs : Beliefs
+
+    """
+    unseen = Unseen.of(many.problem, many.scale, many.final, many.precision)
+    problem, scale, model = many.problem, many.scale, few.final.model
+    have = {effect.key for effect in model.found}
+    others = tuple(effect for effect in many.final.model.found if effect.key not in have)
+    if not others:
+        return 0
+    own, _ = design(problem, model, scale)
+    features = problem.features(model)
+    each = [
+        problem.whitened(problem.effect_columns(features, effect, atoms=False), scale)
+        for effect in others
+    ]
+    columns = np.concatenate([own, *each])
+    residual = problem.whitened(problem.residuals(model), scale)
+    normal, right, rss = projected(
+        columns @ columns.T, columns @ residual, float(residual @ residual), len(own)
+    )
+    labels, scales = groups(others, beliefs)
+    held = believed(model.with_found(others))
+    ridge, _ = learned_precision(normal, right, rss, residual.size, labels, scales, held)
+    mean = np.linalg.lstsq(normal + np.diag(ridge), right, rcond=1e-12)[0]
+    basis = np.linalg.lstsq(own.T, columns[len(own) :].T, rcond=1e-12)[0]
+    parts = mean[:, None] * (columns[len(own) :] - basis.T @ own)
+    least = beliefs.member * unseen.rms(unseen.base(range(len(unseen.parts))).residual)
+    ends = np.cumsum([len(part) for part in each])[:-1]
+    return sum(unseen.rms(part.sum(axis=0)) > least for part in np.split(parts, ends))

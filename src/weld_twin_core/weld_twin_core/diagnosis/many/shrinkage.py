@@ -1,8 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Many small errors at once: each kind's usual size is learned from the data, and each member is
-held to it.
+Many small errors at once: each kind's usual size is learned, and each member is held to it.
 
 Fitted freely, dozens of small geometric errors or hundreds of ripple orders chase the noise. Here
 every group of like coordinates (a family; a joint's ripple within a band of orders) has a prior

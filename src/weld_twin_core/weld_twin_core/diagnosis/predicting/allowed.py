@@ -33,8 +33,8 @@ from ..algebra.fit import LEAST_TURN, coordinates
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Model, Problem, Scale
+from ..frames.open_directions import VISIBLE, open_directions
 from . import plausible_arm
-from .left_open import left_open
 from .leftover import Unseen, leftover, posture_blocks
 
 ROWS = 9000
@@ -56,6 +56,11 @@ NOISE_TRUST = 8.0
 """So many rows' worth of belief in that."""
 TRUST = 4.0
 """So many coordinates' worth of belief in the usual sizes, against what this arm shows."""
+PARTNERS = 0.35
+"""Part of a direction from which on an axis is named with it."""
+MOST = 3
+"""Axes that name a direction."""
+AXES = ('x', 'y', 'z', 'turn about x', 'turn about y', 'turn about z')
 
 
 @dataclass(frozen=True, eq=False)
@@ -351,3 +356,27 @@ class Conditioning:
         right = right - system @ (self._prior.middle / width)
         mean = self._prior.middle + width * (inverse @ right)
         return mean, inverse * np.outer(width, width)
+
+
+def left_open(problem: Problem, model: Model) -> tuple[str, ...]:
+    """
+    Return the directions of aligned frames in which an error does not show, in words.
+
+    A direction is named by the axes that make most of it: 'base z with tool z' is a shift of both
+    along z by which no measured pose changes.
+    """
+    found = open_directions(problem, model)
+    size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in found.names])
+    out = []
+    for vector in found.vectors.T:
+        share = np.abs(vector / size)
+        order = [i for i in np.argsort(-share) if share[i] >= PARTNERS * share.max()]
+        out.append(' with '.join(_named(found.names[i]) for i in order[:MOST]))
+    return tuple(out)
+
+
+def _named(name: str) -> str:
+    frame, axis = name.split('.')
+    kind, _, number = frame.partition(' ')
+    which = '' if number in ('', '0') else f' of recording {int(number) + 1}'
+    return f'{kind} {AXES[int(axis)]}{which}'

@@ -26,6 +26,7 @@ from ...twin.features import Features
 from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
+from .lag import KEPT
 from .mending import measured
 
 GEOMETRY = ('theta', 'd', 'a', 'alpha', 'beta')
@@ -65,6 +66,8 @@ class BaseChange:
         The columns of the positions, not whitened, for the size of a change.
     rows, samples : tuple of int
         Components and samples of every recording.
+    noise : float
+        Unit of the positions [m].
 
     """
 
@@ -78,6 +81,12 @@ class BaseChange:
     tool_metres: Array
     rows: tuple[int, ...]
     samples: tuple[int, ...]
+    noise: float
+
+    def left(self, k: int) -> float:
+        """Return the RMS distance [m] that frames and arm leave of recording k, as a lag counts it."""
+        own = np.sort((self.residual[self.recording == k][:, :3] ** 2).sum(axis=1))
+        return self.noise * float(np.sqrt(own[: max(int(KEPT * own.size), 1)].mean()))
 
     @cached_property
     def recording(self) -> NDArray[np.int_]:
@@ -240,6 +249,7 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
         tool_metres=tool_metres,
         rows=problem.rows,
         samples=problem.samples,
+        noise=scale.position,
     )
 
 

@@ -4,17 +4,14 @@
 
 from __future__ import annotations
 
-from .computed import computed
+from .computed import computed, source
 from .evidence import Checker
-from .gravity import gravity
 from .mixups import mixups
-from .orientation import orientation
-from .outliers import outliers
+from .orientation import gravity, orientation
 from .parted import parted
-from .repeats import repeats
+from .repeats import outliers, repeats
 from .richness import motion, quantity
 from .setup_change import setup
-from .source import source
 from .stamp_regularity import clocks, stamps
 from .stuck import stuck
 

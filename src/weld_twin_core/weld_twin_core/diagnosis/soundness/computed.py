@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Were the poses measured, or did somebody compute them from the joint positions?
+Were poses measured, or computed from the joint positions? Were joint positions read at all?
 
 A controller publishes its own forward kinematics, with the constants of its own model. Some rigid
 arm then agrees with every posture to the last digit. No real arm is so rigid, and no instrument so
@@ -17,6 +17,7 @@ import numpy as np
 from ...arrays import Array
 from ...recording import JointMotion, Recording
 from ..algebra.fit import fit
+from ..algebra.independent_rows import NORMAL
 from ..algebra.noise_floor import SAME_STATION
 from ..algebra.prior import effect_precision
 from ..algebra.problem import FRAMES, Model, Problem, Scale
@@ -39,6 +40,10 @@ ON_GRID = 1e-3
 """Share of a step within which a number lies on it."""
 OVER = 1.3
 """What is left over what rounding alone leaves, at most."""
+SMOOTH = 2e-8
+"""Noise of a joint position [rad, m] below which no encoder has seen it."""
+STATES = 50
+"""Samples below which noise of an encoder cannot be measured."""
 
 
 def computed(case: Case) -> Sequence[Finding]:
@@ -158,3 +163,31 @@ def _grid(values: Array, steps: Sequence[float]) -> float:
         if np.abs(counts - counts.round()).max() < ON_GRID:
             return float(step)
     return 0.0
+
+
+def source(case: Case) -> Sequence[Finding]:
+    """Return a note when moving joint positions carry no trace of an encoder."""
+    names = [r.name for r in case.recordings if _commanded(r.joints)]
+    if not names:
+        return ()
+    return (
+        Finding(
+            'note',
+            f'The joint positions of {", ".join(names)} are as smooth as a command: what the '
+            'drives make of it (lag, following error) is then part of the gap.',
+        ),
+    )
+
+
+def _commanded(joints: JointMotion) -> bool:
+    if joints.static or joints.t.size < STATES:
+        return False
+    noise = _noise(joints.q)
+    moving = np.ptp(joints.q, axis=0) > 1e-3
+    return bool(moving.any() and noise[moving].max() < SMOOTH)
+
+
+def _noise(q: Array) -> Array:
+    """Return the noise of every joint from its fifth differences, which a smooth path has not."""
+    fifth = np.diff(q, n=5, axis=0)
+    return np.asarray(NORMAL * np.median(np.abs(fifth), axis=0) / np.sqrt(252.0))

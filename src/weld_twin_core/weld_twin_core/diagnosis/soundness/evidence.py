@@ -19,9 +19,9 @@ from ..result import Unsound
 from .base_change import BaseChange, base_change, thinned
 from .lag import Lag, lag
 from .lengths import length
-from .limits import LATE_LEFT, RATE_MOST, UNEXPLAINED
+from .limits import BY_ITSELF, LATE_LEFT, LATE_WORTH, RATE_MOST, UNEXPLAINED
 from .mending import Mend, as_entry
-from .slips import Slip, slips
+from .slips import Settling, Slip, changes
 from .snapshot import Snapshot, measured, snapshot
 
 ENOUGH = 30
@@ -112,9 +112,23 @@ class Case:
         """
         found = self._explained(self._lags(self.model))
         if any(found) or self.gap < UNEXPLAINED:
-            return found
+            return self._beyond_arm(found)
         # Nothing near explains what nobody could use: the clocks may be far apart.
         return self._explained(self._lags(self.model, wide=True), wide=True)
+
+    def _beyond_arm(self, found: list[Lag | None]) -> list[Lag | None]:
+        """
+        Return the lags that explain more than the arm's own errors could.
+
+        On a way out and back play is late both times, and later where the arm is slower.
+        """
+        if self.gap > BY_ITSELF or not any(found):
+            return found
+        change = self.change[1]
+        return [
+            late if late is not None and late.after < LATE_WORTH * change.left(k) else None
+            for k, late in enumerate(found)
+        ]
 
     def _explained(self, first: Sequence[Lag | None], *, wide: bool = False) -> list[Lag | None]:
         late = [f if f is not None and f.after < HINT * f.before else None for f in first]
@@ -164,10 +178,15 @@ class Case:
         return problem, base_change(parts, problem, self.model)
 
     @cached_property
-    def slips(self) -> list[Slip]:
-        """Return what gave way at an instant."""
+    def changes(self) -> list[Slip | Settling]:
+        """Return what gave way at an instant, and how the base settled."""
         most = max(float(np.quantile(distance(part), LARGEST)) for part in self.residuals)
-        return slips(*self.change, self.model.robot.joint_names, most)
+        return changes(*self.change, self.model.robot.joint_names, most)
+
+    @property
+    def slips(self) -> list[Slip]:
+        """Return what gave way at an instant and is more than a small step."""
+        return [each for each in self.changes if isinstance(each, Slip) and each.dated]
 
     @cached_property
     def snapshot(self) -> Snapshot:

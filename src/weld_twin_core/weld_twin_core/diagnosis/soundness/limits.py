@@ -107,6 +107,14 @@ of EMPS: 6.5 ms); clocks that nobody synchronised are off by anything.
 """
 LATE_LEFT = 1e-2
 """Gap [m] that a lag must leave at most: more, and something else is wrong that a lag imitates."""
+BY_ITSELF = 2e-3
+"""Median gap [m] that a sound arm leaves by itself: play, ripple, lag and springs."""
+LATE_WORTH = 0.6
+"""
+Share of what the errors of a sound arm would leave, RMS, that a lag must stay below there.
+
+Where play, loops and ratios explain the gap as well, both leave noise: a share of 1. A judgement.
+"""
 RATE = 1e-4
 """
 Rate at which two clocks may run apart.

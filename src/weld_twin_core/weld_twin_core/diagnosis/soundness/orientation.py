@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Do measured orientations turn as the joints say?"""
+"""Do measured orientations turn as the joints say, and does gravity pull down?"""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from ...arrays import Array
 from ..algebra.problem import Model
 from .evidence import Case, Finding, Mistake
-from .limits import UNEXPLAINED
+from .limits import TILTED, UNEXPLAINED
 from .mending import WAYS, turns_as
 from .snapshot import Snapshot, gap
 
@@ -68,3 +68,35 @@ def disagreement(shot: Snapshot, model: Model) -> float:
 
 def _angle(part: Array) -> Array:
     return np.asarray(np.linalg.norm(part[3:], axis=0))
+
+
+DOWN = np.array([0.0, 0.0, -1.0])
+"""Where gravity pulls in a measuring frame that stands upright."""
+
+
+def gravity(case: Case) -> Sequence[Finding]:
+    """Return that gravity and the way the arm was said to stand contradict each other."""
+    robot = case.model.robot
+    turn, pull = robot.T_world_base[:3, :3], robot.gravity
+    if _off_upright(turn @ -DOWN, -DOWN) < TILTED or not np.linalg.norm(pull) > 0.0:
+        return ()  # It stands upright, or nothing was said of how it stands.
+    off = _off_upright(turn @ pull, DOWN)
+    if off < TILTED:
+        return ()
+    own, right = (
+        ', '.join(f'{value:.4g}' for value in vector + 0.0)
+        for vector in (pull, np.round(np.linalg.norm(pull) * turn.T @ DOWN, 5))
+    )
+    return (
+        Finding(
+            'warning',
+            f'Gravity ({own}) m/s^2 is in the base frame, and with the base that was given it pulls '
+            f'{np.degrees(off):.0f} degrees away from down. If the measuring frame stands upright, '
+            f'gravity is ({right}); springs and payload come out wrong with another.',
+        ),
+    )
+
+
+def _off_upright(one: Array, other: Array) -> float:
+    cosine = float(one @ other) / float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float(np.arccos(np.clip(cosine, -1.0, 1.0)))

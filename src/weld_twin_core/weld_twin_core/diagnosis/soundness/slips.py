@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Did something give way at an instant: the instrument or the base, the tool, or one joint?
+Did something give way at an instant: instrument or base, the tool, one joint? Did the base settle?
 
 Residuals of the aligned model, with everything projected out that frames and a plausible arm can
 explain to first order (`base_change`), are searched for a step of each of them. A step is dated
@@ -24,7 +24,7 @@ from ...effects.joint_slip import JointSlip
 from ...effects.tool_slip import ToolSlip
 from ...recording import Recording
 from ..algebra.problem import Problem
-from .base_change import BaseChange, smooth_shapes
+from .base_change import CONSTANTS, BaseChange, other_shapes, smooth_shapes
 from .lengths import instant, length
 from .limits import (
     DATED,
@@ -39,6 +39,10 @@ from .limits import (
 )
 from .mending import measured
 
+SLOW = 2.0
+"""Seconds below which nothing warms up; what dies away faster is a transient of the arm."""
+NEIGHBOURS = np.geomspace(0.8, 1.25, 7)
+"""Factors on a rough time constant that are tried about it."""
 KNOCKED, JUMPED, SLIPPED = 'instrument_knocked', 'reflector_jumped', 'joint_slipped'
 _OTHERWISE = {
     KNOCKED: 'a knock at instrument or base',
@@ -66,6 +70,8 @@ class Slip:
         Evidence for it.
     alike : tuple of (str, tuple of str)
         Kinds and places of what would explain the same step nearly as well.
+    dated : bool
+        Whether it is more than the small steps that effects of no exact formula leave.
 
     """
 
@@ -76,6 +82,7 @@ class Slip:
     size: float
     nats: float
     alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    dated: bool = True
 
     def sentence(self, recording: Recording) -> str:
         """Return what happened, in words."""
@@ -117,11 +124,23 @@ class Slip:
         return ('instrument',) if self.kind == KNOCKED else ('tool',)
 
 
-def slips(
+class Settling(NamedTuple):
+    """A settling of the base: where, time constant [s], RMS motion [m] at its start, nats."""
+
+    recording: int
+    time_constant: float
+    size: float
+    nats: float
+
+
+def changes(
     problem: Problem, change: BaseChange, joints: Sequence[str], largest: float
-) -> list[Slip]:
+) -> list[Slip | Settling]:
     """
-    Return what gave way in the recordings, most evidence first.
+    Return what gave way in the recordings and how the base settled, most evidence first.
+
+    A settling is named only where a steady drift does not do as well; what is neither is taken out
+    before the next is looked for.
 
     Parameters
     ----------
@@ -134,27 +153,33 @@ def slips(
         How far the largest gaps are; nothing moved twice as far.
 
     """
-    out: list[Slip] = []
+    out: list[Slip | Settling] = []
     taken: list[tuple[int, int]] = []
     whole = change.far
     for _ in range(MOST_SLIPS):
-        best = _Seen(problem, change, joints, taken).best()
+        seen = _Seen(problem, change, joints, taken)
+        best = seen.best()
         if best is None:
             break
         before, change = change.far, change.past(best.changed, best.shape)
-        if best.slip is not None:
-            taken.append((best.slip.recording, best.at))
-            if best.slip.size < DATED_SIZE * largest and before - change.far > DATED_SHARE * whole:
-                out.append(best.slip)
+        if best.slip is None:
+            named = seen.named(best)
+            out += [] if named is None else [named]
+            continue
+        taken.append((best.slip.recording, best.at))
+        seldom = before - change.far > DATED_SHARE * whole
+        dated = seldom and best.slip.size < DATED_SIZE * largest
+        out.append(replace(best.slip, dated=dated))
     return out
 
 
 class _Trial(NamedTuple):
-    """A change, its evidence, its shape in time (M,), and where it is abrupt if it is."""
+    """A change of a recording, its evidence, shape in time (M,), and where it is abrupt if it is."""
 
     nats: float
     changed: BaseChange
     shape: Array
+    recording: int
     slip: Slip | None = None
     at: int = -1
 
@@ -196,15 +221,14 @@ class _Seen:
         ]
 
     def _smooth(self, k: int) -> Iterator[_Trial]:
-        t = measured(self.problem.recordings[k]).t
-        age = (t - t[0]) / max(float(np.ptp(t)), 1e-9)
+        age = self._age(k)
         possible = smooth_shapes(age)
         if len(self.problem.recordings) > 1:  # moved between recordings, not within one
-            possible.append(np.ones(t.size))
+            possible.append(np.ones(age.size))
         shapes = np.array([self._placed(shape, k) for shape in possible])
         for _, _, changed in self._kinds:
             shape = shapes[int(changed.gains(shapes).argmax())]
-            yield _Trial(changed.nats(shape), changed, shape)
+            yield _Trial(changed.nats(shape), changed, shape, k)
 
     def _steps(self, k: int) -> Iterator[_Trial]:
         t = measured(self.problem.recordings[k]).t
@@ -223,7 +247,49 @@ class _Seen:
             nats = changed.nats(shape) - float(np.log(t.size))
             time = 0.5 * float(t[at - 1] + t[at])
             slip = Slip(kind, joint, k, time, changed.size(shape), nats)
-            yield _Trial(nats, changed, shape, slip, at)
+            yield _Trial(nats, changed, shape, k, slip, at)
+
+    def named(self, smooth: _Trial) -> Slip | Settling | None:
+        """Return what a smooth change of the base is by name, where no other shape does as well."""
+        if smooth.changed is not self.change:
+            return None
+        k, age = smooth.recording, self._age(smooth.recording)
+        if np.array_equal(smooth.shape, self._placed(np.ones(age.size), k)):
+            return self._moved_between(smooth, smooth_shapes(age))
+
+        def gain(constant: float) -> float:
+            return self.change.gain(self._placed(np.exp(-age / constant), k))
+
+        rough = max(CONSTANTS, key=gain)
+        constant = float(max(rough * NEIGHBOURS, key=gain))
+        shape = self._placed(np.exp(-age / constant), k)
+        t = measured(self.problem.recordings[k]).t
+        late, size = constant * float(np.ptp(t)), self.change.size(shape)
+        slow = self.problem.recordings[k].joints.static or late > SLOW
+        nats = self.change.nats(shape)
+        if not slow or not self._surpasses(nats, shape, k, other_shapes(age)):
+            return None
+        return Settling(k, late, size, nats)
+
+    def _moved_between(self, smooth: _Trial, others: Sequence[Array]) -> Slip | None:
+        """Return a move of the set-up before a recording: of the first, before the second."""
+        if not self._surpasses(smooth.nats, smooth.shape, smooth.recording, others):
+            return None
+        k = max(smooth.recording, 1)
+        start, size = float(measured(self.problem.recordings[k]).t[0]), smooth.changed.size
+        return Slip(KNOCKED, None, k, start, size(smooth.shape), smooth.nats, dated=False)
+
+    def _surpasses(self, nats: float, shape: Array, k: int, others: Sequence[Array]) -> bool:
+        """Return whether a change of the base tells much more than in other shapes, or of joints."""
+        shapes = np.array([self._placed(other, k) for other in others])
+        best = shapes[int(self.change.gains(shapes).argmax())]
+        rival = max(self.change.nats(best), self.change.of_joints.nats(shape))
+        return nats > MARGIN + rival
+
+    def _age(self, k: int) -> Array:
+        """Return time in a recording as a share of it, shape (M,)."""
+        t = measured(self.problem.recordings[k]).t
+        return np.asarray((t - t[0]) / max(float(np.ptp(t)), 1e-9))
 
     def _placed(self, shape: Array, k: int) -> Array:
         mine = self.change.recording == k

@@ -20,13 +20,11 @@ from ...arrays import Array
 from ...twin.features import Features
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
-from .unseen_stretches import Base, Unseen
+from .unseen_stretches import Unseen
 
 KNOTS = 8
 """Bumps over a range of angle or time: a bump is as wide as an eighth of it, finer ones would
 follow the noise."""
-RIDGES = (1e-2, 1.0, 1e2, 1e4)
-"""Prior precisions tried on columns of unit mean square, in units of noise: from free to still."""
 TOLD = 3
 """Things that what remains depends on, told at the most; further ones are echoes of these."""
 
@@ -69,46 +67,15 @@ def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
 
     """
     base = unseen.base(range(len(model.found)))
-    before = unseen.squares(base.residual)
-    labels = unseen.trusted_labels()
-    found: list[tuple[float, float, str, Array]] = []
-    for name, columns in _generic(unseen.problem, model, unseen.scale):
-        gain, sure, squares = best_of(base, columns, before, labels)
-        found.append((gain, sure, name, squares))
-    found.sort(key=lambda item: -item[0])
-    gain, sure, _, squares = found[0]
+    found = [
+        (base.taken(columns), name)
+        for name, columns in _generic(unseen.problem, model, unseen.scale)
+    ]
+    found.sort(key=lambda item: -item[0].gain)
+    best = found[0][0]
     least, certain = beliefs.dependence_gain, beliefs.dependence_sure
-    names = tuple(name for g, s, name, _ in found[:TOLD] if g > least and s > certain)
-    return Structure(float(np.sqrt(squares.mean())), gain, sure, names)
-
-
-def best_of(
-    base: Base, columns: Array, before: Array, labels: Array
-) -> tuple[float, float, Array]:
-    """
-    Return gain, its certainty and the squared errors at the best of a few ridges.
-
-    Parameters
-    ----------
-    base : Base
-        The model that the columns are added to.
-    columns : array, shape (E, rows)
-        Of unit mean square.
-    before, labels : array, shape (samples,)
-        Squared errors without them, and the stretch of every trusted sample.
-
-    """
-    best: tuple[float, float, Array] | None = None
-    for residual in base.extended(columns, RIDGES):
-        after = base.unseen.squares(residual)
-        gain = 1.0 - float(after.mean() / before.mean())
-        if best is None or gain > best[0]:
-            names = np.unique(labels)
-            falls = np.array([(before - after)[labels == n].mean() for n in names])
-            error = float(falls.std(ddof=1) / np.sqrt(names.size)) if names.size > 1 else np.inf
-            best = (gain, float(falls.mean() / max(error, 1e-300)), after)
-    assert best is not None
-    return best
+    names = tuple(n for one, n in found[:TOLD] if one.gain > least and one.steady > certain)
+    return Structure(best.rms_m, best.gain, best.steady, names)
 
 
 def _generic(problem: Problem, model: Model, scale: Scale) -> Iterator[tuple[str, Array]]:
@@ -121,6 +88,8 @@ def _generic(problem: Problem, model: Model, scale: Scale) -> Iterator[tuple[str
         motion = _column_group(problem, features, scale, i, _motion)
         if motion is not None:
             yield f'the speed and acceleration of {joint}', motion
+    if problem.untracked and not problem.placed:
+        return  # no instrument measured, and nothing shows where the base stands
     yield 'time', _pose_group(problem, features, scale, _time)
     yield 'a step in time', _pose_group(problem, features, scale, _steps)
     yield 'the place in the workspace', _pose_group(problem, features, scale, _place)

@@ -34,13 +34,17 @@ def posture_regions(problem: Problem, halvings: int = 3) -> Array:
     postures = np.concatenate(
         [r.joints.at(r.measured.t)[0] for r in problem.recordings if r.measured is not None]
     )
+    # Where a joint stands alike, what was measured decides: not which recording was given first.
+    seen = np.concatenate(
+        [r.measured.position.T for r in problem.recordings if r.measured is not None], axis=1
+    )
     labels = np.zeros(postures.shape[0], dtype=int)
     for _ in range(halvings):
         after = labels * 2
         for name in np.unique(labels):
             here = np.flatnonzero(labels == name)
             spread = np.ptp(postures[here], axis=0)
-            order = np.argsort(postures[here, int(np.argmax(spread))], kind='stable')
+            order = np.lexsort((*seen[:, here], postures[here, int(np.argmax(spread))]))
             after[here[order[here.size // 2 :]]] += 1
         labels = after
     if problem.own_bases:

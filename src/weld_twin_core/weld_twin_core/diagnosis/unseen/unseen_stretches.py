@@ -16,8 +16,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from itertools import pairwise
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -39,6 +40,8 @@ DAMPING = 1e-11
 ROUNDED = 1e-13
 """Share of a column's sum of squares that is rounding once a stretch is taken off it: some hundred
 times what one difference of doubles loses."""
+RIDGES = (1e-2, 1.0, 1e2, 1e4)
+"""Prior precisions tried on columns of unit mean square, in units of noise: from free to still."""
 MANY = 200
 """Columns from which on an inverse of all of them serves every choice of effects."""
 MOST_STEPS = 1e6
@@ -63,8 +66,11 @@ class Unseen:
         P columns: frames, then the coordinates of every found effect.
     parts : tuple of slice
         Columns of every effect.
-    targets : array, shape (1 + K, rows)
-        The final residual, then what each effect takes off it, exactly.
+    residual : array, shape (rows,)
+        The final residual.
+    taken : callable
+        Returns what each effect takes off the residual, exactly, shape (K, rows): a run of the
+        twin for each, which a model of all effects does not need.
     precision, pull : array, shape (P,)
         Prior precision of every column, and how hard it pulls from where the fit is now.
 
@@ -75,7 +81,8 @@ class Unseen:
     labels: Array
     columns: Design
     parts: tuple[slice, ...]
-    targets: Array
+    residual: Array
+    taken: Callable[[], Array]
     precision: Array
     pull: Array
 
@@ -138,6 +145,11 @@ class Unseen:
     def _others(self) -> dict[bytes, Unseen]:
         return {}
 
+    @cached_property
+    def targets(self) -> Array:
+        """Return the final residual, then what each effect takes off it, shape (1 + K, rows)."""
+        return np.concatenate([self.residual[None], self.taken()])
+
     @property
     def frames(self) -> int:
         """Return the number of nuisance columns."""
@@ -153,7 +165,7 @@ class Unseen:
         if gone.size > index.size:
             return self.base(kept).residual
         mix = self._mix(kept)
-        residual = mix @ self.targets
+        residual: Array = np.array(self._explained(mix))
         for b, rows in enumerate(self._spans):
             inverse = self._inverses[b]
             step = inverse.times(self._right(b, mix))
@@ -182,7 +194,7 @@ class Unseen:
     def base(self, kept: Sequence[int]) -> Base:
         """Return a model of some effects, fitted with each stretch left out in turn."""
         index, mix = self._index(kept), self._mix(kept)
-        target = mix @ self.targets
+        target = self._explained(mix)
         solvers, residual = list[Solver](), target.copy()
         for b, rows in enumerate(self._spans if index.size else ()):
             solver = self._solver(b, index)
@@ -201,9 +213,13 @@ class Unseen:
 
     def _mix(self, kept: Sequence[int]) -> Array:
         """Return which targets a model of some effects is to explain, shape (1 + K,)."""
-        mix = np.ones(self.targets.shape[0])
+        mix = np.ones(1 + len(self.parts))
         mix[[1 + k for k in kept]] = 0.0
         return mix
+
+    def _explained(self, mix: Array) -> Array:
+        """Return what such a model is to explain, shape (rows,)."""
+        return np.asarray(mix @ self.targets) if mix[1:].any() else self.residual
 
     def _index(self, kept: Sequence[int]) -> Index:
         """Return the columns of the frames and of some effects."""
@@ -235,8 +251,16 @@ class Unseen:
     @cached_property
     def _rights(self) -> list[Array]:
         """Return the products of the columns with all targets on every stretch, (P, 1 + K)."""
+        return self._products(self.targets)
+
+    @cached_property
+    def _rights_of_residual(self) -> list[Array]:
+        """Return the same with the final residual alone, (P, 1)."""
+        return self._products(self.residual[None])
+
+    def _products(self, targets: Array) -> list[Array]:
         parts = zip(self._stretches, self._spans, strict=True)
-        return [part.products(self.targets[:, rows]) for part, rows in parts]
+        return [part.products(targets[:, rows]) for part, rows in parts]
 
     @cached_property
     def _total(self) -> Array:
@@ -249,6 +273,10 @@ class Unseen:
     @cached_property
     def _right_total(self) -> Array:
         return np.asarray(sum(self._rights))
+
+    @cached_property
+    def _right_total_of_residual(self) -> Array:
+        return np.asarray(sum(self._rights_of_residual))
 
     def _system(self, b: int, index: Index) -> Array:
         """
@@ -265,7 +293,10 @@ class Unseen:
 
     def _right(self, b: int, mix: Array) -> Array:
         """Return the right-hand side of every column on all stretches but one."""
-        return np.asarray((self._right_total - self._rights[b]) @ mix - self.pull)
+        if mix[1:].any():
+            return np.asarray((self._right_total - self._rights[b]) @ mix - self.pull)
+        right = self._right_total_of_residual - self._rights_of_residual[b]
+        return np.asarray(right[:, 0] - self.pull)
 
     def wandered(self) -> Array:
         """
@@ -274,7 +305,7 @@ class Unseen:
         Mean of the squared steps over what noise alone makes them; a formula that does not hold
         wants other parameters on every stretch.
         """
-        every, mix = np.arange(self.columns.count), np.eye(self.targets.shape[0])[0]
+        every, mix = np.arange(self.columns.count), np.eye(1 + len(self.parts))[0]
         whole = _spread(self._total)
         ratios = np.zeros((len(self._spans), every.size))
         for b in range(len(self._spans)):
@@ -318,6 +349,35 @@ class Unseen:
         return [(part[g], w[g]) for (part, w), g in zip(parts, good, strict=True)]
 
 
+def steadiness(before: Array, after: Array) -> float:
+    """Return the mean fall over the folds in its standard errors."""
+    fall = before - after
+    error = float(fall.std(ddof=1) / np.sqrt(fall.size)) if fall.size > 1 else np.inf
+    return float(fall.mean() / max(error, 1e-300))
+
+
+class Taken(NamedTuple):
+    """
+    What columns take off the squared error on unseen stretches.
+
+    Attributes
+    ----------
+    gain : float
+        Share of it.
+    steady : float
+        The same in standard errors between stretches.
+    fall : float [m^2]
+    rms_m : float
+        What is left, RMS [m].
+
+    """
+
+    gain: float
+    steady: float
+    fall: float
+    rms_m: float
+
+
 @dataclass(frozen=True, eq=False)
 class Base:
     """A model fitted with each stretch left out in turn, ready to be given further columns."""
@@ -327,6 +387,28 @@ class Base:
     target: Array
     solvers: list[Solver]
     residual: Array
+
+    def taken(self, extra: Array) -> Taken:
+        """
+        Return what further columns take off at the best of a few ridges.
+
+        Parameters
+        ----------
+        extra : array, shape (E, rows)
+            Of unit mean square.
+
+        """
+        labels, before = self.unseen.trusted_labels(), self.unseen.squares(self.residual)
+        stretches = [labels == name for name in np.unique(labels)]
+        one = np.array([before[here].mean() for here in stretches])
+        told = []
+        for residual in self.extended(extra, RIDGES):
+            after = self.unseen.squares(residual)
+            two = np.array([after[here].mean() for here in stretches])
+            left, fall = float(after.mean()), float(before.mean() - after.mean())
+            gain = fall / max(float(before.mean()), 1e-300)
+            told.append(Taken(gain, steadiness(one, two), fall, float(np.sqrt(left))))
+        return max(told, key=lambda taken: taken.gain)
 
     def extended(self, extra: Array, ridges: Sequence[float]) -> list[Array]:
         """
@@ -377,10 +459,6 @@ def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Uns
     columns, _ = designed(problem, model, scale)
     frames = columns.count - fit.coordinates.size
     ends = np.cumsum([frames, *(effect.coordinates().size for effect in model.found)]).tolist()
-    targets = [fit.residual] + [
-        problem.whitened(problem.residuals(model.without(k)), scale) - fit.residual
-        for k in range(len(model.found))
-    ]
     prior = np.zeros(columns.count)
     prior[:frames], off = frame_prior(problem, model)
     if precision.size:
@@ -394,10 +472,18 @@ def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Uns
         labels=problem.block_labels(BLOCKS),
         columns=columns,
         parts=tuple(slice(a, b) for a, b in pairwise(ends)),
-        targets=np.array(targets),
+        residual=fit.residual,
+        taken=cache(partial(_taken, problem, scale, fit)),
         precision=prior + tether,
         pull=prior * x,
     )
+
+
+def _taken(problem: Problem, scale: Scale, fit: Fit) -> Array:
+    """Return what each effect takes off the final residual, exactly, shape (K, rows)."""
+    without = (fit.model.without(k) for k in range(len(fit.model.found)))
+    left = [problem.whitened(problem.residuals(model), scale) for model in without]
+    return np.array(left).reshape(-1, fit.residual.size) - fit.residual
 
 
 def _solved(factor: tuple[Array, bool], size: Array, right: Array) -> Array:

@@ -9,11 +9,9 @@ from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
-from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..many.weighed_families import weighed_families
 from ..result import Shrink, Site
-from ..unseen.cancelling import parts_of
 from ..unseen.leftover_structure import Structure
 from ..unseen.unseen_stretches import Unseen
 from .evidence import Evidence
@@ -60,8 +58,7 @@ def gathered(
         floor=floor.rms_m,
         fitted=unseen.rms(unseen.predict(everything)),
         independent=floor.independent,
-        parts=tuple(parts_of(unseen).tolist()),
-        causes=tuple(_causes(slot[0]) for slot in found.slots),
+        parts=_parts(unseen),
         glimpsed=glimpsed(found.problem, found.final.model, beliefs),
         refused=tuple(_refused(robot, e) for e in found.refused if beyond(robot, e)),
         lacking=tuple(_lacking(e) for e in found.refused if not beyond(robot, e)),
@@ -69,6 +66,13 @@ def gathered(
         least=least,
         chance=chance,
     )
+
+
+def _parts(unseen: Unseen) -> tuple[float, ...]:
+    """Return the squared contribution of every effect over the square of their sum."""
+    parts = unseen.targets[1:]
+    total = parts.sum(axis=0)
+    return tuple(float(p @ p) / max(float(total @ total), 1e-300) for p in parts)
 
 
 def _refused(robot: Robot, effect: Effect) -> str:
@@ -84,11 +88,3 @@ def _refused(robot: Robot, effect: Effect) -> str:
 def _lacking(effect: Effect) -> str:
     """Return an effect that was taken out of the library."""
     return f'{Site(effect.name, effect.site)}, which was taken out of the library'
-
-
-def _causes(rival: Rival) -> int:
-    """Return how many causes a slot stands for: its leader says."""
-    for effect in rival.fit.model.found:
-        if (effect.name, effect.site) == (rival.site.effect, rival.site.joint):
-            return effect.causes()
-    return 1

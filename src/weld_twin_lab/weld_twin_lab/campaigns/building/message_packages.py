@@ -192,7 +192,9 @@ def _interfaces(package: str) -> dict[str, Mapping[str, str]]:
 
 def _names(package: str) -> list[str]:
     """Return kind and name of the interfaces of a package, as 'msg/InterfaceValue'."""
-    return [f'{kind}/{name}' for kind, texts in _interfaces(package).items() for name in sorted(texts)]
+    return [
+        f'{kind}/{name}' for kind, texts in _interfaces(package).items() for name in sorted(texts)
+    ]
 
 
 def _generate(package: str, source: Path, made: Path, site: Path) -> None:
@@ -247,9 +249,7 @@ def _arguments(package: str, source: Path, made: Path) -> dict[str, Any]:
         'ros_interface_files': [
             str(source / f'{name}.{name.partition("/")[0]}') for name in names
         ],
-        'type_description_tuples': [
-            f'{name}.idl:{made / name}.json' for name in names
-        ],
+        'type_description_tuples': [f'{name}.idl:{made / name}.json' for name in names],
         'include_paths': [f'{own}:{share / own}' for own in NEEDED],
         'target_dependencies': [],
     }

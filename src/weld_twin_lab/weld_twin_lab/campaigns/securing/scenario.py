@@ -25,7 +25,7 @@ from . import keys, party
 
 SECONDS = 6.0
 """How long everybody speaks and listens."""
-STARTED = 8.0
+STARTED = 15.0
 """Seconds the nodes have to start."""
 ENDED = 30.0
 """Seconds a process has to end."""

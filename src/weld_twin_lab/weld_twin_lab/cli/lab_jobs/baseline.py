@@ -36,6 +36,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='store_true',
         help='diagnose every cell with one to four recordings, and in reverse: does more data hurt?',
     )
+    parser.add_argument(
+        '--without',
+        nargs='*',
+        default=[],
+        metavar='NAME',
+        help='take mechanisms of the diagnosis out: what are they worth?',
+    )
     add_pool(parser)
     parser.add_argument('--out', required=True, metavar='DIR', help='where everything goes')
 
@@ -48,7 +55,8 @@ def run(args: argparse.Namespace) -> int:
 
     from ...belief.baseline import brief, page
     from ...belief.rows import read_rows, write_rows
-    from ...belief.trial import SEVERAL, tried
+    from ...belief.switches import tried_without, without
+    from ...belief.trial import SEVERAL
     from ...blind.diagnosing import engine_digest
     from ...blind.simulator import require_simulator
 
@@ -63,8 +71,13 @@ def run(args: argparse.Namespace) -> int:
     out = Path(args.out)
     if args.cases:
         require_simulator()
-        engine = engine_digest()[:8]
-        tasks = [Task(tried, (args.seed, k, SEVERAL), f'cell {k}') for k in range(args.cases)]
+        out_of_it = tuple(sorted(args.without))
+        with without(out_of_it):  # refuses a name that is none before anything is made
+            engine = '-'.join((engine_digest()[:8], *out_of_it))
+        tasks = [
+            Task(tried_without, (args.seed, k, SEVERAL, out_of_it), f'cell {k}')
+            for k in range(args.cases)
+        ]
         with runner_of(args, out / STORE / engine, 'diagnosing') as runner:
             tables['this engine'] = [brief(row) for row in runner.run(tasks)]
         write_rows(out / TABLE, tables['this engine'])

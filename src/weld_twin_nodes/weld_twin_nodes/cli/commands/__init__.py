@@ -1,8 +1,9 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Subcommands, found by their file names: an underscore is a hyphen, a trailing one keeps a name off
-Python's keywords.
+Subcommands, found by their file names.
+
+An underscore is a hyphen, a trailing one keeps a name off Python's keywords.
 
 A module here has a docstring, whose first line is the help text, and two functions::
 

@@ -15,7 +15,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     what = parser.add_mutually_exclusive_group(required=True)
     what.add_argument('bag', nargs='?', metavar='BAG', help='rosbag2 directory, .mcap or .db3')
-    what.add_argument('--robots', action='store_true', help='list the bundled robots instead')
+    what.add_argument(
+        '--robots', action='store_true', help='list the bundled robots and your own instead'
+    )
     add_topics(parser)
 
 
@@ -93,8 +95,11 @@ def _effect(entry: Mapping[str, Any]) -> str:
 
 def _print_robots() -> int:
     from weld_twin_core.arm import catalog
+    from weld_twin_msgs_py.robots import own_files
 
     for name in catalog.names():
         robot = catalog.load(name)
         print(f'{name:16} {robot.n} joints  {robot.source}')
+    for file in own_files():
+        print(f'{file.stem:16} your own  {file}')
     return 0

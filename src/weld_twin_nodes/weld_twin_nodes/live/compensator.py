@@ -1,0 +1,556 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Compensator: moves poses and trajectory goals so that the real tool goes where they mean."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime, timezone
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from weld_twin_core.arm.rotation import transform
+from weld_twin_core.errors import DataError, TwinError
+from weld_twin_core.twin.goal_correction import (
+    CorrectedGoal,
+    GoalLimits,
+    Refusal,
+    corrected_goal,
+)
+from weld_twin_core.twin.pose_correction import PoseCorrection
+from weld_twin_core.twin.program_model import ProgramModel
+from weld_twin_msgs_py.assembly import Intake, Role
+from weld_twin_msgs_py.assembly.frame_names import MeasuringFrame
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.cdr_write import PoseEncoder, TwistEncoder
+from weld_twin_msgs_py.messages.goals import (
+    GoalPoints,
+    beyond_tolerance,
+    corrected_trajectory,
+    read_goal,
+)
+from weld_twin_msgs_py.messages.topics import (
+    AUDIT,
+    COMPENSATED,
+    CORRECTION,
+    DEVIATION,
+    JOINT_STATES,
+    POSE_IN,
+    POSE_OUT,
+    TEMPERATURE,
+    TOOL_WRENCH,
+)
+
+from ..offline.loaded_model import LoadedModel, loaded
+from ..streams.arm_state import ArmState
+from ..streams.pose_stream import Found, PoseStream, Work
+from ..streams.supervision import Supervision
+from .cell_frames import base_frame
+from .goal_relay import Decision, GoalRelay
+from .input_settings import JOINT_SETTINGS
+from .managed_node import ManagedNode
+from .robot_settings import ROBOT_SETTINGS, robot_of
+from .run_node import run
+from .settings import Setting
+
+INACTIVE = 'the compensator is not active; configure and activate it'
+REFUSALS = ('stop', 'pass')
+"""What the parameter ``on_refusal`` may be."""
+SHORT_TURN = 2e-4
+"""Seconds after which threads take turns: what is worked out beside a pose must not keep it waiting."""
+POLL = 0.002
+"""Seconds between two looks at whether a goal is worked out."""
+LOOK_EVERY = 0.5
+"""Seconds between two looks at whether the model is to be used still."""
+LATE = 0.5
+"""A goal that should have begun so long ago [s] begins in the middle, and its correction with a step."""
+WITHDRAWN = 'withdrawn'
+"""Under which the node keeps why it corrects nothing."""
+
+
+Judged = tuple[CorrectedGoal | Refusal, tuple[int, ...]]
+"""What becomes of a goal, and where the robot's joints stand in it."""
+
+
+class Compensator(ManagedNode):
+    """
+    Corrects what a planner sends to a controller, whole, or refuses it with a reason.
+
+    In the shadow, without ``apply``, goals pass as they are and no pose is sent; what would be added
+    is told all the same.
+    """
+
+    settings: ClassVar[tuple[Setting, ...]] = (
+        Setting(
+            'managed',
+            True,
+            'work only between the transitions activate and deactivate of a managed node; else at once',
+        ),
+        *ROBOT_SETTINGS,
+        *JOINT_SETTINGS,
+        Setting('model', '', 'diagnosis.json of this arm; ~/reload reads it again', live=True),
+        Setting(
+            'controller',
+            'joint_trajectory_controller',
+            'controller whose action follow_joint_trajectory corrected goals go to',
+        ),
+        Setting(
+            'apply', False, 'send what is corrected; else tell the correction alone', live=True
+        ),
+        Setting(
+            'on_refusal',
+            'stop',
+            'what becomes of poses that are refused: stop (nothing is sent) or pass; goals are rejected',
+            live=True,
+        ),
+        Setting(
+            'max_correction_m', 2e-3, 'longest way a pose may be moved [m]', 0.0, 0.1, live=True
+        ),
+        Setting(
+            'max_correction_rad',
+            float(np.pi / 180.0),
+            'largest turn a pose may be moved by [rad]',
+            0.0,
+            0.2,
+            live=True,
+        ),
+        Setting('max_rate_m_s', 0.05, 'fastest change of that way [m/s]', 1e-6, 10.0, live=True),
+        Setting(
+            'max_rate_rad_s', 0.2, 'fastest change of that turn [rad/s]', 1e-6, 100.0, live=True
+        ),
+        Setting(
+            'max_acceleration',
+            20.0,
+            'largest acceleration of a joint in what is corrected [rad/s^2, m/s^2]; the robot file may '
+            'say less',
+            1e-6,
+            1e4,
+            live=True,
+        ),
+        Setting(
+            'max_model_age',
+            0.0,
+            'age of the model file above which nothing is corrected [s]; 0: any',
+            0.0,
+            1e10,
+            live=True,
+        ),
+        Setting(
+            'max_age',
+            1.0,
+            'age of the last joint state above which it is not known where the arm stands [s]',
+            0.05,
+            3600.0,
+        ),
+        Setting(
+            'audit', '', 'file that the audit line of every goal is added to; none when empty'
+        ),
+    )
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('compensator', **kwargs)
+        sys.setswitchinterval(SHORT_TURN)
+        self.robot = robot_of(self)
+        self._intake = Intake(self.robot, joint_names=self.joint_names, mend=True)
+        self._arm = ArmState()
+        self._around: tuple[Any, float | None] = (None, None)
+        self._model: LoadedModel | None = None
+        self._active = False
+        self._told, self._looked_at, self._outdated = '', -np.inf, ''
+        self._watch = Supervision()
+        self._stream: PoseStream | None = None
+        self._beside, self._goals = (ThreadPoolExecutor(1) for _ in range(2))
+        self._out = self.offer(POSE_OUT)
+        self._correction = self.offer(CORRECTION, awaited=False)
+        self._audit = self.offer(AUDIT, awaited=False)
+        self._frame = MeasuringFrame(self.setting('base_frame'))
+        self._encoders: dict[str, tuple[PoseEncoder, TwistEncoder]] = {}
+        self.add_on_set_parameters_callback(self._check)
+        self.create_service(Trigger, '~/reload', self._reload)
+        self.listen(TOOL_WRENCH, self._on_wrench, held=True)
+        self.listen(TEMPERATURE, self._on_temperature, held=True)
+        self.listen(JOINT_STATES, self._on_joints)
+        self.listen(DEVIATION, self._on_deviation)
+        self.listen(POSE_IN, self._on_pose)
+        self._relay = self._offer_action()
+        self.every(LOOK_EVERY, self._look)
+        if self.setting('on_refusal') not in REFUSALS:
+            raise DataError(self._no_refusal(self.setting('on_refusal')))
+        self.start()
+
+    def own_topics(self) -> list[str]:
+        """Return the topics under the node's own name."""
+        return [topic.relative for topic in COMPENSATED]
+
+    def _offer_action(self) -> GoalRelay | None:
+        """Offer the action, or say why not."""
+        try:
+            from control_msgs.action import FollowJointTrajectory
+        except ImportError:
+            self.remark(
+                'control_msgs is not installed: poses are corrected, and no action is offered'
+            )
+            return None
+        return GoalRelay(
+            self, FollowJointTrajectory, self.setting('controller'), self._decide, self._since
+        )
+
+    # Transitions -----------------------------------------------------------------------------
+
+    def prepare(self) -> None:
+        """Read the model; refuse one of another arm, or of unsound data."""
+        self._take_model()
+
+    def begin(self) -> None:
+        """Correct from now on."""
+        if self._model is None or not self.managed:
+            self._take_model()
+        assert self._model is not None
+        self._watch = Supervision(self._model.promised)
+        self._active = True
+        self._renew_stream()
+        self._look()
+
+    def finish(self) -> None:
+        """Correct no more; a goal that runs ends as begun."""
+        self._active = False
+        self._stream = None
+
+    def destroy_node(self) -> None:
+        """End what is worked out beside."""
+        for pool in (self._beside, self._goals):
+            pool.shutdown(wait=False, cancel_futures=True)
+        if self._relay is not None:
+            self._relay.close()
+        super().destroy_node()
+
+    def time_went_back(self) -> None:
+        """Forget where the arm stands and what was measured."""
+        self._intake.reset()
+        self._arm.forget()
+        self._watch.forget()
+
+    def _take_model(self) -> None:
+        self._model = loaded(self.robot, self.setting('model'))
+        read = self._model.read
+        if read.posterior is None:
+            self.remark(
+                'the model does not say how sure it is nor where it was recorded: neither is looked at'
+            )
+        self._watch = Supervision(self._model.promised)
+        self.get_logger().info(f'model {self._model.digest}: {len(read.effects)} effects')
+
+    def _reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Go on with the file as it is now; a goal that runs ends with the one before."""
+        try:
+            self._take_model()
+        except TwinError as error:
+            response.message = str(error)
+            return response
+        assert self._model is not None
+        if self._active:
+            self._renew_stream()
+        self._look()
+        response.success, response.message = True, f'model {self._model.digest}'
+        return response
+
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        for parameter in parameters:
+            if parameter.name == 'on_refusal' and parameter.value not in REFUSALS:
+                reason = self._no_refusal(parameter.value)
+                return SetParametersResult(successful=False, reason=reason)
+            if self._active:
+                reason = f'{parameter.name} may be set while the compensator is not active'
+                return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
+
+    @staticmethod
+    def _no_refusal(value: str) -> str:
+        return f'on_refusal must be one of {", ".join(REFUSALS)}, got {value!r}'
+
+    # What is known ---------------------------------------------------------------------------
+
+    def _on_wrench(self, message: Any) -> None:
+        taken = self._intake.take(Role.WRENCH, message)
+        if taken is not None:
+            self._around = (taken.row, self._around[1])
+
+    def _on_temperature(self, message: Any) -> None:
+        taken = self._intake.take(Role.TEMPERATURE, message)
+        if taken is not None:
+            self._around = (self._around[0], float(taken.row[0]))
+
+    def _on_joints(self, message: Any) -> None:
+        taken = self._intake.joint_sample(message)
+        for sentence in self._intake.remarks:
+            self.remark(sentence)
+        if taken is None:
+            return
+        if taken[1]:
+            self._arm.forget()
+        self._arm.take(taken[0][1], time.monotonic())
+
+    def _on_deviation(self, message: Any) -> None:
+        self._watch.take(from_messages.vector3(message), time.monotonic())
+
+    def _withdrawn(self) -> str:
+        """Return why nothing is to be corrected now; empty where there is nothing."""
+        if not self._active or self._model is None:
+            return INACTIVE
+        return self._outdated or self._watch.withdrawn(time.monotonic())
+
+    def _look(self) -> None:
+        """Look at the model file, and tell that the model is withdrawn, or is not any more."""
+        if self._model is not None:
+            self._outdated = self._model.outdated(self.setting('max_model_age'))
+        why = self._withdrawn() if self._active else ''
+        if why != self._told and why.partition(':')[0] != self._told.partition(':')[0]:
+            self.get_logger().warning(why or 'the model is used again')
+        self._told = why
+        self.health.lasting.pop(WITHDRAWN, None)
+        if why:
+            self.health.lasting[WITHDRAWN] = why
+
+    def _present(self) -> ProgramModel:
+        """Return what acts on the arm under its present load and temperature."""
+        assert self._model is not None
+        wrench, warm = self._around
+        return self._model.around(wrench, self._intake.wrench_frame.meaning, warm)
+
+    def _limits(self) -> GoalLimits:
+        return GoalLimits(
+            *(
+                self.setting(name)
+                for name in (
+                    'max_correction_m',
+                    'max_correction_rad',
+                    'max_rate_m_s',
+                    'max_rate_rad_s',
+                    'max_acceleration',
+                )
+            )
+        )
+
+    # Poses -----------------------------------------------------------------------------------
+
+    def _renew_stream(self) -> None:
+        correction = PoseCorrection(self._present(), self.robot.T_flange_tool)
+        for name in correction.left_out:
+            self.remark(f'{name} is not corrected in poses, which do not tell what comes next')
+        self._stream = PoseStream(
+            correction,
+            self._limits(),
+            passing=self.setting('on_refusal') == 'pass',
+            shadow=not self.setting('apply'),
+            later=self._later,
+        )
+
+    def _later(self, work: Work) -> Callable[[], Found | None]:
+        """Begin work beside; return what tells its result once it is there."""
+        doing = self._beside.submit(work)
+        return lambda: doing.result() if doing.done() else None
+
+    def _on_pose(self, message: Any) -> None:
+        self._frame.take(message.header.frame_id)
+        self.remark(self._frame.remark)
+        position, rotation = from_messages.pose(message)
+        stamp = from_messages.stamp_ns(message)
+        encode, encode_twist = self._encoder(message.header.frame_id)
+        stream = self._stream
+        if stream is None:
+            self.refuse(self.resolve_topic_name(POSE_IN.relative), INACTIVE)
+            if self.setting('on_refusal') == 'pass' and self.setting('apply'):
+                self._out.publish(encode(stamp, position, rotation))
+            return
+        now = time.monotonic()
+        start = self._arm.start(now, self.setting('max_age'))
+        # Of poses that come in a burst, the stamps tell how far they are apart; where they are set.
+        at = stamp * 1e-9 or now
+        given = stream.take(transform(rotation, position), at, start.q, self._withdrawn())
+        if given.pose is not None:
+            self._out.publish(encode(stamp, given.pose[:3, 3], given.pose[:3, :3]))
+        if given.added is not None:
+            self._correction.publish(encode_twist(stamp, given.added))
+        if given.why:
+            self.refuse(self.resolve_topic_name(POSE_IN.relative), given.why)
+        stream.settle()
+
+    def _encoder(self, frame_id: str) -> tuple[PoseEncoder, TwistEncoder]:
+        if frame_id not in self._encoders:
+            self._encoders[frame_id] = PoseEncoder(frame_id), TwistEncoder(frame_id)
+        return self._encoders[frame_id]
+
+    # Goals -----------------------------------------------------------------------------------
+
+    async def _decide(self, goal: Any) -> Decision:
+        """Return what becomes of a goal."""
+        self._look()
+        token = self._token()
+        if not goal.trajectory.points:  # the order to stop, which nothing may hold up
+            return Decision(goal, '', partial(self._settled, None, 'passed', 'it has no point'))
+        applied, why = self.setting('apply'), self._withdrawn()
+        if why:
+            passed = goal if not applied and self._active else None
+            return Decision(passed, why, partial(self._settled, None, 'refused', why), token)
+        if not applied:  # it does not wait for what is only told
+            return Decision(goal, '', partial(self._judged_later, goal), token)
+        judged: Future = Future()
+        self._judge(goal, judged.set_result)
+        found, columns = await judged
+        if isinstance(found, Refusal):
+            settled = partial(self._settled, found, 'refused', found.reason)
+            return Decision(None, found.reason, settled, token)
+        trajectory = corrected_trajectory(goal.trajectory, columns, found.goal, found.waits)
+        rest = [name for name in goal.get_fields_and_field_types() if name != 'trajectory']
+        sent = type(goal)(trajectory=trajectory, **{name: getattr(goal, name) for name in rest})
+        self._tell_added(goal.trajectory.header, found)
+        return Decision(sent, '', partial(self._settled, found, _verdict(found), ''), token)
+
+    def _judged_later(self, goal: Any, below: str) -> None:
+        """Tell of a goal that was passed on what a correction would have done."""
+
+        def tell(judged: Judged) -> None:
+            found = judged[0]
+            if isinstance(found, CorrectedGoal):
+                self._tell_added(goal.trajectory.header, found)
+            why = found.reason if isinstance(found, Refusal) else ''
+            self._settled(found, _verdict(found), why, below)
+
+        self._judge(goal, tell)
+
+    def _judge(self, goal: Any, told: Callable[[Judged], None]) -> None:
+        """Work a goal out beside, so that poses and the rest are served meanwhile; then tell."""
+        try:
+            points = self._read(goal)
+        except TwinError as error:
+            told((Refusal(str(error)), ()))
+            return
+        start = self._arm.start(time.monotonic(), self.setting('max_age'))
+        doing = self._goals.submit(
+            corrected_goal, self._present(), points.goal, self._limits(), start
+        )
+
+        def look() -> None:
+            if not doing.done() or timer.is_canceled():
+                return
+            timer.cancel()
+            self.destroy_timer(timer)
+            try:
+                told((_tolerated(goal, points, doing.result()), points.columns))
+            except TwinError as error:
+                told((Refusal(str(error)), ()))
+
+        timer = self.every(POLL, look)
+
+    def _read(self, goal: Any) -> GoalPoints:
+        """Return the points of a goal; refuse one that should have begun already."""
+        stamp = goal.trajectory.header.stamp
+        given = read_goal(goal.trajectory, self._intake.joints.names)
+        at = stamp.sec * 1_000_000_000 + stamp.nanosec
+        late = (self.get_clock().now().nanoseconds - at) * 1e-9 - float(given.goal.t[0])
+        if at and late > LATE:
+            raise DataError(f'the goal should have begun {late:.2f} s ago, by its stamp')
+        return given
+
+    def _tell_added(self, header: Any, found: CorrectedGoal) -> None:
+        """Publish what is added at every point, at the time when the arm is to be there."""
+        begun = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+        begun = begun or self.get_clock().now().nanoseconds
+        encode = self._encoder(base_frame(self))[1]
+        for t, added in zip(found.goal.t, found.added, strict=True):
+            self._correction.publish(encode(begun + round(float(t) * 1e9), added))
+
+    def _settled(
+        self, found: CorrectedGoal | Refusal | None, verdict: str, why: str, below: str = ''
+    ) -> None:
+        """Tell in the log and in the audit what became of a goal."""
+        largest = None if found is None else found.largest
+        line: dict[str, Any] = {
+            'time': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),
+            'model': None if self._model is None else self._model.digest,
+            'applied': self.setting('apply'),
+            'verdict': 'rejected by the controller' if below else verdict,
+            'why': below or why,
+            'largest_m': None if largest is None else largest[0],
+            'largest_rad': None if largest is None else largest[1],
+        }
+        if isinstance(found, CorrectedGoal):
+            line |= {
+                'expected_before_m': found.before,
+                'expected_after_m': found.after,
+                'bound_m': found.bound,
+                'waits_s': found.waits,
+                'notes': list(found.notes),
+            }
+        text = json.dumps(line)
+        self._audit.publish(AUDIT.message_class()(data=text))
+        told = f'goal {text}'
+        if below or verdict == 'refused':
+            self.get_logger().warning(told)
+            self.health.say(f'goal {line["verdict"]}: {line["why"]}')
+        else:
+            self.get_logger().info(told)
+        self._write_audit(text)
+
+    def _write_audit(self, text: str) -> None:
+        path = self.setting('audit')
+        if not path:
+            return
+        try:
+            with Path(path).open('a', encoding='utf-8') as file:
+                file.write(text + '\n')
+        except OSError as error:
+            self.warn(path, f"audit '{path}' cannot be written: {error.strerror}")
+
+    def _token(self) -> object:
+        """Return what tells the model that counts now."""
+        return None if self._model is None else self._model.digest
+
+    def _since(self, token: object) -> str:
+        """Return what has happened to the model since a goal was decided on."""
+        self._look()
+        if self._token() != token:
+            return 'the model was exchanged meanwhile'
+        why = self._withdrawn()
+        return f'the model was withdrawn meanwhile: {why}' if why else ''
+
+
+def _verdict(found: CorrectedGoal | Refusal) -> str:
+    if isinstance(found, Refusal):
+        return 'refused'
+    return 'corrected' if found.before else 'nothing to correct'
+
+
+def _tolerated(
+    goal: Any, points: GoalPoints, found: CorrectedGoal | Refusal
+) -> CorrectedGoal | Refusal:
+    """Return a corrected goal, or that it goes beyond what the goal itself tolerates."""
+    if isinstance(found, Refusal):
+        return found
+    beyond = beyond_tolerance(
+        [*goal.path_tolerance, *goal.goal_tolerance],
+        goal.trajectory.joint_names,
+        points.columns,
+        found.goal.q - points.goal.q,
+    )
+    return Refusal(beyond, found.largest) if beyond else found
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return run(Compensator, args)
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

@@ -1,0 +1,225 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+An action in front of a controller's own: goals are decided on, then sent on; all else passes through.
+
+A goal is accepted when the controller has accepted what became of it. The answer to a goal has no
+room for a reason; it is told in the log, on `/diagnostics` and in the audit.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable
+from typing import Any, NamedTuple
+
+from action_msgs.msg import GoalStatus
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.task import Future
+
+from .cell_node import CellNode
+
+ACTION = 'follow_joint_trajectory'
+ANSWER = 5.0
+"""Seconds a controller has to answer; it answers within milliseconds."""
+LOOK = 0.25
+"""Seconds between two looks at whether a controller is there."""
+GONE = 2.0
+"""Seconds for which a controller must be away before its goal is given up: discovery flickers."""
+
+
+class Decision(NamedTuple):
+    """
+    What becomes of a goal.
+
+    Attributes
+    ----------
+    goal : message, optional
+        To be sent on; None for none.
+    why : str
+        Why there is none.
+    settled : callable
+        Told whether the controller took it, in words: empty where it did.
+    token : object
+        Of the model it was decided with, for `GoalRelay.since`.
+
+    """
+
+    goal: Any
+    why: str
+    settled: Callable[[str], None]
+    token: object = None
+
+
+class _Running:
+    """A goal that a controller runs."""
+
+    def __init__(self, below: Any, token: object, outcome: Future) -> None:
+        self.below, self.token, self.outcome = below, token, outcome
+        self.above: Any = None
+        self.away: float | None = None
+
+
+class GoalRelay:
+    """
+    Serves ``~/follow_joint_trajectory``, and is a client of the controller's.
+
+    Parameters
+    ----------
+    node : CellNode
+    kind : action class
+        `control_msgs/FollowJointTrajectory`.
+    controller : str
+        Name of the controller, or of its action.
+    decide : callable
+        Takes a goal and returns what becomes of it, when that is known.
+    since : callable
+        Takes the token of a decision; returns what has happened to the model since, in words.
+
+    """
+
+    def __init__(
+        self,
+        node: CellNode,
+        kind: Any,
+        controller: str,
+        decide: Callable[[Any], Awaitable[Decision]],
+        since: Callable[[object], str],
+    ) -> None:
+        self._node, self._kind, self._decide, self._since = node, kind, decide, since
+        own = controller.rstrip('/')
+        self.below = own if own.endswith(ACTION) else f'{own}/{ACTION}'
+        # What waits for an answer must not keep the executor from taking it.
+        group = ReentrantCallbackGroup()
+        self._client = ActionClient(node, kind, self.below, callback_group=group)
+        self._pending: dict[int, _Running] = {}
+        self._running: list[_Running] = []
+        self._turns: deque[Future] = deque()
+        self._server = ActionServer(
+            node,
+            kind,
+            f'~/{ACTION}',
+            self._execute,
+            goal_callback=self._take,
+            cancel_callback=self._cancel,
+            callback_group=group,
+        )
+        node.every(LOOK, self._look)
+
+    def close(self) -> None:
+        """End the action; what runs on the controller runs on."""
+        self._server.destroy()
+        self._client.destroy()
+
+    async def _take(self, goal: Any) -> GoalResponse:
+        """Decide on a goal when those before it are decided on, and send it on."""
+        turn = Future()
+        before = self._turns[-1] if self._turns else None
+        self._turns.append(turn)
+        try:
+            if before is not None:
+                await before
+            return await self._sent_on(goal)
+        finally:
+            self._turns.remove(turn)
+            turn.set_result(None)
+
+    async def _sent_on(self, goal: Any) -> GoalResponse:
+        decision = await self._decide(goal)
+        if decision.goal is None:
+            decision.settled('')
+            return GoalResponse.REJECT
+        if not self._client.server_is_ready():
+            decision.settled(f'no controller offers {self.below}')
+            return GoalResponse.REJECT
+        outcome = Future()
+        running = _Running(None, decision.token, outcome)
+        sending = self._client.send_goal_async(decision.goal, self._feedback(running))
+        running.below = await self._answered(sending)
+        if running.below is None:
+            # A controller that answers after all must not run what nobody waits for.
+            sending.add_done_callback(_call_back)
+            decision.settled(f'{self.below} did not answer within {ANSWER:g} s')
+            return GoalResponse.REJECT
+        if not running.below.accepted:
+            decision.settled(f'{self.below} rejected it')
+            return GoalResponse.REJECT
+        decision.settled('')
+        running.below.get_result_async().add_done_callback(
+            lambda done: outcome.done() or outcome.set_result(done.result())
+        )
+        self._pending[id(goal)] = running
+        self._running.append(running)
+        return GoalResponse.ACCEPT
+
+    async def _answered(self, asked: Future) -> Any:
+        """Return the answer to something asked, None where it stays out."""
+        either: Future = Future()
+        asked.add_done_callback(lambda _: either.done() or either.set_result(None))
+        timer = self._node.every(ANSWER, lambda: either.done() or either.set_result(None))
+        await either
+        self._node.destroy_timer(timer)
+        return asked.result() if asked.done() else None
+
+    def _feedback(self, running: _Running) -> Callable[[Any], None]:
+        def pass_on(message: Any) -> None:
+            if running.above is not None and running.above.is_active:
+                running.above.publish_feedback(message.feedback)
+
+        return pass_on
+
+    async def _execute(self, above: Any) -> Any:
+        """Pass the result through, and say where the model was withdrawn meanwhile."""
+        running = self._pending.pop(id(above.request))
+        running.above = above
+        found = await running.outcome
+        self._running.remove(running)
+        if isinstance(found, str):
+            above.abort()
+            return self._kind.Result(error_code=self._kind.Result.INVALID_GOAL, error_string=found)
+        result = found.result
+        happened = self._since(running.token)
+        if happened:
+            told = f'weld_twin: ended as begun, though {happened}'
+            result.error_string = '; '.join(filter(None, [result.error_string, told]))
+            self._node.get_logger().warning(told)
+        if found.status == GoalStatus.STATUS_SUCCEEDED:
+            above.succeed()
+        elif found.status == GoalStatus.STATUS_CANCELED and above.is_cancel_requested:
+            above.canceled()
+        else:
+            above.abort()
+        return result
+
+    async def _cancel(self, above: Any) -> CancelResponse:
+        """Ask the controller, and answer what it answers."""
+        running = next((each for each in self._running if each.above is above), None)
+        running = running or self._pending.get(id(above.request))
+        if running is None:
+            return CancelResponse.REJECT
+        answer = await self._answered(running.below.cancel_goal_async())
+        taken = answer is not None and bool(answer.goals_canceling)
+        return CancelResponse.ACCEPT if taken else CancelResponse.REJECT
+
+    def _look(self) -> None:
+        """Give up goals whose controller has gone."""
+        there = self._client.server_is_ready() if self._running else True
+        now = time.monotonic()
+        for running in self._running:
+            if there:
+                running.away = None
+                continue
+            running.away = running.away or now
+            if now - running.away > GONE and not running.outcome.done():
+                running.outcome.set_result(
+                    f'{self.below} is gone: whether the arm still moves is not known'
+                )
+
+
+def _call_back(sent: Future) -> None:
+    """Cancel a goal whose acceptance came too late."""
+    below = sent.result()
+    if below is not None and below.accepted:
+        below.cancel_goal_async()

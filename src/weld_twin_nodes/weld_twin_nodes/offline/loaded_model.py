@@ -1,0 +1,124 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A model file as a running node corrects with it: what it holds, and whether it is the file's still."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from dataclasses import dataclass, replace
+from math import hypot
+from pathlib import Path
+from typing import Any
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import ModelError
+from weld_twin_core.twin.program_model import ProgramModel
+from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
+
+from .correcting import program_model
+from .told_twin import other_readings
+
+DIGITS = 12
+"""Of the hash of a file, as it is told: enough for all models of a plant."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedModel:
+    """
+    A model and the file it came from.
+
+    Attributes
+    ----------
+    path : Path
+    digest : str
+        Of the content of the file.
+    read : ProgramModel
+    promised : float, optional [m]
+        RMS distance of measurements from the twin that the model leaves on unseen data.
+    modified : float
+        When the file was written [s since 1970].
+
+    """
+
+    path: Path
+    digest: str
+    read: ProgramModel
+    promised: float | None
+    modified: float
+
+    def outdated(self, most_age: float = 0.0) -> str:
+        """
+        Return why the model is not fresh; empty where it is.
+
+        Parameters
+        ----------
+        most_age : float [s]
+            Age of the file above which it is not; 0 for any.
+
+        """
+        try:
+            now = self.path.stat().st_mtime
+            changed = now != self.modified and _digest(self.path) != self.digest
+        except OSError as error:
+            return f"the model '{self.path}' cannot be read any more: {error.strerror}"
+        if changed:
+            return (
+                f"the model '{self.path}' was exchanged; call ~/reload to go on with the new one"
+            )
+        age = time.time() - self.modified
+        if most_age and age > most_age:
+            return (
+                f'the model is {age / 3600.0:.1f} hours old, at most {most_age / 3600.0:g} are '
+                'allowed (max_model_age); measure and diagnose anew'
+            )
+        return ''
+
+    def around(self, wrench: Array | None, frame: str, warm: float | None) -> ProgramModel:
+        """Return what acts on the arm under a load [N, N m] and at a temperature [degC]."""
+        return replace(self.read, wrench=wrench, wrench_frame=frame, temperature=warm, _twins={})
+
+
+def loaded(robot: Robot, path: str) -> LoadedModel:
+    """
+    Return the model of a file.
+
+    Raises
+    ------
+    ModelError
+        There is none, it is of another robot, its data were unsound, or it counts joints
+        otherwise than they are read.
+
+    """
+    if not path:
+        raise ModelError("the compensator needs the parameter 'model': a diagnosis.json")
+    file = Path(path)
+    try:
+        modified, digest = file.stat().st_mtime, _digest(file)
+    except OSError as error:
+        raise ModelError(f"the model '{path}' cannot be read: {error.strerror}") from None
+    promised = None
+    if file.suffix.lower() == '.json':
+        content = read_diagnosis(file)
+        why = other_readings(content)
+        if why:
+            raise ModelError(
+                f"the model of '{path}' takes mended joint positions, and here they come as they "
+                f'are: {why}'
+            )
+        promised = _promised(content)
+    read = program_model(robot, file)
+    if promised is not None and read.posterior is not None:
+        promised = hypot(promised, read.posterior.recorded_m)
+    return LoadedModel(file, digest, read, promised, modified)
+
+
+def _promised(content: dict[str, Any]) -> float | None:
+    shrink = content.get('shrink')
+    left = shrink.get('rms_after_m') if isinstance(shrink, dict) else None
+    return float(left) if isinstance(left, int | float) and left > 0.0 else None
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:DIGITS]

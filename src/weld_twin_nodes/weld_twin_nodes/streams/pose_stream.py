@@ -1,0 +1,352 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A stream of poses on its way to a controller: when it is corrected, and that it never jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
+from weld_twin_core.twin.goal_correction import SMOOTH_PEAK, SMOOTH_SPEED, GoalLimits
+from weld_twin_core.twin.pose_correction import LEVER, Looked, PoseCorrection, between, moved
+
+STILL = 2e-5
+"""Poses that stay within this [m, rad] stand still: far below what a seam moves between two of them."""
+REST = 0.1
+"""Time at standstill [s] after which a stream has come to rest."""
+SILENT = 0.5
+"""Silence [s] after which a stream begins anew: a hundred periods of a slow one."""
+NEAR = (0.01, 0.05)
+"""A stream begins where the arm stands, within this [m, rad]; farther off its first pose is a jump."""
+LOOK = 0.7
+"""Distance, in units of how far an exact look may be, at which the next one is begun."""
+FAR = 2.0
+"""The same from which the pose waits for it: the error is eight times that at one."""
+DOUBT_EVERY = 0.02
+"""Way [m] after which it is asked anew how sure the model is; that changes slowly."""
+SHORT = 1e-6
+"""Ramp [m, rad] that is none."""
+SPAN = 0.05
+"""Shortest time [s] over which speeds of joints are taken from exact looks."""
+
+
+class Given(NamedTuple):
+    """
+    What becomes of a pose.
+
+    Attributes
+    ----------
+    pose : array, shape (4, 4), optional
+        To be sent on; None for nothing.
+    added : array, shape (6,), optional [m, rad]
+        What was, or would be, added; None where it is not known.
+    why : str
+        Why it is not corrected; empty where it is.
+
+    """
+
+    pose: Array | None
+    added: Array | None
+    why: str = ''
+
+
+class Found(NamedTuple):
+    """An exact look, why the pose must not be corrected, and how sure the model is where asked [m]."""
+
+    looked: Looked | None
+    why: str = ''
+    doubt: float | None = None
+
+
+Work = Callable[[], Found]
+"""What is to be worked out."""
+
+
+class _Ramp(NamedTuple):
+    """A change of what is added while the stream is held at one pose."""
+
+    pose: Array
+    start: Array
+    end: Array
+    begun: float
+    span: float
+    mode: str
+
+    def at(self, now: float) -> Array:
+        """Return what is added at a time [s], shape (6,)."""
+        s = min(max((now - self.begun) / self.span, 0.0), 1.0)
+        share = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        return np.asarray(self.start + share * (self.end - self.start))
+
+
+class PoseStream:
+    """
+    Corrects poses one after the other.
+
+    What is added to them follows the model as long as the stream moves. It is faded in before the
+    first pose is followed, and faded in or out where the stream stands still, at no other time.
+
+    Parameters
+    ----------
+    correction : PoseCorrection
+    limits : GoalLimits
+    passing : bool
+        What is refused passes as it came; else nothing is sent.
+    shadow : bool
+        Nothing is sent; what would be added is told.
+    later : callable, optional
+        Takes work that is not to keep the stream waiting, and returns a function that tells whether
+        it is done and what came of it; left out, it is done at once.
+
+    """
+
+    def __init__(
+        self,
+        correction: PoseCorrection,
+        limits: GoalLimits,
+        *,
+        passing: bool = False,
+        shadow: bool = False,
+        later: Callable[[Work], Callable[[], Found | None]] | None = None,
+    ) -> None:
+        self.correction, self._limits = correction, limits
+        self._passing, self._shadow, self._later = passing, shadow, later
+        self._coming: Callable[[], Found | None] | None = None
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew with the next pose."""
+        self.correction.adopt(None)
+        self._mode, self._refused, self._tried = 'none', '', -np.inf
+        self._ramp: _Ramp | None = None
+        self._held = np.zeros(6)
+        self._rest_pose: Array | None = None
+        self._rest_since = self._last = -np.inf
+        self._next: Array | None = None
+        self._coming = None
+        self._sizes = self._doubts = 0.0
+        self._doubted: Array | None = None
+        self._speeds: tuple[float, Array, Array | None] | None = None
+
+    @property
+    def corrected(self) -> bool:
+        """Return whether poses are being corrected, or would be."""
+        return self._mode == 'corrected'
+
+    def take(self, pose: Array, now: float, arm: Array | None, withdrawn: str = '') -> Given:
+        """
+        Return what becomes of a pose.
+
+        Parameters
+        ----------
+        pose : array, shape (4, 4)
+            Of the tool in the robot's base, as the controller counts it.
+        now : float [s]
+            Its stamp.
+        arm : array, shape (n,), optional
+            Joints where the arm stands.
+        withdrawn : str
+            Why nothing is to be corrected from the next standstill on; empty where there is nothing.
+
+        """
+        if not 0.0 <= now - self._last <= SILENT:
+            self.forget()
+        self._last = now
+        rest = self._rested(pose, now)
+        self._adopt_coming(now)
+        added, why = self._wanted(pose, now, rest, arm, withdrawn)
+        if self._shadow:
+            self._mode = 'none' if added is None else 'corrected'
+            return Given(None, added, why)
+        if self._ramp is not None:
+            return self._on_ramp(now, why)
+        if added is None:
+            return self._uncorrected(pose, now, rest, why)
+        if self._mode == 'corrected':
+            self._held = added
+            return Given(moved(pose, added), added)
+        if self._mode == 'none':
+            return self._begun(pose, now, added, arm)
+        if rest < REST:
+            return Given(moved(pose, self._held), self._held, 'waits for a standstill')
+        return self._begin_ramp(pose, now, added, 'corrected')
+
+    def settle(self) -> None:
+        """Do what was put off until the pose was sent: look where the straight line ends."""
+        known, pose = self.correction.looked, self._next
+        self._next = None
+        if pose is None or known is None or self._coming is not None:
+            return
+        work = partial(self._found, partial(self.correction.exact, pose, known))
+        if self._later is None:
+            done = work()
+            self._coming = lambda: done
+        else:
+            self._coming = self._later(work)
+
+    # What is wanted --------------------------------------------------------------------------
+
+    def _wanted(
+        self, pose: Array, now: float, rest: float, arm: Array | None, withdrawn: str
+    ) -> tuple[Array | None, str]:
+        """Return what is to be added by the model, or why nothing is."""
+        if withdrawn and not (self.corrected and rest < REST):
+            self.correction.adopt(None)
+            return None, withdrawn
+        if self._refused:
+            if rest < REST or now - self._tried < REST:
+                return None, self._refused
+            self._refused = ''
+            self.correction.adopt(None)
+        if self.correction.looked is None:
+            self._tried, self._speeds = now, None
+            if arm is None:
+                return None, 'where the arm stands is not known: no joint states are heard'
+            self._adopt(self._found(partial(self.correction.first, pose, arm)), now)
+            if self._refused:
+                return None, self._refused
+        added, far = self.correction.added(pose)
+        if far > FAR:
+            known = self.correction.looked
+            assert known is not None
+            self._coming = None
+            self._adopt(self._found(partial(self.correction.exact, pose, known)), now)
+            if self._refused:
+                return None, self._refused
+            added, far = self.correction.added(pose)
+        if far > LOOK:
+            self._next = pose
+        return added, ''
+
+    def _found(self, solve: Callable[[], Looked]) -> Found:
+        """Return an exact look with why it is refused, or why there is none."""
+        try:
+            looked = solve()
+        except DataError as error:
+            return Found(None, str(error))
+        return Found(looked, self.correction.refusal(looked, self._limits), self._asked(looked))
+
+    def _asked(self, looked: Looked) -> float | None:
+        """Return how sure the model is of a look [m], where that is to be asked anew."""
+        at = looked.pose[:3, 3]
+        if self._doubted is not None and np.linalg.norm(at - self._doubted) < DOUBT_EVERY:
+            return None
+        self._doubted = at
+        return self.correction.doubt(looked)
+
+    def _adopt_coming(self, now: float) -> None:
+        """Take a look that was put off, once it is there."""
+        found = None if self._coming is None else self._coming()
+        if found is not None:
+            self._coming = None
+            self._adopt(found, now)
+
+    def _adopt(self, found: Found, now: float) -> None:
+        looked, why, doubt = found
+        if looked is None:
+            self._refused = why
+            return
+        why = why or self._too_quick(looked, now)
+        if doubt is not None:
+            self._sizes += float(looked.added[:3] @ looked.added[:3])
+            self._doubts += doubt**2
+            if self._sizes < self._doubts:
+                why = why or (
+                    f'the model is less sure of these poses ({doubt * 1e3:.3f} mm) than the '
+                    'correction is large'
+                )
+        self._refused = why
+        self._tried = now
+        self.correction.adopt(looked)
+
+    def _too_quick(self, looked: Looked, now: float) -> str:
+        """Return that joints, or what is added, change faster than they may."""
+        before = self._speeds
+        if before is None or now - before[0] > SILENT:
+            self._speeds = now, looked.q, None
+            return ''
+        span = now - before[0]
+        if span < SPAN:
+            return ''
+        speed = (looked.q - before[1]) / span
+        robot = self.correction.model.robot
+        bend = np.zeros_like(speed) if before[2] is None else (speed - before[2]) / span
+        self._speeds = now, looked.q, speed
+        most = np.minimum(robot.max_acceleration, self._limits.acceleration)
+        for value, limit, name in (
+            (speed, robot.max_velocity, 'velocity'),
+            (bend, most, 'acceleration'),
+        ):
+            over = np.abs(value) - limit
+            if over.max() > 0.0:
+                i = int(over.argmax())
+                return (
+                    f'these poses break the limit of {name} of {robot.joint_names[i]}: '
+                    f'{abs(value[i]):.3g}, the limit is {limit[i]:.3g}'
+                )
+        return ''
+
+    # What is sent ----------------------------------------------------------------------------
+
+    def _uncorrected(self, pose: Array, now: float, rest: float, why: str) -> Given:
+        if not self._passing:
+            self._mode = 'none'
+            return Given(None, None, why)
+        if self._mode in ('corrected', 'held') and np.abs(self._held).max() > SHORT:
+            if rest >= REST:
+                return self._begin_ramp(pose, now, np.zeros(6), 'passed', why)
+            self._mode = 'held'
+            return Given(moved(pose, self._held), self._held, why)
+        self._mode, self._held = 'passed', np.zeros(6)
+        return Given(pose, self._held, why)
+
+    def _begun(self, pose: Array, now: float, added: Array, arm: Array | None) -> Given:
+        """Begin with a stream: fade in from where the arm stands, before its first pose is followed."""
+        assert arm is not None
+        there = between(pose, self.correction.arm_poses(arm[None])[0])
+        far = [float(np.linalg.norm(part)) for part in np.split(there, 2)]
+        if far[0] > NEAR[0] or far[1] > NEAR[1]:
+            self._refused = (
+                f'the pose is {far[0] * 1e3:.1f} mm and {np.degrees(far[1]):.2f} degrees from where '
+                'the arm stands; begin there'
+            )
+            return self._uncorrected(pose, now, 0.0, self._refused)
+        self._held = there
+        return self._begin_ramp(pose, now, added, 'corrected')
+
+    def _begin_ramp(self, pose: Array, now: float, end: Array, mode: str, why: str = '') -> Given:
+        way = [float(np.linalg.norm(part)) for part in np.split(end - self._held, 2)]
+        if max(way) < SHORT:
+            self._mode, self._held = mode, end
+            return Given(moved(pose, end), end, why)
+        most = min(
+            self._limits.acceleration, float(self.correction.model.robot.max_acceleration.min())
+        )
+        span = max(
+            SMOOTH_SPEED * way[0] / self._limits.rate,
+            SMOOTH_SPEED * way[1] / self._limits.turn_rate,
+            sqrt(SMOOTH_PEAK * (way[0] / LEVER + way[1]) / most),
+        )
+        self._ramp = _Ramp(pose, self._held, end, now, span, mode)
+        return self._on_ramp(now, why)
+
+    def _on_ramp(self, now: float, why: str) -> Given:
+        assert self._ramp is not None
+        ramp, added = self._ramp, self._ramp.at(now)
+        self._held = added
+        if now - ramp.begun >= ramp.span:
+            self._mode, self._ramp = ramp.mode, None
+        return Given(moved(ramp.pose, added), added, why)
+
+    def _rested(self, pose: Array, now: float) -> float:
+        """Return for how long the stream has stood still [s]."""
+        at = self._rest_pose
+        if at is None or np.abs(between(at, pose)).max() > STILL:
+            self._rest_pose, self._rest_since = pose, now
+        return now - self._rest_since

@@ -16,6 +16,7 @@ from .algebra.problem import frames_named
 from .answer.answer import answer
 from .answer.refusal import refusal
 from .beliefs import Beliefs
+from .calibration.calibrated import stated
 from .frames.changes import families_named, settled_between
 from .frames.open_directions import held
 from .frames.places import not_told
@@ -23,17 +24,14 @@ from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
 from .hypotheses.structural_aliases import with_structural_aliases
 from .levels.curved import carried, curved, standing
-from .levels.formulas import formulas
+from .levels.formulas import missed, no_noise
 from .levels.placed import placed
 from .many.fitted_together import fitted_together
+from .posterior.table import table_of
 from .predicting.allowed import allowed
 from .predicting.alone import alone
 from .result import Diagnosis, Shrink
 from .soundness import Examined, Given, examine, refuse_reused
-from .stability.repeated import repeated
-from .stability.steadied import came_back, steadied
-from .trust.signs import Signs, signs_of_answer
-from .trust.signs_of_found import signs_of_found
 from .unseen.carrying import carrying
 from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
 from .unseen.leftover_structure import structure
@@ -161,25 +159,24 @@ def _explained(
     floor = noise_floor(found.problem, found.problem.residuals(found.final.model))
     shrink = held_out_shrink(found, unseen, holdout, beliefs)
     found, least = parted_elsewhere(found, holdout, beliefs)
-    found, stability = steadied(found, repeated(found), beliefs)
     chance = reached_by_chance(found, unseen, holdout, beliefs)
     evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, least, chance)
-    verdict = decide(evidence, beliefs)
     rival = curved(found, beliefs)
-    verdict, missed = formulas(found, unseen, verdict, rival, beliefs)
+    left = missed(found, unseen, beliefs)
+    table = table_of(found.slots, beliefs)
+    statements = stated(found, unseen, evidence, table, rival, left)
+    evidence = replace(evidence, believed=tuple(one.probability for one in statements.names))
+    verdict = no_noise(decide(evidence, beliefs), rival, left, beliefs)
     rival = standing(found, verdict, rival, beliefs)
-    back = came_back(found, verdict, stability)
-    each = signs_of_found(found, unseen, evidence, verdict, back, holdout)
-    own = signs_of_answer(found, unseen, evidence, verdict, rival, examined.checks, each)
     unseen.forget_other_parts()
-    places = placed(found, verdict, rival, missed, beliefs)
+    places = placed(found, verdict, rival, left, beliefs)
     progress('held against curves without a formula')
     which = verdict, rival, holdout, beliefs
     found, unseen, shrink, verdict = carried(found, unseen, shrink, *which)
     found = _by_itself(_held(found, examined.given.robot), shrink)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
-    told = (Signs(own, each), rival, places, limits, stability)
+    told = (statements, rival, places, limits)
     return answer(found, unseen, evidence, verdict, shrink, examined, posterior, *told)
 
 

@@ -72,7 +72,7 @@ def standing(
     found: Search, verdict: Verdict, alone: Curved | None, beliefs: Beliefs
 ) -> Curved | None:
     """
-    Return curves for what is left beside the names of an 'unknown' verdict.
+    Return curves for what an 'unknown' verdict leaves beside the names that it tells.
 
     Parameters
     ----------

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """How far a diagnosis can be trusted: learned on cases with known truths, judged on others.
 
-Draws cases, diagnoses them, and fits for every level of an answer how often it is right, with the
-threshold from which it is told as sure. Writes belief.json (the file the diagnosis reads), what it
-is worth, pictures, and the table of cases: with --learn-from and --judge-on it is fitted anew from
-such tables without a diagnosis. Stopped, it goes on where it was when run again.
+Draws cases, diagnoses them, and fits for every kind of statement how often it is right, with the
+threshold from which it is told as sure. Writes weights.json (the file the diagnosis reads), what
+answers are worth on the cases to judge on, pictures, and the tables of statements: with --learn-from
+and --judge-on it is fitted anew from such tables without a diagnosis. Stopped, it goes on where it
+was when run again.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pathlib import Path
 
 from ..blind_jobs.job_options import add_pool, runner_of
 
-LEARNED, JUDGED, STORE = 'cases.jsonl', 'held_out.jsonl', 'done'
+LEARNED, JUDGED, STORE = 'cases.jsonl.gz', 'held_out.jsonl.gz', 'done'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,9 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--risk',
         type=float,
-        default=0.01,
+        default=0.002,
         metavar='P',
-        help='probability that an answer may be sure and wrong (default: 0.01)',
+        help='probability that an answer may be sure and wrong (default: 0.002)',
     )
     add_pool(parser)
     parser.add_argument('--out', required=True, metavar='DIR', help='where everything goes')

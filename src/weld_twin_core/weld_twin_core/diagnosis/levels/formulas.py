@@ -44,7 +44,6 @@ SHARES = (0.02, 0.1, 0.4)
 """Shares of the joint's largest speed about which what depends on the way may set in."""
 SLIDING = 0.1
 """Metres of a joint that slides which are looked at as a radian of one that turns."""
-
 FIELD = 'instrument'
 """A free field over the workspace speaks against every formula: it is what each of them bends to."""
 

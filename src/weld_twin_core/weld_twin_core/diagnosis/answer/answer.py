@@ -69,16 +69,8 @@ def answer(
         What the next experiment may cost, and where it has to stay; None plans none.
 
     """
-    told, shares = causes(
-        found,
-        unseen,
-        before.table,
-        verdict,
-        rival,
-        evidence.floor,
-        found.work.beliefs,
-        placing,
-    )
+    forms = rival, evidence.floor, found.work.beliefs, placing
+    told, shares = causes(found, unseen, before.table, verdict, *forms)
     verdict, told, statements = calibrated(verdict, told, before, placing)
     told = with_intervals(told, found, unseen, verdict, evidence.floor)
     effects, verdict, told = named_effects(found, unseen, verdict, told)

@@ -229,36 +229,6 @@ class Family:
 
 
 @dataclass(frozen=True)
-class CameBack:
-    """
-    How often a cause was named again on parts of the data.
-
-    Attributes
-    ----------
-    times, of : int
-        Halves of the data on which it was, itself or what is told as alike, and halves that would
-        show it. Of many small errors: parts left out in turn that miss it, and all parts.
-    instead : tuple of (Site, int)
-        What was named where it was not, and on how many halves.
-
-    """
-
-    times: int
-    of: int
-    instead: tuple[tuple[Site, int], ...] = ()
-
-    @property
-    def share(self) -> float:
-        """Return the share of the halves on which it came back."""
-        return self.times / self.of
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the entry of ``came_back``."""
-        instead = [{'effect': s.effect, 'joint': s.joint, 'times': n} for s, n in self.instead]
-        return {'times': self.times, 'of': self.of, 'instead': instead}
-
-
-@dataclass(frozen=True)
 class Cause:
     """
     What is certain of one cause, level by level, most probable first.
@@ -277,8 +247,6 @@ class Cause:
     members : tuple of int
         The effects of the model that stand for it, as `Model.found` counts them; none where
         nothing that can be carried over stands for it.
-    came_back : CameBack or None
-        How often it is named again on halves of the data; None where too few can tell.
     probability : float
         That one of its names is right; that its place is, where it has no name of an effect.
     sure : bool
@@ -298,7 +266,6 @@ class Cause:
     share: float
     share_ci90: tuple[float, float]
     members: tuple[int, ...] = ()
-    came_back: CameBack | None = None
     probability: float = 0.0
     sure: bool = False
     effect: int | None = None
@@ -319,7 +286,7 @@ class Cause:
             ],
             'share': self.share,
             'share_ci90': list(self.share_ci90),
-            'came_back': None if self.came_back is None else self.came_back.as_dict(),
+            'came_back': None,  # older readers ask for it
         }
 
 
@@ -551,8 +518,8 @@ class Diagnosis:
     """Where many small errors act together: what each kind accounts for, largest first."""
     evidence: object = None
     """What the verdict was drawn from, `verdict.evidence.Evidence`, to draw it anew."""
-    signs: object = None
-    """What says how far the answer can be trusted, `trust.signs.Signs`."""
+    statements: tuple[object, ...] = ()
+    """What is said, on what evidence and how probable: `calibration.calibrated.Statement`."""
     posterior: Posterior | None = None
     """The models that the recordings allow: what makes a prediction certain or not."""
     causes: tuple[Cause, ...] = ()

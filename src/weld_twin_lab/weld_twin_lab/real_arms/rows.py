@@ -65,40 +65,7 @@ class Plan:
 
 def plans() -> tuple[Plan, ...]:
     """Return every row of the study; nothing is read yet."""
-    out = []
-    for arm in ('ur5', 'ur10'):
-        source = partial(sources.tracked, name=f'{arm}_laser_tracker')
-        for seed in (1, 2):
-            out += [
-                Plan(
-                    f'{arm} {n} stations, draw {seed}',
-                    source,
-                    partial(_drawn, n, seed),
-                    halved=True,
-                )
-                for n in COUNTS
-            ]
-        out += [
-            Plan(f'{arm} {n} stations, tool known', source, partial(_drawn, n, 3), tool_known=True)
-            for n in COUNTS[1:]
-        ]
-        out += [
-            Plan(f'{arm} quarter 1', source, partial(_quarter, 0)),
-            Plan(f'{arm} octant 0', source, partial(_octant, 0)),
-        ]
-    ur10 = partial(sources.tracked, name='ur10_laser_tracker')
-    out += [
-        Plan(f'ur10 {n} points', ur10, partial(_drawn, n, 4), points_only=True, halved=True)
-        for n in COUNTS[1:]
-    ]
-    ur5 = partial(sources.tracked, name='ur5_laser_tracker')
-    out += [
-        Plan('ur5 quarter 4', ur5, partial(_quarter, 3)),
-        Plan('ur5 octant 7', ur5, partial(_octant, 7)),
-        Plan('emps first 60 %', sources.servo, partial(_span, 0.0, 0.6)),
-        Plan('emps last 60 %', sources.servo, partial(_span, 0.4, 1.0)),
-        Plan('emps middle third', sources.servo, partial(_span, 0.33, 0.67)),
-    ]
+    out = [plan for arm in ('ur5', 'ur10') for plan in _of_tracked(arm)]
     for arm in ('panda_1', 'panda_2', 'kuka_14'):
         source = partial(sources.sockets, arm=arm)
         out += [Plan(f'{arm} without place {k}', source, partial(_place, k)) for k in range(3)]
@@ -109,9 +76,43 @@ def plans() -> tuple[Plan, ...]:
             Plan(f'iiwa {name}', sources.iiwa, make, halved=halved),
             Plan(f'motoman {name}', partial(sources.motoman, masses=True), make, halved=halved),
         ]
-    out.append(Plan('motoman all, no masses', partial(sources.motoman, masses=False), _all))
-    out.append(Plan('ur5 swinging', sources.swinging, partial(_span, 0.0, 1.0)))
-    return tuple(out)
+    return (
+        *out,
+        Plan('motoman all, no masses', partial(sources.motoman, masses=False), _all),
+        Plan('emps first 60 %', sources.servo, partial(_span, 0.0, 0.6)),
+        Plan('emps last 60 %', sources.servo, partial(_span, 0.4, 1.0)),
+        Plan('emps middle third', sources.servo, partial(_span, 0.33, 0.67)),
+        Plan('ur5 swinging', sources.swinging, _all),
+    )
+
+
+def _of_tracked(arm: str) -> list[Plan]:
+    """Return the rows of one of the two arms under a laser tracker."""
+    source = partial(sources.tracked, name=f'{arm}_laser_tracker')
+    out = [
+        Plan(f'{arm} {n} stations, draw {seed}', source, partial(_drawn, n, seed), halved=True)
+        for seed in (1, 2)
+        for n in COUNTS
+    ]
+    out += [
+        Plan(f'{arm} {n} stations, tool known', source, partial(_drawn, n, 3), tool_known=True)
+        for n in COUNTS[1:]
+    ]
+    out += [
+        Plan(f'{arm} quarter 1', source, partial(_quarter, 0)),
+        Plan(f'{arm} octant 0', source, partial(_octant, 0)),
+    ]
+    if arm == 'ur5':
+        return [
+            *out,
+            Plan('ur5 quarter 4', source, partial(_quarter, 3)),
+            Plan('ur5 octant 7', source, partial(_octant, 7)),
+        ]
+    points = [
+        Plan(f'{arm} {n} points', source, partial(_drawn, n, 4), points_only=True, halved=True)
+        for n in COUNTS[1:]
+    ]
+    return [*out, *points]
 
 
 def row(data: Path, plan: Plan) -> Row:

@@ -23,7 +23,6 @@ from ..algebra.fit import design
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..unseen.leftover_structure import structure
 from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Unseen
 from .shrinkage import believed, groups, learned_precision, projected
@@ -82,8 +81,6 @@ def fitted_together(
     best, left = _without_creep(found, best, left, (*exclude, *dropped), beliefs, progress)
     few = unseen_rms(found)
     better = found.crowded or left < beliefs.better * few
-    if not better and left < few:
-        better = _more_is_there(found, beliefs)
     if not better:
         better = left < CHOSEN * few and _many(found, best, beliefs)
     if better and not found.crowded and _one_and_crumbs(best, beliefs):
@@ -92,14 +89,9 @@ def fitted_together(
         trial = _carrying(found, exclude, steps[0], beliefs, progress)
         if found.problem.places < PLACES or unseen_rms(trial) < left:
             return trial
-    return best if better else found
-
-
-def _more_is_there(found: Search, beliefs: Beliefs) -> bool:
-    """Return whether what the few leave has structure: dozens that predict better then go on."""
-    unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    left = structure(unseen, found.final.model, beliefs)
-    return left.gain > beliefs.structure_gain and left.sure > beliefs.structure_sure
+    if better:
+        return best
+    return replace(found, many=best) if left < CHOSEN * few else found
 
 
 def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:

@@ -144,7 +144,8 @@ def judged(families, gain=0.0, sure=0.0):
     loose = Structure(1e-4, gain, sure, ('the angle of elbow_joint',))
     # Without a structure what is left is near the floor; with one it is more than what is named.
     left = 3.5e-4 if gain else 5e-5
-    weighed = weighed_families(SimpleNamespace(final=result), unseen)
+    found = SimpleNamespace(final=result, problem=unseen.problem, precision=np.ones(6))
+    weighed = weighed_families(found, unseen, Beliefs())
     return decide(
         Evidence(
             slots=(),

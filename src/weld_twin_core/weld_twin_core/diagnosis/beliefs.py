@@ -143,9 +143,13 @@ class Beliefs:
     looks. Chance reaches 25 once in 3000 looks; the rest is a judgement, as what no model of the
     arm has looks like a motion of the set-up too."""
 
-    family_worth: float = _verdict(1.0)
-    """Share of the squared unseen error by which it must grow without a family to name it: it
-    doubles. A judgement."""
+    family_worth: float = _verdict(0.1)
+    """Share by which the RMS error on unseen data grows without a kind, in the median part left out,
+    from which on the kind is named; a tenth is what a calibration is worth doing for."""
+
+    joint_worth: float = _verdict(0.1)
+    """Share of a kind from which on a joint of it is told, and how nearly as well as the kind another
+    must do to be told beside it. A judgement."""
 
     member_least_m: float = _verdict(1e-6)
     """RMS at the tool [m] below which a member is not listed: no instrument sees it."""
@@ -172,11 +176,6 @@ class Beliefs:
     farthest: float = _unseen(1.0)
     """Logarithm of a ratio between two motions from which on it says no more about the interval:
     a model that leaves e times as much elsewhere fits neither."""
-
-    returns: float = _unseen(0.8, most=1.0)
-    """Share of the stretches and regions of posture left out by which a family of many small errors
-    must be missed to be named. Odd and even halves of recordings of two real arms then name the same
-    families in 27 of 30 pairs, and in 26 at three parts in four; by the mean over the parts in 19."""
 
     # The verdict -----------------------------------------------------------------------------
 

@@ -37,7 +37,7 @@ from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
 from .unseen.leftover_structure import structure
 from .unseen.parted_elsewhere import parted_elsewhere
 from .unseen.unseen_stretches import Unseen
-from .verdict.decision import decide
+from .verdict.decision import LIKELIER, decide
 from .verdict.gathered_evidence import gathered
 
 Progress = Callable[[str], None]
@@ -146,8 +146,36 @@ def _explained(
     limits: Limits | None,
     progress: Progress,
 ) -> Diagnosis:
-    """Return the diagnosis of recordings that were found sound."""
+    """
+    Return the diagnosis of recordings that were found sound.
+
+    Where a few effects leave the cause unknown, and all kinds together predict as well, kinds that
+    unseen data need are told in their place.
+    """
     found = _searched(examined, exclude, beliefs, progress)
+    out = _told(found, examined, exclude, holdout, beliefs, limits, progress)
+    if found.many is None or out.status != 'unknown' or _named(out):
+        return out
+    progress('a few effects leave the cause unknown: all kinds together')
+    many = _told(found.many, examined, exclude, holdout, beliefs, limits, progress)
+    return many if _named(many) else out
+
+
+def _named(out: Diagnosis) -> bool:
+    """Return whether a cause is named that is likelier right than wrong."""
+    return any(cause.effect is not None and cause.probability > LIKELIER for cause in out.causes)
+
+
+def _told(
+    found: Search,
+    examined: Examined,
+    exclude: Sequence[str],
+    holdout: Sequence[Recording],
+    beliefs: Beliefs,
+    limits: Limits | None,
+    progress: Progress,
+) -> Diagnosis:
+    """Return the diagnosis of what was found."""
     examined = examined.torn(found.problem, found.final.model)
     if examined.posed is None:
         return refusal(examined)

@@ -188,12 +188,21 @@ class Family:
     ----------
     effect : str
     named : bool
-        Whether unseen data get clearly worse without it; one that is not is exchangeable here.
+        Whether unseen data get worse without it; one that is not is exchangeable here.
     rms_m : float
         What it accounts for at the tool on unseen data: the root of how much the squared error
-        grows without it, the rest staying as it is, [m].
+        grows without it, the other kinds that are needed fitted anew, [m].
     members : tuple of (Site, float)
         Its members and how far each moves the tool, RMS [m], largest first.
+    growth : float
+        By what share the error on unseen data grows without it, all others fitted anew: the median
+        over the parts left out.
+    needed : tuple of (Site, float)
+        The members without which unseen data get worse, each with its share of the kind.
+    like : tuple of (Site, float)
+        What would do nearly as well in its place, and how nearly: 1 is as well.
+    share : float
+        Share of the squared gap that it takes off unseen data.
 
     """
 
@@ -201,6 +210,10 @@ class Family:
     named: bool
     rms_m: float
     members: tuple[tuple[Site, float], ...]
+    growth: float = 0.0
+    needed: tuple[tuple[Site, float], ...] = ()
+    like: tuple[tuple[Site, float], ...] = ()
+    share: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``verdict.families``."""
@@ -209,6 +222,9 @@ class Family:
             'named': self.named,
             'rms_m': self.rms_m,
             'members': [{'joint': site.joint, 'rms_m': size} for site, size in self.members],
+            'growth': self.growth,
+            'needed': [{'joint': site.joint, 'share': share} for site, share in self.needed],
+            'like': [{'effect': site.effect, 'joint': site.joint} for site, _ in self.like],
         }
 
 

@@ -20,6 +20,10 @@ from .features import Numbers, of_level, of_name, of_rest, of_situation, of_whol
 from .weights import Calibration, Features, usual_calibration
 
 Key = TypeVar('Key')
+KIND = 0.75
+"""Belief in a kind of many small errors that unseen data need, until it is learned anew under the rule
+that names kinds now: of 38 kinds told of 25 recordings of real arms least squares on stations that
+were not fitted bore out 34; the rest of the margin is for arms of another make. A judgement."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +99,7 @@ def stated(
     learned = usual_calibration()
     situation = of_situation(found, unseen, evidence, rival)
     if found.dense:
-        names = [_told('name of many', 0, situation, learned)]
+        names = [Statement('name of many', 0, dict(situation), KIND)]
         return Stated(table, tuple(names), situation, rival)
     sizes = [unseen.rms(part) / max(evidence.floor, 1e-12) for part in unseen.targets[1:]]
     each = zip(table, sizes, unseen.wandered(), strict=False)
@@ -157,7 +161,8 @@ def _levels(
         levels = [_told(one, k, more, learned) for one, more in zip(both, own, strict=True)]
         return [*levels, replace(name, cause=k)]
     if many and cause.name and not cause.rest:
-        return [_told(f'{level} of many', k, situation, learned) for level in (*both, 'name')]
+        of_kind = dict(situation)
+        return [Statement(f'{level} of many', k, of_kind, KIND) for level in (*both, 'name')]
     own = [{**situation, **of_rest(cause, level, placing)} for level in both]
     return [
         _told(f'{level} of the rest', k, more, learned)
@@ -190,6 +195,12 @@ def _with(cause: Cause, levels: Sequence[float], calibration: Calibration) -> Ca
     effect found holds where its name is wrong.
     """
     place, dependence, *name = levels
+    if name and cause.slot is None:
+        # The joints of a kind share what is believed of it, and so do others that are like it.
+        levels_of = _scaled(cause.place, place), _scaled(cause.dependence, dependence)
+        cause = replace(cause, place=levels_of[0], dependence=levels_of[1])
+        named = _scaled(cause.name, name[0])
+        return replace(cause, name=named, probability=name[0], sure=False)
     if cause.slot is not None:
         place, dependence = (name[0] + (1.0 - name[0]) * p for p in (place, dependence))
     told = name[0] if name else place if cause.place else 0.0

@@ -53,6 +53,8 @@ class _Claim:
     """Share of the squared gap that groups at this place take off unseen folds; None of a name."""
     slot: int | None = None
     group: int | None = None
+    kind: float | None = None
+    """Share of the squared gap that a kind takes off unseen data; None of one effect by itself."""
 
 
 def causes(
@@ -97,6 +99,7 @@ def causes(
     whole = _shares(squares, parts, claims, np.ones(labels.size, dtype=bool))
     spread = _spread(squares, parts, claims, labels)
     whole, spread = _as_placed(whole, spread, claims, placing)
+    whole = np.array([s if c.kind is None else c.kind for c, s in zip(claims, whole, strict=True)])
     noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
     left = max(1.0 - float(whole.sum()) - noise, 0.0)
     out = [
@@ -164,7 +167,7 @@ def _told_claims(found: Search, table: Sequence[Row], verdict: Verdict) -> list[
     """Return a claim for every effect that is told, or for every group of many small ones."""
     model = found.final.model.found
     if found.dense:
-        return _claims_of_many(model, {site for group in verdict.sets for site in group})
+        return _claims_of_many(model, verdict)
     out: list[_Claim] = []
     for at, group in enumerate(verdict.sets):
         k = next(i for i, row in enumerate(table) if row.leader.site in group)
@@ -297,21 +300,28 @@ def _merged(places: dict[str, list[Part]]) -> dict[str, list[Part]]:
     return out
 
 
-def _claims_of_many(model: tuple[Effect, ...], named: set[Site]) -> list[_Claim]:
-    """Return a claim for every place and dependence of many small errors together."""
-    groups: dict[tuple[str, str], list[int]] = {}
-    for k, effect in enumerate(model):
-        if Site(effect.name, effect.site) in named:
-            groups.setdefault((effect.at, effect.on), []).append(k)
-    return [
-        _Claim(
-            tuple(members),
-            {at: 1.0},
-            {on: 1.0},
-            {Site(model[k].name, model[k].site): 1.0 for k in members},
-        )
-        for (at, on), members in groups.items()
-    ]
+def _claims_of_many(model: tuple[Effect, ...], verdict: Verdict) -> list[_Claim]:
+    """Return a claim for every kind that unseen data need, with its joints and with what is like it."""
+    out = []
+    for family in verdict.families:
+        if not (family.named and family.needed):
+            continue
+        whole = 1.0 + sum(part for _, part in family.like)
+        told = [(site, share / whole) for site, share in family.needed]
+        told += [(site, part / whole) for site, part in family.like]
+        place: dict[str, float] = {}
+        dependence: dict[str, float] = {}
+        name: dict[Site, float] = {}
+        for site, part in told:
+            own = next(e for e in model if (e.name, e.site) == (site.effect, site.joint))
+            place[own.at] = place.get(own.at, 0.0) + part
+            dependence[own.on] = dependence.get(own.on, 0.0) + part
+            name[site] = part
+        members = tuple(k for k, effect in enumerate(model) if effect.name == family.effect)
+        group = next(k for k, each in enumerate(verdict.sets) if each[0] == family.needed[0][0])
+        claim = _Claim(members, place, dependence, name, group=group, kind=family.share)
+        out.append(claim)
+    return out
 
 
 def _contributions(unseen: Unseen) -> Array:

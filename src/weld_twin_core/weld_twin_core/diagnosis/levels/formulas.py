@@ -3,9 +3,10 @@
 """
 Do the formulas of the names hold? Free forms instead of them and at their places, and noise.
 
-At their places a joint may lose motion by any law; what the instrument and the frames do is a free
-smooth field over the workspace. They are added to everything that is named, so that they need to
-find no more than what the name misses.
+At their places lost motion of a joint is free in the gaps it trails in, and in angle, speed and
+load by the way it goes; what the instrument and the frames do is a free smooth field over the
+workspace. They are added to everything that is named, so that they need to find no more than what
+the name misses.
 """
 
 from __future__ import annotations
@@ -17,7 +18,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
+from ...effects.associative_scan import play
+from ...effects.curve import QUANTITIES, basis
 from ...twin.features import Features
+from ...twin.resampling import Picker
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
@@ -25,9 +29,24 @@ from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Taken, Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
-from .groups import smooth_field, spanned
+from .groups import LEAST, smooth_field, spanned
 from .scatter import Scatter, scatter
-from .whole_arm import lost_motion, moves
+
+GAPS = (5e-5, 2e-4, 8e-4, 2e-3, 1e-2, 4e-2)
+"""Widths [rad, or tens of centimetres] of gaps in series: from half of what the finest play is to
+what takes a tenth of a radian to build up."""
+TURNED = 1e-4
+"""Travel [rad, or tens of centimetres] after which a joint counts as going the other way: teeth
+have changed flanks by then."""
+BENT = 4
+"""Knots over the angle for each way: straight, bent, and bent back."""
+SHARES = (0.02, 0.1, 0.4)
+"""Shares of the joint's largest speed about which what depends on the way may set in."""
+SLIDING = 0.1
+"""Metres of a joint that slides which are looked at as a radian of one that turns."""
+FIELD = 'instrument'
+"""A free field over the workspace speaks against every formula: it is what each of them bends to."""
+
 
 
 class Beside(NamedTuple):
@@ -189,15 +208,40 @@ def _forms(
     named = [('instrument', 'place', field), ('instrument', 'place', linear)]
     moving = not problem.at_rest
     for i, joint in enumerate(features[0].twin.robot.joint_names if moving else ()):
-        if joint in places and moves(features, i):
-            ways = [
-                lost_motion(problem, k, maker, features, i) for k, maker in enumerate(features)
-            ]
+        if joint in places and _moves(features, i):
+            ways = [_lost(problem, k, maker, features, i) for k, maker in enumerate(features)]
             named.append((joint, 'direction', ways))
     for at, on, parts in named:
         columns = spanned(problem, scale, at, on, (), parts).columns
         if columns.size:
             yield at, on, columns
+
+
+def _moves(features: list[Features], i: int) -> bool:
+    return max(float(np.ptp(m.run.view.q[:, i])) for m in features) > LEAST['angle']
+
+
+def _lost(problem: Problem, k: int, maker: Features, features: list[Features], i: int) -> Array:
+    """Return what joint i may lose by the way it goes, shape (E, c, M)."""
+    view, unit = maker.view, SLIDING if maker.twin.robot.prismatic[i] else 1.0
+    q = maker.joint_view.joint(i)
+    widths = unit * np.array([*GAPS, TURNED])[:, None]
+    trails = play(q, widths, np.full(len(widths), q[0])) - q
+    trails = Picker(maker.recording.joints, maker.run.view.t).pick(trails)
+    way = trails[-1] / (-0.5 * widths[-1])
+    angles = [m.view.q[:, i] for m in features]
+    knots = np.linspace(min(map(np.min, angles)), max(map(np.max, angles)), BENT)
+    speed = view.qd[:, i]
+    fastest = max(float(np.abs(m.view.qd[:, i]).max()) for m in features)
+    rest = QUANTITIES['direction'](view, i)
+    about = np.tanh(speed / (np.array(SHARES)[:, None] * max(fastest, LEAST['speed'])))
+    shapes = [
+        *trails[:-1],
+        *(way * basis(knots.tolist(), view.q[:, i])),
+        *about,
+        *(rest, np.abs(rest), speed, way * QUANTITIES['load'](view, i)),
+    ]
+    return np.asarray(problem.seen(k, maker.column(('q', i))) * np.array(shapes)[:, None, :])
 
 
 def worse_of(ways: Sequence[Taken]) -> Taken:

@@ -137,27 +137,39 @@ def _of_nothing(left: Left) -> Verdict:
 
 
 def _of_families(left: Left) -> Verdict:
-    """Return the families that earn their place on unseen data, each with its members."""
+    """Return the families that unseen data need, each with the joints that they need it on."""
     beliefs = left.beliefs
     families = []
     for told in left.evidence.families or ():
         members = tuple(item for item in told.members if item[1] > beliefs.member_least_m)
-        named = told.returns(beliefs.family_worth) >= beliefs.returns
         if members:
-            families.append(Family(told.effect, named, told.rms_m, members))
+            named = told.named(beliefs.family_worth)
+            needed = tuple(item for item in told.needed if item[1] >= beliefs.joint_worth)
+            like = tuple(item for item in told.like if item[1] >= beliefs.joint_worth)
+            more = told.median, needed, like, told.share
+            families.append(Family(told.effect, named, told.rms_m, members, *more))
     families.sort(key=lambda family: -family.rms_m)
-    sets = tuple((site,) for family in families if family.named for site, _ in family.members)
+    sets = tuple(group for family in families if family.named for group in _sets_of(family))
     reason = (
-        'many small errors act together; members of one family are fitted jointly and only their '
-        'sum is certain'
+        'many small errors act together; a kind is named where unseen data get worse without it, '
+        'whatever the others do in its place'
     )
     whole = Verdict('identified', sets, (reason,), tuple(families))
     if not sets:
         return replace(whole, status='unknown', reasons=(reason, _NO_KIND))
-    if all(p > LIKELIER for p in left.evidence.believed):
-        return whole if left.explained > left.share else replace(whole, status='unknown')
-    # As likely as not something else: members are kept in the model, and none is named.
-    return replace(whole, status='unknown', sets=(), reasons=(_MANY_IMITATE,))
+    if not all(p > LIKELIER for p in left.evidence.believed):
+        return replace(whole, status='unknown', reasons=(_MANY_IMITATE,))
+    if left.explained <= left.share:
+        return replace(whole, status='unknown')
+    alone = all(len(group) == 1 for group in sets)
+    return whole if alone else replace(whole, status='ambiguous')
+
+
+def _sets_of(family: Family) -> list[tuple[Site, ...]]:
+    """Return a set for every joint of a kind; what would do as well as the kind is in the first."""
+    sites = [site for site, _ in family.needed]
+    like = tuple(site for site, _ in family.like)
+    return [(sites[0], *like), *((site,) for site in sites[1:])] if sites else []
 
 
 def _absurd(evidence: Evidence) -> str:

@@ -62,7 +62,7 @@ def gathered(
         glimpsed=glimpsed(found.problem, found.final.model, beliefs),
         refused=tuple(_refused(robot, e) for e in found.refused if beyond(robot, e)),
         lacking=tuple(_lacking(e) for e in found.refused if not beyond(robot, e)),
-        families=weighed_families(found, unseen) if found.dense else None,
+        families=weighed_families(found, unseen, beliefs) if found.dense else None,
         least=least,
         chance=chance,
     )

@@ -30,6 +30,7 @@ from .predicting.allowed import allowed
 from .predicting.alone import alone
 from .result import Diagnosis, Shrink
 from .soundness import Examined, Given, examine, refuse_reused
+from .soundness.efforts import with_sign
 from .stability.repeated import repeated
 from .stability.steadied import came_back, steadied
 from .trust.signs import Signs, signs_of_answer
@@ -130,6 +131,7 @@ def diagnose(
     beliefs = beliefs or Beliefs()
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     refuse_reused(recordings, holdout)
+    recordings = with_sign(recordings, robot)
     given = Given(recordings, robot, frames_named(align), families_named(may_change))
     examined = examine(given, known, apply=apply, beliefs=beliefs)
     progress('data checked')

@@ -47,6 +47,8 @@ from .cdr_types import (
 
 HEADER = 4
 """Bytes of encapsulation before the first field; alignment counts from behind them."""
+_MORE = 12
+"""Bytes behind what was read that hold an effort at least: its count, padding, one number."""
 _STAMP_END = HEADER + 8
 """Where the frame name begins: behind seconds and nanoseconds."""
 
@@ -119,30 +121,40 @@ class JointStateDecoder:
 
         """
         for head, (frame, name, body, at) in self._known.items():
-            if data.startswith(head, _STAMP_END) and len(data) >= at + body.size:
+            if data.startswith(head, _STAMP_END) and 0 <= len(data) - at - body.size < _MORE:
                 sec, nanosec = _STAMP.unpack_from(data, HEADER)
                 values = body.unpack_from(data, at)
                 n = len(name)
-                velocity = values[n + 2 :]
+                velocity = values[n + 2 : 2 * n + 2]
                 if values[n] == len(velocity) and data[1] == 1 and data[0] == 0:
                     header = Header(Time(sec, nanosec), frame)
-                    return JointState(header, name, values[:n], velocity)
+                    effort = values[2 * n + 4 :]
+                    if not effort:
+                        return JointState(header, name, values[:n], velocity)
+                    if values[2 * n + 2] == n:
+                        return JointState(header, name, values[:n], velocity, effort)
         state: JointState = decoded('sensor_msgs/msg/JointState', self._slow, data)
         return state
 
     def _slow(self, cursor: _Cursor) -> JointState:
         header, name = cursor.header(), cursor.strings()
         head_end = cursor.at
-        position, velocity = cursor.sequence(), cursor.sequence()
-        cursor.sequence()
-        self._remember(cursor.data, head_end, header.frame_id, name, len(position), len(velocity))
-        return JointState(header, name, position, velocity)
+        position, velocity, effort = cursor.sequence(), cursor.sequence(), cursor.sequence()
+        if len(effort) in (0, len(name)) and not (effort and not velocity):
+            counts = len(position), len(velocity), len(effort)
+            self._remember(cursor.data, head_end, header.frame_id, name, counts)
+        return JointState(header, name, position, velocity, effort)
 
     def _remember(
-        self, data: bytes, end: int, frame: str, name: tuple[str, ...], q: int, qd: int
+        self,
+        data: bytes,
+        end: int,
+        frame: str,
+        name: tuple[str, ...],
+        counts: tuple[int, int, int],
     ) -> None:
         """Keep the bytes of frame, names and count: of one position per name, one velocity or none."""
-        n = len(name)
+        n, (q, qd, effort) = len(name), counts
         if q != n or qd not in (0, n) or data[1] != 1:
             return
         counted = end + -(end - HEADER) % 4 + 4
@@ -150,7 +162,7 @@ class JointStateDecoder:
         if len(self._known) >= self._KEPT:
             self._known.clear()
         # The velocities' count lies on a multiple of 8; behind it four bytes of padding.
-        body = Struct(f'<{n}dII{n}d' if qd else f'<{n}dI')
+        body = Struct(f'<{n}dII{n}d' + (f'II{n}d' if effort else '') if qd else f'<{n}dI')
         self._known[bytes(data[_STAMP_END:counted])] = (frame, name, body, at)
 
 

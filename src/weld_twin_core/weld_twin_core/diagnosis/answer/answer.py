@@ -20,6 +20,7 @@ from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
 from ..result import Cause, Diagnosis, Shares, Shrink
 from ..soundness import Examined
+from ..soundness.efforts import compared
 from ..stability.steadied import Stability, of_families, told_back
 from ..trust.model import usual_trust
 from ..trust.signs import Signs, signs_of_cause
@@ -103,6 +104,7 @@ def answer(
         **_parted(unseen, told, shares, verdict),
         signs=own,
         contacts=contact_spreads(found, unseen),
+        efforts=compared(found.problem.recordings, robot),
         **_compared(found, examined, verdict),
     )
 

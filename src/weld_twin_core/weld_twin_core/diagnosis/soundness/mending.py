@@ -192,6 +192,7 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
         joints=replace(own.joints, t=moved(own.joints.t), qd=qd),
         wrench=signal(own.wrench),
         temperature=signal(own.temperature),
+        effort=signal(own.effort),
     )
     return replace(given, recordings=tuple(recordings))
 

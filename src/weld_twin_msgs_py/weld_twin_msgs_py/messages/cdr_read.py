@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from struct import Struct, error, unpack_from
-from typing import Any
+from typing import Any, NamedTuple
 
 from weld_twin_core.errors import DataError
 
@@ -102,13 +102,24 @@ class _Cursor:
         return PoseStamped(header, Pose(Xyz(*v[:3]), Xyzw(*v[3:])))
 
 
+class _Kept(NamedTuple):
+    """How to read joint states like one that came: where numbers begin and end; efforts among them."""
+
+    frame: str
+    name: tuple[str, ...]
+    body: Struct
+    at: int
+    end: int
+    efforts: bool
+
+
 class JointStateDecoder:
     """Decodes joint states; one that repeats its frame and names is read without parsing them."""
 
     _KEPT = 8
 
     def __init__(self) -> None:
-        self._known: dict[bytes, tuple[str, tuple[str, ...], Struct, int]] = {}
+        self._known: dict[bytes, _Kept] = {}
 
     def __call__(self, data: bytes) -> JointState:
         """
@@ -120,19 +131,18 @@ class JointStateDecoder:
             The bytes are none.
 
         """
-        for head, (frame, name, body, at) in self._known.items():
-            if data.startswith(head, _STAMP_END) and 0 <= len(data) - at - body.size < _MORE:
+        for head, (frame, name, body, at, end, told) in self._known.items():
+            if data.startswith(head, _STAMP_END) and 0 <= len(data) - end < _MORE:
                 sec, nanosec = _STAMP.unpack_from(data, HEADER)
                 values = body.unpack_from(data, at)
                 n = len(name)
-                velocity = values[n + 2 : 2 * n + 2]
+                velocity = values[n + 2 : 2 * n + 2] if told else values[n + 2 :]
                 if values[n] == len(velocity) and data[1] == 1 and data[0] == 0:
                     header = Header(Time(sec, nanosec), frame)
-                    effort = values[2 * n + 4 :]
-                    if not effort:
+                    if not told:
                         return JointState(header, name, values[:n], velocity)
                     if values[2 * n + 2] == n:
-                        return JointState(header, name, values[:n], velocity, effort)
+                        return JointState(header, name, values[:n], velocity, values[2 * n + 4 :])
         state: JointState = decoded('sensor_msgs/msg/JointState', self._slow, data)
         return state
 
@@ -163,7 +173,9 @@ class JointStateDecoder:
             self._known.clear()
         # The velocities' count lies on a multiple of 8; behind it four bytes of padding.
         body = Struct(f'<{n}dII{n}d' + (f'II{n}d' if effort else '') if qd else f'<{n}dI')
-        self._known[bytes(data[_STAMP_END:counted])] = (frame, name, body, at)
+        self._known[bytes(data[_STAMP_END:counted])] = _Kept(
+            frame, name, body, at, at + body.size, bool(effort)
+        )
 
 
 _STAMP = Struct('<iI')

@@ -82,7 +82,8 @@ def with_sign(recordings: Sequence[Recording], robot: Robot) -> tuple[Recording,
     Raises
     ------
     DataError
-        Some recordings have efforts and others none, or they are in another unit than N m.
+        Some recordings have efforts and others none, or none ever changes, or they are in another
+        unit than N m.
 
     """
     told = [recording.effort is not None for recording in recordings]
@@ -92,6 +93,11 @@ def with_sign(recordings: Sequence[Recording], robot: Robot) -> tuple[Recording,
         raise DataError(
             f'{recordings[told.index(False)].name} has no effort of the joints and other recordings '
             'have; record it in all of them, or leave --use-effort out'
+        )
+    if not any(np.ptp(r.effort.value, axis=0).any() for r in recordings if r.effort is not None):
+        raise DataError(
+            f'the efforts of {recordings[0].name} never change, so nothing measured them; leave '
+            '--use-effort out'
         )
     loads = _loads(recordings, _weighing(robot))
     if robot.mass is not None:

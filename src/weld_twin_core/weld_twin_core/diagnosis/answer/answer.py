@@ -104,7 +104,6 @@ def answer(
         **_parted(unseen, told, shares, verdict),
         signs=own,
         contacts=contact_spreads(found, unseen),
-        efforts=compared(found.problem.recordings, robot),
         **_compared(found, examined, verdict),
     )
 
@@ -170,6 +169,7 @@ def _compared(found: Search, examined: Examined, verdict: Verdict) -> dict[str, 
     """Return the recordings, what they say of each other, and what no recording can say."""
     named = examined.given.may_change
     return {
+        'efforts': compared(found.problem.recordings, found.baseline.model.robot),
         'recordings': found.problem.recordings,
         'traces': traces(found),
         'absent': found.library.absent | dict.fromkeys(not_told(found.problem), NOT_TOLD),

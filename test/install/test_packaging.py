@@ -39,7 +39,9 @@ MODULES = {
 }
 """Modules of the distributions that are called otherwise."""
 ROS = {
+    'action_msgs',
     'ament_index_python',
+    'control_msgs',
     'diagnostic_msgs',
     'geometry_msgs',
     'launch',
@@ -57,6 +59,7 @@ ROS = {
     'rosidl_typesupport_introspection_c',
     'sensor_msgs',
     'sros2',
+    'std_msgs',
     'std_srvs',
 }
 

@@ -188,12 +188,21 @@ class Family:
     ----------
     effect : str
     named : bool
-        Whether unseen data get clearly worse without it; one that is not is exchangeable here.
+        Whether unseen data get worse without it; one that is not is exchangeable here.
     rms_m : float
         What it accounts for at the tool on unseen data: the root of how much the squared error
-        grows without it, the rest staying as it is, [m].
+        grows without it, the other kinds that are needed fitted anew, [m].
     members : tuple of (Site, float)
         Its members and how far each moves the tool, RMS [m], largest first.
+    growth : float
+        By what share the error on unseen data grows without it, all others fitted anew: the median
+        over the parts left out.
+    needed : tuple of (Site, float)
+        The members without which unseen data get worse, each with its share of the kind.
+    like : tuple of (Site, float)
+        What would do nearly as well in its place, and how nearly: 1 is as well.
+    share : float
+        Share of the squared gap that it takes off unseen data.
 
     """
 
@@ -201,6 +210,10 @@ class Family:
     named: bool
     rms_m: float
     members: tuple[tuple[Site, float], ...]
+    growth: float = 0.0
+    needed: tuple[tuple[Site, float], ...] = ()
+    like: tuple[tuple[Site, float], ...] = ()
+    share: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``verdict.families``."""
@@ -209,37 +222,10 @@ class Family:
             'named': self.named,
             'rms_m': self.rms_m,
             'members': [{'joint': site.joint, 'rms_m': size} for site, size in self.members],
+            'growth': self.growth,
+            'needed': [{'joint': site.joint, 'share': share} for site, share in self.needed],
+            'like': [{'effect': site.effect, 'joint': site.joint} for site, _ in self.like],
         }
-
-
-@dataclass(frozen=True)
-class CameBack:
-    """
-    How often a cause was named again on parts of the data.
-
-    Attributes
-    ----------
-    times, of : int
-        Halves of the data on which it was, itself or what is told as alike, and halves that would
-        show it. Of many small errors: parts left out in turn that miss it, and all parts.
-    instead : tuple of (Site, int)
-        What was named where it was not, and on how many halves.
-
-    """
-
-    times: int
-    of: int
-    instead: tuple[tuple[Site, int], ...] = ()
-
-    @property
-    def share(self) -> float:
-        """Return the share of the halves on which it came back."""
-        return self.times / self.of
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the entry of ``came_back``."""
-        instead = [{'effect': s.effect, 'joint': s.joint, 'times': n} for s, n in self.instead]
-        return {'times': self.times, 'of': self.of, 'instead': instead}
 
 
 @dataclass(frozen=True)
@@ -261,8 +247,6 @@ class Cause:
     members : tuple of int
         The effects of the model that stand for it, as `Model.found` counts them; none where
         nothing that can be carried over stands for it.
-    came_back : CameBack or None
-        How often it is named again on halves of the data; None where too few can tell.
     probability : float
         That one of its names is right; that its place is, where it has no name of an effect.
     sure : bool
@@ -282,7 +266,6 @@ class Cause:
     share: float
     share_ci90: tuple[float, float]
     members: tuple[int, ...] = ()
-    came_back: CameBack | None = None
     probability: float = 0.0
     sure: bool = False
     effect: int | None = None
@@ -303,7 +286,7 @@ class Cause:
             ],
             'share': self.share,
             'share_ci90': list(self.share_ci90),
-            'came_back': None if self.came_back is None else self.came_back.as_dict(),
+            'came_back': None,  # older readers ask for it
         }
 
 
@@ -613,8 +596,8 @@ class Diagnosis:
     """Where many small errors act together: what each kind accounts for, largest first."""
     evidence: object = None
     """What the verdict was drawn from, `verdict.evidence.Evidence`, to draw it anew."""
-    signs: object = None
-    """What says how far the answer can be trusted, `trust.signs.Signs`."""
+    statements: tuple[object, ...] = ()
+    """What is said, on what evidence and how probable: `calibration.calibrated.Statement`."""
     posterior: Posterior | None = None
     """The models that the recordings allow: what makes a prediction certain or not."""
     causes: tuple[Cause, ...] = ()

@@ -5,7 +5,7 @@ Logistic regression with a ridge and with signs that weights may not change.
 
 A sign that should raise belief may not lower it because of chance in a few hundred cases: weights
 are bounded on one side of zero, which makes belief monotone in what is known to be good or bad
-news. The ridge pulls towards the belief that was there before.
+news.
 """
 
 from __future__ import annotations
@@ -25,9 +25,7 @@ class Weights(NamedTuple):
     slopes: Array
 
 
-def fitted(
-    columns: Array, right: Array, signs: Array, prior: Array, ridge: float, weight: Array
-) -> Weights:
+def fitted(columns: Array, right: Array, signs: Array, ridge: float, weight: Array) -> Weights:
     """
     Return the weights of least penalised log loss.
 
@@ -38,10 +36,8 @@ def fitted(
     right : array of bool, shape (N,)
     signs : array, shape (P,)
         1 where a weight may not be negative, -1 where it may not be positive, 0 where it is free.
-    prior : array, shape (P,)
-        Weights that the ridge pulls to.
     ridge : float
-        Of half the squared distance from the prior, against log loss in nats.
+        Of half the squared weights, against log loss in nats.
     weight : array, shape (N,)
         Of every example.
 
@@ -54,16 +50,15 @@ def fitted(
 
     def loss(x: Array) -> tuple[float, Array]:
         odds = x[0] + columns @ x[1:]
-        off = x[1:] - prior
         value = (weight * (np.logaddexp(0.0, odds) - target * odds)).sum()
         error = weight * (1.0 / (1.0 + np.exp(-odds)) - target)
-        slope = np.concatenate([[error.sum()], columns.T @ error + ridge * off])
-        return float(value + 0.5 * ridge * off @ off), slope
+        slope = np.concatenate([[error.sum()], columns.T @ error + ridge * x[1:]])
+        return float(value + 0.5 * ridge * x[1:] @ x[1:]), slope
 
     bounds = [(None, None)] + [
         (0.0 if sign > 0 else None, 0.0 if sign < 0 else None) for sign in signs
     ]
-    start = np.concatenate([[np.log(share / (1.0 - share))], prior])
+    start = np.concatenate([[np.log(share / (1.0 - share))], np.zeros(columns.shape[1])])
     found = minimize(loss, start, jac=True, bounds=bounds, method='L-BFGS-B')
     return Weights(float(found.x[0]), np.asarray(found.x[1:]))
 

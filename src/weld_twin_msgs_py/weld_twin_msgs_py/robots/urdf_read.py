@@ -239,7 +239,9 @@ def _to_root(tree: Tree, link: str) -> list[Joint]:
     return out
 
 
-def _robot(tree: Tree, chain: list[Joint], gravity: Array, start: Array, path: Path | str) -> Robot:
+def _robot(
+    tree: Tree, chain: list[Joint], gravity: Array, start: Array, path: Path | str
+) -> Robot:
     """Return a robot of the joints of one branch; gravity is in the link where they start."""
     moving = [joint for joint in chain if joint.kind in MOVABLE]
     T = start

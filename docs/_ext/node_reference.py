@@ -76,6 +76,8 @@ def _section(
             ('hears', spoken.hears),
             ('answers', spoken.answers),
             ('asks', spoken.asks),
+            ('offers the action', spoken.does),
+            ('sends goals to', spoken.sends),
         ):
             own = [n for n in names if n not in COMMON]
             if own:

@@ -6,7 +6,8 @@ The nodes beside a real cell: twin, analyzer, markers; recorder, live diagnosis,
     ros2 launch weld_twin_nodes cell.launch.py robot:=ur10 pose_topic:=/tracker/pose bag:=monday
     ros2 launch weld_twin_nodes cell.launch.py --show-args
 
-The controller gives the joint states, a tracker the measurements; nothing here moves a robot.
+The controller gives the joint states, a tracker the measurements. Nothing here moves a robot but the
+compensator, where it is asked for, activated, and told to apply what it corrects.
 """
 
 from pathlib import Path
@@ -47,6 +48,9 @@ ARGUMENTS = {
     'align': ('', 'frames that the live diagnosis fits along: base, tool, or base,tool'),
     'managed': ('false', 'recorder and live diagnosis wait for the transitions of managed nodes'),
     'live': ('true', 'diagnose while the cell works'),
+    'compensate': ('false', 'run the compensator; it waits to be configured and activated'),
+    'controller': ('joint_trajectory_controller', 'controller that corrected goals go to'),
+    'apply': ('false', 'send what the compensator corrects; else it tells the correction alone'),
     'rviz': ('false', 'show the cell in RViz'),
     'config': ('', 'parameter file; empty: config/cell.yaml of this package'),
 }
@@ -54,7 +58,7 @@ ENCLAVES = ("'/' + ('", "'.strip('/') or 'weld_twin')")
 """What stands around the namespace in the folder of the enclaves, as `weld-twin policy` names it."""
 MODEL = ('base_frame', 'base_from_tf', 'base_link', 'measuring_frame', 'robot', 'tip_link')
 MEASURED = ('joint_prefix', 'measured_frame')
-FLAGS = ('base_from_tf', 'managed')
+FLAGS = ('apply', 'base_from_tf', 'managed')
 TOPICS = {
     'joint_states': 'joint_topic',
     'measured/tool_point': 'point_topic',
@@ -63,6 +67,7 @@ TOPICS = {
     'tool_wrench': 'wrench_topic',
 }
 NODES = {
+    'compensator': (*MODEL, 'apply', 'controller', 'joint_prefix', 'model'),
     'deviation_analyzer': (*MODEL, *MEASURED),
     'deviation_markers': (*MODEL, *MEASURED),
     'forward_kinematics_twin': (*MODEL, 'joint_prefix', 'model'),
@@ -71,6 +76,7 @@ NODES = {
 }
 """Nodes, and the arguments each takes as a parameter of the same name."""
 CONDITIONS = {
+    'compensator': IfCondition(LaunchConfiguration('compensate')),
     'live_diagnosis': IfCondition(LaunchConfiguration('live')),
     'recorder': IfCondition(NotEqualsSubstitution(LaunchConfiguration('bag'), '')),
 }

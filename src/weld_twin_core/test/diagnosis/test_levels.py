@@ -11,7 +11,7 @@ import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.levels.formulas import held_against
+from weld_twin_core.diagnosis.levels.formulas import Missed, no_noise
 from weld_twin_core.diagnosis.levels.groups import Group
 from weld_twin_core.diagnosis.levels.sparse_groups import (
     Choosing,
@@ -184,8 +184,8 @@ def test_a_curve_that_is_none_is_refused_in_a_sentence(change, words):
 def test_a_gap_that_something_predicts_is_no_noise(gain, steady, status):
     part = SimpleNamespace(group='tool, depending on load')
     rival = SimpleNamespace(form=SimpleNamespace(parts=(part,), gain=gain, steady=steady))
-    nothing = Verdict('none', 0.95, (), ())
-    verdict = held_against(nothing, None, rival, Beliefs())
+    nothing = Verdict('none')
+    verdict = no_noise(nothing, rival, Missed(), Beliefs())
     assert verdict.status == status
     assert (verdict == nothing) or 'tool, depending on load' in verdict.reasons[0]
 

@@ -11,7 +11,8 @@ import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.hypotheses.search import search
-from weld_twin_core.diagnosis.many.fitted_together import fitted_together, members_beside
+from weld_twin_core.diagnosis.many import fitted_together as together
+from weld_twin_core.diagnosis.many.fitted_together import members_beside
 from weld_twin_core.diagnosis.many.small_errors import many_small
 from weld_twin_core.effects import REGISTRY, LinkTwist, MeasurementScale, TransmissionRipple
 
@@ -142,7 +143,7 @@ def plane_by_plane(robot, seed):
     ]
 
 
-def test_a_creep_that_stands_in_for_postures_visited_in_order_is_left_out(robot):
+def test_a_creep_that_stands_in_for_postures_visited_in_order_is_left_out(robot, monkeypatch):
     """What joint 1 does as it turns on looks like a creep; the creep would go on over the break."""
     first, rest = plane_by_plane(robot, seed=52)
     problem, start = aligned([first], robot, 'base', ())
@@ -150,11 +151,11 @@ def test_a_creep_that_stands_in_for_postures_visited_in_order_is_left_out(robot)
     found = search(problem, start, without, Beliefs(), lambda text: None)
 
     def told(worth):
-        beliefs = replace(Beliefs(), family_worth=worth)
-        model = fitted_together(found, without, beliefs, lambda text: None).final.model
+        monkeypatch.setattr(together, 'CREEPS', worth)
+        model = together.fitted_together(found, without, Beliefs(), lambda text: None).final.model
         return {effect.name for effect in model.found}, off(model, rest)
 
-    names, error = told(Beliefs().family_worth)
+    names, error = told(together.CREEPS)
     creeping, worse = told(-1.0)
     assert 'drift' in creeping - names
     assert error < 0.8 * worse

@@ -143,9 +143,13 @@ class Beliefs:
     looks. Chance reaches 25 once in 3000 looks; the rest is a judgement, as what no model of the
     arm has looks like a motion of the set-up too."""
 
-    family_worth: float = _verdict(1.0)
-    """Share of the squared unseen error by which it must grow without a family to name it: it
-    doubles. A judgement."""
+    family_worth: float = _verdict(0.1)
+    """Share by which the RMS error on unseen data grows without a kind, in the median part left out,
+    from which on the kind is named; a tenth is what a calibration is worth doing for."""
+
+    joint_worth: float = _verdict(0.1)
+    """Share of a kind from which on a joint of it is told, and how nearly as well as the kind another
+    must do to be told beside it. A judgement."""
 
     member_least_m: float = _verdict(1e-6)
     """RMS at the tool [m] below which a member is not listed: no instrument sees it."""
@@ -173,12 +177,6 @@ class Beliefs:
     """Logarithm of a ratio between two motions from which on it says no more about the interval:
     a model that leaves e times as much elsewhere fits neither."""
 
-    returns: float = _unseen(0.8, most=1.0)
-    """Share of the halves of the data on which the search must find again what is named, and of the
-    stretches and regions of posture left out by which a family must be missed: what is named comes
-    back. Odd and even halves of recordings of two real arms then name the same families in 27 of
-    30 pairs, and in 26 at three parts in four; by the mean over the parts in 19."""
-
     # The verdict -----------------------------------------------------------------------------
 
     sure: float = _verdict(0.85, most=1.0)
@@ -190,13 +188,8 @@ class Beliefs:
     less: none changes; more: 1 verdict changes, 35 right."""
 
     unexplained: float = _verdict(0.05)
-    """Share of the squared gap that may stay unexplained before the answer is 'unknown', and
-    at which the belief in a complete answer has halved. Moved: no verdict changes, confidence
-    moves by 0.05 at most."""
-
-    unexplained_power: float = _verdict(3.0)
-    """How steeply that belief falls about its half. Moved: no verdict changes, confidence
-    moves by 0.01 at most."""
+    """Share of the squared gap that may stay unexplained before it is told as something left, and
+    before the answer is 'unknown' where nothing was found. Moved: no verdict changes."""
 
     least_excess: float = _verdict(0.05)
     """Share of the squared floor that a gap counts as standing above it at the least; keeps
@@ -225,69 +218,11 @@ class Beliefs:
     """Effects whose squares sum to this many times the square of their sum cancel each other.
     Moved: nothing changes."""
 
-    carried: float = _verdict(1.3)
-    """What remains on a held-out motion over what remains on unseen stretches of those fitted:
-    beyond this the model does not carry over, as a cause would that was found. Moved: less:
-    none changes; more: 1 verdict changes, 35 right."""
-
-    carried_share: float = _verdict(0.1)
-    """Share of the gap that a model may leave on any motion before it is said not to carry
-    over. Moved: nothing changes."""
-
-    rise: float = _verdict(0.2)
-    """Rise of what remains above the floor, as a share of it (moved: no verdict changes,
-    confidence moves by 0.13 at most),"""
-
-    rise_share: float = _verdict(0.12)
-    """and as a share of the gap, that together halve the belief: a large gap leaves more of
-    the physics that no model has, a small one more of the noise. Moved: no verdict changes,
-    confidence moves by 0.07 at most."""
-
-    rise_power: float = _verdict(2.0)
-    """How steeply that belief falls about its half. Moved: no verdict changes, confidence
-    moves by 0.06 at most."""
-
-    stacked: float = _verdict(0.75)
-    """Belief left when two effects that show at rest sit on one joint: two may stand for a
-    third. Moved: nothing changes."""
-
-    calibration: float = _verdict(0.95, most=1.0)
-    """Belief left for every cause named where all evidence agrees: no library is complete, and
-    on some motions a cause that it lacks moves the tool exactly as those that it holds. Moved:
-    no verdict changes, confidence moves by 0.50 at most."""
-
-    glimpsed: float = _verdict(0.6)
-    """Belief left in a wave of which less was seen. Moved: no verdict changes, confidence
-    moves by 0.13 at most."""
-
-    doubted: float = _verdict(0.75)
-    """Belief in 'unknown' where effects fit but are no plausible explanation. Moved: no
-    verdict changes, confidence moves by 0.19 at most."""
-
-    unknown_least: float = _verdict(0.7)
-    """Belief in 'unknown' where little is unexplained; the share unexplained is added (moved:
-    no verdict changes, confidence moves by 0.18 at most),"""
-
-    unknown_most: float = _verdict(0.95, most=1.0)
-    """up to this. Moved: no verdict changes, confidence moves by 0.24 at most."""
-
     far_above: float = _verdict(1.7)
     """What remains over the floor, RMS, from which the answer is 'unknown' where nothing was found
     and nothing shows the noise by itself. A Gaussian gives 1, one with trimmed outliers up to
     about 1.3; two causes outside the library (seed 515001) gave 1.9 and 2.6 and were called no gap
     without it. Between the two, nearer to the noise. A judgement."""
-
-    noise_unseen: float = _verdict(0.6)
-    """Belief in 'none' where nothing on the recordings shows the noise by itself and what
-    remains is not spread as noise is. Moved: nothing changes."""
-
-    likelier: float = _verdict(0.5)
-    """Probability below which families are more likely wrong than right, and are not named. By the
-    meaning of a probability."""
-
-    families: float = _verdict(0.75)
-    """Belief in the families named where nothing is left: dozens of errors at once are seldom
-    put together on purpose. Moved: nothing changes."""
 
     # Place, dependence and name --------------------------------------------------------------
 
@@ -311,9 +246,6 @@ class Beliefs:
     beaten_steady: float = _levels(2.0)
     """The same in standard errors between stretches."""
 
-    beaten_belief: float = _levels(0.75)
-    """Belief in 'unknown' where a curve beats the names. A judgement."""
-
     field_misses: float = _levels(0.03)
     """RMS that a smooth field over the workspace takes off on unseen stretches, as a share of the
     largest effect named, from which on the names do not hold. Geometry and instruments have exact
@@ -325,23 +257,9 @@ class Beliefs:
     handful of stretches now and then; of those cases the rightly named stay below 4, four with a
     link that jumps or an encoder that rounds reach 6 to 25."""
 
-    scatter_misses: float = _levels(0.2)
-    """Such noise as a share of the effect named at that joint, RMS, from which on it is none of
-    its formula's misfits: a link that jumps gave 0.27 to 0.39, a gear in its play 0.05."""
-
     curve_room: float = _levels(1.05)
     """Curves are carried although effects that imitate the cause leave this much less on unseen
     stretches: they carry no parameter of an effect that is not there."""
-
-    level_agreed: float = _levels(0.98)
-    """Belief in place and dependence of a name where the free form finds the same."""
-
-    level_alone: float = _levels(0.8)
-    """The same where it does not. A judgement."""
-
-    level_free: float = _levels(0.95)
-    """Belief in the place of a curve that no other group comes near: no list of places is whole.
-    On the 8 cases above place and dependence were right in 8."""
 
     level_shared: float = _levels(0.7)
     """Belief that what several joints do alike has one cause, and not one each. A judgement."""

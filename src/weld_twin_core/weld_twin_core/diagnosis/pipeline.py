@@ -16,6 +16,7 @@ from .algebra.problem import frames_named
 from .answer.answer import answer
 from .answer.refusal import refusal
 from .beliefs import Beliefs
+from .calibration.calibrated import stated
 from .frames.changes import families_named, settled_between
 from .frames.open_directions import held
 from .frames.places import not_told
@@ -23,23 +24,21 @@ from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
 from .hypotheses.structural_aliases import with_structural_aliases
 from .levels.curved import carried, curved, standing
-from .levels.formulas import formulas
+from .levels.formulas import missed, no_noise
 from .levels.placed import placed
 from .many.fitted_together import fitted_together
+from .posterior.table import table_of
 from .predicting.allowed import allowed
 from .predicting.alone import alone
 from .result import Diagnosis, Shrink
 from .soundness import Examined, Given, examine, refuse_reused
-from .stability.repeated import repeated
-from .stability.steadied import came_back, steadied
-from .trust.signs import Signs, signs_of_answer
-from .trust.signs_of_found import signs_of_found
+from .soundness.efforts import with_sign
 from .unseen.carrying import carrying
 from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
 from .unseen.leftover_structure import structure
 from .unseen.parted_elsewhere import parted_elsewhere
 from .unseen.unseen_stretches import Unseen
-from .verdict.decision import decide
+from .verdict.decision import LIKELIER, decide
 from .verdict.gathered_evidence import gathered
 
 Progress = Callable[[str], None]
@@ -130,6 +129,7 @@ def diagnose(
     beliefs = beliefs or Beliefs()
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     refuse_reused(recordings, holdout)
+    recordings = with_sign(recordings, robot)
     given = Given(recordings, robot, frames_named(align), families_named(may_change))
     examined = examine(given, known, apply=apply, beliefs=beliefs)
     progress('data checked')
@@ -148,8 +148,36 @@ def _explained(
     limits: Limits | None,
     progress: Progress,
 ) -> Diagnosis:
-    """Return the diagnosis of recordings that were found sound."""
+    """
+    Return the diagnosis of recordings that were found sound.
+
+    Where a few effects leave the cause unknown, and all kinds together predict as well, kinds that
+    unseen data need are told in their place.
+    """
     found = _searched(examined, exclude, beliefs, progress)
+    out = _told(found, examined, exclude, holdout, beliefs, limits, progress)
+    if found.many is None or out.status != 'unknown' or _named(out):
+        return out
+    progress('a few effects leave the cause unknown: all kinds together')
+    many = _told(found.many, examined, exclude, holdout, beliefs, limits, progress)
+    return many if _named(many) else out
+
+
+def _named(out: Diagnosis) -> bool:
+    """Return whether a cause is named that is likelier right than wrong."""
+    return any(cause.effect is not None and cause.probability > LIKELIER for cause in out.causes)
+
+
+def _told(
+    found: Search,
+    examined: Examined,
+    exclude: Sequence[str],
+    holdout: Sequence[Recording],
+    beliefs: Beliefs,
+    limits: Limits | None,
+    progress: Progress,
+) -> Diagnosis:
+    """Return the diagnosis of what was found."""
     examined = examined.torn(found.problem, found.final.model)
     if examined.posed is None:
         return refusal(examined)
@@ -161,25 +189,25 @@ def _explained(
     floor = noise_floor(found.problem, found.problem.residuals(found.final.model))
     shrink = held_out_shrink(found, unseen, holdout, beliefs)
     found, least = parted_elsewhere(found, holdout, beliefs)
-    found, stability = steadied(found, repeated(found), beliefs)
     chance = reached_by_chance(found, unseen, holdout, beliefs)
     evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, least, chance)
-    verdict = decide(evidence, beliefs)
     rival = curved(found, beliefs)
-    verdict, missed = formulas(found, unseen, verdict, rival, beliefs)
-    verdict, rival = standing(found, verdict, rival, beliefs)
-    back = came_back(found, verdict, stability)
-    each = signs_of_found(found, unseen, evidence, verdict, back, holdout)
-    own = signs_of_answer(found, unseen, evidence, verdict, rival, examined.checks, each)
+    left = missed(found, unseen, beliefs)
+    table = table_of(found.slots, beliefs)
+    statements = stated(found, unseen, evidence, table, rival)
+    believed = tuple(one.probability for one in statements.names)
+    evidence = replace(evidence, believed=believed, missed=left.in_words)
+    verdict = no_noise(decide(evidence, beliefs), rival, left, beliefs)
+    rival = standing(found, verdict, rival, beliefs)
     unseen.forget_other_parts()
-    places = placed(found, verdict, rival, missed, beliefs)
+    places = placed(found, verdict, rival, left, beliefs)
     progress('held against curves without a formula')
     which = verdict, rival, holdout, beliefs
     found, unseen, shrink, verdict = carried(found, unseen, shrink, *which)
     found = _by_itself(_held(found, examined.given.robot), shrink)
     posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
     progress('weighed what the data leave open')
-    told = (Signs(own, each), rival, places, limits, stability)
+    told = (statements, rival, places, limits)
     return answer(found, unseen, evidence, verdict, shrink, examined, posterior, *told)
 
 

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -188,12 +188,21 @@ class Family:
     ----------
     effect : str
     named : bool
-        Whether unseen data get clearly worse without it; one that is not is exchangeable here.
+        Whether unseen data get worse without it; one that is not is exchangeable here.
     rms_m : float
         What it accounts for at the tool on unseen data: the root of how much the squared error
-        grows without it, the rest staying as it is, [m].
+        grows without it, the other kinds that are needed fitted anew, [m].
     members : tuple of (Site, float)
         Its members and how far each moves the tool, RMS [m], largest first.
+    growth : float
+        By what share the error on unseen data grows without it, all others fitted anew: the median
+        over the parts left out.
+    needed : tuple of (Site, float)
+        The members without which unseen data get worse, each with its share of the kind.
+    like : tuple of (Site, float)
+        What would do nearly as well in its place, and how nearly: 1 is as well.
+    share : float
+        Share of the squared gap that it takes off unseen data.
 
     """
 
@@ -201,6 +210,10 @@ class Family:
     named: bool
     rms_m: float
     members: tuple[tuple[Site, float], ...]
+    growth: float = 0.0
+    needed: tuple[tuple[Site, float], ...] = ()
+    like: tuple[tuple[Site, float], ...] = ()
+    share: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``verdict.families``."""
@@ -209,37 +222,10 @@ class Family:
             'named': self.named,
             'rms_m': self.rms_m,
             'members': [{'joint': site.joint, 'rms_m': size} for site, size in self.members],
+            'growth': self.growth,
+            'needed': [{'joint': site.joint, 'share': share} for site, share in self.needed],
+            'like': [{'effect': site.effect, 'joint': site.joint} for site, _ in self.like],
         }
-
-
-@dataclass(frozen=True)
-class CameBack:
-    """
-    How often a cause was named again on parts of the data.
-
-    Attributes
-    ----------
-    times, of : int
-        Halves of the data on which it was, itself or what is told as alike, and halves that would
-        show it. Of many small errors: parts left out in turn that miss it, and all parts.
-    instead : tuple of (Site, int)
-        What was named where it was not, and on how many halves.
-
-    """
-
-    times: int
-    of: int
-    instead: tuple[tuple[Site, int], ...] = ()
-
-    @property
-    def share(self) -> float:
-        """Return the share of the halves on which it came back."""
-        return self.times / self.of
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the entry of ``came_back``."""
-        instead = [{'effect': s.effect, 'joint': s.joint, 'times': n} for s, n in self.instead]
-        return {'times': self.times, 'of': self.of, 'instead': instead}
 
 
 @dataclass(frozen=True)
@@ -261,8 +247,6 @@ class Cause:
     members : tuple of int
         The effects of the model that stand for it, as `Model.found` counts them; none where
         nothing that can be carried over stands for it.
-    came_back : CameBack or None
-        How often it is named again on halves of the data; None where too few can tell.
     probability : float
         That one of its names is right; that its place is, where it has no name of an effect.
     sure : bool
@@ -282,7 +266,6 @@ class Cause:
     share: float
     share_ci90: tuple[float, float]
     members: tuple[int, ...] = ()
-    came_back: CameBack | None = None
     probability: float = 0.0
     sure: bool = False
     effect: int | None = None
@@ -303,7 +286,7 @@ class Cause:
             ],
             'share': self.share,
             'share_ci90': list(self.share_ci90),
-            'came_back': None if self.came_back is None else self.came_back.as_dict(),
+            'came_back': None,  # older readers ask for it
         }
 
 
@@ -428,6 +411,84 @@ class KnownLength:
 
 
 @dataclass(frozen=True)
+class JointEffort:
+    """
+    One joint: measured load beside the model's.
+
+    Attributes
+    ----------
+    joint : str
+    model_rms, difference_rms : float [N m, or N of a slide]
+        Load by the statics, about its mean, and measured minus statics.
+    factor : float or None
+        Measured load for each N m of the statics; None where the statics hardly load the joint.
+
+    """
+
+    joint: str
+    model_rms: float
+    difference_rms: float
+    factor: float | None
+
+
+@dataclass(frozen=True)
+class EffortCause:
+    """
+    What explains the difference by itself.
+
+    Attributes
+    ----------
+    name : str
+        'payload', 'torque_constant', 'link_mass' or 'link_masses'.
+    joint : str or None
+    value, std : float
+        Mass beyond the declared one [kg], what is measured for each N m, or the factor on masses.
+    left : float
+        Share of the squared difference that it leaves.
+
+    """
+
+    name: str
+    joint: str | None
+    value: float
+    std: float
+    left: float
+
+
+@dataclass(frozen=True)
+class Efforts:
+    """
+    Measured efforts beside the model's statics.
+
+    Attributes
+    ----------
+    holds : bool
+        The effort holds the load; else it is the load itself.
+    correlation : float
+        Of effort so taken and statics, all joints together; 0 where nothing is loaded.
+    weighed : bool
+        Whether the model has masses; without, every link counts alike, and only the sign is told.
+    joints : tuple of JointEffort
+    difference : float
+        RMS difference for each of the statics' load.
+    causes : tuple of EffortCause
+        What explains the difference by itself, what leaves least first.
+
+    """
+
+    holds: bool
+    correlation: float
+    weighed: bool
+    joints: tuple[JointEffort, ...]
+    difference: float
+    causes: tuple[EffortCause, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers, lists and strings in the public schema."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
 class ContactResult:
     """
     How well contacts agree: mean distances of the tool points from where they touched [m].
@@ -535,8 +596,8 @@ class Diagnosis:
     """Where many small errors act together: what each kind accounts for, largest first."""
     evidence: object = None
     """What the verdict was drawn from, `verdict.evidence.Evidence`, to draw it anew."""
-    signs: object = None
-    """What says how far the answer can be trusted, `trust.signs.Signs`."""
+    statements: tuple[object, ...] = ()
+    """What is said, on what evidence and how probable: `calibration.calibrated.Statement`."""
     posterior: Posterior | None = None
     """The models that the recordings allow: what makes a prediction certain or not."""
     causes: tuple[Cause, ...] = ()
@@ -559,6 +620,9 @@ class Diagnosis:
     complete: float = 0.0
     """Probability that no cause above the noise and a tenth of the squared gap is missing."""
 
+    efforts: Efforts | None = None
+    """Measured efforts of the joints beside the model's statics, where springs take them."""
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""
         sound = self.status != 'unsound'
@@ -577,6 +641,7 @@ class Diagnosis:
             'model': self._model() if sound else None,
             'changed': [item.as_dict() for item in self.changed],
             **({} if self.contacts is None else {'contacts': self.contacts.as_dict()}),
+            **({} if self.efforts is None else {'efforts': self.efforts.as_dict()}),
             'posterior': None if self.posterior is None else as_dict(self.posterior),
         }
 
@@ -630,7 +695,7 @@ class Diagnosis:
         return {
             'robot': robot.name,
             'kinematics': fingerprint(robot),
-            'statics': 'equilibrium',
+            'statics': _statics(self.recordings),
             'tool': _frame(robot.T_flange_tool),
             'bases': [_frame(base) for base in self.model.bases],
             'epochs_ns': [r.epoch_ns for r in self.recordings],
@@ -655,6 +720,13 @@ class Diagnosis:
                 'shares': [list(row) for row in where.map_shares],
             },
         }
+
+
+def _statics(recordings: Sequence[Recording]) -> str:
+    """Return what springs took for their load: the model's statics, or measured efforts."""
+    if not recordings or recordings[0].effort is None:
+        return 'equilibrium'
+    return 'effort' if recordings[0].effort_holds else 'effort_reversed'
 
 
 def _candidate(item: Candidate) -> dict[str, Any]:

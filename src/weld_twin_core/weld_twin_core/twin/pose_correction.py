@@ -4,8 +4,7 @@
 Poses moved so that the real tool goes where they meant, one after the other, at a controller's rate.
 
 The exact solution costs more than a control cycle has. It is therefore worked out now and then, with
-its slope; in between it is straight. How far apart that may be is learned from how far the straight
-line was off.
+its slope; in between it goes on as it did. How far apart that may be is learned from how far it was off.
 """
 
 from __future__ import annotations
@@ -36,10 +35,12 @@ OPEN = 1e-9
 """Error [m, rad] that a solution must not have: that of `compensate`."""
 SLOPE = (1e-3, 2e-3)
 """Distances [m, rad] to either side over which a slope is taken: what bends there is below 1e-9."""
-EXACT = 1e-9
-"""Largest error [m] that a straight line between two looks should have."""
-REACH = (2e-5, 5e-4, 5e-3)
+EXACT = 2e-10
+"""Largest error [m] that what is told between two looks should have."""
+REACH = (2e-5, 5e-4, 1e-2)
 """Least, first and largest distance [m] between two exact looks; a turn counts half a metre a radian."""
+ONWARD = 0.97
+"""Cosine of the angle between two ways [m, rad] that go on in one direction; another bends otherwise."""
 LEVER = 0.5
 """Distance [m] at which a turn of the tool counts as much as its way: between wrist and torch."""
 
@@ -88,7 +89,7 @@ class PoseCorrection:
         self._back = np.linalg.inv(model.robot.T_world_base)
         self._still = still
         self._at: Looked | None = None
-        self._reach = REACH[1]
+        self._reach, self._bend, self._way = REACH[1], np.zeros((6, 6)), np.zeros(6)
 
     @property
     def looked(self) -> Looked | None:
@@ -132,12 +133,16 @@ class PoseCorrection:
         """Go on from an exact correction, and learn how far apart such looks may be; None forgets."""
         before, self._at = self._at, looked
         if before is None or looked is None:
-            self._reach = REACH[1]
+            self._reach, self._bend, self._way = REACH[1], np.zeros((6, 6)), np.zeros(6)
             return
-        way, size = _away(before, looked.pose)
-        off = float(np.linalg.norm((before.added + before.slope @ way - looked.added)[:3]))
-        # The error of a straight line grows with the square of its length.
-        best = size * np.sqrt(EXACT / max(off, 1e-2 * EXACT))
+        size = _away(before, looked.pose)[1]
+        told = _told(before, self._bend, looked.pose)[0]
+        off = float(np.linalg.norm((told - looked.added)[:3]))
+        if size > REACH[0]:
+            self._bend = (looked.slope - before.slope) / size
+            self._way = between(before.pose, looked.pose)
+        # The error of what bends evenly grows with the third power of its length.
+        best = size * float(np.cbrt(EXACT / max(off, 1e-2 * EXACT)))
         best = min(best, 1.5 * self._reach) if off < EXACT else best
         self._reach = float(np.clip(best, REACH[0], REACH[2]))
 
@@ -157,8 +162,9 @@ class PoseCorrection:
 
         """
         assert self._at is not None
-        way, size = _away(self._at, pose)
-        return np.asarray(self._at.added + self._at.slope @ way), size / self._reach
+        added, size = _told(self._at, self._bend, pose)
+        onward = _onward(self._way, between(self._at.pose, pose))
+        return added, size / (self._reach if onward else min(self._reach, REACH[1]))
 
     def refusal(self, looked: Looked, limits: GoalLimits) -> str:
         """Return why a pose must not be corrected; empty where it may."""
@@ -237,6 +243,17 @@ def _away(at: Looked, pose: Array) -> tuple[Array, float]:
     return way, sqrt(way[:3] @ way[:3]) + LEVER * sqrt(way[3:] @ way[3:])
 
 
+def _told(at: Looked, bend: Array, pose: Array) -> tuple[Array, float]:
+    """Return what a look tells to add to a pose, its slope bent onwards, and how far that is [m]."""
+    way, size = _away(at, pose)
+    return np.asarray(at.added + (at.slope + 0.5 * size * bend) @ way), size
+
+
+def _onward(before: Array, way: Array) -> bool:
+    """Return whether a way goes on in the direction of the one before."""
+    return bool(before @ way > ONWARD * sqrt((before @ before) * (way @ way)))
+
+
 def between(start: Array, end: Array) -> Array:
     """Return what takes poses to others, shape (M, 6) [m, rad], linear part first, in fixed axes."""
     turn = angle_between(end[..., :3, :3], start[..., :3, :3])
@@ -245,7 +262,7 @@ def between(start: Array, end: Array) -> Array:
 
 def moved(pose: Array, twist: Array) -> Array:
     """Return a pose (4, 4) moved by twists (..., 6) [m, rad], shape (..., 4, 4)."""
-    out = np.broadcast_to(pose, (*twist.shape[:-1], 4, 4)).copy()
+    out: Array = np.broadcast_to(pose, (*twist.shape[:-1], 4, 4)).copy()
     out[..., :3, 3] += twist[..., :3]
     out[..., :3, :3] = rotation_matrix(twist[..., 3:]) @ out[..., :3, :3]
     return out

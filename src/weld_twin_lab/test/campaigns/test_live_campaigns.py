@@ -16,9 +16,12 @@ pytest.importorskip('rclpy', reason='needs ROS 2')
 
 from weld_twin_lab import campaigns
 from weld_twin_lab.campaigns import latency
+from weld_twin_lab.campaigns.live import soaking
 from weld_twin_lab.campaigns.live.latency_race import Contender
 from weld_twin_lab.campaigns.live.soaking import EACH, losses, verdict
 from weld_twin_lab.campaigns.live.usage import cpu_ns, rss_bytes
+from weld_twin_lab.campaigns.soak import table as soak_table
+from weld_twin_nodes.live.health import Health
 
 ROOT = Path(__file__).parents[4]
 RESULTS = ROOT / 'docs/results/robustness'
@@ -86,3 +89,14 @@ def test_the_page_shows_the_table_of_the_kept_result(name):
     table = import_module(f'{campaigns.__name__}.{name}').table(kept)
     assert table.count('|') > 20
     assert table in (ROOT / 'docs/robustness.md').read_text()
+
+
+def test_a_soak_begins_with_what_a_recorder_tells_and_counts_what_a_node_missed():
+    health = Health('/recorder', 1.0)
+    health.watch('/deviation', required=True)
+    name = health.statuses()[1].name
+    assert name == soaking.BEGUN
+    node = {'cpu_share': 0.1, 'rss_mib': 1.0, 'rss_slope_mib_per_h': 0.0}
+    assert soak_table({'health': {name: {'missing': 7}}, 'nodes': {'recorder': node}}).endswith(
+        '| 7 |\n'
+    )

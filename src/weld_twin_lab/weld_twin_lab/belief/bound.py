@@ -86,6 +86,28 @@ def bounded(probability: Array, right: Array, risk: float) -> Bound:
     return at(best, p, good)
 
 
+def precise(probability: Array, right: Array, risk: float) -> Bound:
+    """
+    Return the lowest threshold at which one more sure case is wrong too seldom to matter.
+
+    Parameters
+    ----------
+    probability : array, shape (N,)
+        Of cases that took no part in the fit.
+    right : array of bool, shape (N,)
+    risk : float
+        Share of the sure cases that may be wrong.
+
+    """
+    p, good = np.asarray(probability, dtype=float), np.asarray(right, dtype=bool)
+    best = NEVER
+    for threshold in GRID:
+        sure = p >= threshold
+        if int((sure & ~good).sum()) + 1 <= risk * (int(sure.sum()) + 1):
+            best = float(threshold)
+    return at(best, p, good)
+
+
 def at(threshold: float, probability: Array, right: NDArray[np.bool_]) -> Bound:
     """
     Return what is known of a threshold.

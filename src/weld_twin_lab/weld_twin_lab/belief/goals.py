@@ -4,158 +4,115 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
-
-from weld_twin_core.diagnosis.result import Cause, Site
-from weld_twin_core.diagnosis.trust.model import Trust
-from weld_twin_core.diagnosis.trust.trusted import trusted_cause
 
 from ..blind.judging import NOT_IN_LIBRARY
 from ..blind.measures import Measure
 from ..blind.statistics import Estimate, bootstrap, share
-from .judged import Case
-from .levels_of_truth import levels_of
-from .told import is_sure, sure_and_right
 
+Kept = Mapping[str, Any]
 SEEN, PLAIN = 1.0, 3.0
 """Effect RMS over noise from which a cause can be seen, and from which it is plain."""
 
 
-def goal_measures(cases: Sequence[Case], trust: Trust) -> list[Measure]:
+def goal_measures(rows: Sequence[Kept]) -> list[Measure]:
     """
-    Return the measures of verdicts, of levels, and of what curves remove.
+    Return the measures of verdicts and of levels.
 
     Parameters
     ----------
-    cases : sequence of Case
-        None of them was learned from.
-    trust : Trust
+    rows : sequence of mappings
+        As `judged.kept` gives them; none of them was learned from.
 
     """
-    known = [c for c in cases if c.judged.in_library and c.judged.stratum >= SEEN]
-    return [
-        *_of_causes(cases, trust),
-        *_of_foreign([c for c in cases if c.judged.kind in NOT_IN_LIBRARY]),
-        Measure(
-            'needless_unknown',
-            'causes in the library, 1 noise or more: needlessly unknown',
-            share([c.judged.status == 'unknown' for c in known]),
-            0.02,
-            False,
-        ),
-        Measure(
-            'fia', 'mean belief in the true family, one cause detected', _fia(cases, trust), 0.93
-        ),
-        Measure('breadth', 'members of a set, median', _breadth(cases), 2.0, False),
-        Measure('seconds', 'processor seconds of a diagnosis, median', _seconds(cases)),
-    ]
+    return [*_of_causes(rows), *_of_foreign(rows)]
 
 
-def _of_causes(cases: Sequence[Case], trust: Trust) -> list[Measure]:
-    """Return the measures of named causes, and of what is said as sure."""
-    single = [c for c in cases if c.judged.kind == 'single' and c.judged.stratum >= SEEN]
-    wrong = [is_sure(c, trust) and not c.right for c in cases]
+def _of_causes(rows: Sequence[Kept]) -> list[Measure]:
+    """Return the measures of causes that the library has."""
+    single = [r for r in rows if r['kind'] == 'single' and min(r['sizes']) >= SEEN]
+    lone = [r for r in rows if len(r['sizes']) == 1 and min(r['sizes']) >= SEEN]
+    lone = [r for r in lone if r['kind'] not in NOT_IN_LIBRARY]
+    known = [r for r in rows if r['kind'] in ('single', 'double', 'triple', 'several')]
+    known = [r for r in known if min(r['sizes']) >= SEEN]
     return [
-        Measure('sure_wrong', 'sure and wrong', share(wrong), 0.01, False),
-        Measure(
+        _measure('sure_wrong', 'sure and wrong', rows, _sure_and_wrong, 0.002, least=False),
+        _measure(
             'single_sure',
             'one cause in the library, 1 noise or more: right and sure',
-            share([sure_and_right(c, trust) for c in single]),
-            0.90,
-        ),
-        Measure('single_right', 'the same: right', share([c.right for c in single])),
-        Measure(
-            'double_named', 'two causes, each 3 noise: both named', _named(cases, 'double'), 0.92
-        ),
-        Measure(
-            'triple_named', 'three causes, each 3 noise: all named', _named(cases, 'triple'), 0.85
-        ),
-    ]
-
-
-def _of_foreign(foreign: Sequence[Case]) -> list[Measure]:
-    """Return the measures of causes that the library does not have."""
-    return [
-        Measure(
-            'honest',
-            'withheld or outside: unknown, a set that holds it, or as good on sealed data',
-            share([c.honest or c.judged.status == 'unknown' for c in foreign]),
-            0.95,
-        ),
-        Measure('place', 'the same: place right, first answer', _level(foreign, 'place', 0), 0.90),
-        Measure(
-            'dependence', 'the same: dependence right', _level(foreign, 'dependence', 1), 0.85
-        ),
-        Measure(
-            'curve_removes',
-            "the same, 'unknown': share of the removable gap removed on a new motion, median",
-            _removed(foreign),
+            lone,
+            lambda r: r['right'] and r['sure'],
             0.70,
         ),
+        _measure('single_right', 'the same: right', lone, lambda r: r['right']),
+        _measure('double_named', 'two causes, each 3 noise: both named', *_several(rows, 2, 0.90)),
+        _measure(
+            'triple_named', 'three causes, each 3 noise: all named', *_several(rows, 3, 0.85)
+        ),
+        _measure(
+            'needless_unknown',
+            'causes in the library, 1 noise or more: needlessly unknown',
+            known,
+            lambda r: r['status'] == 'unknown',
+            0.03,
+            least=False,
+        ),
+        Measure('fia', 'mean belief in the true family, one cause', _fia(single), 0.92),
+        Measure('seconds', 'processor seconds of a diagnosis, median', _seconds(rows)),
     ]
 
 
-def _named(cases: Sequence[Case], kind: str) -> Estimate:
-    asked = [c for c in cases if c.judged.kind == kind and c.judged.stratum >= PLAIN]
-    return share([c.judged.named for c in asked])
+def _of_foreign(rows: Sequence[Kept]) -> list[Measure]:
+    """Return the measures of causes that the library does not have."""
+    foreign = [r for r in rows if r['kind'] in NOT_IN_LIBRARY]
+    return [
+        _measure(
+            'honest',
+            'withheld or outside: unknown, a set that holds it, or as good on sealed data',
+            foreign,
+            lambda r: r['honest'] or r['status'] == 'unknown',
+            0.95,
+        ),
+        _measure(
+            'place', 'the same: place right, first answer', foreign, lambda r: r['place'], 0.90
+        ),
+        _measure(
+            'dependence', 'the same: dependence right', foreign, lambda r: r['dependence'], 0.87
+        ),
+    ]
 
 
-def _level(cases: Sequence[Case], level: str, at: int) -> Estimate:
-    """Return how often the first place, or dependence, of the largest cause is right."""
-    word, hits = ('at' if level == 'place' else 'on'), []
-    for case in cases:
-        causes = case.row['verdict']['causes']
-        right = frozenset().union(*(truth[at] for truth in levels_of(case.row['truth'])))
-        hits.append(bool(causes and causes[0][level] and causes[0][level][0][word] in right))
-    return share(hits)
+def _measure(
+    key: str,
+    title: str,
+    rows: Sequence[Kept],
+    hit: Callable[[Kept], bool],
+    goal: float | None = None,
+    *,
+    least: bool = True,
+) -> Measure:
+    return Measure(key, title, share([bool(hit(row)) for row in rows]), goal, least)
 
 
-def _removed(cases: Sequence[Case]) -> Estimate:
-    out = []
-    for case in cases:
-        sealed, truth = case.row['sealed'], case.row['truth']
-        room = sealed['before'] ** 2 - sealed['floor'] ** 2
-        if case.judged.status == 'unknown' and truth['test'] == 'new motion' and room > 0.0:
-            out.append((sealed['before'] ** 2 - sealed['after'] ** 2) / room)
-    return bootstrap(out)
+def _sure_and_wrong(row: Kept) -> bool:
+    return bool(row['sure'] and not row['right'])
 
 
-def _fia(cases: Sequence[Case], trust: Trust) -> Estimate:
+def _several(
+    rows: Sequence[Kept], count: int, goal: float
+) -> tuple[list[Kept], Callable[[Kept], bool], float]:
+    own = [r for r in rows if len(r['sizes']) == count and min(r['sizes']) >= PLAIN]
+    own = [r for r in own if r['kind'] not in (*NOT_IN_LIBRARY, 'ambiguous')]
+    return own, lambda row: row['named'], goal
+
+
+def _fia(rows: Sequence[Kept]) -> Estimate:
     """Return the mean belief in the true family, as fault isolation benchmarks have it."""
-    out = []
-    for case in cases:
-        if case.judged.kind == 'single' and case.judged.status != 'none':
-            (family, _), *_ = case.row['truth']['sites']
-            beliefs = [
-                _belief_in(family, cause, case, more, trust) for cause, more in _causes(case)
-            ]
-            out.append(max(beliefs, default=0.0))
-    return bootstrap(out, np.mean)
+    return bootstrap([float(r['family']) for r in rows if r['status'] != 'none'], np.mean)
 
 
-def _causes(case: Case) -> list[tuple[dict[str, object], dict[str, float]]]:
-    return list(zip(case.row['verdict']['causes'], case.row['cause_signs'], strict=True))
-
-
-def _belief_in(
-    family: str, told: dict[str, object], case: Case, more: dict[str, float], trust: Trust
-) -> float:
-    """Return the belief in a family that one cause holds, as it is told."""
-    names = told['name']
-    assert isinstance(names, list)
-    sites = tuple((Site(n['effect'], n['joint']), float(n['probability'])) for n in names)
-    slot = None if told.get('effect', 0) is None else 0
-    bare = Cause((), (), sites, 0.0, (0.0, 0.0), slot=slot)
-    cause = trusted_cause(bare, case.judged.status, {**case.row['signs'], **more}, trust)
-    return sum(p for site, p in cause.name if site.effect == family)
-
-
-def _breadth(cases: Sequence[Case]) -> Estimate:
-    sizes = [len(g) for c in cases for g in c.row['verdict']['indistinguishable'] if len(g) > 1]
-    return bootstrap([float(size) for size in sizes])
-
-
-def _seconds(cases: Sequence[Case]) -> Estimate:
-    return bootstrap([float(c.row['seconds']) for c in cases])
+def _seconds(rows: Sequence[Kept]) -> Estimate:
+    return bootstrap([float(r['seconds']) for r in rows])

@@ -71,7 +71,7 @@ class Step(NamedTuple):
     """
     A cause that was sure and right, before and after a recording more.
 
-    ``after`` is 0 where no set told holds the cause any more.
+    ``after`` is 0 where no set told holds the cause any more; ``sure`` tells whether it still is.
     """
 
     name: str
@@ -79,6 +79,7 @@ class Step(NamedTuple):
     cause: Site
     before: float
     after: float
+    sure: bool
 
     @property
     def fell(self) -> bool:
@@ -100,9 +101,9 @@ def steps(row: Mapping[str, Any]) -> Iterator[Step]:
     for effect, joint in truth['sites']:
         alike = alike_by_structure(truth['robot'], (effect, joint))
         held = [_of(one['verdict'], alike) for one in row['told']]
-        for k, ((before, sure), (after, _)) in enumerate(pairwise(held)):
+        for k, ((before, sure), (after, still)) in enumerate(pairwise(held)):
             if sure:
-                yield Step(row['name'], k + 1, (effect, joint), before, after)
+                yield Step(row['name'], k + 1, (effect, joint), before, after, still)
 
 
 def _of(verdict: Mapping[str, Any], alike: frozenset[Site]) -> tuple[float, bool]:
@@ -155,6 +156,7 @@ def page(rows: Sequence[Mapping[str, Any]]) -> str:
     measures = {
         'sure causes that fall by more than 0.1': share([step.fell for step in every]),
         'sure causes that lose their name': share([step.after == 0.0 for step in every]),
+        'sure causes that are sure no longer': share([not step.sure for step in every]),
         'cells whose order changes a name': share([apart(row) == 1.0 for row in good]),
         'cells whose order moves a probability': share([apart(row) > SAME for row in good]),
     }

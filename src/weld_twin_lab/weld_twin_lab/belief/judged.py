@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from weld_twin_core.diagnosis.result import NAMING
-from weld_twin_core.diagnosis.trust.trusted import group_of, level_group_of
 
 from ..blind.judging import Judged, answers_of, judge
 from .levels_of_truth import alike_by_structure, levels_of, numbers
@@ -26,67 +25,43 @@ AS_GOOD = 1.05
 CURVES = ('joint_curve', 'frame_curve')
 
 
+LARGE = 0.1
+"""Share of the squared gap from which on a cause that is not told is missing, if it is no noise."""
+
+
 class Example(NamedTuple):
     """
-    One statement, the signs it was made on, and whether it was right.
+    One statement, the features it was made on, and whether it was right.
 
     Attributes
     ----------
     case : str
         Name of the case; statements on one case are kept together.
-    level : str
-        Level and group of status, as in 'place named'.
-    signs : mapping from str to float
+    kind : str
+        As `weld_twin_core.diagnosis.calibration.features.KINDS` has it.
+    features : mapping from str to float
     right : bool
     told : float
-        What was believed of it before anything was learned.
+        What was told of it.
+    sure : bool
+        Whether it was told as sure.
+    weight : float
+        How much it counts.
 
     """
 
     case: str
-    level: str
-    signs: Mapping[str, float]
+    kind: str
+    features: Mapping[str, float]
     right: bool
     told: float
+    sure: bool = False
+    weight: float = 1.0
 
 
-class Case(NamedTuple):
+def kept(row: Mapping[str, Any]) -> dict[str, Any]:
     """
-    A case with a verdict.
-
-    Attributes
-    ----------
-    row : mapping
-        As `trial.tried` gives it.
-    judged : Judged
-    right : bool
-        Whether the answer as a whole is right, sets of two and more held to what they predict.
-    honest : bool
-        Whether it is right, or predicts the sealed recording as well as the truth does.
-
-    """
-
-    row: Mapping[str, Any]
-    judged: Judged
-    right: bool
-    honest: bool
-
-
-def cases_of(rows: Sequence[Mapping[str, Any]]) -> list[Case]:
-    """
-    Return the rows that came to a verdict on causes, judged.
-
-    Parameters
-    ----------
-    rows : sequence of mappings
-
-    """
-    return [_case(row) for row in rows if not row['error'] and row['signs']]
-
-
-def judged_row(row: Mapping[str, Any]) -> dict[str, Any]:
-    """
-    Return a row with what its answer was worth, so that no later library judges it otherwise.
+    Return what is kept of a case: what its answer was worth, and every statement as an example.
 
     Parameters
     ----------
@@ -94,18 +69,70 @@ def judged_row(row: Mapping[str, Any]) -> dict[str, Any]:
         As `trial.tried` gives it.
 
     """
-    if row['error'] or not row['signs']:
-        return dict(row)
-    case = _case(row)
-    truth = row['truth']
-    words = [[sorted(level.places), sorted(level.dependences)] for level in levels_of(truth)]
-    at_work = sorted(_at_work(truth), key=str)
+    if row['error'] or not row['statements']:
+        return {key: row.get(key) for key in ('name', 'error', 'unsound')}
+    truth, verdict = row['truth'], row['verdict']
+    told = judge(_with_absorbed(row), {'verdict': {'effects': (), **verdict}})
+    right = _right(row, told)
+    sealed, causes = row['sealed'], verdict['causes']
+    as_good = sealed['after'] < AS_GOOD * sealed['floor'] and told.status in NAMING
+    words = levels_of(truth)
     return {
-        **row,
-        'right': case.right,
-        'honest': case.honest,
-        'truth': {**truth, 'levels': words, 'at_work': at_work},
+        'name': row['name'],
+        'error': None,
+        'engine': row['engine'],
+        'kind': told.kind,
+        'robot': told.robot,
+        'motion': f'{told.motion} {row["poor"]}'.strip(),
+        'truth': told.truth,
+        'said': told.said,
+        'sizes': list(truth['ratios']),
+        'status': told.status,
+        'confidence': verdict['confidence'],
+        'sure': bool(verdict['sure']),
+        'right': right,
+        'honest': right or (as_good and bool(truth['sites'])),
+        'named': told.named,
+        'place': _first(causes, 'place', frozenset().union(*(own.places for own in words))),
+        'dependence': _first(
+            causes, 'dependence', frozenset().union(*(own.dependences for own in words))
+        ),
+        'family': _family(row),
+        'seconds': row['seconds'],
+        'examples': [list(one) for one in _examples(row, right)],
     }
+
+
+def _with_absorbed(row: Mapping[str, Any]) -> dict[str, Any]:
+    truth = row['truth']
+    return {**truth, 'causes': (), 'alike': [*truth['alike'], *_absorbed(row)]}
+
+
+def _right(row: Mapping[str, Any], told: Judged) -> bool:
+    """Return whether an answer is right as a whole, sets held to what they predict."""
+    several = 'shown' in row['truth']
+    right = whole(row['truth'], row['verdict']).right if several else told.right
+    return right and _sets_hold(row)
+
+
+def _first(causes: Sequence[Mapping[str, Any]], level: str, words: frozenset[str]) -> bool:
+    """Return whether the first place, or dependence, of the largest cause is right."""
+    word = 'at' if level == 'place' else 'on'
+    return bool(causes and causes[0][level] and causes[0][level][0][word] in words)
+
+
+def _family(row: Mapping[str, Any]) -> float:
+    """Return the most that any cause believes of the family of the first cause at work."""
+    if not row['truth']['sites']:
+        return 0.0
+    (family, _), *_ = row['truth']['sites']
+    return max(
+        (
+            sum(n['probability'] for n in cause['name'] if n['effect'] == family)
+            for cause in row['verdict']['causes']
+        ),
+        default=0.0,
+    )
 
 
 def _at_work(truth: Mapping[str, Any]) -> set[tuple[str, str | None]]:
@@ -113,22 +140,6 @@ def _at_work(truth: Mapping[str, Any]) -> set[tuple[str, str | None]]:
     if 'at_work' in truth:
         return {(str(effect), joint) for effect, joint in truth['at_work']}
     return {site for answer in answers_of(truth) for site in answer}
-
-
-def _case(row: Mapping[str, Any]) -> Case:
-    if 'right' in row:
-        told = judge(
-            {**row['truth'], 'causes': ()}, {'verdict': {'effects': (), **row['verdict']}}
-        )
-        return Case(row, told, bool(row['right']), bool(row['honest']))
-    truth = {**row['truth'], 'causes': (), 'alike': [*row['truth']['alike'], *_absorbed(row)]}
-    told = judge(truth, {'verdict': {'effects': (), **row['verdict']}})
-    several = 'shown' in row['truth']
-    right = whole(row['truth'], row['verdict']).right if several else told.right
-    right = right and _sets_hold(row)
-    sealed = row['sealed']
-    as_good = sealed['after'] < AS_GOOD * sealed['floor'] and told.status in NAMING
-    return Case(row, told, right, right or (as_good and bool(row['truth']['sites'])))
 
 
 def _absorbed(row: Mapping[str, Any]) -> list[list[tuple[str, str | None]]]:
@@ -163,42 +174,59 @@ def _sets_hold(row: Mapping[str, Any]) -> bool:
     return True
 
 
-def examples_of(cases: Sequence[Case]) -> list[Example]:
+def examples_of(rows: Sequence[Mapping[str, Any]]) -> list[Example]:
     """
-    Return every statement made on the cases.
+    Return every statement made on some cases.
 
     Parameters
     ----------
-    cases : sequence of Case
+    rows : sequence of mappings
+        As `kept` gives them.
 
     """
-    return [example for case in cases for example in _examples(case)]
+    return [
+        Example(str(row['name']), *one, weight=float(row.get('weight', 1.0)))
+        for row in rows
+        for one in row.get('examples', ())
+    ]
 
 
-def _examples(case: Case) -> Iterator[Example]:
-    row, status = case.row, case.judged.status
-    name, group = str(row['name']), group_of(status, row['signs'])
-    causes = row['verdict']['causes']
-    signs = {**row['signs'], 'top_share': causes[0]['share'] if causes else 0.0}
-    yield Example(name, f'answer {group}', signs, case.right, signs['belief'])
-    if status == 'none':
-        return
+def _examples(
+    row: Mapping[str, Any], whole_right: bool
+) -> Iterator[tuple[str, Mapping[str, float], bool, float, bool]]:
+    """Yield kind, features, whether it was right, what was told of it and whether as sure."""
+    causes, at_work = row['verdict']['causes'], _at_work(row['truth'])
     truths = levels_of(row['truth'])
-    at_work = _at_work(row['truth'])
-    for cause, more in zip(row['verdict']['causes'], row['cause_signs'], strict=True):
-        both = {**signs, **more}
-        slot = status in NAMING if 'effect' not in cause else cause['effect'] is not None
-        group = level_group_of(status, row['signs'], named=slot)
-        if cause['place']:
-            here = cause['place'][0]['at']
-            hit = any(here in truth.places for truth in truths)
-            yield Example(name, f'place {group}', both, hit, more['place'])
-        if cause['dependence']:
-            on = cause['dependence'][0]['on']
-            hit = any(on in truth.dependences for truth in truths)
-            yield Example(name, f'dependence {group}', both, hit, more['dependence'])
-        sites = [(item['effect'], item['joint']) for item in cause['name']]
-        if sites and (slot or group == 'families'):
-            hit = any(site in at_work for site in sites)
-            told = sum(item for key, item in more.items() if key in ('name', 'name_second'))
-            yield Example(name, f'name {group}', both, hit, min(told, 1.0))
+    for said in row['statements']:
+        kind, told = said['kind'], said['probability']
+        if said['cause'] is None:
+            right = _complete(row) if kind == 'complete' else whole_right
+            sure = kind != 'complete' and bool(row['verdict']['sure'])
+            yield kind, said['features'], right, told, sure
+            continue
+        cause, level = causes[said['cause']], kind.split()[0]
+        named = any((n['effect'], n['joint']) in at_work for n in cause['name'])
+        if level == 'name':
+            right = named
+        elif not cause[level] or (named and kind in ('place', 'dependence')):
+            # Those of a right name are right; what is learned of them holds where it is wrong.
+            continue
+        else:
+            first = cause[level][0]['at' if level == 'place' else 'on']
+            right = any(first in own[level == 'dependence'] for own in truths)
+        sure = bool(cause['sure']) and (level == 'name' or kind == 'place of the rest')
+        yield kind, said['features'], right, told, sure
+
+
+def _complete(row: Mapping[str, Any]) -> bool:
+    """Return whether no cause above the noise and a tenth of the squared gap is missing."""
+    truth, told = row['truth'], set[tuple[str, str | None]]()
+    for cause in row['verdict']['causes']:
+        if not cause['rest']:
+            told |= {(n['effect'], n['joint']) for n in cause['name']}
+    gap = next(one['features']['gap'] for one in row['statements'] if one['kind'] == 'complete')
+    least = max(1.0, LARGE * 10.0 ** (2.0 * gap))
+    return not any(
+        ratio**2 > least and not alike_by_structure(truth['robot'], (e, j)) & told
+        for (e, j), ratio in zip(truth['sites'], truth['ratios'], strict=True)
+    )

@@ -1,97 +1,47 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Belief fitted to examples: weights of each level, judged on cases that took no part."""
+"""Weights of the calibration fitted to examples, and from where on a statement is sure."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.trust.model import (
-    AS_LOGIT,
-    FROM,
-    LEVELS_BACK,
-    PRESENT,
-    SCHEMA,
-    Trust,
-    comes_back,
-    taken,
-    trust_from,
-    with_products,
-)
+from weld_twin_core.diagnosis.calibration.features import ONLY
+from weld_twin_core.diagnosis.calibration.weights import SCHEMA
 
-from ..blind.statistics import calibration_error
-from .bound import Bound, at, bounded
+from .bound import Bound, bounded, precise
 from .judged import Example
-from .logistic import Weights, fitted, log_loss
-from .terms import BENT, BENT_LEVELS, RANGES, TERMS
+from .logistic import fitted
+from .terms import OF_FAMILIES, TERMS
 
-RIDGES = (3.0, 10.0, 30.0, 100.0)
-"""Ridges tried, in nats for weights one away from the prior: from as free as a few hundred cases
-allow to hardly moved. The one that predicts unseen folds best is taken."""
+RIDGE = 3.0
+"""Of half the squared weights, against log loss in nats: each weight moves as far as some ten
+examples ask it to."""
 FOLDS = 8
 """Parts of the cases that take turns in being unseen."""
-NOTHING = Bound(1.0, 0, 0, 1.0, 1.0, 0.0)
-"""What is known of a threshold before there is one."""
-FEWEST = 20
-"""Examples of a level from which on it is learned at all."""
-FEWEST_NAMED = 5
-"""Examples in which a family is named from which on its name is a sign at all."""
-RISK = 0.01
-"""Probability that an answer may be sure and wrong."""
-LEVEL_RISK = 0.02
-"""The same of a place, a dependence or a name, where the answer as a whole need not be sure. What
-is told of them is to be as often right as it says; below 1 % most of them would be told as less
-than they are, and above 2 % nothing more is gained."""
-TOLD_UNSURE = 0.8
-"""What is not sure by the bound is told as this at the most; above it counts as sure."""
-BEFORE = frozenset({'belief', 'place', 'dependence', 'name'})
-"""Signs that are what was believed before: the ridge pulls towards taking them as they are."""
-
-
-class Level(NamedTuple):
-    """
-    What was learned of one level.
-
-    Attributes
-    ----------
-    content : dict
-        Its entry of the belief file.
-    unseen : array, shape (N,)
-        Probability of each example by weights fitted without its case.
-
-    """
-
-    content: dict[str, Any]
-    unseen: Array
-
-
-class Part(NamedTuple):
-    """Examples of one level: probabilities unseen, what was right, told, may be sure; the bound."""
-
-    unseen: Array
-    right: NDArray[np.bool_]
-    told: Array
-    may: NDArray[np.bool_]
-    bound: Bound
-
-    @property
-    def bounded(self) -> Array:
-        """Return the probabilities that a threshold is asked of."""
-        return np.where(self.may, self.unseen, np.minimum(self.unseen, TOLD_UNSURE))
+ENDS = (0.005, 0.995)
+"""Quantiles of a feature between which it counts: beyond, single cases would decide."""
+RISK, CAUSE_RISK = 0.002, 0.01
+"""Probability that an answer is sure and wrong, and that a cause told as sure is wrong."""
+CAUSES = ('name', 'name of many', 'place of the rest')
+"""Kinds of statements by which a cause is sure."""
+FEWEST_NAMED = 30
+"""Examples in which a family is named alone from which on that is a feature."""
+DIGITS = 4
+"""Significant digits of a weight."""
 
 
 class Table(NamedTuple):
-    """Examples of one level as columns: signs as they enter, what was right, weights, folds."""
+    """Examples of one kind as columns: features, what was right, weights, folds."""
 
-    names: list[str]
     values: Array
-    right: Array
+    right: NDArray[np.bool_]
     weight: Array
     folds: Array
 
@@ -100,7 +50,7 @@ def learned(
     examples: Sequence[Example], card: Mapping[str, Any], risk: float = RISK
 ) -> dict[str, Any]:
     """
-    Return the content of a belief file.
+    Return the content of a file of weights.
 
     Parameters
     ----------
@@ -111,177 +61,93 @@ def learned(
         Probability that an answer may be sure and wrong.
 
     """
-    levels: dict[str, Level] = {}
-    parts: dict[str, Part] = {}
-    for name in TERMS:
-        own = [e for e in examples if e.level == name]
-        if len(own) >= FEWEST:
-            levels[name] = _level(own, name)
-            told, right = (np.array([getattr(e, key) for e in own]) for key in ('told', 'right'))
-            may = np.array([_may_be_sure(e) for e in own])
-            parts[name] = Part(levels[name].unseen, right, told, may, NOTHING)
-    parts = _together(parts, risk)
+    statements, parts = {}, {}
+    for kind in TERMS:
+        terms, table, signs = _of_kind([e for e in examples if e.kind == kind], kind)
+        statements[kind] = _content(table, terms, signs)
+        parts[kind] = _unseen(table, signs), table.right
+    answers, causes = (
+        [np.concatenate(both) for both in zip(*(parts[kind] for kind in kinds), strict=True)]
+        for kinds in ([kind for kind in TERMS if kind.startswith('answer')], CAUSES)
+    )
+    bounds = {
+        'answer': bounded(answers[0], answers[1], risk),
+        'cause': precise(causes[0], causes[1], CAUSE_RISK),
+    }
     return {
         'schema': SCHEMA,
         'card': {
             **card,
-            'risk': risk,
-            'bounds': {name: _told(part.bound, name, risk) for name, part in parts.items()},
-            'unseen': {
-                level: _unseen_worth([p for n, p in parts.items() if n.startswith(f'{level} ')])
-                for level in dict.fromkeys(name.split()[0] for name in parts)
-            },
+            'risk': {'answer': risk, 'cause': CAUSE_RISK},
+            'bounds': {what: _rounded(bound) for what, bound in bounds.items()},
         },
-        'sure_from': {name: part.bound.sure_from for name, part in parts.items()},
-        'told_unsure': TOLD_UNSURE,
-        'levels': {name: level.content for name, level in levels.items()},
+        'sure_from': {what: bound.sure_from for what, bound in bounds.items()},
+        'statements': statements,
     }
 
 
-def trust_of(examples: Sequence[Example]) -> Trust:
-    """Return what examples teach, ready to be asked."""
-    return trust_from(learned(examples, {}))
-
-
-def _unseen_worth(parts: Sequence[Part]) -> dict[str, Any]:
-    """Return what beliefs are worth, each by weights that had not seen its case."""
-    learned, right, before = (np.concatenate([part[k] for part in parts]) for k in range(3))
-    sure = np.concatenate([_sure(part) for part in parts])
-    return {
-        name: {
-            'ece': round(
-                float(calibration_error(list(p), list(map(bool, right))).value or 0.0), 4
-            ),
-            'sure_and_wrong': round(float((is_sure & ~right).mean()), 4),
-            'sure': round(float(is_sure.mean()), 4),
-        }
-        for name, p, is_sure in (
-            ('by hand', before, before > TOLD_UNSURE),
-            ('learned', learned, sure),
-        )
-    }
-
-
-def _sure(part: Part) -> NDArray[np.bool_]:
-    """Return which examples are told as sure."""
-    return np.asarray(part.may & (part.unseen >= part.bound.sure_from))
-
-
-def _together(parts: Mapping[str, Part], risk: float) -> dict[str, Part]:
+def unseen(examples: Sequence[Example], content: Mapping[str, Any]) -> list[Example]:
     """
-    Return examples with their bounds: one threshold for all groups of a level.
-
-    What counts is how often any answer is sure and wrong. As probabilities mean the same in every
-    group, one threshold for all gives the most sure answers for that.
-    """
-    out = {}
-    for level in dict.fromkeys(name.split()[0] for name in parts):
-        own = {name: part for name, part in parts.items() if name.split()[0] == level}
-        p, right = (
-            np.concatenate([getattr(part, key) for part in own.values()])
-            for key in ('bounded', 'right')
-        )
-        most = bounded(p, right, risk if level == 'answer' else max(risk, LEVEL_RISK))
-        for name, part in own.items():
-            here = at(most.sure_from, part.bounded, part.right)
-            out[name] = part._replace(bound=here._replace(expected=most.expected))
-    return out
-
-
-def _may_be_sure(example: Example) -> bool:
-    return example.level.split()[0] not in LEVELS_BACK or comes_back(example.signs)
-
-
-def _told(bound: Bound, name: str, risk: float) -> dict[str, Any]:
-    own = risk if name.startswith('answer ') else max(risk, LEVEL_RISK)
-    return {**bound._asdict(), 'risk': own}
-
-
-def _level(examples: Sequence[Example], name: str) -> Level:
-    table = _table(examples, name)
-    ways = np.array([TERMS[name][sign.partition(FROM)[0]] for sign in table.names], dtype=float)
-    tried = [(_unseen(table, ways, ridge), ridge) for ridge in RIDGES]
-    unseen, ridge = min(tried, key=lambda item: log_loss(item[0], table.right, table.weight))
-    middle, spread = _scaling(table.values)
-    weights = _weights(table, ways, ridge, middle, spread)
-    least, most = _limits(table)
-    terms = {
-        sign: {
-            'weight': round(float(slope), 5),
-            'middle': round(float(middle[k]), 5),
-            'spread': round(float(spread[k]), 5),
-            'low': round(float(np.nanmin(table.values[:, k])), 5),
-            'high': round(float(np.nanmax(table.values[:, k])), 5),
-        }
-        for k, (sign, slope) in enumerate(zip(table.names, weights.slopes, strict=True))
-        if abs(slope) > 1e-4
-    }
-    content = {
-        'bias': round(weights.bias, 5),
-        'least': least,
-        'most': most,
-        'cases': len({e.case for e in examples}),
-        'examples': len(examples),
-        'right': int(table.right.sum()),
-        'ridge': ridge,
-        'terms': terms,
-    }
-    return Level(content, np.clip(unseen, least, most))
-
-
-def _table(examples: Sequence[Example], name: str) -> Table:
-    signs = [with_products(e.signs) for e in examples]
-    names = [
-        sign
-        for sign in TERMS[name]
-        if not sign.startswith(PRESENT) or sum(sign in s for s in signs) >= FEWEST_NAMED
-    ]
-    names = [
-        sign
-        for sign in names
-        if sign.startswith(PRESENT) or sum(sign in s for s in signs) >= FEWEST
-    ]
-    columns = [np.array([entered(s, sign) for s in signs]) for sign in names]
-    if name.split()[1] in BENT_LEVELS:
-        pieces = [(n, c) for n, c in zip(names, columns, strict=True) if n in BENT]
-        for sign, column in pieces:
-            for low, high in _pieces(column):
-                names.append(f'{sign}{FROM}{low:.3g}')
-                columns.append(np.clip(column, low, high))
-    values = np.array(columns).T
-    cases = [e.case for e in examples]
-    counts = {case: cases.count(case) for case in set(cases)}
-    places = {case: k for k, case in enumerate(sorted(counts, key=_scattered))}
-    return Table(
-        names,
-        values,
-        np.array([e.right for e in examples]),
-        np.array([1.0 / counts[case] for case in cases]),
-        np.array([places[case] % FOLDS for case in cases]),
-    )
-
-
-def entered(signs: Mapping[str, float], sign: str) -> float:
-    """
-    Return a sign as it enters, cut to what can tell anything; not a number where it is missing.
+    Return examples as they are told by weights that had not seen their cases.
 
     Parameters
     ----------
-    signs : mapping from str to float
-    sign : str
+    examples : sequence of Example
+    content : mapping
+        As `learned` returned it.
 
     """
-    low, high = RANGES.get(sign, (-np.inf, np.inf))
-    missing = 0.0 if sign.startswith(PRESENT) else np.nan
-    return float(np.clip(taken(sign, signs[sign]), low, high)) if sign in signs else missing
+    out = []
+    for kind in TERMS:
+        own = [e for e in examples if e.kind == kind]
+        table, signs = _of_kind(own, kind)[1:]
+        what = 'answer' if kind.startswith('answer') else 'cause' if kind in CAUSES else ''
+        bound = content['sure_from'].get(what, 2.0)
+        out += [
+            e._replace(told=float(p), sure=bool(p >= bound))
+            for e, p in zip(own, _unseen(table, signs), strict=True)
+        ]
+    return out
 
 
-def _pieces(column: Array) -> list[tuple[float, float]]:
-    """Return the thirds of a sign's examples, from where to where; none where few values occur."""
-    known = column[~np.isnan(column)]
-    ends = np.quantile(known, (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)) if known.size else np.zeros(4)
-    many = np.unique(known).size >= FEWEST
-    return [(float(a), float(b)) for a, b in pairwise(ends) if many and b - a > 1e-3]
+def _of_kind(own: Sequence[Example], kind: str) -> tuple[dict[str, int], Table, Array]:
+    """Return the features of a kind of statement, its examples, and which way each may count."""
+    terms = {**TERMS[kind], **(_families(own) if kind in OF_FAMILIES else {})}
+    return terms, _table(own, list(terms)), np.array(list(terms.values()), float)
+
+
+def _families(examples: Sequence[Example]) -> dict[str, int]:
+    """Return the families named alone often enough to learn anything of them."""
+    named = Counter(
+        name for e in examples for name in e.features if name.startswith(ONLY) and e.features[name]
+    )
+    return {name: 0 for name in sorted(named) if named[name] >= FEWEST_NAMED}
+
+
+def count_of(content: Mapping[str, Any]) -> int:
+    """Return how many weights were learned, constants included."""
+    return sum(1 + len(own['weights']) for own in content['statements'].values())
+
+
+def _rounded(bound: Bound) -> dict[str, Any]:
+    return {key: round(float(value), 5) for key, value in bound._asdict().items()}
+
+
+def _table(examples: Sequence[Example], names: Sequence[str]) -> Table:
+    places = {
+        case: k % FOLDS
+        for k, case in enumerate(sorted({e.case for e in examples}, key=_scattered))
+    }
+    values = [
+        [e.features.get(name, 0.0 if name.startswith(ONLY) else np.nan) for name in names]
+        for e in examples
+    ]
+    return Table(
+        np.array(values, float).reshape(len(examples), len(names)),
+        np.array([e.right for e in examples], bool),
+        np.array([e.weight for e in examples], float),
+        np.array([places[e.case] for e in examples], int),
+    )
 
 
 def _scattered(case: str) -> str:
@@ -289,39 +155,62 @@ def _scattered(case: str) -> str:
     return case[::-1]
 
 
-def _scaling(values: Array) -> tuple[Array, Array]:
-    """Return middle and spread of every sign where it is known."""
-    spread = np.nanstd(values, axis=0)
-    return np.nanmean(values, axis=0), np.where(spread > 1e-9, spread, 1.0)
+class Scaled(NamedTuple):
+    """How features enter: cut to what was seen, with mean zero and spread one."""
+
+    low: Array
+    high: Array
+    middle: Array
+    spread: Array
+
+    @classmethod
+    def of(cls, values: Array) -> Scaled:
+        """Return the scaling of examples; what an older example lacks counts as usual."""
+        low, high = np.nanquantile(values, ENDS, axis=0)
+        # A family that is named seldom is named all the same.
+        rare = low == high
+        low, high = (
+            np.where(rare, end(values, axis=0), own)
+            for end, own in ((np.nanmin, low), (np.nanmax, high))
+        )
+        cut = np.clip(values, low, high)
+        spread = np.nanstd(cut, axis=0)
+        return cls(low, high, np.nanmean(cut, axis=0), np.where(spread > 1e-9, spread, 1.0))
+
+    def __call__(self, values: Array) -> Array:
+        """Return features as they enter."""
+        cut = np.clip(values, self.low, self.high)
+        return np.nan_to_num((cut - self.middle) / self.spread)
 
 
-def _weights(table: Table, ways: Array, ridge: float, middle: Array, spread: Array) -> Weights:
-    # A sign that is missing counts as at its middle.
-    columns = np.nan_to_num((table.values - middle) / spread)
-    prior = np.array(
-        [
-            spread[k] if name in BEFORE and name in AS_LOGIT else 0.0
-            for k, name in enumerate(table.names)
-        ]
-    )
-    return fitted(columns, table.right, ways, prior, ridge, table.weight)
+def _content(table: Table, names: Mapping[str, int], signs: Array) -> dict[str, Any]:
+    scaled = Scaled.of(table.values)
+    found = fitted(scaled(table.values), table.right, signs, RIDGE, table.weight)
+    slopes = found.slopes / scaled.spread
+    return {
+        'examples': len(table.right),
+        'right': int(table.right.sum()),
+        'constant': _short(found.bias - float(slopes @ scaled.middle)),
+        'weights': {
+            name: {'weight': _short(slope), 'low': _short(low), 'high': _short(high)}
+            for name, slope, low, high in zip(names, slopes, scaled.low, scaled.high, strict=True)
+            if abs(slope) > 1e-4
+        },
+    }
 
 
-def _unseen(table: Table, ways: Array, ridge: float) -> Array:
+def _short(value: float) -> float:
+    return float(f'{value:.{DIGITS}g}')
+
+
+def _unseen(table: Table, signs: Array) -> Array:
     """Return the probability of each example by weights fitted on the other folds."""
     out = np.zeros(len(table.right))
     for fold in range(FOLDS):
         here = table.folds == fold
-        rest = Table(table.names, *(column[~here] for column in table[1:]))
-        middle, spread = _scaling(rest.values)
-        weights = _weights(rest, ways, ridge, middle, spread)
-        low, high = np.nanmin(rest.values, axis=0), np.nanmax(rest.values, axis=0)
-        columns = np.nan_to_num((np.clip(table.values[here], low, high) - middle) / spread)
-        out[here] = 1.0 / (1.0 + np.exp(-(weights.bias + columns @ weights.slopes)))
+        rest = Table(*(column[~here] for column in table))
+        scaled = Scaled.of(rest.values)
+        found = fitted(scaled(rest.values), rest.right, signs, RIDGE, rest.weight)
+        odds = found.bias + scaled(table.values[here]) @ found.slopes
+        out[here] = 1.0 / (1.0 + np.exp(-odds))
     return out
-
-
-def _limits(table: Table) -> tuple[float, float]:
-    """Return the probabilities that so many cases allow: one more case might be another."""
-    count = float(table.weight.sum()) + 2.0
-    return round(1.0 / count, 4), round(1.0 - 1.0 / count, 4)

@@ -5,7 +5,7 @@ Logistic regression with a ridge and with signs that weights may not change.
 
 A sign that should raise belief may not lower it because of chance in a few hundred cases: weights
 are bounded on one side of zero, which makes belief monotone in what is known to be good or bad
-news. The ridge pulls towards the belief that was there before.
+news.
 """
 
 from __future__ import annotations
@@ -26,7 +26,12 @@ class Weights(NamedTuple):
 
 
 def fitted(
-    columns: Array, right: Array, signs: Array, prior: Array, ridge: float, weight: Array
+    columns: Array,
+    right: Array,
+    signs: Array,
+    ridge: float,
+    weight: Array,
+    prior: Array | None = None,
 ) -> Weights:
     """
     Return the weights of least penalised log loss.
@@ -38,14 +43,15 @@ def fitted(
     right : array of bool, shape (N,)
     signs : array, shape (P,)
         1 where a weight may not be negative, -1 where it may not be positive, 0 where it is free.
-    prior : array, shape (P,)
-        Weights that the ridge pulls to.
     ridge : float
         Of half the squared distance from the prior, against log loss in nats.
     weight : array, shape (N,)
         Of every example.
+    prior : array, shape (P,), optional
+        Weights that the ridge pulls to; zeros when left out.
 
     """
+    prior = np.zeros(columns.shape[1]) if prior is None else prior
     # One more case of each outcome, with every sign at its middle: few cases are never certain.
     columns = np.concatenate([columns, np.zeros((2, columns.shape[1]))])
     target = np.concatenate([np.asarray(right, dtype=float), [0.0, 1.0]])

@@ -1,10 +1,11 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Reliability and risk over coverage, before and after, as pictures that take a page's colours."""
+"""Reliability and risk over coverage as pictures that take a page's colours."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,34 +14,37 @@ from numpy.typing import NDArray
 from weld_twin_core.arrays import Array
 
 from ..blind.statistics import reliability
-from .told import Belief, risk_curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BEFORE, AFTER, GREY = '#d98a2b', '#3b82c4', '#8d98a6'
+COLOURS, GREY = ('#3b82c4', '#d98a2b'), '#8d98a6'
 PAPER = '#ffffff'
 
 
-def reliability_picture(belief: Belief) -> str:
+Told = Mapping[str, tuple[Array, NDArray[np.bool_]]]
+"""What was told of statements of a kind, and which were right."""
+
+
+def reliability_picture(told: Told) -> str:
     """
-    Return the share that was right over what was believed, as SVG.
+    Return the share that was right over what was told, as SVG.
 
     Parameters
     ----------
-    belief : Belief
+    told : mapping from str to (array, array of bool)
+        At most two kinds.
 
     """
     figure, axes = _figure()
     axes.plot([0, 1], [0, 1], color=GREY, lw=1, ls='--')
-    for told, colour, label, off in (
-        (belief.before, BEFORE, 'set by hand', -0.006),
-        (belief.after, AFTER, 'learned', 0.006),
+    for (label, (p, right)), colour, off in zip(
+        told.items(), COLOURS, (-0.006, 0.006), strict=False
     ):
-        _bins(axes, told, belief.right, colour, label, off)
+        _bins(axes, p, right, colour, label, off)
     axes.legend(frameon=False, fontsize=8)
-    axes.set(xlim=(0, 1.03), ylim=(0, 1.03), xlabel='believed', ylabel='share that was right')
+    axes.set(xlim=(0, 1.03), ylim=(0, 1.03), xlabel='told', ylabel='share that was right')
     return _svg(figure)
 
 
@@ -52,33 +56,33 @@ def _bins(
         if value is None or low is None or high is None:
             continue
         axes.plot([b.confidence + off] * 2, [low, high], color=colour, lw=1.3)
-        size = 3.0 + 0.9 * float(np.sqrt(count))
+        size = 3.0 + 0.15 * float(np.sqrt(count))
         axes.plot(b.confidence + off, value, 'o', color=colour, ms=size, label=label)
         label = None
 
 
-def risk_picture(belief: Belief) -> str:
+def risk_picture(told: Told) -> str:
     """
     Return the share wrong among the surest, over how many are looked at, as SVG.
 
     Parameters
     ----------
-    belief : Belief
+    told : mapping from str to (array, array of bool)
+        At most two kinds.
 
     """
     figure, axes = _figure()
-    for told, colour, label in (
-        (belief.before, BEFORE, 'set by hand'),
-        (belief.after, AFTER, 'learned'),
-    ):
-        coverage, risk = risk_curve(told, belief.right)
+    for (label, (p, right)), colour in zip(told.items(), COLOURS, strict=False):
+        order = np.argsort(-p, kind='stable')
+        count = np.arange(1, p.size + 1)
+        coverage, risk = count / p.size, np.cumsum(~right[order]) / count
         axes.plot(100.0 * coverage, 100.0 * risk, color=colour, lw=1.5, label=label)
     axes.axvline(70.0, color=GREY, lw=1, ls='--')
     axes.legend(frameon=False, fontsize=8)
     axes.set(
         xlim=(0, 100),
         ylim=(0, None),
-        xlabel='cases answered, the surest first [%]',
+        xlabel='statements, the surest first [%]',
         ylabel='of them wrong [%]',
     )
     return _svg(figure)

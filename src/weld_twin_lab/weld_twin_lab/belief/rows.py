@@ -4,55 +4,17 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.whole_files import write_bytes
 
-from .judged import judged_row
-
-DIGITS = 5
+DIGITS = 4
 """Significant digits that are kept."""
-TRUTH = (
-    'kind',
-    'robot',
-    'motion',
-    'construction',
-    'sites',
-    'alike',
-    'ratios',
-    'excluded',
-    'orientation',
-    'richness',
-    'align',
-    'test',
-    'levels',
-    'at_work',
-    'shown',
-)
-VERDICT = ('status', 'confidence', 'indistinguishable', 'causes')
-
-
-def slim(row: Mapping[str, Any]) -> dict[str, Any]:
-    """
-    Return a row with what belief is learned from and judged by, and nothing else.
-
-    Parameters
-    ----------
-    row : mapping
-        As `trial.tried` gives it.
-
-    """
-    if row['error']:
-        return {'name': row['name'], 'error': row['error']}
-    out = judged_row(row)
-    truth = out['truth']
-    out['truth'] = {'name': row['name'], **{key: truth[key] for key in TRUTH if key in truth}}
-    out['verdict'] = {key: row['verdict'][key] for key in VERDICT}
-    return dict(rounded(out))
 
 
 def rounded(value: Any) -> Any:
@@ -74,11 +36,15 @@ def write_rows(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
     ----------
     path : Path
     rows : iterable of mappings
-        As `slim` gives them.
+        As `judged.kept` gives them. A path that ends in .gz is packed.
 
     """
-    lines = (json.dumps(row, separators=(',', ':')) for row in rows)
-    write_text(path, '\n'.join(lines) + '\n', overwrite=True)
+    lines = (json.dumps(rounded(row), separators=(',', ':')) for row in rows)
+    text = '\n'.join(lines) + '\n'
+    packed = (
+        gzip.compress(text.encode('utf-8'), mtime=0) if path.suffix == '.gz' else text.encode()
+    )
+    write_bytes(path, packed, overwrite=True)
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
@@ -96,9 +62,10 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
 
     """
     try:
-        text = path.read_text(encoding='utf-8')
+        raw = path.read_bytes()
+        text = (gzip.decompress(raw) if path.suffix == '.gz' else raw).decode('utf-8')
         rows = [json.loads(line) for line in text.splitlines() if line]
-    except (OSError, ValueError) as error:
+    except (OSError, EOFError, ValueError) as error:
         raise DataError(f"the table of cases '{path}' cannot be read: {error}") from None
     if not all(isinstance(row, dict) and 'name' in row for row in rows):
         raise DataError(f"'{path}' is no table of cases")

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What learned belief is worth, as tables."""
+"""What the calibration is worth, as tables."""
 
 from __future__ import annotations
 
@@ -9,20 +9,17 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
-COUNTED = frozenset({'breadth', 'seconds', 'fia', 'curve_removes'})
+COUNTED = frozenset({'seconds', 'fia'})
 """Measures that are no shares of cases."""
 HEAD = (
-    'statements on',
+    'statements',
     'number',
     'right',
-    'calibration error, by hand',
-    'learned',
-    'sure and wrong, by hand',
-    'learned',
-    'sure, by hand',
-    'learned',
-    'wrong among the surest 70 %, by hand',
-    'learned',
+    'calibration error',
+    'log loss',
+    'sure',
+    'sure and wrong',
+    'wrong among the surest 70 %',
 )
 
 
@@ -36,62 +33,45 @@ def page(result: Mapping[str, Any]) -> str:
         As `study.judged` gives it.
 
     """
-    levels = [(name, row) for name, row in result['levels'].items() if row['after']]
-    groups = [(name, row) for name, row in result['groups'].items() if row['after']]
     return '\n'.join(
         [
             *_bounds(result['learned_from'], result['judged_on']),
             '',
-            markdown.table(HEAD, *(_row(name, row) for name, row in levels)),
-            'Answers as a whole:',
-            '',
-            markdown.table(HEAD, *(_row(name, row) for name, row in groups)),
-            'The cases learned from, each judged by weights that had not seen it:',
-            '',
-            markdown.table(
-                ('statements on', 'belief', 'calibration error', 'sure and wrong', 'sure'),
-                *_unseen(result['learned_from']['unseen']),
-            ),
-            'Beside the goals:',
-            '',
-            markdown.table(
-                ('measure', 'value', '95 % interval', 'cases', 'goal', 'reached'),
-                *(_goal(item) for item in result['goals']),
-            ),
-            *_failures(result['wrong_and_sure']),
+            markdown.table(HEAD, *(_row(*item) for item in result['statements'].items())),
+            *(_beside_goals(result) if result['goals'] else ()),
         ]
     )
 
 
-def _bounds(taught: Mapping[str, Any], tried: Mapping[str, Any]) -> list[str]:
-    """Return what was learned from, and from where an answer is told as sure."""
-    bounds = {name: b for name, b in taught['bounds'].items() if name.startswith('answer ')}
+def _beside_goals(result: Mapping[str, Any]) -> list[str]:
+    """Return the measures beside their goals, and what was sure and wrong."""
     return [
-        f'Learned from {taught["cases"]} cases of seed {_listed(taught["seeds"])}, judged on '
-        f'{tried["cases"]} cases of seed {_listed(tried["seeds"])}, none of which was learned '
-        f'from. From where an answer is told as sure:',
+        'Beside the goals:',
         '',
         markdown.table(
-            ('answers', 'cases', 'sure from', 'sure', 'of these wrong', 'at most', 'surely below'),
-            *(_bound(name.partition(' ')[2], b) for name, b in bounds.items()),
+            ('measure', 'value', '95 % interval', 'cases', 'goal', 'reached'),
+            *(_goal(item) for item in result['goals']),
         ),
-        'Each case was judged by weights that had not seen it. One more such answer is sure and '
-        'wrong with a probability of at most the sixth column; the share is below the last with '
-        '90 % confidence.',
+        *_failures(result['wrong_and_sure']),
     ]
 
 
-def _unseen(levels: Mapping[str, Any]) -> list[tuple[str, ...]]:
+def _bounds(taught: Mapping[str, Any], tried: Mapping[str, Any]) -> list[str]:
+    """Return what was learned from, and from where a statement is told as sure."""
+    by = (
+        f'judged on {tried["cases"]} cases of seed {_listed(tried["seeds"])}, none of which was '
+        'learned from'
+        if tried['cases']
+        else 'each judged by weights that had not seen it'
+    )
     return [
-        (
-            level,
-            name,
-            f'{worth["ece"]:.3f}',
-            _percent(worth['sure_and_wrong']),
-            _percent(worth['sure']),
-        )
-        for level, beliefs in levels.items()
-        for name, worth in beliefs.items()
+        f'{taught["weights"]} weights, learned from {taught["cases"]} cases of seed '
+        f'{_listed(taught["seeds"])}; {by}. From where a statement is told as sure:',
+        '',
+        markdown.table(
+            ('statement', 'number', 'sure from', 'sure', 'of these wrong'),
+            *(_bound(name, bound) for name, bound in taught['bounds'].items()),
+        ),
     ]
 
 
@@ -99,25 +79,23 @@ def _bound(name: str, bound: Mapping[str, Any]) -> tuple[str, ...]:
     never = bound['sure_from'] > 1.0
     return (
         name,
-        str(bound['cases']),
+        f'{bound["cases"]:.0f}',
         'never: too few cases' if never else f'{bound["sure_from"]:.3f}',
         _percent(bound['sure']),
-        str(bound['wrong']),
-        _percent(bound['expected']),
-        _percent(bound['most']),
+        f'{bound["wrong"]:.0f}',
     )
 
 
 def _row(name: str, row: Mapping[str, Any]) -> tuple[str, ...]:
-    before, after = row['before'], row['after']
     return (
         name,
         str(row['statements']),
         _percent(row['right'] / row['statements']),
-        *(f'{told["ece"]["value"]:.3f}' for told in (before, after)),
-        *(_percent(told['sure_and_wrong']['value']) for told in (before, after)),
-        *(_percent(told['sure']['value']) for told in (before, after)),
-        *(_percent(told['wrong_at_70']) for told in (before, after)),
+        f'{row["ece"]["value"]:.3f}',
+        f'{row["log_loss"]:.3f}',
+        _percent(row['sure']['value']),
+        str(row['sure_and_wrong']),
+        _percent(row['wrong_at_70']),
     )
 
 
@@ -142,7 +120,7 @@ def _failures(listed: Sequence[Mapping[str, Any]]) -> list[str]:
         return ['No case was sure and wrong.', '']
     rows = [
         (
-            item['case'],
+            item['name'],
             item['kind'],
             item['robot'],
             item['motion'],

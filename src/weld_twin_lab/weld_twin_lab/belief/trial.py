@@ -12,7 +12,6 @@ from typing import Any
 from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
-from weld_twin_core.diagnosis.trust.signs import Signs
 from weld_twin_core.diagnosis.verdict.evidence import Evidence
 from weld_twin_core.effects.registry import effects_from_list
 from weld_twin_core.recording import Recording
@@ -33,7 +32,7 @@ USUAL, SEVERAL = 'usual', 'several'
 
 def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
     """
-    Return the row of one case: its truth, what was said of it, and the signs it was said on.
+    Return the row of one case: its truth, what was said of it, and on what evidence.
 
     Parameters
     ----------
@@ -91,7 +90,7 @@ def row_of(name: str, case: Case, *, held_out: bool = True) -> dict[str, Any]:
 
 def said(told: Diagnosis) -> dict[str, Any]:
     """
-    Return a verdict and its signs in plain values.
+    Return a verdict and its statements in plain values.
 
     Parameters
     ----------
@@ -99,13 +98,11 @@ def said(told: Diagnosis) -> dict[str, Any]:
 
     """
     whole = told.as_dict()
-    signs = told.signs if isinstance(told.signs, Signs) else Signs({})
     return {
         'verdict': whole['verdict'],
         'model': [(e['effect'], e.get('joint')) for e in (whole['model'] or {}).get('found', ())],
         'unsound': [item['kind'] for item in whole['unsound']],
-        'signs': dict(signs.answer),
-        'cause_signs': [dict(item) for item in signs.causes],
+        'statements': [vars(one) for one in told.statements],
     }
 
 

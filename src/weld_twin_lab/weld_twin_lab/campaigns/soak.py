@@ -71,7 +71,7 @@ def table(result: dict[str, Any]) -> str:
         return sum(
             row.get('missing', 0)
             for name, row in result['health'].items()
-            if name.partition(': ')[0] == node
+            if name.partition(': ')[0].lstrip('/') == node
         )
 
     head = ('node', 'share of a core', 'memory', 'its slope', 'messages missed')

@@ -23,7 +23,7 @@ from .sources import Source
 COUNTS = (15, 30, 60, 120)
 """Stations of a subset: from hardly enough to plenty."""
 HALVED = 60
-"""Stations from which on the two halves of a row are diagnosed as well."""
+"""Stations from which on the two halves of a row are diagnosed as well, where it asks for that."""
 Make = Callable[[Source], tuple[Rows, Rows]]
 """Returns the stations that are fitted, and those that are not."""
 
@@ -60,45 +60,59 @@ class Plan:
     make: Make
     tool_known: bool = False
     points_only: bool = False
+    halved: bool = False
 
 
 def plans() -> tuple[Plan, ...]:
     """Return every row of the study; nothing is read yet."""
-    out = []
-    for arm in ('ur5', 'ur10'):
-        source = partial(sources.tracked, name=f'{arm}_laser_tracker')
-        for seed in (1, 2):
-            out += [
-                Plan(f'{arm} {n} stations, draw {seed}', source, partial(_drawn, n, seed))
-                for n in COUNTS
-            ]
+    out = [plan for arm in ('ur5', 'ur10') for plan in _of_tracked(arm)]
+    for arm in ('panda_1', 'panda_2', 'kuka_14'):
+        source = partial(sources.sockets, arm=arm)
+        out += [Plan(f'{arm} without place {k}', source, partial(_place, k)) for k in range(3)]
+    for name, make in _PARTS.items():
+        halved = name == 'all'
         out += [
-            Plan(f'{arm} {n} stations, tool known', source, partial(_drawn, n, 3), tool_known=True)
-            for n in COUNTS[1:]
+            Plan(f'positioner {name}', sources.positioner, make, halved=halved),
+            Plan(f'iiwa {name}', sources.iiwa, make, halved=halved),
+            Plan(f'motoman {name}', partial(sources.motoman, masses=True), make, halved=halved),
         ]
-        out += [Plan(f'{arm} quarter {k + 1}', source, partial(_quarter, k)) for k in range(4)]
-        out.append(Plan(f'{arm} all but quarter 1', source, _but_quarter))
-        out.append(Plan(f'{arm} octant 0', source, partial(_octant, 0)))
-        out.append(Plan(f'{arm} octant 7', source, partial(_octant, 7)))
-    ur10 = partial(sources.tracked, name='ur10_laser_tracker')
-    out += [
-        Plan(f'ur10 {n} points', ur10, partial(_drawn, n, 4), points_only=True) for n in COUNTS[1:]
-    ]
-    out += [
+    return (
+        *out,
+        Plan('motoman all, no masses', partial(sources.motoman, masses=False), _all),
         Plan('emps first 60 %', sources.servo, partial(_span, 0.0, 0.6)),
         Plan('emps last 60 %', sources.servo, partial(_span, 0.4, 1.0)),
         Plan('emps middle third', sources.servo, partial(_span, 0.33, 0.67)),
+        Plan('ur5 swinging', sources.swinging, _all),
+    )
+
+
+def _of_tracked(arm: str) -> list[Plan]:
+    """Return the rows of one of the two arms under a laser tracker."""
+    source = partial(sources.tracked, name=f'{arm}_laser_tracker')
+    out = [
+        Plan(f'{arm} {n} stations, draw {seed}', source, partial(_drawn, n, seed), halved=True)
+        for seed in (1, 2)
+        for n in COUNTS
     ]
-    for arm, count in (('panda_1', 3), ('panda_2', 3), ('kuka_14', 3)):
-        source = partial(sources.sockets, arm=arm)
-        out += [Plan(f'{arm} without place {k}', source, partial(_place, k)) for k in range(count)]
-    for name, make in _PARTS.items():
-        out.append(Plan(f'positioner {name}', sources.positioner, make))
-        out.append(Plan(f'iiwa {name}', sources.iiwa, make))
-        out.append(Plan(f'motoman {name}', partial(sources.motoman, masses=True), make))
-    out.append(Plan('motoman all, no masses', partial(sources.motoman, masses=False), _all))
-    out.append(Plan('ur5 swinging', sources.swinging, partial(_span, 0.0, 1.0)))
-    return tuple(out)
+    out += [
+        Plan(f'{arm} {n} stations, tool known', source, partial(_drawn, n, 3), tool_known=True)
+        for n in COUNTS[1:]
+    ]
+    out += [
+        Plan(f'{arm} quarter 1', source, partial(_quarter, 0)),
+        Plan(f'{arm} octant 0', source, partial(_octant, 0)),
+    ]
+    if arm == 'ur5':
+        return [
+            *out,
+            Plan('ur5 quarter 4', source, partial(_quarter, 3)),
+            Plan('ur5 octant 7', source, partial(_octant, 7)),
+        ]
+    points = [
+        Plan(f'{arm} {n} points', source, partial(_drawn, n, 4), points_only=True, halved=True)
+        for n in COUNTS[1:]
+    ]
+    return [*out, *points]
 
 
 def row(data: Path, plan: Plan) -> Row:
@@ -187,10 +201,6 @@ def _even(source: Source) -> tuple[Rows, Rows]:
 
 def _quarter(k: int, source: Source) -> tuple[Rows, Rows]:
     return _span(k / 4.0, (k + 1) / 4.0, source)
-
-
-def _but_quarter(source: Source) -> tuple[Rows, Rows]:
-    return _span(0.25, 1.0, source)
 
 
 def _octant(number: int, source: Source) -> tuple[Rows, Rows]:

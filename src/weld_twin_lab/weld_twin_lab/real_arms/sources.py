@@ -28,6 +28,7 @@ from ..real_robots.data import tables
 from ..transfer.servo_axis import axis_recording, axis_robot
 
 HALF_PI = float(np.pi / 2.0)
+"""A right angle [rad]."""
 LEAN = float(np.radians(15.0))
 """Lean of the S axes of the two-armed Motoman to either side [rad]."""
 GRAVITY = 9.80665

@@ -64,7 +64,7 @@ def judged(data: str, name: str) -> dict[str, Any]:
             claim |= {'against_all': _plain(whole), 'against_told': _plain(beside)}
     out['claims'] = claims
     out['unseen_m'] = _unseen(one, found)
-    pair = halves(one.fitted)
+    pair = halves(one.fitted) if plan.halved else None
     if pair is not None:
         both = [_tried(half, one)[0] for half in pair]
         out['halves'] = [_said(half) if half is not None else None for half in both]
@@ -106,7 +106,7 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     claims = [c for e in done for c in e['claims']]
     shown = [(e, k) for e in done for k, b in e.get('kinds', {}).items() if b['out']]
     pairs = [e['halves'] for e in done if e.get('halves') and None not in e['halves']]
-    alike = [_alike(*(_kinds_of(told_claims(half)) for half in pair)) for pair in pairs]
+    alike = [_alike(*(told_claims(half) for half in pair)) for pair in pairs]
     ratios = [
         e['unseen_m']['product'] / min(v for k, v in e['unseen_m'].items() if k != 'product')
         for e in done
@@ -131,7 +131,7 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         'rows with something outside the arm accused': sum(_accused(e) for e in done),
         'pairs of halves': len(pairs),
         'halves with the same kinds': sum(a == 1.0 for a in alike),
-        'share of the kinds that halves have in common': float(np.mean(alike)) if alike else None,
+        'claims of a half that the other shares': float(np.mean(alike)) if alike else None,
         'error over the best plain fit, median': float(np.median(ratios)) if ratios else None,
         'error over the best plain fit, worst': float(max(ratios)) if ratios else None,
         'seconds': sum(e['seconds'] for e in entries),
@@ -187,9 +187,14 @@ def _rest(cause: Mapping[str, Any]) -> str:
     return f'{place[0]} ({100.0 * cause["share"]:.0f} %)'
 
 
-def _alike(one: set[str], two: set[str]) -> float:
-    """Return the share of the kinds of two halves that both have."""
-    return len(one & two) / len(one | two) if one | two else 1.0
+def _alike(one: Sequence[Mapping[str, Any]], two: Sequence[Mapping[str, Any]]) -> float:
+    """Return the share of the claims of two halves that have a kind in common with the other's."""
+    shared = [
+        bool(_kinds_of([claim]) & _kinds_of(others))
+        for own, others in ((one, two), (two, one))
+        for claim in own
+    ]
+    return float(np.mean(shared)) if shared else 1.0
 
 
 def _accused(entry: Mapping[str, Any]) -> bool:

@@ -20,8 +20,13 @@ def followed(path: Path | str) -> Path:
 
 
 def write_text(path: Path | str, text: str, *, overwrite: bool = False) -> None:
+    """Write a text file as `write_bytes` does, in UTF-8."""
+    write_bytes(path, text.encode('utf-8'), overwrite=overwrite)
+
+
+def write_bytes(path: Path | str, content: bytes, *, overwrite: bool = False) -> None:
     """
-    Write a text file beside its place, then move it there; a link is followed.
+    Write a file beside its place, then move it there; a link is followed.
 
     Raises
     ------
@@ -35,8 +40,8 @@ def write_text(path: Path | str, text: str, *, overwrite: bool = False) -> None:
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with _beside(target) as (scratch, file):
-            with open(file, 'w', encoding='utf-8', closefd=False) as stream:
-                stream.write(text)
+            with open(file, 'wb', closefd=False) as stream:
+                stream.write(content)
             os.fchmod(file, 0o644)
             os.replace(scratch, target)
     except OSError as error:

@@ -109,6 +109,21 @@ def test_stamps_that_jump_forwards_and_that_begin_anew_are_told(bench):
     assert bench.health.values[f'/{TWIN}: /joint_states']['lost'] == '0'
 
 
+def test_a_load_that_was_refused_is_no_value_that_counts(bench):
+    wrench = bench.cell.publisher(TOOL_WRENCH)
+    message = TOOL_WRENCH.message_class()()
+    message.header.frame_id = 'tool'
+    message.wrench.force.x = float('inf')
+    for k in range(1, 4):
+        message.header.stamp.sec = k
+        wrench.publish(message)
+    values = bench.health.values
+    refused = lambda: values.get(f'/{TWIN}: /tool_wrench', {}).get('refused') == '3'  # noqa: E731
+    bench.cell.wait(refused, 'the refusals')
+    bench.run(4.0)
+    assert not any('that counts' in text for _, text in bench.health.told[f'/{TWIN}'])
+
+
 def test_a_load_that_nobody_tells_any_more_is_told_with_its_age(bench):
     wrench = bench.cell.publisher(TOOL_WRENCH)
     message = TOOL_WRENCH.message_class()()

@@ -36,6 +36,7 @@ WAYS = {
     ],
     'recorder': [{'topics': list(BY_NAME)}, {'managed': True}],
     'live_diagnosis': [{}, {'managed': True}],
+    'compensator': [{'managed': True}],
 }
 """Parameters that between them bring out everything a node can do."""
 

@@ -292,6 +292,7 @@ class CellNode(Node):
                 at = message.header.stamp
                 state.stamped(at.sec * 1_000_000_000 + at.nanosec)
             callback(message)
+            state.used = state.last
 
         def guarded(kind: str, data: bytes) -> None:
             state.arrived()
@@ -512,13 +513,14 @@ class CellNode(Node):
         now = time.monotonic()
         for state in self._held:
             key, silent = f'held from {state.topic}', state.silent(now)
-            if not silent:
+            if not (silent and state.used):  # what was refused counts for nothing
                 self.health.lasting.pop(key, None)
                 continue
             if key not in self.health.lasting:
                 self.get_logger().warning(f'{state.topic}: silent; its last value still counts')
             self.health.lasting[key] = (
-                f'{state.topic}: the value that counts is {silent:.1f} s old, nothing came since'
+                f'{state.topic}: the value that counts is {now - state.used:.1f} s old, nothing usable '
+                'came since'
             )
 
     def _tell_last_losses(self) -> None:

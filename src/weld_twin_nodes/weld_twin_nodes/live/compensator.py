@@ -375,7 +375,9 @@ class Compensator(ManagedNode):
             return
         now = time.monotonic()
         start = self._arm.start(now, self.setting('max_age'))
-        given = stream.take(transform(rotation, position), now, start.q, self._withdrawn())
+        # Of poses that come in a burst, the stamps tell how far they are apart; where they are set.
+        at = stamp * 1e-9 or now
+        given = stream.take(transform(rotation, position), at, start.q, self._withdrawn())
         if given.pose is not None:
             self._out.publish(encode(stamp, given.pose[:3, 3], given.pose[:3, :3]))
         if given.added is not None:

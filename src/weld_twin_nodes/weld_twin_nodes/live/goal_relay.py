@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
 
 from .cell_node import CellNode
@@ -90,7 +91,9 @@ class GoalRelay:
         self._node, self._kind, self._decide, self._since = node, kind, decide, since
         own = controller.rstrip('/')
         self.below = own if own.endswith(ACTION) else f'{own}/{ACTION}'
-        self._client = ActionClient(node, kind, self.below)
+        # What waits for an answer must not keep the executor from taking it.
+        group = ReentrantCallbackGroup()
+        self._client = ActionClient(node, kind, self.below, callback_group=group)
         self._pending: dict[int, _Running] = {}
         self._running: list[_Running] = []
         self._turns: deque[Future] = deque()
@@ -101,6 +104,7 @@ class GoalRelay:
             self._execute,
             goal_callback=self._take,
             cancel_callback=self._cancel,
+            callback_group=group,
         )
         node.every(LOOK, self._look)
 

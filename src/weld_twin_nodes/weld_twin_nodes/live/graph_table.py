@@ -45,12 +45,16 @@ _MANAGED_SAY = ('~/transition_event',)
 
 
 class Spoken(NamedTuple):
-    """Topics and services of a node, sorted, each name once."""
+    """Topics, services and actions of a node, sorted, each name once."""
 
     publishes: tuple[str, ...]
     hears: tuple[str, ...]
     answers: tuple[str, ...]
     asks: tuple[str, ...] = ()
+    does: tuple[str, ...] = ()
+    """Actions that it offers."""
+    sends: tuple[str, ...] = ()
+    """Actions of others that it sends goals to."""
 
 
 def _names(rows: Iterable[Topic | str]) -> set[str]:
@@ -62,12 +66,14 @@ def _node(
     hears: Iterable[Topic | str],
     answers: Iterable[str] = (),
     asks: Iterable[str] = (),
+    actions: tuple[Iterable[str], Iterable[str]] = ((), ()),
 ) -> Spoken:
     return Spoken(
         tuple(sorted({*_EVERYBODY_SAYS, *_names(says)})),
         tuple(sorted({*_EVERYBODY_HEARS, *_names(hears)})),
         tuple(sorted({*_EVERYBODY_ANSWERS, *answers})),
         tuple(sorted(asks)),
+        *(tuple(sorted(each)) for each in actions),
     )
 
 
@@ -97,6 +103,10 @@ SPOKEN = {
         (t.POSE_OUT, t.CORRECTION, t.AUDIT, *_MANAGED_SAY),
         (*_MODEL, t.DEVIATION, t.POSE_IN),
         ('~/reload', *_MANAGED_ANSWER),
+        actions=(
+            ('~/follow_joint_trajectory',),
+            ('joint_trajectory_controller/follow_joint_trajectory',),
+        ),
     ),
     'recorder': _node(
         _MANAGED_SAY,

@@ -48,7 +48,8 @@ class Input:
         self.matched = 0
         """Publishers that the subscription itself has met; the graph may know of more."""
         self.last_reason = ''
-        self.last = 0.0
+        self.last = self.used = 0.0
+        """When the last message came, and the last one that was not refused; 0 for none."""
         self.first: int | None = None
         """Stamp of the first message, where they have stamps [ns]."""
         self.lost = 0

@@ -26,7 +26,10 @@ PARTS = (
     ('topics', 'subscribe', 'topic'),
     ('services', 'reply', 'service'),
     ('services', 'request', 'service'),
+    ('actions', 'execute', 'action'),
+    ('actions', 'call', 'action'),
 )
+"""What a node may do, in the order of the fields of `Spoken`."""
 
 
 def policy(

@@ -99,6 +99,9 @@ def spin(node: CellNode, stop: Stop) -> None:
             if stop.wished and not ending:
                 ending = True
                 node.end()
+            elif isinstance(runner, SingleThreadedExecutor):
+                # Its wait for a future begins anew every time, and always with the work under way.
+                runner.spin_once(timeout_sec=LOOP)
             else:
                 runner.spin_until_future_complete(Future(), timeout_sec=LOOP)
     finally:

@@ -24,10 +24,10 @@ SILENT = 0.5
 """Silence [s] after which a stream begins anew: a hundred periods of a slow one."""
 NEAR = (0.01, 0.05)
 """A stream begins where the arm stands, within this [m, rad]; farther off its first pose is a jump."""
-LOOK = 0.5
+LOOK = 0.7
 """Distance, in units of how far an exact look may be, at which the next one is begun."""
-FAR = 3.0
-"""The same from which the pose waits for it: the error is nine times that at one."""
+FAR = 2.0
+"""The same from which the pose waits for it: the error is eight times that at one."""
 DOUBT_EVERY = 0.02
 """Way [m] after which it is asked anew how sure the model is; that changes slowly."""
 SHORT = 1e-6
@@ -133,7 +133,6 @@ class PoseStream:
         self._sizes = self._doubts = 0.0
         self._doubted: Array | None = None
         self._speeds: tuple[float, Array, Array | None] | None = None
-        self._looked_at = -np.inf
 
     @property
     def corrected(self) -> bool:
@@ -149,13 +148,14 @@ class PoseStream:
         pose : array, shape (4, 4)
             Of the tool in the robot's base, as the controller counts it.
         now : float [s]
+            Its stamp.
         arm : array, shape (n,), optional
             Joints where the arm stands.
         withdrawn : str
             Why nothing is to be corrected from the next standstill on; empty where there is nothing.
 
         """
-        if now - self._last > SILENT:
+        if not 0.0 <= now - self._last <= SILENT:
             self.forget()
         self._last = now
         rest = self._rested(pose, now)
@@ -205,7 +205,7 @@ class PoseStream:
             self._refused = ''
             self.correction.adopt(None)
         if self.correction.looked is None:
-            self._tried = now
+            self._tried, self._speeds = now, None
             if arm is None:
                 return None, 'where the arm stands is not known: no joint states are heard'
             self._adopt(self._found(partial(self.correction.first, pose, arm)), now)

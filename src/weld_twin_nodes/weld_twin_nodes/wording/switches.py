@@ -42,16 +42,12 @@ def cause_name(diagnosis: Diagnosis, cause: Cause) -> str:
 
 
 def _together(sites: Sequence[Site]) -> str:
-    """Return small errors of one place, which are there together and are no alternatives."""
-    joints = {site.joint for site in sites}
-    if len(joints) > 1:
-        return listed([site_name(site) for site in sites[:_NAMED]])
-    kinds = [called(site.effect, None) for site in sites]
-    if all(kind.startswith('link ') and kind.endswith(' error') for kind in kinds):
-        own = [kind.removeprefix('link ').removesuffix(' error') for kind in kinds]
-        return f'errors of link {listed(own)} of {joints.pop()}'
-    more = [f'{len(kinds) - _NAMED} more'] if len(kinds) > _NAMED else []
-    return f'{listed([*kinds[:_NAMED], *more])} of {joints.pop() or "the robot"}'
+    """Return a kind of small errors with the joints that need it, and what would do as well."""
+    kind = sites[0].effect
+    own = [str(site.joint) for site in sites if site.effect == kind and site.joint]
+    more = [f'{len(own) - _NAMED} more'] if len(own) > _NAMED else []
+    told = called(kind, listed([*own[:_NAMED], *more]) if own else None)
+    return listed([told, *(site_name(site) for site in sites if site.effect != kind)], 'or')
 
 
 def alternatives(diagnosis: Diagnosis, cause: Cause) -> tuple[Site, ...]:

@@ -186,18 +186,6 @@ def cause_words(cause: Cause) -> str:
     return f'{where}, depending on {listed([DEPENDENCES.get(o, o) for o in on])}'
 
 
-def again_words(cause: Cause, *, many: bool = False) -> str | None:
-    """Return how often a cause comes back on parts of the data; None where it always does."""
-    told = cause.came_back
-    if told is None or told.times == told.of:
-        return None
-    if many:
-        return f'Of {told.of} parts of the data left out in turn, {told.times} need it.'
-    others = [site_name(site) for site, _ in told.instead[:_NAMED]]
-    instead = f'; in others, {listed(others, "or")} took its place' if others else ''
-    return f'Looked for again in halves of the data, it is found in {told.times} of {told.of}{instead}.'
-
-
 def someplace(cause: Cause) -> str:
     """Return a cause without a name as a heading: where it sits and what it depends on."""
     where = likely(cause.place) or 'a place not found'

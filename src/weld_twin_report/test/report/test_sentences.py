@@ -11,7 +11,7 @@ import diagnoses
 import pytest
 from rich.console import Console
 
-from weld_twin_core.diagnosis.result import CameBack, Candidate, Found, Site
+from weld_twin_core.diagnosis.result import Candidate, Found, Site
 from weld_twin_core.effects import REGISTRY, effect_from_mapping
 from weld_twin_nodes.wording.quantities import (
     millimetres,
@@ -21,8 +21,8 @@ from weld_twin_nodes.wording.quantities import (
     uncertain,
 )
 from weld_twin_nodes.wording.verdict import verdict
-from weld_twin_nodes.wording.words import CAUSES, again_words, cause, in_words, listed
-from weld_twin_report.report import print_summary, report_page
+from weld_twin_nodes.wording.words import CAUSES, cause, in_words, listed
+from weld_twin_report.report import print_summary
 from weld_twin_report.report.footing import next_section
 from weld_twin_report.report.to_do import worth_doing
 
@@ -246,22 +246,3 @@ def test_no_probability_is_told_as_certain():
     assert plain(odds(1.0)) == '> 99 %'
     assert plain(odds(0.0)) == '< 1 %'
     assert plain(odds(0.6)) == '60 %'
-
-
-def test_a_card_says_how_often_a_cause_comes_back_where_it_is_not_always():
-    told = diagnoses.backlash()
-    first = told.causes[0]
-
-    def of(times):
-        seldom = replace(
-            first, came_back=CameBack(times, 32, ((Site('drift', None), 32 - times),))
-        )
-        return seldom, report_page(replace(told, causes=(seldom, *told.causes[1:])))
-
-    seldom, page = of(25)
-    assert f'found in 25 of 32; in others, {CAUSES["drift"]} took its place.' in page
-    assert (
-        again_words(seldom, many=True) == 'Of 32 parts of the data left out in turn, 25 need it.'
-    )
-    assert 'in halves of the data' not in of(32)[1]
-    assert again_words(first) is None

@@ -22,6 +22,7 @@ from weld_twin_nodes.offline.output_directory import new_directory
 from weld_twin_nodes.offline.seam_motion import plan_motion
 
 from .analysis import analyse
+from .closed_loop import close_loop
 from .demo_diagnosis import find_causes, leave_open
 from .deviation_table import MARK, write_table
 from .hand_over import Job, Step
@@ -41,6 +42,12 @@ EFFECTS = [
     {'effect': 'measurement_noise', 'sigma': 2e-5},
 ]
 """What is wrong with the robot; one seam tells these from everything else."""
+STILL_EFFECTS = [
+    {'effect': 'link_twist', 'joint': 'elbow_joint', 'dalpha': 6e-4},
+    *EFFECTS[1:],
+]
+"""The same without play, which poses cannot tell when to correct: they are all that a compensator takes
+where no controller's action is installed."""
 
 
 def plan_seam(job: Job, _: object) -> None:
@@ -58,16 +65,23 @@ STEPS = (
     Step('do the same where one seam cannot tell', leave_open),
     Step('write the table', write_table),
 )
+CLOSED_LOOP = (
+    *STEPS[:-1],
+    Step('weld it again with the loop closed', close_loop),
+    STEPS[-1],
+)
+"""The same with the seam corrected by what was found."""
 
 
-def run_demo(out: Path | str, steps: tuple[Step, ...] = STEPS, *, force: bool = False) -> None:
+def run_demo(out: Path | str, *, closed_loop: bool = False, force: bool = False) -> None:
     """
     Run the steps into a directory that appears when all are done.
 
     Parameters
     ----------
     out : Path or str
-    steps : tuple of Step
+    closed_loop : bool
+        Weld the seam again through the compensator, on an arm without play.
     force : bool
         As `new_directory` takes it.
 
@@ -79,8 +93,9 @@ def run_demo(out: Path | str, steps: tuple[Step, ...] = STEPS, *, force: bool = 
     """
     console = Console()
     robot = catalog.load(ROBOT)
+    steps, effects = (CLOSED_LOOP, STILL_EFFECTS) if closed_loop else (STEPS, EFFECTS)
     with new_directory(out, mark=MARK, force=force) as folder:
-        job = Job(folder, robot, effects_from_list(EFFECTS, robot), SEAM, RATE, SEED)
+        job = Job(folder, robot, effects_from_list(effects, robot), SEAM, RATE, SEED)
         columns = TextColumn('{task.description:<40}'), BarColumn(), TimeElapsedColumn()
         with Progress(*columns, console=console) as bars:
             for step in steps:

@@ -38,6 +38,8 @@ def belief_of(diagnosis: Diagnosis, cause: Cause) -> float | None:
     named = {site: p for site, p in cause.name if site.effect not in CURVES}
     if not named:
         return sum(p for _, p in leading(cause.place)) if cause.place else None
+    if diagnosis.families:
+        return cause.probability
     alike = alternatives(diagnosis, cause)
     own = sum(named.get(site, 0.0) for site in alike) if alike else max(named.values())
     whole = diagnosis.confidence if diagnosis.status in NAMING else 0.0

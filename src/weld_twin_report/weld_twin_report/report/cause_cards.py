@@ -26,7 +26,7 @@ from weld_twin_nodes.wording.switches import (
     switches,
     trusted,
 )
-from weld_twin_nodes.wording.words import again_words, same_words, unnamed
+from weld_twin_nodes.wording.words import same_words, unnamed
 
 from .acceptance import mark
 from .belief import sure_entry
@@ -140,7 +140,6 @@ def _card(diagnosis: Diagnosis, k: int, rank: int, brand: str | None, rule: Rule
     name = cause_name(diagnosis, cause)
     entries = [
         ('How sure', sure_entry(diagnosis, cause)),
-        ('Comes back', again_words(cause, many=bool(diagnosis.families))),
         ('By how much', _off_by(diagnosis, cause)),
         ('Stands on', _commanded(diagnosis, cause)),
         (_EFFECT[at_rest(diagnosis)], _effect(diagnosis, k)),

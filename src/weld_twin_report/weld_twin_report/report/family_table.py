@@ -11,12 +11,12 @@ import numpy as np
 from weld_twin_core.diagnosis.result import Diagnosis, Family
 from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 from weld_twin_nodes.wording.quantities import millimetres, turned
-from weld_twin_nodes.wording.words import cause
+from weld_twin_nodes.wording.words import cause, site_name
 
 from .html import Html, joined, table, tag
 
 _LARGEST = 3
-"""Members of a kind told; the others are counted."""
+"""Joints of a kind told, those first that need it most."""
 _LINES = 3
 """Orders of ripple told for each joint."""
 
@@ -31,16 +31,15 @@ class Ripple(NamedTuple):
 
 
 def family_rows(families: tuple[Family, ...]) -> list[list[str]]:
-    """Return kind, number of members, what it accounts for, its largest members."""
+    """Return kind, what it accounts for, how much worse it is without, joints, what is like it."""
     rows = []
     for family in families:
-        largest = [
-            f'{site.joint or "robot"} {millimetres(size)}'
-            for site, size in family.members[:_LARGEST]
-        ]
+        joints = [site.joint for site, _ in family.needed if site.joint] if family.named else []
+        like = [site_name(site) for site, _ in family.like] if family.named else []
         name = cause(family.effect, None) + ('' if family.named else ' (exchangeable)')
-        size = millimetres(family.rms_m)
-        rows.append([name, str(len(family.members)), size, ', '.join(largest)])
+        without = f'{100.0 * family.growth:+.0f} %'
+        told = [millimetres(family.rms_m), without, ', '.join(joints[:_LARGEST]), ', '.join(like)]
+        rows.append([name, *told])
     return rows
 
 
@@ -72,7 +71,7 @@ def ripple_rows(diagnosis: Diagnosis) -> list[list[str]]:
     ]
 
 
-FAMILY_HEADS = ('Kind', 'Members', 'Accounts for', 'Largest members')
+FAMILY_HEADS = ('Kind', 'Accounts for', 'Error without it', 'Needed at', 'Would do as well')
 RIPPLE_HEADS = ('Joint', 'Ripple, RMS', 'Strongest orders per turn')
 
 
@@ -85,10 +84,10 @@ def families_table(diagnosis: Diagnosis) -> Html:
             table(FAMILY_HEADS, family_rows(diagnosis.families), 'effects'),
             tag(
                 'p',
-                'What a kind accounts for is how much the error on unseen data grows without it, '
-                'as RMS at the tool, while the others stay as they are. Exchangeable: the data hardly '
-                'get worse without it, for the other kinds take its place. Every member and order is '
-                'in effects.yaml.',
+                'A kind is named where data that were not fitted get worse without it by a tenth or '
+                'more in the median part left out, and better in none; all other kinds that are '
+                'needed and the frames are fitted anew each time. Exchangeable: the other kinds take '
+                'its place. Every member and order is in effects.yaml.',
                 class_='note',
             ),
             tag('h3', 'Transmission ripple by joint') if rows else None,

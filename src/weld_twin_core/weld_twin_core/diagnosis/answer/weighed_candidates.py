@@ -13,7 +13,7 @@ from ..levels.free_form import FreeForm
 from ..result import Candidate, Shrink, Unexplained
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
-from ..verdict.weighing import Weighed
+from ..verdict.left import Left
 
 
 def weighed_candidates(found: Search, evidence: Evidence) -> tuple[Candidate, ...]:
@@ -57,7 +57,7 @@ def unexplained(
         What tells the places of an unknown gap, so that this says what the causes say.
 
     """
-    case = Weighed(evidence, beliefs)
+    case = Left(evidence, beliefs)
     names = evidence.structure.depends_on if case.structured else ()
     if verdict.status == 'unknown' and placing is not None and placing.parts:
         names = tuple(dict.fromkeys(part.words for part in placing.parts))

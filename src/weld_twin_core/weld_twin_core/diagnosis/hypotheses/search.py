@@ -70,6 +70,8 @@ class Search:
         What would explain the rest best, but no machine has.
     ruled_out : frozenset of Site
         What is alike on the recordings fitted, and fails on held-out ones.
+    many : Search or None
+        All kinds fitted together, where that predicts about as well as the few do.
 
     """
 
@@ -86,6 +88,7 @@ class Search:
     dense: bool = False
     refused: tuple[Effect, ...] = ()
     ruled_out: frozenset[Site] = frozenset()
+    many: Search | None = None
 
     @property
     def library(self) -> Library:

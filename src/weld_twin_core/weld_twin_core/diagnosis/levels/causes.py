@@ -18,11 +18,10 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...effects.registry import REGISTRY
 from ..beliefs import Beliefs
-from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
-from ..result import NAMING, Cause, Shares, Site
+from ..posterior.table import Row
+from ..result import Cause, Shares, Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
@@ -30,11 +29,6 @@ from .free_form import FreeForm, Part
 
 LISTED = 0.02
 """A place, dependence or name less probable than this is not listed."""
-ALONE = 0.5
-"""Belief at most in a lone name beside what has none: two cells of a delay and of a clock that gains,
-both taken out of the library, were told as lags and as a delay. A judgement."""
-LIKELY = 0.1
-"""Weight from which a place or dependence of the free form counts as found."""
 STUDENT = 1.86
 """Student's t for 90 % and the 8 stretches that take turns."""
 
@@ -59,11 +53,14 @@ class _Claim:
     """Share of the squared gap that groups at this place take off unseen folds; None of a name."""
     slot: int | None = None
     group: int | None = None
+    kind: float | None = None
+    """Share of the squared gap that a kind takes off unseen data; None of one effect by itself."""
 
 
 def causes(
     found: Search,
     unseen: Unseen,
+    table: Sequence[Row],
     verdict: Verdict,
     rival: Curved | None,
     floor: float,
@@ -78,6 +75,8 @@ def causes(
     found : Search
     unseen : Unseen
         Of its final model.
+    table : sequence of Row
+        The table of answers.
     verdict : Verdict
     rival : Curved or None
         The free-form explanation; it is the model itself where ``unseen`` is its own.
@@ -88,7 +87,7 @@ def causes(
         What tells the places of an unknown gap; the curves carried, where left out.
 
     """
-    told = _told_claims(found, verdict, rival, beliefs)
+    told = _told_claims(found, table, verdict)
     curved = rival if rival is not None and rival.unseen is unseen else None
     claims, rest = _nameless(found, told, verdict, curved, placing, beliefs)
     squares = (
@@ -100,10 +99,9 @@ def causes(
     whole = _shares(squares, parts, claims, np.ones(labels.size, dtype=bool))
     spread = _spread(squares, parts, claims, labels)
     whole, spread = _as_placed(whole, spread, claims, placing)
+    whole = np.array([s if c.kind is None else c.kind for c, s in zip(claims, whole, strict=True)])
     noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
     left = max(1.0 - float(whole.sum()) - noise, 0.0)
-    if verdict.status == 'unknown':
-        claims = [_beside(c, float(s), left, told) for c, s in zip(claims, whole, strict=True)]
     out = [
         _cause(claim, float(share), float(error))
         for claim, share, error in zip(claims, whole, spread, strict=True)
@@ -115,21 +113,6 @@ def causes(
         error = float(np.sqrt((spread**2).sum()))
         out.append(replace(_cause(rest, left, error), rest=True))
     return tuple(out), Shares(unexplained=left, noise=max(noise, 0.0))
-
-
-def _beside(claim: _Claim, share: float, left: float, told: Sequence[_Claim]) -> _Claim:
-    """
-    Return a claim with its name believed as far as it outweighs what is left beside it.
-
-    What is left may be what its formula misses. A lone name beside a rest is as likely as not an
-    imitation of one cause that the library lacks.
-    """
-    if claim.slot is None:
-        return claim
-    factor = share / max(share + left, 1e-300)
-    if len(told) == 1:
-        factor = min(factor, ALONE / max(sum(claim.name.values()), ALONE))
-    return replace(claim, name={site: factor * p for site, p in claim.name.items()})
 
 
 def _cause(claim: _Claim, share: float, error: float) -> Cause:
@@ -180,29 +163,25 @@ def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
     return tuple((name, belief) for name, belief in ordered if belief >= LISTED)
 
 
-def _told_claims(
-    found: Search, verdict: Verdict, rival: Curved | None, beliefs: Beliefs
-) -> list[_Claim]:
+def _told_claims(found: Search, table: Sequence[Row], verdict: Verdict) -> list[_Claim]:
     """Return a claim for every effect that is told, or for every group of many small ones."""
     model = found.final.model.found
     if found.dense:
-        named = {site for group in verdict.sets for site in group}
-        return _claims_of_many(model, named, verdict.confidence)
-    each = verdict.confidence ** (1.0 / max(len(verdict.sets), 1))
-    belief = each if verdict.status in NAMING else beliefs.calibration
+        return _claims_of_many(model, verdict)
     out: list[_Claim] = []
     for at, group in enumerate(verdict.sets):
-        k = next(i for i, slot in enumerate(found.slots) if slot[0].site in group)
+        k = next(i for i, row in enumerate(table) if row.leader.site in group)
         taken = {member for claim in out for member in claim.members}
-        member = _member(model, group, found.slots[k], taken)
+        member = _member(model, group, table[k], taken)
         if member is not None:
-            claim = _named_claim(member, k, found.slots[k], belief, rival, beliefs)
-            out.append(replace(claim, group=at))
+            names = {site: p for site, p in table[k].names().items() if site in group}
+            levels = table[k].places(), table[k].dependences()
+            out.append(_Claim((member,), *levels, names, slot=k, group=at))
     return out
 
 
 def _member(
-    model: Sequence[Effect], group: Sequence[Site], slot: tuple[Rival, ...], taken: set[int]
+    model: Sequence[Effect], group: Sequence[Site], row: Row, taken: set[int]
 ) -> int | None:
     """
     Return which effect of the model stands for a set.
@@ -210,7 +189,7 @@ def _member(
     A member that was taken out of the library may lead its set; the model holds another.
     """
     sites = [Site(effect.name, effect.site) for effect in model]
-    for among in (group, [rival.site for rival in slot]):
+    for among in (group, [rival.site for rival in row.slot]):
         for at, site in enumerate(sites):
             if site in among and at not in taken:
                 return at
@@ -239,17 +218,16 @@ def _nameless(
     held = _carried_by(places, curved) if places else {}
     claims, left = list(told), list[Part]()
     taken = {at for claim in told for at in claim.members}
-    free = beliefs.level_free
     for k, effect in enumerate(model if curved is not None else ()):
         if k not in taken and not effect.bends:
-            levels = {effect.at: free}, {effect.on: free}
-            claims.append(_Claim((k,), *levels, {Site(effect.name, effect.site): free}))
+            levels = {effect.at: 1.0}, {effect.on: 1.0}
+            claims.append(_Claim((k,), *levels, {Site(effect.name, effect.site): 1.0}))
     for place, own in places.items():
         if not held[place]:
             left += own
             continue
-        curves = {Site(model[k].name, model[k].site): free for k in held[place]}
-        levels = (_place_of(place, own, beliefs), _dependence_of(own, beliefs))
+        curves = {Site(model[k].name, model[k].site): 1.0 for k in held[place]}
+        levels = (_place_of(place, own, beliefs), _dependence_of(own))
         share = float(sum(part.share for part in own))
         claims.append(_Claim(held[place], *levels, curves, share))
     return claims, _rest(left, beliefs)
@@ -265,48 +243,7 @@ def _rest(left: list[Part], beliefs: Beliefs) -> _Claim:
     places = _merged(places)
     first = max(places, key=lambda at: sum(part.share for part in places[at]))
     own = places[first]
-    return _Claim((), _place_of(first, own, beliefs), _dependence_of(own, beliefs), {})
-
-
-def _named_claim(
-    member: int,
-    k: int,
-    slot: tuple[Rival, ...],
-    belief: float,
-    rival: Curved | None,
-    beliefs: Beliefs,
-) -> _Claim:
-    """Return what is believed of an effect found one by one, from its rivals."""
-    place: dict[str, float] = {}
-    dependence: dict[str, float] = {}
-    name: dict[Site, float] = {}
-    for other in slot:
-        effect = _effect_of(other)
-        at = effect.at if effect is not None else str(other.site.joint)
-        on = effect.on if effect is not None else REGISTRY[other.site.effect].depends_on
-        place[at] = place.get(at, 0.0) + other.probability
-        dependence[on] = dependence.get(on, 0.0) + other.probability
-        name[other.site] = other.probability * belief
-    seen = rival.form.parts if rival is not None else ()
-    return _Claim(
-        (member,),
-        {at: p * _agreement(seen, 'at', at, beliefs) for at, p in place.items()},
-        {on: p * _agreement(seen, 'on', on, beliefs) for on, p in dependence.items()},
-        name,
-        slot=k,
-    )
-
-
-def _agreement(parts: Sequence[Part], kind: str, value: str, beliefs: Beliefs) -> float:
-    same = any(part.weight_of(kind).get(value, 0.0) > LIKELY for part in parts)
-    return beliefs.level_agreed if same else beliefs.level_alone
-
-
-def _effect_of(rival: Rival) -> Effect | None:
-    for effect in rival.fit.model.found:
-        if (effect.name, effect.site) == (rival.site.effect, rival.site.joint):
-            return effect
-    return None
+    return _Claim((), _place_of(first, own, beliefs), _dependence_of(own), {})
 
 
 def _carried_by(places: dict[str, list[Part]], rival: Curved | None) -> dict[str, Members]:
@@ -327,21 +264,21 @@ def _carried_by(places: dict[str, list[Part]], rival: Curved | None) -> dict[str
 
 def _place_of(place: str, parts: list[Part], beliefs: Beliefs) -> dict[str, float]:
     """Return what is believed of the place of some parts, by the one that does most."""
-    free, shared = beliefs.level_free, beliefs.level_shared
+    shared = beliefs.level_shared
     weights = max(parts, key=lambda part: part.share).weight_of('at')
     if place in weights:
-        return {at: w * free for at, w in weights.items()}
-    return {place: shared, **{at: w * (free - shared) for at, w in weights.items()}}
+        return weights
+    return {place: shared, **{at: w * (1.0 - shared) for at, w in weights.items()}}
 
 
-def _dependence_of(parts: list[Part], beliefs: Beliefs) -> dict[str, float]:
+def _dependence_of(parts: list[Part]) -> dict[str, float]:
     """Return what is believed of the dependence of some parts, each counted by its share."""
     whole = sum(part.share for part in parts)
     out: dict[str, float] = {}
     for part in parts:
         size = part.share / whole if whole > 0.0 else 1.0 / len(parts)
         for on, weight in part.weight_of('on').items():
-            out[on] = out.get(on, 0.0) + size * weight * beliefs.level_free
+            out[on] = out.get(on, 0.0) + size * weight
     return out
 
 
@@ -363,23 +300,28 @@ def _merged(places: dict[str, list[Part]]) -> dict[str, list[Part]]:
     return out
 
 
-def _claims_of_many(
-    model: tuple[Effect, ...], named: set[Site], confidence: float
-) -> list[_Claim]:
-    """Return a claim for every place and dependence of many small errors together."""
-    groups: dict[tuple[str, str], list[int]] = {}
-    for k, effect in enumerate(model):
-        if Site(effect.name, effect.site) in named:
-            groups.setdefault((effect.at, effect.on), []).append(k)
-    return [
-        _Claim(
-            tuple(members),
-            {at: confidence},
-            {on: confidence},
-            {Site(model[k].name, model[k].site): confidence for k in members},
-        )
-        for (at, on), members in groups.items()
-    ]
+def _claims_of_many(model: tuple[Effect, ...], verdict: Verdict) -> list[_Claim]:
+    """Return a claim for every kind that unseen data need, with its joints and with what is like it."""
+    out = []
+    for family in verdict.families:
+        if not (family.named and family.needed):
+            continue
+        whole = 1.0 + sum(part for _, part in family.like)
+        told = [(site, share / whole) for site, share in family.needed]
+        told += [(site, part / whole) for site, part in family.like]
+        place: dict[str, float] = {}
+        dependence: dict[str, float] = {}
+        name: dict[Site, float] = {}
+        for site, part in told:
+            own = next(e for e in model if (e.name, e.site) == (site.effect, site.joint))
+            place[own.at] = place.get(own.at, 0.0) + part
+            dependence[own.on] = dependence.get(own.on, 0.0) + part
+            name[site] = part
+        members = tuple(k for k, effect in enumerate(model) if effect.name == family.effect)
+        group = next(k for k, each in enumerate(verdict.sets) if each[0] == family.needed[0][0])
+        claim = _Claim(members, place, dependence, name, group=group, kind=family.share)
+        out.append(claim)
+    return out
 
 
 def _contributions(unseen: Unseen) -> Array:

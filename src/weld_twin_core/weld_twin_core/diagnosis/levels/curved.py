@@ -70,12 +70,9 @@ def curved(found: Search, beliefs: Beliefs) -> Curved | None:
 
 def standing(
     found: Search, verdict: Verdict, alone: Curved | None, beliefs: Beliefs
-) -> tuple[Verdict, Curved | None]:
+) -> Curved | None:
     """
-    Return an 'unknown' verdict with the names that stand, and curves for what is left beside them.
-
-    Names stand beside what has no name, unless curves alone predict unseen stretches clearly
-    better than names and curves together: then the names imitate.
+    Return curves for what an 'unknown' verdict leaves beside the names that it tells.
 
     Parameters
     ----------
@@ -88,7 +85,7 @@ def standing(
 
     """
     if verdict.status != 'unknown' or found.dense:
-        return verdict, alone
+        return alone
     told = {site for group in verdict.sets for site in group}
     named = [
         effect
@@ -97,28 +94,16 @@ def standing(
     ]
     if not named:
         wandering = None if alone else _beside(found, _setup(found), beliefs, wandering=True)
-        return verdict, alone or wandering
+        return alone or wandering
     kept = [*_setup(found), *named]
     beside = _beside(found, kept, beliefs)
-    if alone is not None and _beaten(found, beside, alone, beliefs):
-        return replace(verdict, sets=()), alone
     if beside is None and found.final.model.found != tuple(kept):
         beside = _beside(found, kept, beliefs, wandering=True)
-    return verdict, beside
+    return beside
 
 
 def _setup(found: Search) -> list[Effect]:
     return [effect for effect in found.final.model.found if not effect.cause]
-
-
-def _beaten(found: Search, beside: Curved | None, alone: Curved, beliefs: Beliefs) -> bool:
-    """Return whether curves alone predict clearly better than names, with curves or without."""
-    if beside is None:
-        named = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    else:
-        named = beside.unseen
-    gain, steady = gain_of(named, alone.unseen)
-    return gain >= beliefs.beaten_share and steady >= beliefs.beaten_steady
 
 
 def _beside(

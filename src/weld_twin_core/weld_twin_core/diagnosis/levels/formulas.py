@@ -3,186 +3,49 @@
 """
 Do the formulas of the names hold? Free forms instead of them and at their places, and noise.
 
-At their places a joint may lose motion by any law; what the instrument and the frames do is a free
-smooth field over the workspace. They are added to everything that is named, so that they need to
-find no more than what the name misses.
+At their places lost motion of a joint is free in the gaps it trails in, and in angle, speed and
+load by the way it goes; what the instrument and the frames do is a free smooth field over the
+workspace. They are added to everything that is named, so that they need to find no more than what
+the name misses.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays import Array
+from ...effects.associative_scan import play
+from ...effects.curve import QUANTITIES, basis
 from ...twin.features import Features
+from ...twin.resampling import Picker
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..result import NAMING, Site
 from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Taken, Unseen
 from ..verdict.decision import Verdict
-from .curved import Curved, gain_of
-from .groups import smooth_field, spanned
+from .curved import Curved
+from .groups import LEAST, smooth_field, spanned
 from .scatter import Scatter, scatter
-from .whole_arm import lost_motion, moves
 
-
-class Missed(NamedTuple):
-    """
-    What the formulas of the names miss.
-
-    Attributes
-    ----------
-    scattered : tuple of Scatter
-        Joints that noise comes from, largest first.
-    forms : tuple of Beside
-        Free forms that predict what a name should.
-
-    """
-
-    scattered: tuple[Scatter, ...] = ()
-    forms: tuple[Beside, ...] = ()
-
-
-def formulas(
-    found: Search, unseen: Unseen, verdict: Verdict, rival: Curved | None, beliefs: Beliefs
-) -> tuple[Verdict, Missed]:
-    """
-    Return the verdict, or 'unknown' where what it names leaves what its formula should not.
-
-    A free form that takes off much less than the effect itself, or than the noise, only mends a
-    formula; so does scatter.
-
-    Parameters
-    ----------
-    found : Search
-    unseen : Unseen
-        Of its final model.
-    verdict : Verdict
-    rival : Curved or None
-        The free-form explanation in place of the names.
-    beliefs : Beliefs
-
-    """
-    verdict = held_against(verdict, unseen, rival, beliefs)
-    if found.dense:
-        return verdict, Missed()
-    loose = [
-        one
-        for one in sorted(scatter(found, unseen), key=lambda one: -one.share)
-        if one.share >= beliefs.beaten_share and one.steady >= beliefs.scatter_sure
-    ]
-    if verdict.status not in (*NAMING, 'none'):
-        return verdict, Missed(tuple(loose))
-    sizes = _sizes(found, unseen)
-    reasons = [
-        f'what remains is no noise of the instrument: {100.0 * one.share:.0f} % of it lies along '
-        f'the motion of {one.joint}'
-        for one in loose
-        if one.size >= beliefs.scatter_misses * sizes.get(one.joint, 0.0)
-    ]
-    told = beside_names(found, unseen) if verdict.status in NAMING else []
-    missed = tuple(one for one in told if _fails(one, beliefs))
-    reasons += [_misses(one) for one in _clearest(missed)]
-    if not reasons:
-        return verdict, Missed()
-    doubted = {one.at for one in missed} | {one.joint for one in loose}
-    sets = () if 'instrument' in doubted else _but_at(verdict, doubted)
-    unknown = Verdict('unknown', beliefs.beaten_belief, sets, tuple(reasons))
-    return unknown, Missed(tuple(loose), missed)
-
-
-def _but_at(verdict: Verdict, doubted: Set[str]) -> tuple[tuple[Site, ...], ...]:
-    """Return what is named but for the places where a formula does not hold."""
-    return tuple(group for group in verdict.sets if not {s.joint for s in group} & doubted)
-
-
-def _sizes(found: Search, unseen: Unseen) -> dict[str, float]:
-    """Return the largest effect at every place, RMS in units of noise."""
-    out: dict[str, float] = {}
-    for effect, part in zip(found.final.model.found, unseen.targets[1:], strict=True):
-        out[effect.at] = max(out.get(effect.at, 0.0), float(np.sqrt((part**2).mean())))
-    return out
-
-
-def _clearest(missed: Sequence[Beside]) -> list[Beside]:
-    """Return one free form for each place, that which predicts most."""
-    out: dict[str, Beside] = {}
-    for one in missed:
-        if one.at not in out or one.gain > out[one.at].gain:
-            out[one.at] = one
-    return list(out.values())
-
-
-def _fails(one: Beside, beliefs: Beliefs) -> bool:
-    """Return whether a free form takes off more than what a formula may miss."""
-    if one.on == 'place':
-        clear = one.gain >= beliefs.dependence_gain and one.steady >= beliefs.dependence_sure
-        return clear and one.share >= beliefs.field_misses
-    clear = one.gain >= beliefs.group_share and one.steady >= beliefs.structure_sure
-    return clear and one.share >= beliefs.misfit_share
-
-
-def _misses(one: Beside) -> str:
-    return (
-        f'a free curve at {one.at}, depending on {one.on}, still predicts '
-        f'{100.0 * one.gain:.0f} % of what is left on unseen stretches: the formula of what was '
-        'found does not hold'
-    )
-
-
-def held_against(
-    verdict: Verdict, named: Unseen, rival: Curved | None, beliefs: Beliefs
-) -> Verdict:
-    """
-    Return the verdict, or 'unknown' where a free form predicts clearly better than the names.
-
-    There is no 'none' where a free form predicts what looks like noise, whether or not a curve can
-    carry it to another motion. What is named stays told; `standing` says whether it holds beside
-    what is left.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    named : Unseen
-        Of the model with the effects named.
-    rival : Curved or None
-    beliefs : Beliefs
-
-    """
-    if rival is None:
-        return verdict
-    if verdict.status == 'none':
-        return _something(verdict, rival, beliefs)
-    if verdict.status == 'unknown':
-        return verdict
-    gain, steady = gain_of(named, rival.unseen)
-    if gain < beliefs.beaten_share or steady < beliefs.beaten_steady:
-        return verdict
-    reason = (
-        f'a curve at {_places(rival)} predicts unseen stretches better than any effect in the library '
-        f'({100.0 * gain:.0f} % less squared error)'
-    )
-    return Verdict('unknown', beliefs.beaten_belief, verdict.sets, (reason,))
-
-
-def _something(verdict: Verdict, rival: Curved, beliefs: Beliefs) -> Verdict:
-    """Return 'unknown' where what looks like noise follows something on unseen stretches."""
-    form = rival.form
-    if form.gain < beliefs.beaten_share or form.steady < beliefs.beaten_steady:
-        return verdict
-    reason = (
-        f'no effect in the library explains the gap, but it is no noise: {_places(rival)} predicts '
-        f'{100.0 * form.gain:.0f} % of it on unseen stretches'
-    )
-    return Verdict('unknown', beliefs.beaten_belief, (), (reason,))
-
-
-def _places(rival: Curved) -> str:
-    return ' and '.join(str(part.group) for part in rival.form.parts)
+GAPS = (5e-5, 2e-4, 8e-4, 2e-3, 1e-2, 4e-2)
+"""Widths [rad, or tens of centimetres] of gaps in series: from half of what the finest play is to
+what takes a tenth of a radian to build up."""
+TURNED = 1e-4
+"""Travel [rad, or tens of centimetres] after which a joint counts as going the other way: teeth
+have changed flanks by then."""
+BENT = 4
+"""Knots over the angle for each way: straight, bent, and bent back."""
+SHARES = (0.02, 0.1, 0.4)
+"""Shares of the joint's largest speed about which what depends on the way may set in."""
+SLIDING = 0.1
+"""Metres of a joint that slides which are looked at as a radian of one that turns."""
+FIELD = 'instrument'
+"""A free field over the workspace speaks against every formula: it is what each of them bends to."""
 
 
 class Beside(NamedTuple):
@@ -208,6 +71,103 @@ class Beside(NamedTuple):
     gain: float
     steady: float
     share: float
+
+
+class Missed(NamedTuple):
+    """
+    What the formulas of the names miss.
+
+    Attributes
+    ----------
+    scattered : tuple of Scatter
+        Joints that noise comes from beyond doubt, largest first.
+    forms : tuple of Beside
+        Free forms that predict beyond doubt what a name should.
+
+    """
+
+    scattered: tuple[Scatter, ...] = ()
+    forms: tuple[Beside, ...] = ()
+
+    @property
+    def in_words(self) -> tuple[tuple[str, str], ...]:
+        """Return the places where formulas do not hold, each with the free form that predicts most."""
+        best: dict[str, Beside] = {}
+        for one in self.forms:
+            if one.at not in best or one.gain > best[one.at].gain:
+                best[one.at] = one
+        return tuple((at, _misses(one)) for at, one in best.items())
+
+
+def missed(found: Search, unseen: Unseen, beliefs: Beliefs) -> Missed:
+    """
+    Return what the formulas of the effects found miss, as far as it is beyond doubt.
+
+    Parameters
+    ----------
+    found : Search
+    unseen : Unseen
+        Of its final model.
+    beliefs : Beliefs
+
+    """
+    if found.dense:
+        return Missed()
+    loose = [
+        one
+        for one in sorted(scatter(found, unseen), key=lambda one: -one.share)
+        if one.share >= beliefs.beaten_share and one.steady >= beliefs.scatter_sure
+    ]
+    forms = tuple(one for one in beside_names(found, unseen) if _fails(one, beliefs))
+    return Missed(tuple(loose), forms)
+
+
+def no_noise(verdict: Verdict, rival: Curved | None, left: Missed, beliefs: Beliefs) -> Verdict:
+    """
+    Return 'unknown' in the place of 'none' where what looks like noise follows something.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        Of any other status, nothing changes.
+    rival : Curved or None
+        The free-form explanation, whether or not it can be carried to another motion.
+    left : Missed
+    beliefs : Beliefs
+
+    """
+    if verdict.status != 'none':
+        return verdict
+    reasons = [
+        f'what remains is no noise of the instrument: {100.0 * one.share:.0f} % of it lies along '
+        f'the motion of {one.joint}'
+        for one in left.scattered
+    ]
+    form = None if rival is None else rival.form
+    if form and form.gain >= beliefs.beaten_share and form.steady >= beliefs.beaten_steady:
+        places = ' and '.join(str(part.group) for part in form.parts)
+        reasons.append(
+            f'no effect in the library explains the gap, but it is no noise: {places} predicts '
+            f'{100.0 * form.gain:.0f} % of it on unseen stretches'
+        )
+    return replace(verdict, status='unknown', reasons=tuple(reasons)) if reasons else verdict
+
+
+def _fails(one: Beside, beliefs: Beliefs) -> bool:
+    """Return whether a free form takes off more than what a formula may miss."""
+    if one.on == 'place':
+        clear = one.gain >= beliefs.dependence_gain and one.steady >= beliefs.dependence_sure
+        return clear and one.share >= beliefs.field_misses
+    clear = one.gain >= beliefs.group_share and one.steady >= beliefs.structure_sure
+    return clear and one.share >= beliefs.misfit_share
+
+
+def _misses(one: Beside) -> str:
+    return (
+        f'a free curve at {one.at}, depending on {one.on}, still predicts '
+        f'{100.0 * one.gain:.0f} % of what is left on unseen stretches: the formula of what was '
+        'found does not hold'
+    )
 
 
 def beside_names(found: Search, unseen: Unseen) -> list[Beside]:
@@ -247,15 +207,40 @@ def _forms(
     named = [('instrument', 'place', field), ('instrument', 'place', linear)]
     moving = not problem.at_rest
     for i, joint in enumerate(features[0].twin.robot.joint_names if moving else ()):
-        if joint in places and moves(features, i):
-            ways = [
-                lost_motion(problem, k, maker, features, i) for k, maker in enumerate(features)
-            ]
+        if joint in places and _moves(features, i):
+            ways = [_lost(problem, k, maker, features, i) for k, maker in enumerate(features)]
             named.append((joint, 'direction', ways))
     for at, on, parts in named:
         columns = spanned(problem, scale, at, on, (), parts).columns
         if columns.size:
             yield at, on, columns
+
+
+def _moves(features: list[Features], i: int) -> bool:
+    return max(float(np.ptp(m.run.view.q[:, i])) for m in features) > LEAST['angle']
+
+
+def _lost(problem: Problem, k: int, maker: Features, features: list[Features], i: int) -> Array:
+    """Return what joint i may lose by the way it goes, shape (E, c, M)."""
+    view, unit = maker.view, SLIDING if maker.twin.robot.prismatic[i] else 1.0
+    q = maker.joint_view.joint(i)
+    widths = unit * np.array([*GAPS, TURNED])[:, None]
+    trails = play(q, widths, np.full(len(widths), q[0])) - q
+    trails = Picker(maker.recording.joints, maker.run.view.t).pick(trails)
+    way = trails[-1] / (-0.5 * widths[-1])
+    angles = [m.view.q[:, i] for m in features]
+    knots = np.linspace(min(map(np.min, angles)), max(map(np.max, angles)), BENT)
+    speed = view.qd[:, i]
+    fastest = max(float(np.abs(m.view.qd[:, i]).max()) for m in features)
+    rest = QUANTITIES['direction'](view, i)
+    about = np.tanh(speed / (np.array(SHARES)[:, None] * max(fastest, LEAST['speed'])))
+    shapes = [
+        *trails[:-1],
+        *(way * basis(knots.tolist(), view.q[:, i])),
+        *about,
+        *(rest, np.abs(rest), speed, way * QUANTITIES['load'](view, i)),
+    ]
+    return np.asarray(problem.seen(k, maker.column(('q', i))) * np.array(shapes)[:, None, :])
 
 
 def worse_of(ways: Sequence[Taken]) -> Taken:

@@ -5,8 +5,9 @@ Places that no single joint shows: the instrument, all links alike, a weight at 
 
 A wrong unit of length looks like small constants of several joints, a weight like several
 springs, links that warm up like several lengths. One group for each lets the simplest explanation
-win. Beside them stands what each joint loses by the way it goes, without a formula for how. None of
-these groups can be carried to another motion as a curve; they say where, and on what it depends.
+win. Beside them stand loops of joints: lost motion that builds up over a travel, without a formula
+for how. None of these groups can be carried to another motion as a curve; they say where, and on
+what it depends.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from ...arm.dynamics import payload_torque
 from ...arrays import Array
 from ...effects.associative_scan import play
-from ...effects.curve import QUANTITIES, basis
+from ...effects.curve import basis
 from ...twin.features import Features
 from ...twin.resampling import Picker
 from ..algebra.problem import Model, Problem, Scale
@@ -28,16 +29,9 @@ RANGES = 4
 """Knots over the distance from the instrument: straight, bent, and bent back."""
 WARM = 3
 """Knots over the temperature."""
-GAPS = (5e-5, 2e-4, 8e-4, 2e-3, 1e-2, 4e-2, 0.16)
-"""Widths [rad, or tens of centimetres] of gaps in series: from half of what the finest play is to
-what takes a quarter of a radian to build up."""
-TURNED = 1e-4
-"""Travel [rad, or tens of centimetres] after which a joint counts as going the other way: teeth
-have changed flanks by then."""
-BENT = 4
-"""Knots over the angle for each way: straight, bent, and bent back."""
-SHARES = (0.02, 0.1, 0.4)
-"""Shares of the joint's largest speed about which what depends on the way may set in."""
+LOOPS = (2e-3, 1e-2, 4e-2, 0.16)
+"""Widths [rad, or tens of centimetres] of the gaps in series that make up a loop: from what acts
+like a gap to what takes a quarter of a radian to build up."""
 SLIDING = 0.1
 """Metres of a joint that slides which are looked at as a radian of one that turns."""
 NEAR = 1e-3
@@ -46,7 +40,7 @@ NEAR = 1e-3
 
 def whole_arm_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
     """
-    Return the groups of causes that act at several joints at once, and what each joint loses.
+    Return the groups of causes that act at several joints at once, and loops of each joint.
 
     Parameters
     ----------
@@ -64,12 +58,6 @@ def whole_arm_groups(problem: Problem, model: Model, scale: Scale) -> list[Group
         for at, on, parts in _yielded(features)
         if not (at == 'instrument' and problem.untracked)
     ]
-    for i, joint in enumerate(model.robot.joint_names if not problem.at_rest else ()):
-        if moves(features, i):
-            parts = [
-                lost_motion(problem, k, maker, features, i) for k, maker in enumerate(features)
-            ]
-            out.append(spanned(problem, scale, joint, 'direction', (), parts))
     return [group for group in out if group.columns.size]
 
 
@@ -93,6 +81,9 @@ def _yielded(features: list[Features]) -> Iterator[tuple[str, str, list[Array]]]
             pairs = zip(features, warmth, strict=True)
             middle = 0.5 * (knots[0] + knots[-1])
             yield 'base', 'temperature', [_grown(m)[None] * (w - middle) for m, w in pairs]
+    if not all(maker.run.view.static for maker in features):
+        for index, joint in enumerate(features[0].twin.robot.joint_names):
+            yield joint, 'direction', [_looped(maker, index) for maker in features]
 
 
 def _knots(values: list[Array], count: int, least: float) -> tuple[float, ...] | None:
@@ -134,48 +125,12 @@ def _grown(maker: Features) -> Array:
     return np.asarray(sum(length * maker.column(channel) for channel, length in lengths if length))
 
 
-def moves(features: list[Features], i: int) -> bool:
-    """Return whether joint i moves at all."""
-    return max(float(np.ptp(m.run.view.q[:, i])) for m in features) > LEAST['angle']
-
-
-def lost_motion(
-    problem: Problem, k: int, maker: Features, features: list[Features], i: int
-) -> Array:
-    """
-    Return what joint i may lose by the way it goes, shape (E, c, M).
-
-    Lost motion is free in the gaps it trails in, and in angle, speed and load by the way it goes.
-
-    Parameters
-    ----------
-    problem : Problem
-    k : int
-        Which recording, counted from 0.
-    maker : Features
-        Of that recording.
-    features : list of Features
-        Of all recordings.
-    i : int
-        Which joint, counted from 0.
-
-    """
-    view, unit = maker.view, SLIDING if maker.twin.robot.prismatic[i] else 1.0
-    q = maker.joint_view.joint(i)
-    widths = unit * np.array([*GAPS, TURNED])[:, None]
-    trails = play(q, widths, np.full(len(widths), q[0])) - q
-    trails = Picker(maker.recording.joints, maker.run.view.t).pick(trails)
-    way = trails[-1] / (-0.5 * widths[-1])
-    angles = [m.view.q[:, i] for m in features]
-    knots = np.linspace(min(map(np.min, angles)), max(map(np.max, angles)), BENT)
-    speed = view.qd[:, i]
-    fastest = max(float(np.abs(m.view.qd[:, i]).max()) for m in features)
-    rest = QUANTITIES['direction'](view, i)
-    about = np.tanh(speed / (np.array(SHARES)[:, None] * max(fastest, LEAST['speed'])))
-    shapes = [
-        *trails[:-1],
-        *(way * basis(knots.tolist(), view.q[:, i])),
-        *about,
-        *(rest, np.abs(rest), speed, way * QUANTITIES['load'](view, i)),
-    ]
-    return np.asarray(problem.seen(k, maker.column(('q', i))) * np.array(shapes)[:, None, :])
+def _looped(maker: Features, index: int) -> Array:
+    """Return a joint that trails in gaps of several widths in series, (L, 6, M)."""
+    view = maker.joint_view
+    unit = SLIDING if view.robot.prismatic[index] else 1.0
+    q = view.joint(index)
+    widths = unit * np.array(LOOPS)[:, None]
+    trails = play(q, widths, np.full(len(LOOPS), q[0])) - q
+    at = Picker(maker.recording.joints, maker.run.view.t).pick(trails)
+    return np.asarray(maker.column(('q', index))[None] * at[:, None, :])

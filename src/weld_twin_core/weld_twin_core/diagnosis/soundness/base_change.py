@@ -218,9 +218,7 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
     frames = [_moved(maker, 'base', 6, c) for maker, c in pairs]
     tools = [_moved(maker, 'tool', 6, c) for maker, c in pairs]
     joints = [_moved(maker, 'q', model.robot.n, c) for maker, c in pairs]
-    arms = [
-        np.concatenate([_arm(maker, c), _grown(maker, c), _scaled(maker, c)]) for maker, c in pairs
-    ]
+    arms = [np.concatenate([part(*pair) for part in (_arm, _grown, _scaled)]) for pair in pairs]
     left, base, tool, joint, arm = (
         _stacked([_white(part, scale, k) for k, part in enumerate(each)])
         for each in ([part[None] for part in parts], frames, tools, joints, arms)

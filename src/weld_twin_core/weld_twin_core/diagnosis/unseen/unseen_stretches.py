@@ -118,6 +118,25 @@ class Unseen:
             self._others[key] = replace(self, labels=labels)
         return self._others[key]
 
+    def held(self, precision: Array, coordinates: Array) -> Unseen:
+        """
+        Return the same under another prior about zero.
+
+        Parameters
+        ----------
+        precision : array, shape (K,)
+            Of every coordinate, one over variance.
+        coordinates : array, shape (K,)
+            Where the fit is.
+
+        """
+        frames = self.frames
+        return replace(
+            self,
+            precision=np.concatenate([self.precision[:frames], precision]),
+            pull=np.concatenate([self.pull[:frames], precision * coordinates]),
+        )
+
     def forget_other_parts(self) -> None:
         """Let go of what was worked out for other parts: with many columns it is a hundred MB."""
         self._others.clear()

@@ -31,8 +31,6 @@ class Evidence:
         Whether the floor was measured apart from any model.
     parts : tuple of float
         Squared contribution of every effect over the square of their sum.
-    causes : tuple of int
-        How many separate causes every slot stands for.
     glimpsed : tuple of str
         Joints of which a wave was seen over too little of a period.
     refused : tuple of str
@@ -46,6 +44,12 @@ class Evidence:
         out, it is ``after``.
     chance : float
         Ratio of ``after`` to ``fitted`` that chance alone reaches: few stations vary much.
+    believed : tuple of float
+        How probable it is of every effect found that its name is right, as the calibration has it;
+        of many small errors, of all that are named.
+    missed : tuple of (str, str)
+        Places at which something free predicts beyond doubt what the formula of a name should, and
+        that in words; at 'instrument' it speaks against every name.
 
     """
 
@@ -57,10 +61,11 @@ class Evidence:
     fitted: float
     independent: bool
     parts: tuple[float, ...]
-    causes: tuple[int, ...] = ()
     glimpsed: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
     lacking: tuple[str, ...] = ()
     families: tuple[WeighedFamily, ...] | None = None
     least: float | None = None
     chance: float = 1.0
+    believed: tuple[float, ...] = ()
+    missed: tuple[tuple[str, str], ...] = ()

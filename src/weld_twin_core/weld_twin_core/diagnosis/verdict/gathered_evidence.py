@@ -9,7 +9,6 @@ from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
-from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..many.weighed_families import weighed_families
 from ..result import Shrink, Site
@@ -60,11 +59,10 @@ def gathered(
         fitted=unseen.rms(unseen.predict(everything)),
         independent=floor.independent,
         parts=_parts(unseen),
-        causes=tuple(_causes(slot[0]) for slot in found.slots),
         glimpsed=glimpsed(found.problem, found.final.model, beliefs),
         refused=tuple(_refused(robot, e) for e in found.refused if beyond(robot, e)),
         lacking=tuple(_lacking(e) for e in found.refused if not beyond(robot, e)),
-        families=weighed_families(found, unseen) if found.dense else None,
+        families=weighed_families(found, unseen, beliefs) if found.dense else None,
         least=least,
         chance=chance,
     )
@@ -90,11 +88,3 @@ def _refused(robot: Robot, effect: Effect) -> str:
 def _lacking(effect: Effect) -> str:
     """Return an effect that was taken out of the library."""
     return f'{Site(effect.name, effect.site)}, which was taken out of the library'
-
-
-def _causes(rival: Rival) -> int:
-    """Return how many causes a slot stands for: its leader says."""
-    for effect in rival.fit.model.found:
-        if (effect.name, effect.site) == (rival.site.effect, rival.site.joint):
-            return effect.causes()
-    return 1

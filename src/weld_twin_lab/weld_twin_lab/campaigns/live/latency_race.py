@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from struct import unpack_from
 from typing import Any
@@ -32,22 +32,31 @@ SETTLE = 0.15
 """Seconds to wait for what is still under way after a turn."""
 
 
-class Contender:
-    """A process that answers joint states; its latency [ns], turn by turn, and its CPU time."""
+USUAL = {JOINT_STATES.name: 'given', TWIN_POSE.name: 'answer'}
+"""Where contenders are asked and answer."""
 
-    def __init__(self, name: str, module: str, kind: Any, parameters: Sequence[str]) -> None:
+
+class Contender:
+    """A process that answers; its latency [ns], turn by turn, and its CPU time."""
+
+    def __init__(
+        self,
+        name: str,
+        module: str,
+        kind: Any,
+        parameters: Sequence[str],
+        remaps: Mapping[str, str] = USUAL,
+    ) -> None:
         self.name, self.kind = name, kind
         self.given, self.answer = f'/race/{name}/in', f'/race/{name}/out'
+        ends = {'given': self.given, 'answer': self.answer}
         self._command = [
             sys.executable,
             '-m',
             module,
             '--ros-args',
             *parameters,
-            '-r',
-            f'{JOINT_STATES.name}:={self.given}',
-            '-r',
-            f'{TWIN_POSE.name}:={self.answer}',
+            *(w for old, new in remaps.items() for w in ('-r', f'{old}:={ends.get(new, new)}')),
             '-r',
             f'__node:={name}',
         ]
@@ -99,8 +108,10 @@ class Contender:
 class Race:
     """A context manager in which contenders answer."""
 
-    def __init__(self, contenders: Sequence[Contender]) -> None:
+    def __init__(self, contenders: Sequence[Contender], *, poses: bool = False) -> None:
         self.contenders = contenders
+        self._poses = poses
+        self.meanwhile: Callable[[], None] = lambda: None
         self._stack = ExitStack()
 
     def __enter__(self) -> Race:
@@ -110,7 +121,7 @@ class Race:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         self._stack.callback(rclpy.try_shutdown)
         self._runner = executor()
-        node = Node('finish')
+        node = self.node = Node('finish')
         self._runner.add_node(node)
         deep = QoSProfile(depth=10_000, reliability=ReliabilityPolicy.RELIABLE)
         for contender in self.contenders:
@@ -149,11 +160,12 @@ class Race:
         count = max(round(rate * seconds), 1)
         contender.turns.append([])
         before = cpu_ns(contender.process.pid)
-        self._pulse.stdin.write(f'{contender.given} {rate} {count}\n')
+        self._pulse.stdin.write(f'{contender.given} {rate} {count} {int(self._poses)}\n')
         future: Future = Future()
         done = self._pulse.stdout.readline
         threading.Thread(target=lambda: future.set_result(done())).start()
         while not future.done():
+            self.meanwhile()
             self._runner.spin_until_future_complete(future, timeout_sec=0.05)
         end = time.monotonic() + SETTLE
         while time.monotonic() < end:

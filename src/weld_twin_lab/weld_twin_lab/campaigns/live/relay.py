@@ -19,11 +19,12 @@ from weld_twin_nodes.live.run_node import LOOP, executor
 
 
 class Relay(Node):
-    """Copies joint states to the topic of the twin's poses, with the same quality of service."""
+    """Copies joint states, or poses, to the topic of the twin, with the same quality of service."""
 
     def __init__(self) -> None:
         super().__init__('relay')
-        kind = JOINT_STATES.message_class()
+        poses = self.declare_parameter('poses', False).value
+        kind = (TWIN_POSE if poses else JOINT_STATES).message_class()
         raw = self.declare_parameter('raw', False).value
         self._out = self.create_publisher(kind, TWIN_POSE.name, TWIN_POSE.offered.to_rclpy())
         self.create_subscription(

@@ -25,6 +25,8 @@ from .usage import children, cpu_ns, rss_bytes
 MIB = 2.0**20
 """Bytes."""
 ROBOT, PATH = 'ur5', 'polyline'
+BEGUN = '/recorder: /deviation'
+"""Status of the last node's input, which brings something once the cell works."""
 COMPLETE = 300.0
 """Seconds the recorder has to complete its bag."""
 SPLIT = 300.0
@@ -99,9 +101,7 @@ class Soak:
     def run(self, every: float, tell: Callable[[str], None]) -> None:
         """Let the cell work to the end of the motion; look at its processes now and then."""
         heard = self._listener.values
-        self._cell.wait(
-            lambda: int(heard.get('recorder: /deviation', {}).get('received', 0)) > 0, 'the motion'
-        )
+        self._cell.wait(lambda: int(heard.get(BEGUN, {}).get('received', 0)) > 0, 'the motion')
         begin = time.monotonic()
         self._listener.clear()
         due = every

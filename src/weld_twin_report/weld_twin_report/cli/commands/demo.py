@@ -12,6 +12,11 @@ from weld_twin_nodes.cli.options import add_output
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     add_output(parser, 'directory for the results (default: out)', default='out')
+    parser.add_argument(
+        '--closed-loop',
+        action='store_true',
+        help='weld the seam again through the compensator, and show both beside each other',
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -26,5 +31,5 @@ def run(args: argparse.Namespace) -> int:
         ) from None
     from ...demo import run_demo
 
-    run_demo(args.out, force=args.force)
+    run_demo(args.out, closed_loop=args.closed_loop, force=args.force)
     return 0

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Evidence weighed by beliefs: what stands above the noise, what is left, whether it carries."""
+"""What is left on data that were not fitted, and how much of the gap that is."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ TINY = 1e-18
 
 
 @dataclass(frozen=True, eq=False)
-class Weighed:
-    """Evidence, and the beliefs that it is weighed by."""
+class Left:
+    """Evidence, and the numbers from which on what it leaves is more than noise."""
 
     evidence: Evidence
     beliefs: Beliefs
@@ -48,45 +48,24 @@ class Weighed:
         return self.structured or self.high
 
     @property
-    def rise(self) -> float:
-        """Return by what share of an independent floor what remains stands above it."""
-        told = self.evidence
-        floor = max(told.floor, np.sqrt(TINY))
-        return float(max(told.after / floor - 1.0, 0.0)) if told.independent else 0.0
-
-    @property
     def share(self) -> float:
-        """Return what remains above the floor as a share of the gap."""
-        told = self.evidence
-        gap = max(told.gap**2 - told.floor**2, TINY)
-        return float(np.sqrt(max(told.after**2 - told.floor**2, 0.0) / gap))
-
-    @property
-    def carries(self) -> bool:
-        """Return whether the model does on a held-out motion what it does on those fitted."""
-        # A ratio that chance reaches on so few readings says nothing.
-        told = self.evidence
-        return (
-            told.after < self.beliefs.above * told.floor
-            or told.after < max(self.beliefs.carried, told.chance) * told.fitted
-            or self.share < self.beliefs.carried_share
-        )
-
-    @property
-    def left(self) -> float:
         """Return the share of the squared gap above noise that is not explained."""
         told = self.evidence
-        least = self.beliefs.least_excess * told.floor**2
-        excess = max(told.gap**2 - told.floor**2, least, TINY)
         found = told.structure.gain * told.after**2 if self.structured else 0.0
         over = told.after**2 - told.floor**2 if self.high else 0.0
         if self.wide:
             # Such a floor may be too low by that factor; what is beyond is left all the same.
             over = told.after**2 - (self.beliefs.far_above * told.floor) ** 2
-        return float(np.clip(max(found, over) / excess, 0.0, 1.0))
+        return float(np.clip(max(found, over) / self._excess, 0.0, 1.0))
 
     @property
-    def complete(self) -> float:
-        """Return how far to believe that nothing is missing, 1 to 0 as more is left."""
-        much = self.left / self.beliefs.unexplained
-        return float(1.0 / (1.0 + much**self.beliefs.unexplained_power))
+    def explained(self) -> float:
+        """Return the share of the squared gap above noise that the model takes off unseen data."""
+        told = self.evidence
+        return float(np.clip((told.gap**2 - told.after**2) / self._excess, 0.0, 1.0))
+
+    @property
+    def _excess(self) -> float:
+        told = self.evidence
+        least = self.beliefs.least_excess * told.floor**2
+        return max(told.gap**2 - told.floor**2, least, TINY)

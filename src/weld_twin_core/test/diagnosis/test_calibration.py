@@ -1,0 +1,124 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Probabilities of statements: from features and learned weights, as they are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import weld_twin_core as wt
+from weld_twin_core.diagnosis.calibration.features import KINDS, odds, of_whole
+from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
+from weld_twin_core.diagnosis.hypotheses.rivals import Rival
+from weld_twin_core.diagnosis.posterior.table import table_of
+from weld_twin_core.diagnosis.result import Site
+
+PLAY = Site('backlash', 'elbow_joint')
+
+
+def taught(constant=0.0, **weights):
+    terms = {name: {'weight': w, 'low': -2.0, 'high': 3.0} for name, w in weights.items()}
+    return calibration_from(
+        {
+            'statements': {'name': {'constant': constant, 'weights': terms}},
+            'sure_from': {'answer': 0.9, 'cause': 0.8},
+            'card': {},
+        }
+    )
+
+
+def test_log_odds_are_a_sum_over_features_and_end_where_nothing_was_learned():
+    told = taught(0.5, gap=1.0, left=-2.0)
+    for gap, left, total in ((1.0, 0.5, 0.5), (9.0, 0.0, 3.5), (-9.0, 0.0, -1.5)):
+        probability = told.probability('name', {'gap': gap, 'left': left})
+        assert probability == pytest.approx(1.0 / (1.0 + np.exp(-total)))
+
+
+def test_a_family_that_is_not_named_counts_as_nothing():
+    told = taught(0.0, **{'only backlash': -1.0})
+    assert told.probability('name', {}) == pytest.approx(0.5)
+    assert told.probability('name', {'only backlash': 1.0}) == pytest.approx(1.0 / (1.0 + np.e))
+
+
+@pytest.mark.parametrize(('probability', 'sure'), [(0.9, True), (0.899, False)])
+def test_what_is_sure_is_set_apart_from_how_probable_it_is(probability, sure):
+    assert taught().sure('answer', probability) is sure
+    assert taught().sure('cause', probability)
+
+
+def test_what_is_learned_can_be_read_and_is_no_more_than_200_numbers():
+    learned = usual_calibration()
+    assert set(learned.statements) == set(KINDS)
+    assert sum(1 + len(one.terms) for one in learned.statements.values()) <= 200
+    assert all(0.5 < bound <= 1.01 for bound in learned.sure_from.values())
+
+
+def test_the_whole_answer_has_the_least_of_its_names():
+    own = {'apart': 1.0, 'size': 0.5, 'members': 1.0, 'only drift': 1.0, 'only wear': 0.0}
+    other = {'apart': -1.0, 'size': 2.0, 'members': 3.0}
+    told = of_whole([0.9, 0.5], [own, other])
+    assert told['names'] == pytest.approx(np.log(0.45))
+    assert told['least name'] == pytest.approx(0.0)
+    assert (told['least apart'], told['least size'], told['widest set']) == (-1.0, 0.5, 3.0)
+    assert told['only drift'] == 1.0 and 'only wear' not in told
+    assert of_whole([], [])['names'] == 0.0
+
+
+def test_log_odds_end_at_a_thousand_to_one():
+    assert odds(1.0) == pytest.approx(np.log(999.0))
+    assert odds(0.0) == pytest.approx(-np.log(999.0))
+
+
+class _Fit:
+    """A fit that left some residual, with nothing in its model."""
+
+    def __init__(self, *residual):
+        self.residual = np.array(residual)
+        self.model = type('Model', (), {'found': ()})()
+
+
+def test_marginals_of_a_row_are_sums_over_who_shares_it():
+    zero, gear = Site('joint_offset', 'wrist'), Site('gear_ratio', 'wrist')
+    slot = (
+        Rival(zero, 9.0, _Fit(0.0, 0.0), 0.5),
+        Rival(gear, 8.0, _Fit(1.0, 1.0), 0.3),
+        Rival(PLAY, 5.0, _Fit(3.0, 3.0), 0.18),
+        Rival(Site('drift', None), 2.0, _Fit(5.0, 5.0), 0.02),
+    )
+    (row,) = table_of((slot,), wt.diagnosis.Beliefs())
+    assert row.listed == (zero, gear, PLAY)
+    assert row.mass == pytest.approx(0.98)
+    assert row.places()['wrist'] == pytest.approx(0.8)
+    assert row.dependences() == pytest.approx(
+        {'constant': 0.5, 'angle': 0.3, 'direction': 0.18, 'time': 0.02}
+    )
+    assert (row.gap, row.margin, row.apart) == (9.0, 7.0, 5.0)
+    sure = (replace(slot[0], probability=0.9), *(replace(r, probability=0.03) for r in slot[1:]))
+    (row,) = table_of((sure,), wt.diagnosis.Beliefs())
+    assert row.listed == (zero,)
+    assert (row.margin, row.apart) == (1.0, 1.0)
+
+
+@pytest.fixture(scope='module')
+def play():
+    """Return a robot, and a recording of it with play in its elbow."""
+    robot = wt.load('ur5')
+    plan = wt.plan(robot, wt.default_seam(robot, 'spline'), 'aggressive', rate_hz=50.0)
+    commanded = wt.Recording('seam', plan.motion)
+    real = wt.Twin(robot, [wt.effects.Backlash('elbow_joint', width=5e-4)]).poses(commanded)
+    noise = np.random.default_rng(7).normal(scale=2e-5, size=real.position.shape)
+    return robot, commanded.with_measured(wt.Measurements(plan.motion.t, real.position + noise))
+
+
+def test_what_stands_in_for_another_cause_is_believed_less(play):
+    robot, recording = play
+    right = wt.diagnose(recording, robot)
+    other = wt.diagnose(recording, robot, exclude=('backlash',))
+    (own,) = (s for s in right.statements if s.kind == 'name')
+    imitating = [s for s in other.statements if s.kind == 'name']
+    assert right.causes[0].probability == own.probability > 0.6
+    assert right.confidence == right.as_dict()['verdict']['learned'] > 0.5
+    assert all(s.features['wander'] > own.features['wander'] for s in imitating)
+    assert all(s.probability < own.probability for s in imitating)
+    assert other.confidence < right.confidence or other.status == 'unknown'

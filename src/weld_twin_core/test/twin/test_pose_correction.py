@@ -1,0 +1,77 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Poses corrected one after the other, judged on an arm whose own numbers were changed by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.errors import DataError
+from weld_twin_core.motion.inverse.newton import polish
+from weld_twin_core.motion.paths import default_seam
+from weld_twin_core.motion.planned_motion import plan
+from weld_twin_core.twin.pose_correction import PoseCorrection, moved
+from weld_twin_core.twin.program_model import ProgramModel
+
+UR5 = load('ur5')
+CAUSES = (
+    {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 6e-4},
+    {'effect': 'link_twist', 'joint': 'shoulder_pan_joint', 'dalpha': 5e-4},
+    {'effect': 'backlash', 'joint': 'elbow_joint', 'width': 5e-4},
+)
+
+
+def real_arm():
+    data = UR5.to_mapping()
+    data['joints'][2]['theta_offset'] += 6e-4
+    data['joints'][0]['alpha'] += 5e-4
+    return Robot.from_mapping(data)
+
+
+def correction():
+    model = ProgramModel(UR5, tuple(effect_from_mapping(cause) for cause in CAUSES))
+    return PoseCorrection(model, UR5.T_flange_tool)
+
+
+def test_a_pose_is_taken_to_where_the_real_tool_is_where_it_was_meant():
+    q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+    (meant,) = forward(UR5, q[None])
+    looked = correction().first(meant, q + 0.05)
+    (joints,), left = polish(UR5, q[None], moved(meant, looked.added)[None])
+    assert np.abs(left).max() < 1e-12
+    np.testing.assert_allclose(forward(real_arm(), joints[None])[0], meant, atol=1e-9)
+    assert np.linalg.norm(looked.added[:3]) > 1e-4
+
+
+def test_poses_between_two_looks_are_as_good():
+    motion = plan(UR5, default_seam(UR5, 'spline'), rate_hz=250.0).motion
+    poses = forward(UR5, motion.q)[:1500]
+    found, looks, worst = correction(), 1, 0.0
+    found.adopt(found.first(poses[0], motion.q[0]))
+    joints = motion.q[0]
+    for k, pose in enumerate(poses):
+        added, far = found.added(pose)
+        if k % 50 == 0:
+            (joints,), _ = polish(UR5, joints[None], moved(pose, added)[None])
+            off = forward(real_arm(), joints[None])[0] - pose
+            worst = max(worst, float(np.abs(off[:3, 3]).max()))
+        if far > 0.7:
+            found.adopt(found.exact(pose, found.looked))
+            looks += 1
+    assert worst < 2e-9
+    assert looks < len(poses) / 10
+
+
+def test_play_is_told_as_left_and_a_pose_out_of_reach_is_said():
+    found = correction()
+    assert found.left_out == ['backlash']
+    q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+    far = forward(UR5, q[None])[0]
+    far[0, 3] += 3.0
+    with pytest.raises(DataError, match='cannot be reached'):
+        found.first(far, q)

@@ -1,0 +1,231 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Features of statements: a few plain numbers that say how far each can be trusted.
+
+Sizes and ratios enter as decimal logarithms, probabilities as log odds, evidence as the logarithm
+of nats. Nothing here says which families were taken out of the library: how often that is done is
+no property of a cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..hypotheses.search import Search
+from ..levels.curved import Curved, gain_of
+from ..levels.free_form import FreeForm
+from ..posterior.table import Row, dependence_of
+from ..result import Cause
+from ..unseen.unseen_stretches import Unseen
+from ..verdict.evidence import Evidence
+from ..verdict.left import Left
+
+Numbers = dict[str, float]
+FAR = 1e3
+"""Nothing beyond a thousand, or below a thousandth, says more."""
+MOVES = 0.02
+"""Travel [rad, m] from which on a joint shows something at all."""
+ONLY = 'only '
+"""Before a family that is named alone: some stand in for causes that no library has."""
+KINDS = {
+    'name': 'one of the names of an effect found is right',
+    'place': 'its place is right although its name is not',
+    'dependence': 'what it depends on is right although its name is not',
+    'name of many': 'the families named of many small errors are there',
+    'place of many': 'where they are is right',
+    'dependence of many': 'what they depend on is right',
+    'place of the rest': 'the place of what has no name is right',
+    'dependence of the rest': 'what it depends on is right',
+    'complete': 'no cause above the noise and a tenth of the squared gap is missing',
+    'answer, named': 'the whole answer is right, where it is identified or ambiguous',
+    'answer, unknown': 'the whole answer is right, where it is unknown',
+    'answer, none': 'there is no gap above the noise, where none is told',
+    'answer, many': 'the whole answer is right, where it names many small errors',
+}
+"""Every kind of statement, and what it says."""
+
+
+def of_situation(
+    found: Search, unseen: Unseen, evidence: Evidence, rival: Curved | None
+) -> Numbers:
+    """
+    Return the features that all statements of a diagnosis share.
+
+    Parameters
+    ----------
+    found : Search
+        The effects found.
+    unseen : Unseen
+        Of its final model.
+    evidence : Evidence
+    rival : Curved or None
+        The free-form explanation in place of all names.
+
+    """
+    floor = max(evidence.floor, 1e-12)
+    elsewhere = evidence.after if evidence.least is None else min(evidence.after, evidence.least)
+    travel = np.max([np.ptp(r.joints.q, axis=0) for r in found.problem.recordings], axis=0)
+    return plain(
+        {
+            'gap': log(evidence.gap / floor),
+            'left': log(evidence.after / floor),
+            'left elsewhere': log(elsewhere / max(evidence.fitted * evidence.chance, 1e-12)),
+            'left unexplained': Left(evidence, found.work.beliefs).share,
+            'structure': evidence.structure.gain,
+            'structure, errors': evidence.structure.sure,
+            'rows': log(found.effective(found.small)),
+            'joints moving': float((travel > MOVES).mean()),
+            'causes': len(evidence.slots),
+            'refused': len(evidence.refused),
+            'lacking': len(evidence.lacking),
+            'cancelling': log(sum(evidence.parts)) if evidence.parts else 0.0,
+            'waves hardly seen': len(evidence.glimpsed),
+            'floor measured': float(evidence.independent),
+            'stations': float(found.problem.recordings[0].joints.static),
+            **_of_curves(unseen, rival, floor),
+        }
+    )
+
+
+def _of_curves(unseen: Unseen, rival: Curved | None, floor: float) -> Numbers:
+    """Return how curves without a name compare with the names."""
+    if rival is None:
+        return dict.fromkeys(('curves', 'curves instead', 'curves, left', 'form'), 0.0)
+    return {
+        'curves': len(rival.form.parts),
+        'curves instead': max(gain_of(unseen, rival.unseen)[0], -1.0),
+        'curves, left': log(rival.rms_m / floor),
+        'form': rival.form.gain,
+    }
+
+
+def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ()) -> Numbers:
+    """
+    Return the features of the name of an effect found, from its row of the table of answers.
+
+    Parameters
+    ----------
+    row : Row
+    size : float
+        How far the effect moves the tool, RMS in units of noise.
+    wandered : float
+        How far its values move from stretch to stretch, over what noise makes them: a formula that
+        stands in for another wants other values on every stretch.
+    left_at : sequence of str
+        What the most of what is left depends on, in words.
+
+    """
+    on = dependence_of(row.leader)
+    return plain(
+        {
+            'weight': odds(row.mass),
+            'evidence': log1(row.gap),
+            'margin': log1(min(row.margin, FAR)),
+            'apart': log(min(row.apart, FAR)),
+            'size': log(size),
+            'wander': log(wandered),
+            'members': len(row.listed),
+            'left at its joint': float(any(str(row.leader.site.joint) in w for w in left_at[:1])),
+            'constant': float(on == 'constant'),
+            'angle': float(on == 'angle'),
+            f'{ONLY}{row.leader.site.effect}': float(len(row.listed) == 1),
+        }
+    )
+
+
+def of_level(row: Row, level: str, rival: Curved | None) -> Numbers:
+    """
+    Return the features of the place, or of the dependence, of an effect found.
+
+    Parameters
+    ----------
+    row : Row
+    level : str
+        'place' or 'dependence'.
+    rival : Curved or None
+        The free-form explanation; it may find the same.
+
+    """
+    weights = row.places() if level == 'place' else row.dependences()
+    own = max(weights, key=lambda key: weights[key])
+    parts = rival.form.parts if rival is not None else ()
+    seen = {part.group.at if level == 'place' else part.group.on for part in parts}
+    return plain({f'weight of the {level}': odds(weights[own]), 'form agrees': float(own in seen)})
+
+
+def of_rest(cause: Cause, level: str, form: FreeForm | None) -> Numbers:
+    """
+    Return the features of the place, or of the dependence, of what has no name.
+
+    Parameters
+    ----------
+    cause : Cause
+        With the weights of the groups that found it.
+    level : str
+        'place' or 'dependence'.
+    form : FreeForm or None
+
+    """
+    listed = [p for _, p in (cause.place if level == 'place' else cause.dependence)]
+    first, second, *_ = (*listed, 0.0, 0.0)
+    return plain(
+        {
+            'weight': odds(first),
+            'second': second,
+            'share': cause.share,
+            'groups': 0 if form is None else len(form.parts),
+            'steady': 0.0 if form is None else min(form.steady, 10.0),
+        }
+    )
+
+
+def of_whole(probabilities: Sequence[float], names: Sequence[Mapping[str, float]]) -> Numbers:
+    """
+    Return the features of an answer as a whole, from what is told of its names.
+
+    Parameters
+    ----------
+    probabilities : sequence of float
+        Of every name told.
+    names : sequence of mapping from str to float
+        Features of the same names.
+
+    """
+    alone = {
+        key: 1.0 for own in names for key, told in own.items() if key.startswith(ONLY) and told
+    }
+    return plain(
+        {
+            'names': float(np.log(max(float(np.prod(probabilities)), 1.0 / FAR))),
+            'least name': odds(min(probabilities, default=0.5)),
+            'told': len(names),
+            'least apart': min((own['apart'] for own in names), default=log(FAR)),
+            'least size': min((own['size'] for own in names), default=0.0),
+            'widest set': max((own['members'] for own in names), default=0.0),
+            **alone,
+        }
+    )
+
+
+def plain(numbers: Mapping[str, float]) -> Numbers:
+    """Return finite numbers, cut where nothing beyond says more."""
+    return {k: float(np.clip(np.nan_to_num(v, nan=0.0), -FAR, FAR)) for k, v in numbers.items()}
+
+
+def odds(probability: float) -> float:
+    """Return the log odds of a probability, as far as a thousand to one."""
+    held = min(max(probability, 1.0 / FAR), 1.0 - 1.0 / FAR)
+    return float(np.log(held / (1.0 - held)))
+
+
+def log(value: float) -> float:
+    """Return the decimal logarithm of what cannot be negative."""
+    return float(np.log10(max(value, 1.0 / FAR)))
+
+
+def log1(value: float) -> float:
+    """Return a logarithm that is linear near zero, with the sign of the value."""
+    return float(np.sign(value) * np.log10(1.0 + abs(value)))

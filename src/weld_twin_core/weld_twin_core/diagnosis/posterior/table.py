@@ -1,0 +1,158 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The table of answers, and its marginals: name, place and dependence of every effect found.
+
+A row of the table is an effect that the search found, with every other that was fitted in its place
+and what share of the evidence each has. What these data cannot tell apart shares its row. The three
+marginals are sums over a row, so a place may be certain where several names at it are not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from ...effects.effect import Effect
+from ...effects.registry import REGISTRY
+from ..beliefs import Beliefs
+from ..hypotheses.rivals import Rival
+from ..result import Site
+
+Key = TypeVar('Key')
+Slot = tuple[Rival, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """
+    One effect found, with what could stand in its place.
+
+    Attributes
+    ----------
+    slot : tuple of Rival
+        Most probable first; their weights add up to one.
+    listed : tuple of Site
+        Those named together: the leader alone where it has nearly all of the weight.
+
+    """
+
+    slot: Slot
+    listed: tuple[Site, ...]
+
+    @property
+    def leader(self) -> Rival:
+        """Return the most probable."""
+        return self.slot[0]
+
+    @property
+    def mass(self) -> float:
+        """Return the weight of all that are named together."""
+        return float(sum(rival.probability for rival in self.slot if rival.site in self.listed))
+
+    @property
+    def others(self) -> list[Rival]:
+        """Return those that are not named."""
+        return [rival for rival in self.slot if rival.site not in self.listed]
+
+    @property
+    def gap(self) -> float:
+        """Return by how much evidence the best answer with it is ahead of the best without [nats]."""
+        return self.leader.nats
+
+    @property
+    def margin(self) -> float:
+        """Return by how much the leader is ahead of the best that is not named [nats]; inf of none."""
+        return min((self.leader.nats - rival.nats for rival in self.others), default=float('inf'))
+
+    @property
+    def apart(self) -> float:
+        """
+        Return how far the nearest that is not named leaves another residual, RMS [noise]; inf of none.
+
+        The next rival and the frames were fitted, so this is what lies outside the span of both.
+        """
+        own = self.leader.fit.residual
+        return min((_rms(own - rival.fit.residual) for rival in self.others), default=float('inf'))
+
+    def names(self) -> dict[Site, float]:
+        """Return the weight of every name."""
+        return _marginal(self.slot, lambda rival: rival.site)
+
+    def places(self) -> dict[str, float]:
+        """Return the weight of every place."""
+        return _marginal(self.slot, place_of)
+
+    def dependences(self) -> dict[str, float]:
+        """Return the weight of everything that it may depend on."""
+        return _marginal(self.slot, dependence_of)
+
+
+def table_of(slots: Sequence[Slot], beliefs: Beliefs) -> tuple[Row, ...]:
+    """
+    Return the table of answers, a row for every effect found.
+
+    Parameters
+    ----------
+    slots : sequence of tuple of Rival
+        For every effect found, itself and its rivals, most probable first.
+    beliefs : Beliefs
+
+    """
+    return tuple(Row(slot, named_together(slot, beliefs)) for slot in slots)
+
+
+def named_together(slot: Slot, beliefs: Beliefs) -> tuple[Site, ...]:
+    """
+    Return the leader alone when it is sure, else all worth naming, the simplest first.
+
+    Parameters
+    ----------
+    slot : tuple of Rival
+    beliefs : Beliefs
+
+    """
+    if slot[0].probability >= beliefs.sure:
+        return (slot[0].site,)
+    listed = dict.fromkeys(r.site for r in slot if r.probability >= beliefs.listed)
+    return tuple(sorted(listed, key=_numbers))
+
+
+def effect_of(rival: Rival) -> Effect | None:
+    """Return a rival's effect as it was fitted."""
+    for effect in rival.fit.model.found:
+        if (effect.name, effect.site) == (rival.site.effect, rival.site.joint):
+            return effect
+    return None
+
+
+def place_of(rival: Rival) -> str:
+    """Return where a rival sits."""
+    effect = effect_of(rival)
+    return effect.at if effect is not None else str(rival.site.joint)
+
+
+def dependence_of(rival: Rival) -> str:
+    """Return what a rival depends on."""
+    effect = effect_of(rival)
+    return effect.on if effect is not None else REGISTRY[rival.site.effect].depends_on
+
+
+def _marginal(slot: Slot, key: Callable[[Rival], Key]) -> dict[Key, float]:
+    out: dict[Key, float] = {}
+    for rival in slot:
+        own = key(rival)
+        out[own] = out.get(own, 0.0) + rival.probability
+    return out
+
+
+def _numbers(site: Site) -> int:
+    """Return how many numbers an effect has: the fewer, the simpler."""
+    return sum(max(parameter.size, 1) for parameter in REGISTRY[site.effect].parameters)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt((values**2).mean()))

@@ -1,0 +1,283 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One arm in a cell: the injector as the real arm, a controller, a twin, an analyzer, a compensator.
+
+Every goal runs twice over the same way, once as it is and once by the compensator, each time from the
+same side. What the tool does is heard on `/measured/tool_pose`.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from rclpy.action import ActionClient
+
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.twin.goal_correction import GoalLimits, Refusal, corrected_goal
+from weld_twin_core.twin.goal_motion import Goal, course
+from weld_twin_core.twin.program_model import ProgramModel
+from weld_twin_msgs_py.files.yaml_file import yaml_text
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.topics import AUDIT, DEVIATION, MEASURED_POSE
+from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.harness.controller import Controller
+
+from .drawn_cells import DrawnGoal, cell_of, drawn_causes, drawn_goal, learned, true_effects
+
+PACE = 10.0
+"""How many times as fast as they say goals run: nothing in these cells hangs on speed."""
+RETURN = 3.0
+"""Length of a way back, or to where a goal begins [s]."""
+NOTICE = 30.0
+"""Longest time [s] after a change until goals count."""
+SETTLED = 1.5
+"""Time [s] in which everything that is under way has arrived."""
+JUMP = 4.0
+"""By how much the clock of the measurements jumps [s]: the most that an injector takes."""
+EACH = 3
+"""Goals after each change."""
+CHANGES = ('clock jumped', 'load changed', 'wrong model', 'tracker lost')
+
+
+class CellTrial:
+    """A cell that goals are sent to."""
+
+    def __init__(self, cell: Cell, folder: Path, name: str, seed: int) -> None:
+        from control_msgs.action import FollowJointTrajectory
+
+        self.cell, self.kind, self.name = cell, FollowJointTrajectory, name
+        self.robot, self.causes, self.rng = cell_of(name, seed)
+        self.right = learned(self.robot, self.causes, self.rng)
+        self.model = folder / 'diagnosis.json'
+        self.model.write_text(self.right)
+        self._late = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        cell, robot = self.cell, self.robot
+        first = drawn_goal(robot, self.rng).goal.q[0]
+        self.controller = cell.add(Controller, robot.joint_names, first, PACE)
+        common = {'robot': self.name, 'reliable_inputs': True}
+        cell.start('error_injector', effects=self._effects(), **common)
+        cell.start('forward_kinematics_twin', model=str(self.model), **common)
+        self.analyzer = cell.start('deviation_analyzer', **common)
+        self.compensator = cell.start(
+            'compensator', model=str(self.model), apply=True, managed=False, **common
+        )
+        self.audit: list[dict[str, Any]] = []
+        cell.node.create_subscription(
+            AUDIT.message_class(),
+            '/compensator/audit',
+            self._audited,
+            AUDIT.requested.to_rclpy(),
+        )
+        self.measured = cell.collect(MEASURED_POSE.name)
+        self.deviations = cell.collect(DEVIATION.name)
+        action = 'follow_joint_trajectory'
+        self._through = ActionClient(cell.node, self.kind, f'/compensator/{action}')
+        self._direct = ActionClient(cell.node, self.kind, f'/joint_trajectory_controller/{action}')
+        for client in (self._through, self._direct):
+            cell.wait(client.server_is_ready, 'the actions')
+        cell.meet()
+        cell.wait(lambda: len(self.deviations) > 0, 'a deviation')
+
+    def _audited(self, message: Any) -> None:
+        self.audit.append(json.loads(message.data))
+
+    def _effects(self, *more: dict[str, Any]) -> str:
+        return yaml_text([*self.causes, *more])
+
+    # Goals -----------------------------------------------------------------------------------
+
+    def run(self, goal: Goal, *, through: bool) -> tuple[bool, dict[str, Any]]:
+        """Run a goal; return whether it was taken, and its audit line."""
+        message = self.kind.Goal()
+        message.trajectory.joint_names = list(self.robot.joint_names)
+        message.trajectory.points = self.cell.messages.trajectory_points(*goal)
+        client, lines = (self._through if through else self._direct), len(self.audit)
+        asked = client.send_goal_async(message)
+        self.cell.wait(asked.done, 'the answer')
+        if through:
+            self.cell.wait(lambda: len(self.audit) > lines, 'the audit')
+        line = self.audit[-1] if through else {}
+        if not asked.result().accepted:
+            return False, line
+        result = asked.result().get_result_async()
+        self.cell.wait(result.done, 'the result', limit=60.0)
+        return True, line
+
+    def to(self, q: Array) -> None:
+        """Bring the arm to a posture, uncorrected."""
+        here = self.controller.q
+        t = np.linspace(0.0, RETURN, 16)
+        s = (0.5 - 0.5 * np.cos(np.pi * t / RETURN))[:, None]
+        self.run(Goal(t, here + s * (q - here)), through=False)
+
+    def off(self, goal: Goal, waits: float = 0.0) -> float:
+        """Return the RMS distance of the real tool from where the goal meant it on the last run [m]."""
+        track = {stamp + self._late: t - waits for stamp, t in self.controller.track}
+        self.measured_until(max(track))
+        meant, real = [], []
+        for message in self.measured.messages:
+            t = track.get(from_messages.stamp_ns(message))
+            if t is not None and t >= 0.0:
+                real.append(from_messages.pose(message)[0])
+                meant.append(t)
+        self.measured.messages.clear()
+        self.deviations.messages.clear()
+        way = course(goal, np.minimum(np.array(meant), goal.t[-1]))
+        apart = np.array(real) - forward(self.robot, way.q)[:, :3, 3]
+        return float(np.sqrt((apart**2).sum(axis=1).mean()))
+
+    def measured_until(self, stamp: int) -> None:
+        """Wait until the tool was measured at a stamp [ns]."""
+        messages = self.measured.messages
+        self.cell.wait(
+            lambda: bool(messages) and from_messages.stamp_ns(messages[-1]) >= stamp,
+            'the measurements',
+        )
+
+    def judged(self, drawn: DrawnGoal, after: str) -> dict[str, Any]:
+        """Return what became of a goal, run as it is and through the compensator."""
+        goal = drawn.goal
+        beyond = goal.q[0] - 0.05 * np.sign(goal.q[min(3, len(goal.q) - 1)] - goal.q[0])
+        offs = []
+        taken, line = True, dict[str, Any]()
+        for through in (False, True):
+            self.to(beyond)
+            self.to(goal.q[0])
+            taken, line = self.run(goal, through=through)
+            if taken:
+                offs.append(self.off(goal, line.get('waits_s', 0.0)))
+        best = self._best(goal)
+        return {
+            'robot': self.name,
+            'after': after,
+            'inside': drawn.inside,
+            'verdict': line['verdict'],
+            'why': line['why'],
+            'before_m': offs[0],
+            'after_m': offs[1] if taken else offs[0],
+            'best_m': min(best, offs[0]),
+            'bound_m': line.get('bound_m'),
+            'largest_m': line.get('largest_m'),
+        }
+
+    def _best(self, goal: Goal) -> float:
+        """Return what would be left with the true causes [m]."""
+        true = ProgramModel(self.robot, true_effects(self.robot, self.causes))
+        found = corrected_goal(true, goal, GoalLimits(acceleration=20.0))
+        return np.inf if isinstance(found, Refusal) else found.after
+
+    # Changes ---------------------------------------------------------------------------------
+
+    def changed(self, what: str) -> dict[str, Any]:
+        """Change something, and wait for the notice; return how long that took."""
+        begun, count = time.monotonic(), len(self.compensator.log)
+        if what == 'clock jumped':
+            self._inject({'effect': 'time_delay', 'delay': JUMP})
+            self._late = round(JUMP * 1e9)
+        elif what == 'load changed':
+            self._inject(*_load(self.robot))
+        elif what == 'tracker lost':
+            self.analyzer.stop()
+        else:
+            other = drawn_causes(self.robot, self.rng)
+            self.model.write_text(learned(self.robot, other, self.rng))
+            self._reload()
+            begun = time.monotonic()
+
+        def noticed() -> bool:
+            told = self.compensator.log[count:]
+            return 'does not hold' in told or 'is lost' in told
+
+        # The arm goes to and fro meanwhile: measurements of one place tell of one place.
+        while not noticed() and time.monotonic() - begun < NOTICE:
+            self.to(self.controller.q + 0.1 * self.rng.uniform(-1.0, 1.0, self.robot.n))
+        return {
+            'robot': self.name,
+            'change': what,
+            'noticed': noticed(),
+            'seconds': round(time.monotonic() - begun, 2),
+        }
+
+    def restore(self) -> None:
+        """Undo all changes."""
+        self._late = 0
+        self._inject()
+        self.model.write_text(self.right)
+        self._reload()
+        end = time.monotonic() + SETTLED
+        self.cell.wait(lambda: time.monotonic() > end, 'what is under way')
+        self.measured.messages.clear()
+        count = len(self.deviations)
+        self.cell.wait(lambda: len(self.deviations) > count + 30, 'deviations')
+        self._reload()
+
+    def _inject(self, *more: dict[str, Any]) -> None:
+        done = self.cell.set_parameter('error_injector', 'effects', self._effects(*more))
+        assert done.successful, done.reason
+
+    def _reload(self) -> None:
+        for node in ('forward_kinematics_twin', 'compensator'):
+            answer = self.cell.trigger(f'/{node}/reload')
+            assert answer.success, answer.message
+
+
+def _load(robot: Robot) -> tuple[dict[str, Any], ...]:
+    """Return what a torch of another weight does: it bends the shoulder and the elbow."""
+    joints = robot.joint_names
+    return (
+        {'effect': 'joint_offset', 'joint': joints[1], 'offset': 4e-4},
+        {'effect': 'joint_offset', 'joint': joints[2], 'offset': -5e-4},
+    )
+
+
+def tried(
+    name: str, seed: int, goals: int, tell: Callable[[str], None]
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return what became of the goals of one arm, and of its changes."""
+    rows, changes = [], []
+    with _cell() as (cell, folder):
+        trial = CellTrial(cell, folder, name, seed)
+        for k in range(goals):
+            rows.append(trial.judged(drawn_goal(trial.robot, trial.rng), ''))
+            if k % 10 == 9:
+                tell(f'{name}: {k + 1} of {goals} goals')
+        for what in CHANGES:
+            changes.append(trial.changed(what))
+            tell(f'{name}: {changes[-1]}')
+            for _ in range(EACH):
+                rows.append(trial.judged(drawn_goal(trial.robot, trial.rng), what))
+            if what != CHANGES[-1]:
+                trial.restore()
+    return rows, changes
+
+
+@contextmanager
+def _cell() -> Iterator[tuple[Cell, Path]]:
+    with TemporaryDirectory() as place, Cell(Path(place) / 'cell') as cell:
+        yield cell, Path(place)
+
+
+def other_arm(seed: int) -> str:
+    """Return what a compensator says that is given the model of another arm."""
+    names = ('ur5', 'ur10e')
+    robot, causes, rng = cell_of(names[1], seed)
+    text = learned(robot, causes, rng)
+    with _cell() as (cell, folder):
+        model = folder / 'diagnosis.json'
+        model.write_text(text)
+        process = cell.start('compensator', robot=names[0], model=str(model), managed=False)
+        code = process.end(60.0)
+        return f'exit code {code}: {process.log.strip().splitlines()[-1]}'

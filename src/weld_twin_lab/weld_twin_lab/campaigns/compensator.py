@@ -1,0 +1,246 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Send drawn goals through a compensator in a cell, and change the cell under it.
+
+A diagnosis learns each of six arms with sure causes. Goals run as they are and through the compensator.
+Then a clock jumps, the load changes, the model is a wrong one, the tracker is lost. A stream of
+poses races a relay that copies them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from weld_twin_msgs_py.files import markdown
+
+WORSE = (2e-5, 0.05)
+"""A goal is worse if it is farther off than before by more than this [m], and by this share."""
+WORTH = 0.5
+"""Share of its error that a goal must be able to gain to count among those to be corrected."""
+CORRECTED = 0.95
+"""Share of those that must be."""
+HELD = (0.88, 0.95)
+"""Share of the goals whose error must stay within the bound that was told."""
+SLOWER = 1.5
+"""Times the latency of a relay that copies which poses may take."""
+POSES = 500.0
+"""Poses a second in the race."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument(
+        '--goals', type=int, default=500, metavar='N', help='goals of all arms (default: 500)'
+    )
+    parser.add_argument(
+        '--without-cell',
+        type=int,
+        default=500,
+        metavar='N',
+        help='goals of all arms that are judged without nodes, 0 for none (default: 500)',
+    )
+    parser.add_argument('--seed', type=int, default=7, metavar='N', help='decides what is drawn')
+    parser.add_argument(
+        '--go-on', action='store_true', help='keep the arms that the file has, and try the others'
+    )
+    parser.add_argument(
+        '--turns', type=int, default=20, metavar='N', help='turns of the race of poses, 0 for none'
+    )
+
+
+def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
+    """Return what became of every goal and of every change, and the race."""
+    from .building.message_packages import messages_importable
+    from .keeping.result_file import write_result
+
+    with messages_importable():
+        from .compensating.drawn_cells import HOMES
+        from .compensating.pose_race import race
+        from .compensating.trial import other_arm, tried
+
+        rows, changes = _before(args)
+        begun = time.monotonic()
+        each = -(-args.goals // len(HOMES))
+        for name in HOMES:
+            if name in _names(rows):
+                continue
+            done, changed = tried(name, args.seed, each, tell)
+            rows += done
+            changes += changed
+            tell(f'{name}: {_told(done)}')
+            made = {**summary(rows, changes, '', None), 'seed': args.seed, 'goals': rows}
+            write_result(args.out, 'compensator', time.monotonic() - begun, made)
+        other = other_arm(args.seed)
+        tell(other)
+        more = without_cell(args.without_cell, args.seed, tell)
+        poses = race(args.turns, POSES, tell) if args.turns else None
+    found = summary(rows, changes, other, poses)
+    return {**found, 'without_cell': more, 'seed': args.seed, 'goals': rows}
+
+
+def without_cell(goals: int, seed: int, tell: Callable[[str], None]) -> dict[str, Any] | None:
+    """Return what goals come to that are judged without nodes, by arm and in all."""
+    from .compensating.drawn_cells import HOMES
+    from .compensating.without_cell import judged
+
+    if not goals:
+        return None
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for name in HOMES:
+        rows[name] = judged(name, seed + 1, -(-goals // len(HOMES)))
+        tell(f'{name}, without a cell: {_told(rows[name])}')
+    arms = {name: counted(own) for name, own in rows.items()}
+    return {'robots': arms, 'totals': counted([row for own in rows.values() for row in own])}
+
+
+def _before(args: argparse.Namespace) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return the goals and changes of the file, none where there is no file yet."""
+    file = Path(args.out)
+    if not args.go_on or not file.exists():
+        return [], []
+    found = json.loads(file.read_text(encoding='utf-8'))
+    return found['goals'], found['changes']
+
+
+def _told(rows: Sequence[dict[str, Any]]) -> str:
+    found = counted(rows)
+    return ', '.join(f'{key} {found[key]}' for key in ('goals', 'corrected', 'worse', 'held'))
+
+
+def worse(row: dict[str, Any]) -> bool:
+    """Return whether a goal came out farther off than it was."""
+    return bool(row['after_m'] > row['before_m'] + max(WORSE[0], WORSE[1] * row['before_m']))
+
+
+def worth(row: dict[str, Any]) -> bool:
+    """Return whether a goal is among those to be corrected."""
+    return bool(row['inside'] and row['best_m'] <= (1.0 - WORTH) * row['before_m'])
+
+
+def counted(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return what goals come to."""
+    import numpy as np
+
+    done = [row for row in rows if row['verdict'] == 'corrected']
+    bound = [row for row in done if row['bound_m'] is not None]
+    to_do = [row for row in rows if worth(row)]
+    middle = {
+        key: float(np.median([row[key] for row in done])) if done else None
+        for key in ('before_m', 'after_m', 'best_m', 'bound_m')
+    }
+    return {
+        'goals': len(rows),
+        'corrected': len(done),
+        'refused': sum(row['verdict'] == 'refused' for row in rows),
+        'worse': sum(worse(row) for row in rows),
+        'to_correct': len(to_do),
+        'of_them_corrected': sum(row['verdict'] == 'corrected' for row in to_do),
+        'outside': sum(not row['inside'] for row in rows),
+        'outside_corrected': sum(not row['inside'] for row in done),
+        'bounds': len(bound),
+        'held': sum(row['after_m'] <= row['bound_m'] for row in bound),
+        'median': middle,
+    }
+
+
+def summary(
+    rows: Sequence[dict[str, Any]],
+    changes: Sequence[dict[str, Any]],
+    other: str,
+    poses: dict[str, Any] | None,
+) -> dict[str, Any]:
+    """Return what all of it comes to, and whether it passed."""
+    calm = [row for row in rows if not row['after']]
+    kinds = list(dict.fromkeys(row['after'] for row in rows))
+    totals = counted(calm)
+    robots = {name: counted([r for r in calm if r['robot'] == name]) for name in _names(rows)}
+    after = {kind: counted([r for r in rows if r['after'] == kind]) for kind in kinds if kind}
+    held = totals['held'] / max(totals['bounds'], 1)
+    goals = {
+        'none worse': not any(worse(row) for row in rows),
+        'corrected where it pays': totals['of_them_corrected'] >= CORRECTED * totals['to_correct'],
+        'changes noticed': all(change['noticed'] for change in changes),
+        'nothing corrected after a change': all(not row['corrected'] for row in after.values()),
+        'model of another arm refused': other.startswith('exit code 2'),
+        'bound holds': HELD[0] <= held <= HELD[1],
+    }
+    if poses is not None:
+        goals['poses in time'] = max(poses['ratio'].values()) <= SLOWER and not poses['lost']
+    return {
+        'passed': all(goals.values()),
+        'reached': goals,
+        'totals': totals,
+        'robots': robots,
+        'after_a_change': after,
+        'changes': list(changes),
+        'other_arm': other,
+        'poses': poses,
+    }
+
+
+def _names(rows: Sequence[dict[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(row['robot'] for row in rows))
+
+
+HEAD = (
+    'arm',
+    'goals',
+    'corrected',
+    'of those that gain half',
+    'refused of those outside',
+    'worse',
+    'before, mm',
+    'after',
+    'true causes',
+    'bound told',
+    'within it',
+)
+
+
+def table(result: dict[str, Any]) -> str:
+    """Return the tables of the page: the arms, the changes, the race of poses."""
+    arms = [*result['robots'].items(), ('all', result['totals'])]
+    lines = [markdown.table(HEAD, *(_row(name, one) for name, one in arms)), _changes(result)]
+    more = result.get('without_cell')
+    if more is not None:
+        arms = [*more['robots'].items(), ('all', more['totals'])]
+        lines.append(markdown.table(HEAD, *(_row(name, one) for name, one in arms)))
+    poses = result['poses']
+    if poses is not None:
+        rows = [
+            (name, *(f'{poses[name][key] / 1e3:.2f} ms' for key in ('p50_us', 'p99_us')))
+            for name in ('relay', 'compensator')
+        ]
+        rows.append(('ratio', *(f'{poses["ratio"][key]:.2f}' for key in ('p50_us', 'p99_us'))))
+        lines.append(markdown.table(('500 poses a second', 'p50', 'p99'), *rows))
+    return '\n\n'.join(lines)
+
+
+def _row(name: str, one: dict[str, Any]) -> tuple[str, ...]:
+    """Return a row of an arm."""
+    middle = [one['median'][key] for key in ('before_m', 'after_m', 'best_m', 'bound_m')]
+    return (
+        name,
+        str(one['goals']),
+        str(one['corrected']),
+        f'{one["of_them_corrected"]} of {one["to_correct"]}',
+        f'{one["outside"] - one["outside_corrected"]} of {one["outside"]}',
+        str(one['worse']),
+        *('' if value is None else f'{value * 1e3:.4f}' for value in middle),
+        f'{one["held"]} of {one["bounds"]}',
+    )
+
+
+def _changes(result: dict[str, Any]) -> str:
+    """Return a row for each kind of change."""
+    rows = []
+    for kind, one in result['after_a_change'].items():
+        noticed = max(c['seconds'] for c in result['changes'] if c['change'] == kind)
+        rows.append((kind, one['goals'], one['refused'], one['worse'], f'{noticed:.1f} s'))
+    head = ('change', 'goals after its notice', 'refused', 'worse', 'noticed within')
+    return markdown.table(head, *rows)

@@ -1,0 +1,121 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""When a stream of poses is corrected, and that what is added changes at a standstill alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.twin.goal_correction import GoalLimits
+from weld_twin_core.twin.pose_correction import PoseCorrection, between
+from weld_twin_core.twin.program_model import ProgramModel
+from weld_twin_nodes.streams.pose_stream import PoseStream
+
+UR5 = load('ur5')
+HOME = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+START = forward(UR5, HOME[None])[0]
+STEP = 0.004
+LIMITS = GoalLimits(rate=5e-3)
+
+
+def stream(**options):
+    cause = effect_from_mapping({'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 6e-4})
+    found = PoseCorrection(ProgramModel(UR5, (cause,)), UR5.T_flange_tool)
+    return PoseStream(found, LIMITS, **options)
+
+
+class Run:
+    """Poses given to a stream on a beat, and what was added to each."""
+
+    def __init__(self, stream):
+        self.stream, self.now, self.pose, self.added = stream, 10.0, START.copy(), []
+
+    def go(self, count, speed=0.0, withdrawn='', arm=HOME):
+        """Go on at a speed [m/s] along x; return the last answer."""
+        for _ in range(count):
+            self.now += STEP
+            self.pose = self.pose.copy()
+            self.pose[0, 3] += speed * STEP
+            given = self.stream.take(self.pose, self.now, arm, withdrawn)
+            self.stream.settle()
+            sent = None if given.pose is None else between(self.pose, given.pose)
+            self.added.append(sent)
+        return given
+
+    def changes(self, last):
+        """Return how fast what was added changed over the last poses [m/s]."""
+        rows = np.array(self.added[-last:])[:, :3]
+        return np.linalg.norm(np.diff(rows, axis=0), axis=1) / STEP
+
+
+def test_it_is_faded_in_before_the_first_pose_is_followed_and_then_stays():
+    run = Run(stream())
+    run.go(60)
+    assert np.abs(run.added[0]).max() < 1e-12
+    full = run.added[-1]
+    assert np.linalg.norm(full[:3]) > 1e-4
+    assert run.changes(60).max() < 1.01 * LIMITS.rate
+    run.go(100, speed=0.05)
+    # What is added follows the model, which changes by some thousandths of the way.
+    assert run.changes(100).max() < 2e-4
+
+
+def test_a_withdrawal_waits_for_the_standstill():
+    run = Run(stream(passing=True))
+    run.go(60)
+    run.go(50, speed=0.05)
+    before = run.added[-1]
+    run.go(50, speed=0.05, withdrawn='the model was exchanged')
+    assert run.changes(50).max() < 2e-4
+    assert np.linalg.norm(run.added[-1] - before) < 1e-5
+    given = run.go(120, withdrawn='the model was exchanged')
+    assert given.why == 'the model was exchanged'
+    assert np.abs(run.added[-1]).max() == 0.0
+    assert run.changes(120).max() < 1.01 * LIMITS.rate
+    run.go(50, speed=0.05)  # it is used again, but not while the stream moves
+    assert np.abs(run.added[-1]).max() == 0.0
+    run.go(120)
+    assert np.linalg.norm(run.added[-1][:3]) > 1e-4
+
+
+def test_stopped_nothing_is_sent_and_what_comes_from_elsewhere_is_no_beginning():
+    run = Run(stream())
+    run.go(60)
+    given = run.go(60, withdrawn='the tracker is lost')
+    assert (given.pose, given.why) == (None, 'the tracker is lost')
+    run.pose[0, 3] += 0.1
+    given = run.go(60)
+    assert given.pose is None
+    assert 'from where the arm stands' in given.why
+    run.pose[0, 3] -= 0.1
+    assert run.go(60).pose is not None
+
+
+@pytest.mark.parametrize(('passing', 'sent'), [(False, None), (True, 0.0)])
+def test_where_the_arm_stands_must_be_known(passing, sent):
+    run = Run(stream(passing=passing))
+    given = run.go(3, arm=None)
+    assert 'no joint states' in given.why
+    assert (given.pose is None) == (sent is None)
+    if sent is not None:
+        assert np.abs(run.added[-1]).max() == sent
+
+
+def test_the_shadow_tells_and_sends_nothing():
+    given = Run(stream(shadow=True)).go(3)
+    assert given.pose is None
+    assert np.linalg.norm(given.added[:3]) > 1e-4
+
+
+def test_poses_that_break_a_limit_of_a_joint_end_the_correction():
+    run = Run(stream(passing=True))
+    run.go(60)
+    run.go(2)
+    given = run.go(60, speed=3.0)
+    assert 'limit of' in given.why
+    # What was added stays, so that it does not jump while the stream moves.
+    assert np.linalg.norm(run.added[-1][:3]) > 1e-4

@@ -1,0 +1,151 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The page of a seam that was welded twice: as it is, and with the loop closed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+
+from ..report.charts import Axis, Line, chart
+from ..report.html import Html, document, section, table, tag
+
+WAYS = {
+    'goals': 'as a goal of a trajectory controller, with the correction of play',
+    'poses': 'as a stream of poses, for control_msgs is not installed here. Play of an arm would not be '
+    'corrected in poses, which do not tell where a joint will turn around',
+}
+"""How the seam was corrected, in words."""
+SHOWN = 600
+"""Points of a line."""
+AXES = 'xyz'
+
+
+@dataclass(frozen=True, eq=False)
+class Seam:
+    """
+    One run along a seam.
+
+    Attributes
+    ----------
+    meant, real : array, shape (N, 3) [m]
+        Where the tool was to be, and where it was measured.
+
+    """
+
+    meant: Array
+    real: Array
+
+    @cached_property
+    def off(self) -> Array:
+        """Return the distance of the tool from where it was to be, shape (N,) [m]."""
+        return np.asarray(np.linalg.norm(self.real - self.meant, axis=1))
+
+    @cached_property
+    def way(self) -> Array:
+        """Return the way along the seam, shape (N,) [m]."""
+        steps = np.linalg.norm(np.diff(self.meant, axis=0), axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])
+
+    @property
+    def rms(self) -> float:
+        """Return the RMS distance [m]."""
+        return float(np.sqrt((self.off**2).mean()))
+
+    @property
+    def worst(self) -> float:
+        """Return the largest distance [m]."""
+        return float(self.off.max())
+
+
+def closed_loop_page(robot: str, seams: tuple[Seam, Seam], how: str, noise: float) -> str:
+    """
+    Return the page.
+
+    Parameters
+    ----------
+    robot : str
+    seams : tuple of two Seam
+        As it is, and corrected.
+    how : str
+        A key of `WAYS`.
+    noise : float [m]
+        RMS distance that measuring alone makes.
+
+    """
+    before, after = seams
+    head = (
+        f'The same seam on the same arm: {before.rms * 1e3:.3f} mm off as it is, '
+        f'{after.rms * 1e3:.3f} mm through the compensator (RMS).'
+    )
+    body = tag(
+        'main',
+        tag(
+            'header',
+            tag('p', 'Closed loop', class_='kind'),
+            tag('p', robot, class_='subject'),
+        ),
+        tag('section', tag('h1', head), _figures(before, after), id_='verdict'),
+        section(
+            'Along the seam',
+            *_charts(before, after),
+            id_='seam',
+            lead='How far the measured tool is from where it was to be. Both runs have one scale.',
+        ),
+        section(
+            'How it was done',
+            tag(
+                'p',
+                'The error injector stands in for the arm. The diagnosis of its first run is the model. '
+                f'The seam was corrected {WAYS[how]}. The noise of the measurement alone is '
+                f'{noise * 1e3:.3f} mm.',
+            ),
+            id_='how',
+        ),
+    )
+    return document(f'Closed loop · {robot}', body, charts=True)
+
+
+def _figures(before: Seam, after: Seam) -> Html:
+    rows = [
+        (name, f'{one.rms * 1e3:.3f}', f'{one.worst * 1e3:.3f}')
+        for name, one in (('as it is', before), ('corrected', after))
+    ]
+    return table(('run', 'RMS, mm', 'at worst, mm'), rows)
+
+
+def _charts(before: Seam, after: Seam) -> list[Html]:
+    """Return the distance along the seam of both runs, and their parts along the axes."""
+    x = np.linspace(0.0, min(before.way[-1], after.way[-1]), SHOWN)
+    axis = Axis('way along the seam', 'mm')
+    size = [np.interp(x, one.way, one.off) * 1e3 for one in (before, after)]
+    out = [
+        chart(
+            'Distance from the seam',
+            x * 1e3,
+            [Line('as it is', size[0], 'before'), Line('corrected', size[1], 'after')],
+            (axis, Axis('distance', 'mm')),
+            key='seam',
+            from_zero=True,
+            height=240,
+        )
+    ]
+    for k, name in enumerate(AXES):
+        parts = [
+            np.interp(x, one.way, (one.real - one.meant)[:, k]) * 1e3 for one in (before, after)
+        ]
+        out.append(
+            chart(
+                f'Part along {name}',
+                x * 1e3,
+                [Line('as it is', parts[0], 'before'), Line('corrected', parts[1], 'after')],
+                (axis, Axis(name, 'mm')),
+                key='seam',
+                height=120,
+            )
+        )
+    return out

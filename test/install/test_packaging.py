@@ -59,7 +59,6 @@ ROS = {
     'rosidl_typesupport_introspection_c',
     'sensor_msgs',
     'sros2',
-    'std_msgs',
     'std_srvs',
 }
 

@@ -37,6 +37,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--goals', type=int, default=500, metavar='N', help='goals of all arms (default: 500)'
     )
+    parser.add_argument(
+        '--without-cell',
+        type=int,
+        default=500,
+        metavar='N',
+        help='goals of all arms that are judged without nodes, 0 for none (default: 500)',
+    )
     parser.add_argument('--seed', type=int, default=7, metavar='N', help='decides what is drawn')
     parser.add_argument(
         '--go-on', action='store_true', help='keep the arms that the file has, and try the others'
@@ -70,8 +77,25 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
             write_result(args.out, 'compensator', time.monotonic() - begun, made)
         other = other_arm(args.seed)
         tell(other)
+        more = without_cell(args.without_cell, args.seed, tell)
         poses = race(args.turns, POSES, tell) if args.turns else None
-    return {**summary(rows, changes, other, poses), 'seed': args.seed, 'goals': rows}
+    found = summary(rows, changes, other, poses)
+    return {**found, 'without_cell': more, 'seed': args.seed, 'goals': rows}
+
+
+def without_cell(goals: int, seed: int, tell: Callable[[str], None]) -> dict[str, Any] | None:
+    """Return what goals come to that are judged without nodes, by arm and in all."""
+    from .compensating.drawn_cells import HOMES
+    from .compensating.without_cell import judged
+
+    if not goals:
+        return None
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for name in HOMES:
+        rows[name] = judged(name, seed + 1, -(-goals // len(HOMES)))
+        tell(f'{name}, without a cell: {_told(rows[name])}')
+    arms = {name: counted(own) for name, own in rows.items()}
+    return {'robots': arms, 'totals': counted([row for own in rows.values() for row in own])}
 
 
 def _before(args: argparse.Namespace) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
@@ -182,6 +206,10 @@ def table(result: dict[str, Any]) -> str:
     """Return the tables of the page: the arms, the changes, the race of poses."""
     arms = [*result['robots'].items(), ('all', result['totals'])]
     lines = [markdown.table(HEAD, *(_row(name, one) for name, one in arms)), _changes(result)]
+    more = result.get('without_cell')
+    if more is not None:
+        arms = [*more['robots'].items(), ('all', more['totals'])]
+        lines.append(markdown.table(HEAD, *(_row(name, one) for name, one in arms)))
     poses = result['poses']
     if poses is not None:
         rows = [

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -158,7 +159,7 @@ def _by_poses(cell: Cell, job: Job, measured: Tap) -> Weld:
             stamp += BEAT
             if corrected and k:
                 given.publish(cell.messages.pose(stamp, pose[:3, 3], pose[:3, :3], 'base'))
-                cell.wait(lambda k=k: len(out) >= k, 'a corrected pose')
+                cell.wait(partial(_has, out, k), 'a corrected pose')
                 position, rotation = from_messages.pose(out.last)
                 goal = np.eye(4)
                 goal[:3, :3], goal[:3, 3] = rotation, position
@@ -166,13 +167,17 @@ def _by_poses(cell: Cell, job: Job, measured: Tap) -> Weld:
             else:
                 q = there
             joints.publish(cell.messages.joint_state(stamp, robot.joint_names, q))
-            cell.wait(lambda k=k: len(measured) > k, 'the tool to be measured')
+            cell.wait(partial(_has, measured, k + 1), 'the tool to be measured')
         begun[0] = stamp + 5_000_000_000
         real = np.array([from_messages.pose(m)[0] for m in measured.messages])
         cell.node.destroy_publisher(given)
         return _seam(job, path[STANDS:], real[STANDS:])
 
     return weld
+
+
+def _has(tap: Tap, count: int) -> bool:
+    return len(tap) >= count
 
 
 def _noise(job: Job) -> float:

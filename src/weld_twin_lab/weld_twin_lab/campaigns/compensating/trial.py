@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from rclpy.action import ActionClient
-from std_msgs.msg import String
 
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
@@ -77,9 +76,9 @@ class CellTrial:
         )
         self.audit: list[dict[str, Any]] = []
         cell.node.create_subscription(
-            String,
+            AUDIT.message_class(),
             '/compensator/audit',
-            lambda line: self.audit.append(json.loads(line.data)),
+            self._audited,
             AUDIT.requested.to_rclpy(),
         )
         self.measured = cell.collect(MEASURED_POSE.name)
@@ -91,6 +90,9 @@ class CellTrial:
             cell.wait(client.server_is_ready, 'the actions')
         cell.meet()
         cell.wait(lambda: len(self.deviations) > 0, 'a deviation')
+
+    def _audited(self, message: Any) -> None:
+        self.audit.append(json.loads(message.data))
 
     def _effects(self, *more: dict[str, Any]) -> str:
         return yaml_text([*self.causes, *more])

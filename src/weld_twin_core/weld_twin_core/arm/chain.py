@@ -179,9 +179,7 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
 
 def _started(rotation: Array, point: Array, axes: int) -> tuple[tuple[Array, ...], Array]:
     """Return axes and origin of a frame, components first, for samples of so many axes."""
-    x, y, z, p = (
-        pad(components(v), axes) for v in (*(rotation[..., k] for k in range(3)), point)
-    )
+    x, y, z, p = (pad(components(v), axes) for v in (*(rotation[..., k] for k in range(3)), point))
     return (x, y, z), p
 
 

@@ -97,23 +97,7 @@ def wrench_rotation(robot: Robot, chain: Frames, frame: str) -> Array:
     """
     if frame == 'tool':
         return chain.rotation
-    return np.asarray(chain.base_rotation @ robot.T_base_origin[:3, :3])
-
-
-def foot_rotation(robot: Robot, chain: Frames) -> Array:
-    """
-    Return the axes of the link that the arm stands in, in the world, shape (..., 3, 3).
-
-    Beside a positioner they are those of the frame where the arm's rows begin.
-
-    Parameters
-    ----------
-    robot : Robot
-    chain : Frames
-        The chain at the samples.
-
-    """
-    return chain.root_rotation if robot.behind else wrench_rotation(robot, chain, 'base')
+    return np.asarray(chain.root_rotation @ robot.T_base_foot[:3, :3])
 
 
 def _wrench_in_world(
@@ -296,8 +280,8 @@ def _wrench_slope(robot: Robot, chain: Frames, wrench: Array, frame: str) -> Arr
         moved = way if slides[j] else cross(way, levers[j])
         for i in range(robot.n):
             beyond = j > i
-            # The force turns against what carries joint i: with the tool, or not with the arm.
-            turns = turned * (beyond if frame == 'tool' else -(not beyond))
+            # The force turns with the tool, or with the arm's foot, against what carries joint i.
+            turns = turned * ((frame == 'tool' or j < robot.behind) - (not beyond))
             by_force, by_moment = cross(turns, force), cross(turns, moment)
             shifted = moved if beyond else still
             own = by_moment + cross(levers[i], by_force) + cross(shifted, force)

@@ -187,10 +187,21 @@ class Robot:
 
     @property
     def T_base_origin(self) -> Array:
-        """Return the link that the arm stands in, in the base frame of the rows, (4, 4) [m]."""
+        """
+        Return the link that poses are measured from, in the frame where the chain begins, (4, 4).
+
+        The arm stands in it; of a workpiece on a positioner it is the table.
+        """
         if self.controller is None or self.controller.foot is None:
             return np.eye(4)
         return self.controller.foot
+
+    @property
+    def T_base_foot(self) -> Array:
+        """Return the link that the arm stands in, in the frame where its rows begin, (4, 4) [m]."""
+        if not self.behind:
+            return self.T_base_origin
+        return np.eye(4) if self.controller is None else self.controller.base
 
     @property
     def T_world_origin(self) -> Array:

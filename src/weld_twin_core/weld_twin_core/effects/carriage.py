@@ -7,8 +7,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from ..arm.vectors import components, cross, pad
 from ..arrays import Array
+from ..errors import ModelError
 from .effect import Effect
 from .view import View
 
@@ -20,6 +22,24 @@ class GuideError(Effect):
     depends_on = 'angle'
     by_motion = True
     common = False
+
+    def check(self, robot: Robot) -> None:
+        """
+        Refuse an effect this robot cannot have.
+
+        Parameters
+        ----------
+        robot : Robot
+
+        Raises
+        ------
+        ModelError
+            As of every effect, or its joint turns.
+
+        """
+        super().check(robot)
+        if not self.on_slide(robot):
+            raise ModelError(f'{self.name} is of a joint that slides, and {self.site!r} turns')
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:

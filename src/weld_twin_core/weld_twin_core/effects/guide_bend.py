@@ -33,7 +33,9 @@ class GuideBend(GuideError):
         """Return how the tool moves with the carriage."""
         parts = self._parts(view)
         return {
-            channel: sum(self.number('curvature', k) * part[channel] for k, part in enumerate(parts))
+            channel: sum(
+                self.number('curvature', k) * part[channel] for k, part in enumerate(parts)
+            )
             for channel in parts[0]
         }
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arm.channels import Shift
-from ..arm.dynamics import foot_rotation, point_force_torque
+from ..arm.dynamics import point_force_torque, wrench_rotation
 from ..arm.vectors import components, pad
 from ..arrays import Array
 from .effect import Effect
@@ -71,7 +71,7 @@ def _torques(view: View) -> list[Array]:
     flange = components(chain.flange_point)
     width = flange.ndim - 1
     away = flange - pad(components(chain.root_point), width)
-    base = foot_rotation(view.robot, chain)
+    base = wrench_rotation(view.robot, chain, 'base')
     axes = [pad(components(base[..., k]), width) for k in range(3)]
     forces = [*(np.broadcast_to(axis, flange.shape) for axis in axes), -away]
     return [point_force_torque(view.robot, chain, flange, force) for force in forces]

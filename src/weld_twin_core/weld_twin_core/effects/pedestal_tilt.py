@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arm.channels import Channel, Shift
-from ..arm.dynamics import base_moment, foot_rotation
+from ..arm.dynamics import base_moment, wrench_rotation
 from ..arm.vectors import components, dot, pad
 from ..arrays import Array
 from .base_leans import base_leans
@@ -84,7 +84,7 @@ class PedestalTilt(Effect):
 def _moments(view: View) -> tuple[Array, Array]:
     """Return the moments about the base's x and y, each shape (..., N) [N m]."""
     moment = base_moment(view.robot, view.frames, view.wrench, view.wrench_frame)
-    axes = foot_rotation(view.robot, view.frames)
+    axes = wrench_rotation(view.robot, view.frames, 'base')
     x, y = (dot(pad(components(axes[..., k]), moment.ndim - 1), moment) for k in range(2))
     return x, y
 
@@ -92,7 +92,7 @@ def _moments(view: View) -> tuple[Array, Array]:
 def _leans(view: View) -> tuple[dict[Channel, Array], dict[Channel, Array]]:
     """Return the turn of the base in the world for a compliance of one about its x, and its y."""
     robot = view.robot
-    axes = np.eye(3)[:2] if robot.behind else robot.T_base_origin[:3, :2].T
+    axes = robot.T_base_foot[:3, :2].T
     x, y = (
         {channel: share * moment for channel, share in lean.items()}
         for lean, moment in zip(base_leans(robot, axes), _moments(view), strict=True)

@@ -261,7 +261,9 @@ TABLE: dict[tuple[str, str], Plausible] = {
     ('vibration', 'gain'): _even(1.0, 5.0, 'derived: one is the whole inertia on one spring'),
     ('base_pose', 'xyz'): _even(5e-3, 0.5, 'derived: half a metre off is another place'),
     ('base_pose', 'rotvec'): _even(1e-2, 0.2, 'derived: ten degrees are seen by the eye'),
-    ('root_pose', 'xyz'): _even(5e-3, 0.1, 'derived: a root that was measured by touch, or by hand'),
+    ('root_pose', 'xyz'): _even(
+        5e-3, 0.1, 'derived: a root that was measured by touch, or by hand'
+    ),
     ('root_pose', 'rotvec'): _even(5e-3, 0.1, 'derived: five millimetres on a metre'),
     ('guide_bend', 'curvature'): _even(
         2e-4,

@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..arm.robot import Robot
+from ..errors import ModelError
 from .constant import FrameError
 from .registry import register
 from .view import Value, View
@@ -23,6 +25,26 @@ class RootPose(FrameError):
     depends_on = 'constant'
     place = 'base'
     channel = 'root'
+
+    def check(self, robot: Robot) -> None:
+        """
+        Refuse an effect this robot cannot have.
+
+        Parameters
+        ----------
+        robot : Robot
+
+        Raises
+        ------
+        ModelError
+            As of every effect, or no positioner is there.
+
+        """
+        super().check(robot)
+        if not robot.behind:
+            raise ModelError(
+                f'{self.name} is of a positioner, and robot {robot.name!r} has none; use base_pose'
+            )
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:

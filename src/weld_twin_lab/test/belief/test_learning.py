@@ -96,7 +96,7 @@ def test_of_the_sure_ones_as_few_are_wrong_as_promised():
         sure = probability >= threshold
         return ((sure & ~right).sum() + 1) / (sure.sum() + 1)
 
-    assert bound.wrong == (~right & (probability >= bound.sure_from)).sum() > 1
+    assert bound.wrong == (~right & (probability >= bound.sure_from)).sum() == 1
     assert wrong(bound.sure_from) <= 0.01 < wrong(bound.sure_from - 0.002)
     assert precise(probability[:3], right[:3], 0.01).sure_from > 1.0
 

@@ -52,9 +52,15 @@ class Messages:
         return self._make('std_msgs/msg/Header', stamp=self.time(ns), frame_id=frame_id)
 
     def joint_state(
-        self, ns: int, names: Sequence[str], q: Array, qd: Array | None = None, frame_id: str = ''
+        self,
+        ns: int,
+        names: Sequence[str],
+        q: Array,
+        qd: Array | None = None,
+        frame_id: str = '',
+        effort: Array | None = None,
     ) -> Any:
-        """Return a JointState from positions and velocities, shape (n,) each [rad, rad/s]."""
+        """Return a JointState from positions, velocities, efforts, (n,) each [rad, rad/s, N m]."""
         empty = np.zeros(0)
         return self._make(
             'sensor_msgs/msg/JointState',
@@ -62,7 +68,7 @@ class Messages:
             name=list(names),
             position=self._numbers(np.asarray(q, dtype=np.float64)),
             velocity=self._numbers(empty if qd is None else np.asarray(qd, dtype=np.float64)),
-            effort=self._numbers(empty),
+            effort=self._numbers(empty if effort is None else np.asarray(effort, dtype=float)),
         )
 
     def _xyz(self, kind: str, value: Array) -> Any:

@@ -19,6 +19,7 @@ from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
 from ..result import Cause, Diagnosis, Shares, Shrink
 from ..soundness import Examined
+from ..soundness.efforts import compared
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
 from ..verdict.decision import Verdict
@@ -119,6 +120,7 @@ def _compared(found: Search, examined: Examined, verdict: Verdict) -> dict[str, 
     """Return the recordings, what they say of each other, and what no recording can say."""
     named = examined.given.may_change
     return {
+        'efforts': compared(found.problem.recordings, found.baseline.model.robot),
         'recordings': found.problem.recordings,
         'traces': traces(found),
         'absent': found.library.absent | dict.fromkeys(not_told(found.problem), NOT_TOLD),

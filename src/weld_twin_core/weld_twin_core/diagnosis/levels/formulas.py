@@ -48,7 +48,6 @@ FIELD = 'instrument'
 """A free field over the workspace speaks against every formula: it is what each of them bends to."""
 
 
-
 class Beside(NamedTuple):
     """
     What a free form predicts that the names do not.

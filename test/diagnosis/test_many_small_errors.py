@@ -142,7 +142,7 @@ def judged(families, gain=0.0, sure=0.0):
     """Return the verdict on the two families, with a structure left beside them."""
     result, unseen = families[3:]
     loose = Structure(1e-4, gain, sure, ('the angle of elbow_joint',))
-    # Without a structure what is left is near the floor.
+    # Without a structure what is left is near the floor; with one it is more than what is named.
     left = 3.6e-4 if gain else 5e-5
     found = SimpleNamespace(final=result, problem=unseen.problem, precision=np.ones(6))
     weighed = weighed_families(found, unseen, Beliefs())

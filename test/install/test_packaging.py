@@ -39,7 +39,9 @@ MODULES = {
 }
 """Modules of the distributions that are called otherwise."""
 ROS = {
+    'action_msgs',
     'ament_index_python',
+    'control_msgs',
     'diagnostic_msgs',
     'geometry_msgs',
     'launch',

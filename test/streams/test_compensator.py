@@ -26,6 +26,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import TwinError
+from weld_twin_core.motion.inverse.newton import polish
 from weld_twin_core.recording import JointMotion
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior, as_dict
@@ -83,6 +84,7 @@ class Planner:
         from weld_twin_nodes.harness.controller import Controller
 
         self.cell, self.kind, self.audit = cell, FollowJointTrajectory, []
+        self.model, self.active = model, False
         self.controller = cell.add(Controller, NAMES, HOME, 4.0)
         self.process = cell.start('compensator', robot='ur5', model=str(model), **parameters)
         cell.node.create_subscription(
@@ -110,6 +112,21 @@ class Planner:
             asked = self._change.call_async(ChangeState.Request(transition=Transition(id=number)))
             self.cell.wait(asked.done, step)
             assert asked.result().success, step
+            self.active = step == 'activate'
+
+    def to(self, q):
+        """Put the arm somewhere, and wait until the compensator has heard of it."""
+        self.controller.q = np.array(q)
+        seen(self.cell, 0.3)
+
+    def refused(self, goal, reason):
+        """Send a goal that must not reach the controller."""
+        count = len(self.controller.goals)
+        handle, line = self.send(goal)
+        assert not handle.accepted
+        assert reason in line['why'], line
+        assert len(self.controller.goals) == count
+        return line
 
     def goal(self, motion, stamp=0, names=NAMES):
         out = self.kind.Goal()
@@ -130,7 +147,7 @@ class Planner:
         return asked.result()
 
 
-@pytest.fixture
+@pytest.fixture(scope='module')
 def messages():
     try:
         with messages_importable():
@@ -139,10 +156,33 @@ def messages():
         pytest.skip(str(error))
 
 
+@pytest.fixture(scope='module')
+def shared(tmp_path_factory, messages):
+    """One compensator that applies what it corrects, for all tests of goals."""
+    folder = tmp_path_factory.mktemp('goals')
+    write_model(folder / 'diagnosis.json')
+    with Cell(folder / 'cell') as cell:
+        yield Planner(
+            cell, folder / 'diagnosis.json', apply=True, audit=str(folder / 'audit.jsonl')
+        )
+
+
 @pytest.fixture
-def cell(tmp_path, messages):
-    with Cell(tmp_path / 'cell') as cell:
-        yield cell
+def inactive(shared):
+    if shared.active:
+        shared.go('deactivate', 'cleanup')
+    return shared
+
+
+@pytest.fixture
+def planner(shared):
+    """The compensator with the right model, and a controller that runs nothing."""
+    write_model(shared.model)
+    shared.go(*(() if shared.active else ('configure', 'activate')))
+    assert shared.cell.trigger('/compensator/reload').success
+    shared.controller.accepts = True
+    shared.to(HOME)
+    return shared
 
 
 def points(goal):
@@ -154,196 +194,224 @@ def seen(cell, seconds):
     cell.wait(lambda: time.monotonic() > end, 'a while')
 
 
-def test_goals_are_corrected_refused_and_passed_through(cell, tmp_path):
-    model, audit = tmp_path / 'diagnosis.json', tmp_path / 'audit.jsonl'
-    write_model(model)
-    planner = Planner(cell, model, apply=True, audit=str(audit))
-    controller, motion = planner.controller, sway()
-
-    # Inactive: refused; an order to stop passes all the same.
-    handle, line = planner.send(planner.goal(motion))
-    assert (handle.accepted, line['verdict']) == (False, 'refused')
-    assert 'not active' in line['why']
-    stop = planner.kind.Goal()
+def test_inactive_it_refuses_goals_and_an_order_to_stop_passes(inactive):
+    line = inactive.refused(inactive.goal(sway()), 'not active')
+    assert line['verdict'] == 'refused'
+    stop = inactive.kind.Goal()
     stop.trajectory.joint_names = NAMES
-    handle, line = planner.send(stop)
+    handle, line = inactive.send(stop)
     assert handle.accepted
     assert line['verdict'] == 'passed'
-    controller.goals.clear()
 
-    # Corrected: the real arm goes where the goal meant; feedback and result come through.
-    planner.go('configure', 'activate')
-    feedback = []
+
+def test_the_real_arm_goes_where_a_goal_meant_and_all_else_passes_through(planner):
+    motion, feedback = sway(), []
+    planner.added.clear()
     handle, line = planner.send(planner.goal(motion), feedback.append)
     assert handle.accepted
     assert (line['verdict'], line['applied']) == ('corrected', True)
-    got = points(controller.goals[-1])
+    got = points(planner.controller.goals[-1])
     np.testing.assert_allclose(forward(real_arm(), got), forward(ROBOT, motion.q), atol=1e-9)
     assert line['largest_m'] == pytest.approx(line['expected_before_m'], rel=0.5)
     assert line['bound_m'] > line['expected_after_m']
     done = planner.result(handle)
     assert (done.status, done.result.error_string) == (4, '')
     assert len(feedback) > 10
-    assert json.loads(audit.read_text().splitlines()[-1]) == line
-    cell.wait(lambda: len(planner.added) == motion.t.size, 'a correction of every point')
+    assert json.loads((planner.model.parent / 'audit.jsonl').read_text().splitlines()[-1]) == line
+    planner.cell.wait(lambda: len(planner.added) == motion.t.size, 'a correction of every point')
 
-    # Other order, a track beside the arm, a tolerance, an effort: the track's points are its own.
-    order = [3, 0, 5, 1, 4, 2]
-    back = JointMotion(motion.t, motion.q[::-1], -motion.velocity[::-1])
+
+def test_joints_come_in_any_order_and_a_track_beside_them_is_left(planner):
+    motion, order = sway(), [3, 0, 5, 1, 4, 2]
     names = ['track', *(NAMES[k] for k in order)]
     wide = JointMotion(
-        back.t,
-        np.column_stack([back.t, back.q[:, order]]),
-        np.column_stack([np.ones(back.t.size), back.velocity[:, order]]),
+        motion.t,
+        np.column_stack([motion.t, motion.q[:, order]]),
+        np.column_stack([np.ones(motion.t.size), motion.velocity[:, order]]),
     )
-    handle, line = planner.send(planner.goal(wide, names=names))
+    asked = planner.goal(wide, names=names)
+    handle, line = planner.send(asked)
     assert handle.accepted, line
-    sent = controller.goals[-1]
+    sent = planner.controller.goals[-1]
     assert list(sent.trajectory.joint_names) == names
-    np.testing.assert_array_equal(points(sent)[:, 0], back.t)
+    np.testing.assert_array_equal(points(sent)[:, 0], motion.t)
     arm = points(sent)[:, [1 + order.index(k) for k in range(6)]]
-    np.testing.assert_allclose(forward(real_arm(), arm), forward(ROBOT, back.q), atol=1e-9)
+    np.testing.assert_allclose(forward(real_arm(), arm), forward(ROBOT, motion.q), atol=1e-9)
     planner.result(handle)
 
-    # Refused, each with its reason, and nothing reaches the controller.
-    count = len(controller.goals)
-    tight = planner.goal(motion)
+
+def test_a_single_point_and_one_at_time_zero_are_corrected(planner):
+    goal = planner.goal(sway())
+    goal.trajectory.points = goal.trajectory.points[-1:]
+    goal.trajectory.points[0].velocities = [0.0] * 6
+    for sec in (1, 0):
+        goal.trajectory.points[0].time_from_start.sec = sec
+        handle, line = planner.send(goal)
+        assert handle.accepted, line
+        got = points(planner.controller.goals[-1])
+        np.testing.assert_allclose(
+            forward(real_arm(), got), forward(ROBOT, sway().q[-1:]), atol=1e-9
+        )
+        planner.result(handle)
+
+
+def test_what_is_refused_says_why_and_does_not_reach_the_controller(planner):
     from control_msgs.msg import JointTolerance
 
+    motion = sway()
+    tight, same_time = planner.goal(motion), planner.goal(motion)
     tight.path_tolerance = [JointTolerance(name=NAMES[2], position=OFF / 2)]
-    now = cell.node.get_clock().now().nanoseconds
-    same_time = planner.goal(motion)
     for point in same_time.trajectory.points:
         point.time_from_start.sec = point.time_from_start.nanosec = 0
+    past = planner.cell.node.get_clock().now().nanoseconds - 5_000_000_000
+    fewer = JointMotion(motion.t, motion.q[:, :5])
     for asked, reason in (
         (tight, 'which tolerates'),
-        (planner.goal(motion, stamp=now - 5_000_000_000), 'should have begun'),
-        (
-            planner.goal(JointMotion(motion.t, motion.q[:, :5]), names=NAMES[:5]),
-            "no joint 'wrist_3",
-        ),
+        (planner.goal(motion, stamp=past), 'should have begun'),
+        (planner.goal(fewer, names=NAMES[:5]), "no joint 'wrist_3"),
         (same_time, 'must increase'),
         (planner.goal(sway(begin=HOME + 0.5)), 'outside what was recorded'),
         (planner.goal(sway(span=0.05)), 'the goal itself breaks'),
     ):
-        handle, line = planner.send(asked)
-        assert not handle.accepted
-        assert reason in line['why'], line
-    assert len(controller.goals) == count
-
-    # What the controller rejects is rejected.
-    controller.accepts = False
+        planner.refused(asked, reason)
+    planner.controller.accepts = False
     handle, line = planner.send(planner.goal(motion))
     assert (handle.accepted, line['verdict']) == (False, 'rejected by the controller')
-    controller.accepts = True
 
-    # Cancelled on the way; one that takes the place of another.
+
+def test_a_goal_is_cancelled_and_another_takes_its_place(planner):
     handle, _ = planner.send(planner.goal(sway(4.0)))
     asked = handle.cancel_goal_async()
-    cell.wait(asked.done, 'the cancel')
+    planner.cell.wait(asked.done, 'the cancel')
     assert len(asked.result().goals_canceling) == 1
     assert planner.result(handle).status == 5
+    planner.to(HOME)
     first, _ = planner.send(planner.goal(sway(4.0)))
     second, _ = planner.send(planner.goal(sway(1.0)))
     ended = planner.result(first)
     assert (ended.status, ended.result.error_string) == (6, 'preempted')
     assert planner.result(second).status == 4
 
-    # The model is exchanged while a goal runs: that one ends as begun and says so.
+
+def test_two_goals_at_once_reach_the_controller_in_their_order(planner):
+    planner.controller.answers = 0.2
+    count = len(planner.controller.goals)
+    asked = [
+        planner.client.send_goal_async(planner.goal(sway(span, count=size)))
+        for span, size in ((2.0, 400), (1.0, 3))
+    ]
+    for each in asked:
+        planner.cell.wait(each.done, 'the answer')
+    planner.controller.answers = 0.0
+    sizes = [len(goal.trajectory.points) for goal in planner.controller.goals[count:]]
+    assert sizes == [400, 3]
+    planner.result(asked[1].result())
+
+
+def test_a_model_exchanged_meanwhile_counts_from_the_next_goal_on(planner):
     handle, before = planner.send(planner.goal(sway(4.0)))
-    write_model(model, 0.5 * OFF)
-    refused, line = planner.send(planner.goal(motion))
-    assert not refused.accepted
-    assert 'was exchanged' in line['why']
+    write_model(planner.model, 0.5 * OFF)
+    planner.refused(planner.goal(sway()), 'was exchanged')
     assert 'exchanged' in planner.result(handle).result.error_string
-    assert cell.trigger('/compensator/reload').success
-    handle, line = planner.send(planner.goal(motion))
+    assert planner.cell.trigger('/compensator/reload').success
+    planner.to(HOME)
+    handle, line = planner.send(planner.goal(sway(4.0)))
     assert handle.accepted
     assert line['model'] != before['model']
-    assert line['largest_m'] == pytest.approx(0.5 * before['largest_m'], rel=0.3)
+    assert line['largest_m'] == pytest.approx(0.5 * before['largest_m'], rel=0.1)
     planner.result(handle)
 
-    # Deviations that the model does not leave withdraw it; so does a controller that dies.
-    deviation = cell.publisher(DEVIATION)
+
+def test_deviations_that_the_model_does_not_leave_withdraw_it(planner):
+    deviation = planner.cell.publisher(DEVIATION)
     for k in range(20):
-        deviation.publish(cell.messages.vector3(k, np.array([3e-4, 0.0, 0.0])))
-    cell.wait(lambda: 'does not hold' in planner.process.log, 'the notice')
-    handle, line = planner.send(planner.goal(motion))
-    assert 'does not hold any more' in line['why']
-    assert cell.trigger('/compensator/reload').success
+        deviation.publish(planner.cell.messages.vector3(k, np.array([3e-4, 0.0, 0.0])))
+    planner.cell.wait(lambda: 'does not hold' in planner.process.log, 'the notice')
+    planner.refused(planner.goal(sway()), 'does not hold any more')
+    planner.cell.node.destroy_publisher(deviation)
+
+
+def test_a_controller_that_dies_ends_its_goal(planner):
     handle, _ = planner.send(planner.goal(sway(40.0)))
     assert handle.accepted
-    cell.remove(controller)
+    planner.cell.remove(planner.controller)
     died = planner.result(handle)
     assert died.status == 6
     assert 'is gone' in died.result.error_string
-    handle, line = planner.send(planner.goal(motion))
-    assert 'no controller offers' in line['why']
+    planner.refused(planner.goal(sway()), 'no controller offers')
 
 
-def test_poses_are_corrected_and_in_the_shadow_nothing_is_sent(cell, tmp_path):
-    model = tmp_path / 'diagnosis.json'
-    write_model(model)
-    planner = Planner(cell, model, apply=False, executor='single_threaded')
-    handle, _ = planner.send(planner.goal(sway()))
-    assert not handle.accepted  # not active
-    planner.go('configure', 'activate')
-    handle, line = planner.send(planner.goal(sway(0.5)))
+@pytest.fixture
+def shadow(tmp_path, messages):
+    write_model(tmp_path / 'diagnosis.json')
+    with Cell(tmp_path / 'cell') as cell:
+        planner = Planner(
+            cell, tmp_path / 'diagnosis.json', apply=False, executor='single_threaded'
+        )
+        planner.go('configure', 'activate')
+        yield planner
+
+
+class Poses:
+    """A stream of poses to the compensator, and what comes of it."""
+
+    def __init__(self, planner):
+        self.planner, self.cell, self.out = planner, planner.cell, []
+        kind, node = POSE_OUT.message_class(), planner.cell.node
+        node.create_subscription(
+            kind, '/compensator/pose_out', self.out.append, POSE_OUT.requested.to_rclpy()
+        )
+        self._given = node.create_publisher(
+            kind, '/compensator/pose_in', POSE_IN.offered.to_rclpy()
+        )
+        self.cell.wait(lambda: self._given.get_subscription_count() == 1, 'the compensator')
+        self.cell.meet()
+        self._stamp = 1_000_000_000
+
+    def feed(self, q, until, what):
+        """Send one pose again and again until something is so."""
+        T = forward(ROBOT, np.asarray(q))
+        end = time.monotonic() + 30.0
+        while not until() and time.monotonic() < end:
+            self._stamp += 8_000_000
+            self._given.publish(self.cell.messages.pose(self._stamp, T[:3, 3], T[:3, :3], 'base'))
+            seen(self.cell, 0.008)
+        assert until(), what + self.planner.process.log
+
+    @property
+    def way(self):
+        return np.array([from_messages.pose(message)[0] for message in self.out])
+
+
+def test_in_the_shadow_nothing_is_changed_and_poses_are_corrected_once_applied(shadow):
+    handle, line = shadow.send(shadow.goal(sway(0.5)))
     assert handle.accepted
     assert (line['verdict'], line['applied']) == ('corrected', False)
-    sent = points(planner.controller.goals[-1])
-    np.testing.assert_array_equal(sent, sway(0.5).q)
-    planner.result(handle)
-    cell.wait(lambda: len(planner.added) == 26, 'the corrections')
+    np.testing.assert_array_equal(points(shadow.controller.goals[-1]), sway(0.5).q)
+    shadow.result(handle)
+    shadow.cell.wait(lambda: len(shadow.added) == 26, 'the corrections')
+    poses, here = Poses(shadow), shadow.controller.q
+    shadow.added.clear()
+    poses.feed(here, lambda: len(shadow.added) > 5, 'the shadow')
+    assert not poses.out
 
-    out = []
-    kind = POSE_OUT.message_class()
-    cell.node.create_subscription(
-        kind, '/compensator/pose_out', out.append, POSE_OUT.requested.to_rclpy()
-    )
-    given = cell.node.create_publisher(kind, '/compensator/pose_in', POSE_IN.offered.to_rclpy())
-    cell.wait(lambda: given.get_subscription_count() == 1, 'the compensator')
-    cell.meet()
-    here = planner.controller.q
-    stamps = iter(range(1, 10_000))
-
-    def feed(q, until, what):
-        T = forward(ROBOT, np.asarray(q))
-        ended = time.monotonic() + 30.0
-        while not until() and time.monotonic() < ended:
-            stamp = 1_000_000_000 + 8_000_000 * next(stamps)
-            given.publish(cell.messages.pose(stamp, T[:3, 3], T[:3, :3], 'base'))
-            seen(cell, 0.008)
-        assert until(), what + planner.process.log
-
-    planner.added.clear()
-    feed(here, lambda: len(planner.added) > 5, 'the shadow')
-    assert not out
-    planner.go('deactivate')
+    shadow.go('deactivate')
     for name, value in (('apply', True), ('on_refusal', 'pass'), ('max_rate_m_s', 2e-3)):
-        assert cell.set_parameter('compensator', name, value).successful
-    planner.go('activate')
-    assert not cell.set_parameter('compensator', 'apply', False).successful
-
-    # Faded in where the stream stands, then the real tool is where the pose meant.
-    feed(here, lambda: len(out) > 60, 'corrected poses')
-    position, rotation = from_messages.pose(out[-1])
-    from weld_twin_core.motion.inverse.newton import polish
-
+        assert shadow.cell.set_parameter('compensator', name, value).successful
+    shadow.go('activate')
+    assert not shadow.cell.set_parameter('compensator', 'apply', False).successful
+    poses.feed(here, lambda: len(poses.out) > 60, 'corrected poses')
+    position, rotation = from_messages.pose(poses.out[-1])
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = rotation, position
     q, _ = polish(ROBOT, here[None], T[None])
     np.testing.assert_allclose(forward(real_arm(), q[0]), forward(ROBOT, here), atol=1e-9)
-    way = np.array([from_messages.pose(message)[0] for message in out])
-    step = np.linalg.norm(np.diff(way, axis=0), axis=1).max()
-    assert step < 0.6 * np.linalg.norm(way[-1] - way[0])
+    # Faded in where the stream stands.
+    step = np.linalg.norm(np.diff(poses.way, axis=0), axis=1).max()
+    assert step < 0.6 * np.linalg.norm(poses.way[-1] - poses.way[0])
 
     # Where nothing was recorded a pose passes as it came, once the stream stands still there.
     far = here + [0.0, 0.0, 0.3, 0.0, 0.0, 0.0]
-    T = forward(ROBOT, far)
-    feed(
-        far,
-        lambda: np.allclose(from_messages.pose(out[-1])[0], T[:3, 3], atol=1e-12),
-        'a pose that is passed through',
-    )
-    assert 'outside what was recorded' in planner.process.log
+    wanted = forward(ROBOT, far)[:3, 3]
+    poses.feed(far, lambda: np.allclose(poses.way[-1], wanted, atol=1e-12), 'a pose that passes')
+    assert 'outside what was recorded' in shadow.process.log

@@ -240,8 +240,8 @@ class Signal:
     ----------
     t : array, shape (K,) [s]
         Stamps on the joint clock, strictly increasing.
-    value : array, shape (K,) or (K, 6)
-        Temperatures [degC], or force and torque [N, N m].
+    value : array, shape (K,) or (K, m)
+        Temperatures [degC]; force and torque [N, N m], m = 6; efforts of m joints [N m, or N].
     held : bool
         A sample is in force until the next one, as a running twin has it; else the signal is
         straight between samples.
@@ -268,7 +268,7 @@ class Signal:
         t = increasing(self.t, 'signal stamps')
         if t.size == 0:
             raise DataError('a signal is empty; leave it out of the recording')
-        shape = (t.size,) if np.ndim(self.value) == 1 else (t.size, 6)
+        shape = (t.size,) if np.ndim(self.value) == 1 else (t.size, None)
         object.__setattr__(self, 't', t)
         object.__setattr__(self, 'value', readonly(self.value, shape, 'signal values'))
 
@@ -316,6 +316,10 @@ class Recording:
         What the tool point touched in every posture, in place of measured positions.
     simulated : bool
         Whether it says of itself that a simulator made it, with or without noise of an instrument.
+    effort : Signal, value shape (K, n) [N m, or N of a slide], optional
+        Effort of each joint as the controller measured it; there where springs are to take it.
+    effort_holds : bool
+        The effort is what holds the load, as ROS means it; else it is the load itself.
 
     Raises
     ------
@@ -345,6 +349,8 @@ class Recording:
     incomplete: tuple[str, ...] = ()
     contacts: Contacts | None = None
     simulated: bool = False
+    effort: Signal | None = None
+    effort_holds: bool = True
 
     def __post_init__(self) -> None:
         if self.contacts is not None and self.contacts.size != self.joints.t.size:
@@ -357,17 +363,28 @@ class Recording:
                 f'wrench_frame must be one of {", ".join(WRENCH_FRAMES)}, '
                 f'got {self.wrench_frame!r}'
             )
-        sides = (('wrench', self.wrench, '(K, 6)'), ('temperature', self.temperature, '(K,)'))
+        n = self.joints.q.shape[1]
+        sides: tuple[tuple[str, Signal | None, tuple[int, ...]], ...] = (
+            ('wrench', self.wrench, (6,)),
+            ('temperature', self.temperature, ()),
+            ('effort', self.effort, (n,)),
+        )
         for name, signal, wanted in sides:
-            if signal is not None and signal.value.ndim != wanted.count('6') + 1:
+            if signal is not None and signal.value.shape[1:] != wanted:
+                told = ', '.join(['K', *map(str, wanted)]) if wanted else 'K,'
                 raise DataError(
-                    f'{name} of recording {self.name!r} must have shape {wanted}, '
+                    f'{name} of recording {self.name!r} must have shape ({told}), '
                     f'got {signal.value.shape}'
                 )
 
-    def at(self, t: Array) -> tuple[Array, Array, Array | None, Array | None]:
+    @property
+    def sides(self) -> tuple[Signal | None, Signal | None, Signal | None]:
+        """Return wrench, temperature and effort."""
+        return self.wrench, self.temperature, self.effort
+
+    def at(self, t: Array) -> tuple[Array, Array, Array | None, Array | None, Array | None]:
         """
-        Return joint position and velocity, wrench and temperature at other times.
+        Return joint position and velocity, wrench, temperature and effort at other times.
 
         What belongs to the stamps of the recording's own measurements is worked out once: a fit
         asks for it again and again.
@@ -382,7 +399,7 @@ class Recording:
         return self._looked_up(t)
 
     @cached_property
-    def _at_measured(self) -> tuple[Array, Array, Array | None, Array | None]:
+    def _at_measured(self) -> tuple[Array, Array, Array | None, Array | None, Array | None]:
         assert self.measured is not None
         found = self._looked_up(self.measured.t)
         for value in found:
@@ -390,11 +407,11 @@ class Recording:
                 value.setflags(write=False)
         return found
 
-    def _looked_up(self, t: Array) -> tuple[Array, Array, Array | None, Array | None]:
-        wrench, temperature = (
-            None if signal is None else signal.at(t) for signal in (self.wrench, self.temperature)
-        )
-        return (*self.joints.at(t), wrench, temperature)
+    def _looked_up(
+        self, t: Array
+    ) -> tuple[Array, Array, Array | None, Array | None, Array | None]:
+        wrench, warm, effort = (None if side is None else side.at(t) for side in self.sides)
+        return (*self.joints.at(t), wrench, warm, effort)
 
     @property
     def span_ns(self) -> tuple[int, int]:
@@ -437,11 +454,10 @@ class Recording:
         A running twin has to hold what it heard last; an analysis of the past knows the sample
         after as well.
         """
-        wrench, temperature = (
-            None if signal is None else replace(signal, held=False)
-            for signal in (self.wrench, self.temperature)
+        wrench, temperature, effort = (
+            None if signal is None else replace(signal, held=False) for signal in self.sides
         )
-        return replace(self, wrench=wrench, temperature=temperature)
+        return replace(self, wrench=wrench, temperature=temperature, effort=effort)
 
     def thinned(self, measurements: int, joints: int) -> Recording:
         """

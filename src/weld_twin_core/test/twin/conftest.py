@@ -55,6 +55,19 @@ def random_robot(seed, n=6, convention='standard', slides=(), frames=True):
     return Robot.from_mapping(data)
 
 
+def random_cell(seed, convention='standard', slides=()):
+    """Return a robot beside a positioner of two joints, j1 at its foot and j0 at the workpiece."""
+    arm = random_robot(seed, n=4, convention=convention, slides=slides).to_mapping()
+    foot = random_robot(seed + 50, n=2, convention=convention).to_mapping()
+    for rows, names in ((arm['joints'], ('j2', 'j3', 'j4', 'j5')), (foot['joints'], ('j1', 'j0'))):
+        for row, name in zip(rows, names, strict=True):
+            row['name'] = name
+    return Robot.from_mapping(arm | {'workpiece': {k: v for k, v in foot.items() if k in KEPT}})
+
+
+KEPT = ('base', 'tool', 'joints', 'links', 'payload', 'convention')
+
+
 def ur5():
     """Return a UR5 with link masses."""
     masses = [3.7, 8.393, 2.33, 1.219, 1.219, 0.1879]
@@ -85,6 +98,8 @@ ROBOTS = {
     'seven joints': random_robot(3, n=7),
     'gantry': random_robot(4, slides=(0, 3), convention='standard'),
     'modified gantry': random_robot(5, slides=(1,), convention='modified'),
+    'positioner': random_cell(6, slides=(0,)),
+    'modified positioner': random_cell(7, convention='modified'),
 }
 
 
@@ -143,20 +158,33 @@ def turned_frame(frame, xyz, rotvec, side):
     return out
 
 
-def textbook_pose(robot, q, table=(), base=None, tool=None):
+def textbook_pose(robot, q, table=(), base=None, tool=None, root=None):
     """Return T_world_tool by multiplying one matrix after the other."""
     pose = robot.T_world_base if base is None else base
-    for row in textbook_rows(robot, q, table):
+    rows = textbook_rows(robot, q, table)
+    if robot.behind:
+        for row in rows[: robot.behind]:
+            pose = pose @ np.linalg.inv(row)
+        pose = pose @ (robot.T_root_base if root is None else root)
+    for row in rows[robot.behind :]:
         pose = pose @ row
     return pose @ (robot.T_flange_tool if tool is None else tool)
 
 
 def potential_energy(robot, q, extra_mass=0.0, extra_com=(0.0, 0.0, 0.0)):
-    """Return the potential energy of links, payload and an extra payload [J]."""
-    gravity = robot.T_world_base[:3, :3] @ robot.gravity
-    energy, pose = 0.0, robot.T_world_base
-    for i, row in enumerate(textbook_rows(robot, q)):
-        pose = pose @ row
+    """
+    Return the potential energy of links, payload and an extra payload [J].
+
+    All that weighs stands on what does not move: the robot, and a positioner beside it.
+    """
+    gravity, energy, pose = robot.gravity, 0.0, np.eye(4)
+    rows, k = textbook_rows(robot, q), robot.behind
+    foot = np.linalg.inv(robot.T_root_base)
+    for i in range(k)[::-1]:
+        foot = foot @ rows[i]
+        energy -= robot.mass[i] * gravity @ (foot[:3, :3] @ robot.com[i] + foot[:3, 3])
+    for i in range(k, robot.n):
+        pose = pose @ rows[i]
         energy -= robot.mass[i] * gravity @ (pose[:3, :3] @ robot.com[i] + pose[:3, 3])
     tool = pose @ robot.T_flange_tool
     for mass, com in ((robot.payload_mass, robot.payload_com), (extra_mass, extra_com)):
@@ -172,7 +200,10 @@ def load_torque(robot, q, wrench=None, frame='tool', joints=None, **extra):
     """
     step, out = 1e-6, np.zeros(robot.n)
     here = textbook_pose(robot, q)
-    turn = here[:3, :3] if frame == 'tool' else robot.T_world_base[:3, :3]
+    foot = robot.T_world_base
+    for row in textbook_rows(robot, q)[: robot.behind]:
+        foot = foot @ np.linalg.inv(row)
+    turn = here[:3, :3] if frame == 'tool' else (foot @ robot.T_root_base)[:3, :3]
     for i in range(robot.n) if joints is None else joints:
         dq = step * np.eye(robot.n)[i]
         out[i] = -(

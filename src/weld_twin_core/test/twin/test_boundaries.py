@@ -227,7 +227,7 @@ def test_a_robot_survives_its_file(robot):
     assert again.convention == robot.convention
     for key in ('a', 'alpha', 'd', 'theta', 'beta', 'prismatic', 'mass', 'com', 'payload_com'):
         np.testing.assert_array_equal(getattr(again, key), getattr(robot, key))
-    for key in ('T_world_base', 'T_flange_tool'):
+    for key in ('T_world_base', 'T_flange_tool', 'T_root_base'):
         np.testing.assert_allclose(getattr(again, key), getattr(robot, key), atol=1e-15)
     assert again.to_mapping().keys() == robot.to_mapping().keys()
 

@@ -47,7 +47,7 @@ def test_every_geometric_channel_has_the_right_column_at_any_displacement(robot,
     rng = np.random.default_rng(1)
     q, step = positions(robot), 1e-6
     channels = chain.identification_channels(robot)
-    assert len(channels) == 12 + 5 * robot.n
+    assert len(channels) == 12 + 5 * robot.n + (6 if robot.behind else 0)
     shift = {channel: np.asarray(size * rng.normal()) for channel in channels}
     at = chain.frames(robot, q, shift)
     for channel in channels:

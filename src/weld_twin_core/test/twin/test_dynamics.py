@@ -24,31 +24,49 @@ def pinocchio_model(pin, robot):
     def slide(axis, length):
         return pin.SE3(np.eye(3), length * np.eye(3)['xyz'.index(axis)])
 
-    model = pin.Model()
-    model.gravity = pin.Motion(robot.T_world_base[:3, :3] @ robot.gravity, np.zeros(3))
-    parent, after = 0, pin.SE3(robot.T_world_base)
-    for i in range(robot.n):
-        before = turn('x', robot.alpha[i]) * turn('y', robot.beta[i]) * slide('x', robot.a[i])
-        fixed = turn('z', robot.theta[i]) * slide('z', robot.d[i])
-        if robot.convention == 'standard':
-            place = after
-            fixed = (
-                fixed
-                * slide('x', robot.a[i])
-                * turn('x', robot.alpha[i])
-                * turn('y', robot.beta[i])
-            )
-        else:
-            place = after * before
-        joint = pin.JointModelPZ() if robot.prismatic[i] else pin.JointModelRZ()
-        parent, after = model.addJoint(parent, joint, place, f'j{i}'), fixed
-        inertia = pin.Inertia(robot.mass[i], robot.com[i], np.zeros((3, 3)))
-        model.appendBodyToJoint(parent, inertia, fixed)
+    def branch(place, rows):
+        """Add rows from a place on what stands still; return the last joint, and the end in it."""
+        parent, after = 0, pin.SE3(place)
+        for i in rows:
+            before = turn('x', robot.alpha[i]) * turn('y', robot.beta[i]) * slide('x', robot.a[i])
+            fixed = turn('z', robot.theta[i]) * slide('z', robot.d[i])
+            if robot.convention == 'standard':
+                at = after
+                fixed = (
+                    fixed
+                    * slide('x', robot.a[i])
+                    * turn('x', robot.alpha[i])
+                    * turn('y', robot.beta[i])
+                )
+            else:
+                at = after * before
+            joint = pin.JointModelPZ() if robot.prismatic[i] else pin.JointModelRZ()
+            parent, after = model.addJoint(parent, joint, at, f'j{i}'), fixed
+            inertia = pin.Inertia(robot.mass[i], robot.com[i], np.zeros((3, 3)))
+            model.appendBodyToJoint(parent, inertia, fixed)
+        return parent, after
+
+    model, k = pin.Model(), robot.behind
+    # A robot stands in the measuring frame; beside a positioner all stand in the robot's base.
+    base = np.eye(4) if k else robot.T_world_base
+    model.gravity = pin.Motion(base[:3, :3] @ robot.gravity, np.zeros(3))
+    parent, after = branch(np.linalg.inv(robot.T_root_base), range(k)[::-1]) if k else (0, base)
+    table = (
+        pin.SE3(after) * pin.SE3(np.linalg.inv(robot.T_world_base)) if k else pin.SE3.Identity()
+    )
+    model.addFrame(pin.Frame('table', parent, table, pin.FrameType.OP_FRAME))
+    parent, after = branch(base, range(k, robot.n))
     tool = after * pin.SE3(robot.T_flange_tool)
     payload = pin.Inertia(robot.payload_mass, robot.payload_com, np.zeros((3, 3)))
     model.appendBodyToJoint(parent, payload, tool)
     model.addFrame(pin.Frame('tool', parent, tool, pin.FrameType.OP_FRAME))
     return model
+
+
+def in_order(robot, values):
+    """Return values of joints in the order of the other library's tree: a positioner from its foot."""
+    k = robot.behind
+    return np.concatenate([values[:k][::-1], values[k:]])
 
 
 def test_gravity_torque_is_the_negative_of_pinocchios_generalised_gravity(robot):
@@ -58,24 +76,31 @@ def test_gravity_torque_is_the_negative_of_pinocchios_generalised_gravity(robot)
     q = positions(robot)
     found = dynamics.gravity_torque(robot, q)
     for row, torque in zip(q, found, strict=True):
-        expected = -pin.computeGeneralizedGravity(model, data, row)
-        np.testing.assert_allclose(torque, expected, atol=1e-11)
+        expected = -pin.computeGeneralizedGravity(model, data, in_order(robot, row))
+        np.testing.assert_allclose(in_order(robot, torque), expected, atol=1e-11)
 
 
 def test_pose_and_jacobian_agree_with_pinocchio(robot):
     pin = pytest.importorskip('pinocchio')
     model = pinocchio_model(pin, robot)
     data = model.createData()
-    tool = model.getFrameId('tool')
+    tool, table = model.getFrameId('tool'), model.getFrameId('table')
     q = positions(robot)
     poses, columns = forward(robot, q), jacobian(robot, q)
     for k, row in enumerate(q):
+        row = in_order(robot, row)
         pin.framesForwardKinematics(model, data, row)
-        np.testing.assert_allclose(poses[k], data.oMf[tool].homogeneous, atol=1e-13)
-        expected = pin.computeFrameJacobian(
-            model, data, row, tool, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        seen = data.oMf[table].inverse() * data.oMf[tool]
+        np.testing.assert_allclose(poses[k], seen.homogeneous, atol=1e-13)
+        tip, plate = (
+            pin.computeFrameJacobian(model, data, row, at, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+            for at in (tool, table)
         )
-        np.testing.assert_allclose(columns[k], expected, atol=1e-12)
+        lever = data.oMf[tool].translation - data.oMf[table].translation
+        plate[:3] += np.cross(plate[3:], lever, axis=0)
+        expected = np.kron(np.eye(2), data.oMf[table].rotation.T) @ (tip - plate)
+        found = np.stack([in_order(robot, line) for line in columns[k]])
+        np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize('frame', ['tool', 'base'])

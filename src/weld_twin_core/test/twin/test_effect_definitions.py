@@ -30,11 +30,12 @@ class Cell:
     q: np.ndarray
     table: dict = field(default_factory=dict)
     base: np.ndarray | None = None
+    root: np.ndarray | None = None
     tool: np.ndarray | None = None
     move: object = None
 
     def pose(self):
-        pose = self.textbook.pose(self.robot, self.q, self.table, self.base, self.tool)
+        pose = self.textbook.pose(self.robot, self.q, self.table, self.base, self.tool, self.root)
         return pose if self.move is None else self.move(pose)
 
 
@@ -169,7 +170,9 @@ def bearing_tilt(cell):
     angle, standard = cell.q[0], cell.robot.convention == 'standard'
     x, y = 2e-3 * np.cos(angle) + 1e-3 * np.sin(angle), 3e-3 * np.sin(angle)
     x, y = x - 4e-4 * np.sin(2.0 * angle), y + 5e-4 * np.cos(2.0 * angle)
-    if standard:
+    if standard and cell.robot.behind:
+        cell.table = {('alpha', 1): x, ('beta', 1): y}  # the row before it, from the foot outward
+    elif standard:
         axes = cell.robot.T_world_base[:3, :2]
         turn = Rotation.from_rotvec(axes @ [x, y]).as_matrix()
         cell.base = np.array(cell.robot.T_world_base)
@@ -210,11 +213,13 @@ def measurement_scale(cell):
 
 def pedestal_tilt(cell):
     """Two levers at a time: every weight, and the wrench, about the base's origin."""
-    robot, base = cell.robot, cell.robot.T_world_base
+    robot = cell.robot
+    base = np.eye(4) if robot.behind else robot.T_world_base
     gravity, pose = base[:3, :3] @ robot.gravity, base
     moment = np.zeros(3)
-    for k, row in enumerate(cell.textbook.rows(robot, cell.q)):
-        pose = pose @ row
+    rows = cell.textbook.rows(robot, cell.q)
+    for k in range(robot.behind, robot.n):
+        pose = pose @ rows[k]
         centre = (pose @ [*robot.com[k], 1.0])[:3]
         moment += np.cross(centre - base[:3, 3], robot.mass[k] * gravity)
     tool = pose @ robot.T_flange_tool
@@ -224,15 +229,21 @@ def pedestal_tilt(cell):
     moment += twist + np.cross(tool[:3, 3] - base[:3, 3], force)
     own = base[:3, :3].T @ moment
     turn = base[:3, :3] @ [1e-5 * own[0], 3e-5 * own[1], 0.0]
-    cell.base = cell.textbook.frame(base, np.zeros(3), turn, 'left')
+    leaned = cell.textbook.frame(base, np.zeros(3), turn, 'left')
+    if robot.behind:
+        cell.root = robot.T_root_base @ leaned
+    else:
+        cell.base = leaned
 
 
 def hose_pull(cell):
     """Virtual work: the joint turns a little, and the energy of a spring and a weight changes."""
 
     def energy(q):
-        pose = cell.textbook.pose(cell.robot, q, tool=np.eye(4))
-        place = (np.linalg.inv(cell.robot.T_world_base) @ pose)[:3, 3]
+        pose = np.eye(4)
+        for row in cell.textbook.rows(cell.robot, q)[cell.robot.behind :]:
+            pose = pose @ row
+        place = pose[:3, 3]
         return 0.5 * 40.0 * place @ place - place @ [10.0, -20.0, 30.0]
 
     step = 1e-5 * np.eye(cell.robot.n)[1]
@@ -323,6 +334,8 @@ DEFINITIONS = {
 IN_TIME = {'backlash', 'servo_lag', 'vibration', 'time_delay', 'clock_rate'}
 LOST_MOTION = {'friction', 'hysteresis', 'gear_ratio_by_direction'}
 """Tested in test_lost_motion."""
+OF_CELLS = {'root_pose', 'guide_bend', 'guide_tilt'}
+"""Of robots beside a positioner, or on a track; tested in test_cells."""
 
 
 def effect(name, **values):
@@ -337,7 +350,7 @@ def with_helpers(name, effects):
 
 def test_every_registered_effect_is_tested_here():
     bundled = {name for name, kind in REGISTRY.items() if kind.__module__.startswith('weld_twin')}
-    assert bundled == set(DEFINITIONS) | IN_TIME | LOST_MOTION
+    assert bundled == set(DEFINITIONS) | IN_TIME | LOST_MOTION | OF_CELLS
 
 
 @pytest.mark.parametrize('name', DEFINITIONS)

@@ -67,7 +67,7 @@ def sure(position=1e-5, low=-4.0, high=4.0):
     return Posterior(Directions((), 1, ()), np.zeros(0), np.zeros((0, 0)), rest, domain)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
     st.sampled_from(list(HOMES)),
     st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4),
@@ -142,7 +142,7 @@ def through_a_gap(q, width, middle):
     return np.array(out)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(st.floats(2e-4, 1.2e-3), st.sampled_from([-1.0, 0.0, 1.0]))
 def test_a_step_of_play_is_spread_over_the_standstill_of_the_turn(width, came):
     t = np.linspace(0.0, 3.0, 376)
@@ -222,7 +222,7 @@ def test_a_goal_at_the_edge_of_a_joint_is_refused_where_the_correction_leaves_it
 
 
 @given(st.floats(1e-5, 4e-4))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=4, deadline=None)
 def test_the_bound_grows_with_what_the_model_is_not_sure_of(size):
     out = corrected_goal(model(offset(2e-3), posterior=sure(size)), goal(), GoalLimits(0.01, 0.1))
     # Of three coordinates of that size each, nine in ten lie within 2.5 of them.

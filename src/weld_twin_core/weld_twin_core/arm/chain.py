@@ -46,7 +46,10 @@ class Frames(NamedTuple):
 
     ``rotation`` is (..., 3, 3) and ``position`` (..., 3) of the tool; ``flange_rotation`` and
     ``flange_point`` are those of the chain's end before the tool frame; ``base_rotation`` and
-    ``base_point`` those of the base.
+    ``base_point`` those of the base. ``root_rotation`` and ``root_point`` are those of the frame
+    where the robot's rows begin: the base itself, unless a positioner stands between. ``ends`` are
+    the frames at the outer end of the rows that the chain passes backwards: axes x, y, z and
+    origin, components first.
     """
 
     rotation: Array
@@ -56,6 +59,9 @@ class Frames(NamedTuple):
     flange_point: Array
     base_rotation: Array
     base_point: Array
+    root_rotation: Array
+    root_point: Array
+    ends: tuple[tuple[Array, Array, Array, Array], ...] = ()
 
 
 def _six(shift: Shift, name: str) -> Array | None:
@@ -82,6 +88,21 @@ def tool_frame(robot: Robot, shift: Shift = NO_SHIFT) -> tuple[Array, Array]:
     if error is None:
         return rotation, origin
     return rotation @ rotation_matrix(error[..., 3:]), origin + error[..., :3]
+
+
+def root_frame(robot: Robot, shift: Shift = NO_SHIFT) -> tuple[Array, Array]:
+    """
+    Return rotation (..., 3, 3) and origin (..., 3) of the robot's base in the positioner's foot.
+
+    The foot is what is displaced, in the axes of the base: xyz, and a turn about its own origin.
+    """
+    rotation, origin = robot.T_root_base[:3, :3], robot.T_root_base[:3, 3]
+    error = _six(shift, 'root')
+    if error is None:
+        return rotation, origin
+    turned = rotation @ np.swapaxes(rotation_matrix(error[..., 3:]), -1, -2)
+    foot = -(rotation.T @ origin) + error[..., :3]
+    return turned, -(turned @ foot[..., None])[..., 0]
 
 
 def _nothing(value: Any) -> bool:
@@ -117,10 +138,9 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
     """
     base_rotation, base_point = base_frame(robot, shift)
     axes = max([q.ndim - 1, *(np.ndim(value) for value in shift.values())])
-    x, y, z, p = (
-        pad(components(v), axes) for v in (*(base_rotation[..., k] for k in range(3)), base_point)
-    )
-    rows = []
+    triad, p = _started(base_rotation, base_point, axes)
+    root_rotation, root_point = base_rotation, base_point
+    rows, ends = [], []
     for i in range(robot.n):
         values: dict[str, Any] = {key: getattr(robot, key)[i] for key in ROW_CHANNELS}
         moved = 'd' if robot.prismatic[i] else 'theta'
@@ -128,11 +148,20 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
         for key, channel in ((moved, ('q', i)), *((key, (key, i)) for key in ROW_CHANNELS)):
             if channel in shift:
                 values[key] = values[key] + shift[channel]
-        (x, y, z), p, row_axes = _row(robot.convention, (x, y, z), p, values)
+        order = ROW_ORDER[robot.convention]
+        if i < robot.behind:
+            ends.append((*triad, p))
+            order, values = order[::-1], {key: -value for key, value in values.items()}
+        triad, p, row_axes = _row(order, triad, p, values)
         rows.append(row_axes)
-    flange = np.stack([samples_first(v) for v in np.broadcast_arrays(x, y, z)], axis=-1)
+        if i + 1 == robot.behind:
+            rotation, origin = root_frame(robot, shift)
+            at, foot = _ended(triad, p)
+            root_rotation = at @ rotation
+            root_point = foot + (at @ origin[..., None])[..., 0]
+            triad, p = _started(root_rotation, root_point, axes)
+    flange, flange_point = _ended(triad, p)
     tool_rotation, tool_point = tool_frame(robot, shift)
-    flange_point = samples_first(p)
     position = flange_point + (flange @ tool_point[..., None])[..., 0]
     return Frames(
         flange @ tool_rotation,
@@ -142,15 +171,30 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
         flange_point,
         base_rotation,
         base_point,
+        root_rotation,
+        root_point,
+        tuple(ends),
     )
 
 
+def _started(rotation: Array, point: Array, axes: int) -> tuple[tuple[Array, ...], Array]:
+    """Return axes and origin of a frame, components first, for samples of so many axes."""
+    x, y, z, p = (pad(components(v), axes) for v in (*(rotation[..., k] for k in range(3)), point))
+    return (x, y, z), p
+
+
+def _ended(triad: tuple[Array, ...], p: Array) -> tuple[Array, Array]:
+    """Return rotation (..., 3, 3) and origin (..., 3) of axes that had components first."""
+    axes = [samples_first(v) for v in np.broadcast_arrays(*triad)]
+    return np.stack(axes, axis=-1), samples_first(p)
+
+
 def _row(
-    convention: str, axes: tuple[Array, Array, Array], p: Array, values: dict[str, Any]
-) -> tuple[tuple[Array, Array, Array], Array, RowAxes]:
+    order: tuple[str, ...], axes: tuple[Array, ...], p: Array, values: dict[str, Any]
+) -> tuple[tuple[Array, ...], Array, RowAxes]:
     """Return axes and origin behind a row, and where each of its motions began."""
     moving, met = list(axes), {}
-    for kind in ROW_ORDER[convention]:
+    for kind in order:
         k = AXIS[kind]
         met[kind] = moving[k], p
         if kind in TURNS:
@@ -171,8 +215,9 @@ def displaced_robot(robot: Robot, shift: Mapping[Channel, float]) -> Robot:
         if name in rows:
             rows[name][i] += value
     arrays = {key: np.asarray(value) for key, value in shift.items()}
-    base, tool = base_frame(robot, arrays), tool_frame(robot, arrays)
-    return replace(robot, **rows, T_world_base=transform(*base), T_flange_tool=transform(*tool))
+    kinds = {'T_world_base': base_frame, 'T_root_base': root_frame, 'T_flange_tool': tool_frame}
+    moved = {key: transform(*frame(robot, arrays)) for key, frame in kinds.items()}
+    return replace(robot, **rows, **moved)
 
 
 def positions(robot: Robot, q: ArrayLike) -> Array:
@@ -215,6 +260,11 @@ def forward(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array:
 
     """
     q = positions(robot, q)
+    if robot.behind and not shift:
+        foot, arm = robot.branches
+        T_root_table = forward(foot, q[..., : robot.behind][..., ::-1])
+        T_root_tool = forward(arm, q[..., robot.behind :])
+        return np.asarray(np.linalg.inv(T_root_table) @ T_root_tool)
     if q.size >= MANY * robot.n and robot.n <= MOST_JOINTS and not shift:
         return kernel_of(robot).poses(q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 4, 4)
     chain = frames(robot, q, shift)
@@ -249,10 +299,16 @@ def column(robot: Robot, chain: Frames, channel: Channel, shift: Shift = NO_SHIF
         return _unit(i, chain.position.shape[:-1])
     if name in ('base', 'tool'):
         return _frame_column(robot, chain, name, i, shift)
-    row = chain.rows[i]
+    if name == 'root':
+        return _root_column(robot, chain, i, shift)
     if name == 'q':
         name = 'd' if robot.prismatic[i] else 'theta'
-    tip = components(chain.position)
+    out = _row_column(robot, chain.rows[i], name, components(chain.position))
+    return -out if i < robot.behind else out
+
+
+def _row_column(robot: Robot, row: RowAxes, name: str, tip: Array) -> Array:
+    """Return the velocity of the tip and its turn by one value of a row, passed forwards."""
     match name:
         case 'theta':
             return _turn_column(row.z, row.z_point, tip)
@@ -265,7 +321,7 @@ def column(robot: Robot, chain: Frames, channel: Channel, shift: Shift = NO_SHIF
         case 'a':
             along = row.x if robot.convention == 'standard' else cross(row.y, row.z)
             return _slide_column(along, tip)
-    raise KeyError(channel)
+    raise KeyError(name)
 
 
 def _turn_column(axis: Array, point: Array, tip: Array) -> Array:
@@ -304,6 +360,21 @@ def _frame_column(robot: Robot, chain: Frames, name: str, i: int, shift: Shift) 
     return out
 
 
+def _root_column(robot: Robot, chain: Frames, i: int, shift: Shift) -> Array:
+    """Return the column of a displacement of the positioner's foot: the robot goes the other way."""
+    tip = components(chain.position)
+    if i < 3:
+        return -_slide_column(components(chain.root_rotation[..., i]), tip)
+    error = _six(shift, 'root')
+    axis = (np.eye(3) if error is None else left_jacobian(error[..., 3:]))[..., i - 3]
+    rotation, origin = root_frame(robot, shift)
+    to_foot = np.swapaxes(rotation, -1, -2) @ origin[..., None]
+    foot = chain.root_point - (chain.root_rotation @ to_foot)[..., 0]
+    turned = (chain.root_rotation @ axis[..., None])[..., 0]
+    axes = tip.ndim - 1
+    return -_turn_column(pad(components(turned), axes), pad(components(foot), axes), tip)
+
+
 def jacobian(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array:
     """
     Return the geometric Jacobian at the tool, shape (..., 6, n), linear part first.
@@ -339,7 +410,8 @@ def jacobian(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array:
 
 
 def identification_channels(robot: Robot) -> tuple[Channel, ...]:
-    """Return every geometric channel: base, theta d a alpha beta of every row, tool."""
+    """Return every geometric channel: base, theta d a alpha beta of every row, root, tool."""
     rows = tuple((key, i) for i in range(robot.n) for key in ROW_CHANNELS)
+    root = tuple(('root', k) for k in range(6)) if robot.behind else ()
     base = tuple(('base', k) for k in range(6))
-    return base + rows + tuple(('tool', k) for k in range(6))
+    return base + rows + root + tuple(('tool', k) for k in range(6))

@@ -4,9 +4,9 @@
 Channels of the chain, and displacements of them.
 
 A *channel* is one scalar of the chain that an effect may displace: ``('q', i)``,
-``('theta' | 'd' | 'a' | 'alpha' | 'beta', i)``, ``('base' | 'tool' | 'pose', 0..5)`` or
-``('tau', i)``. A *shift* maps channels to displacements that broadcast with the samples.
-
+``('theta' | 'd' | 'a' | 'alpha' | 'beta', i)``, ``('base' | 'root' | 'tool' | 'pose', 0..5)`` or
+``('tau', i)``. 'root' is where a positioner's rows begin, in the axes of the robot's base. A
+*shift* maps channels to displacements that broadcast with the samples.
 """
 
 from __future__ import annotations

@@ -83,7 +83,8 @@ def _line(robot: Robot, chain: Frames) -> tuple[Array, Array]:
     for k, row in enumerate(chain.rows):
         x, at, turned = (np.moveaxis(v, 0, -1) for v in (row.x, row.x_point, row.z_point))
         if robot.convention == 'standard':
-            points += [at - robot.a[k] * x, at]
+            ends = [at - robot.a[k] * x, at]
+            points += ends[::-1] if k < robot.behind else ends
             link += [k, k]
         else:
             # Its own z begins where its x ended; what lies before still belongs to the row before.

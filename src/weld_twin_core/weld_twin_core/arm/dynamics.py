@@ -5,6 +5,9 @@ Load torque on the joints from gravity, payload and the wrench on the tool.
 
 A positive torque turns the joint in its positive direction; it is what the load does to the
 joint, the negative of what the motor must hold.
+
+The joints of a positioner carry what stands on them, and not the robot: both hang on the same
+foot. The force of a process acts between tool and workpiece, and so on the joints of both.
 """
 
 from collections.abc import Sequence
@@ -20,14 +23,22 @@ from .robot import Robot
 from .vectors import components, cross, dot, pad
 
 
-def point_force_torque(robot: Robot, chain: Frames, point: Array, force: Array) -> Array:
+def point_force_torque(
+    robot: Robot, chain: Frames, point: Array, force: Array, *, contact: bool = False
+) -> Array:
     """
     Return joint torques, shape (n, ...), of a force at a point carried by the tool.
 
     Parameters
     ----------
+    robot : Robot
+    chain : Frames
+        The chain at the samples.
     point, force : array, shape (3, ...) [m, N]
         Components first, in the world frame.
+    contact : bool
+        The force comes from the workpiece, and pushes back on it; otherwise a positioner does not
+        feel it.
 
     """
     axes = max(point.ndim, force.ndim, chain.position.ndim) - 1
@@ -36,13 +47,16 @@ def point_force_torque(robot: Robot, chain: Frames, point: Array, force: Array) 
     for i, row in enumerate(chain.rows):
         z = pad(row.z, axes)
         way = z if robot.prismatic[i] else cross(z, point - pad(row.z_point, axes))
-        torques.append(dot(way, force))
+        torque = dot(way, force)
+        if i < robot.behind:
+            torque = -torque if contact else np.zeros_like(torque)
+        torques.append(torque)
     return np.stack(np.broadcast_arrays(*torques))
 
 
 def gravity_direction(robot: Robot, chain: Frames) -> Array:
     """Return gravity in the world frame, components first, shape (3, ...) [m/s^2]."""
-    return pad(components(chain.base_rotation @ robot.gravity), chain.position.ndim - 1)
+    return pad(components(chain.root_rotation @ robot.gravity), chain.position.ndim - 1)
 
 
 def payload_torque(robot: Robot, chain: Frames, mass: Array | float, com: Array) -> Array:
@@ -83,7 +97,7 @@ def wrench_rotation(robot: Robot, chain: Frames, frame: str) -> Array:
     """
     if frame == 'tool':
         return chain.rotation
-    return np.asarray(chain.base_rotation @ robot.T_base_origin[:3, :3])
+    return np.asarray(chain.root_rotation @ robot.T_base_foot[:3, :3])
 
 
 def _wrench_in_world(
@@ -111,11 +125,12 @@ def wrench_torque(robot: Robot, chain: Frames, wrench: Array, frame: str = 'tool
 
     """
     force, moment = _wrench_in_world(robot, chain, wrench, frame)
-    torque = point_force_torque(robot, chain, components(chain.position), force)
+    torque = point_force_torque(robot, chain, components(chain.position), force, contact=True)
     moment = pad(moment, torque.ndim - 1)
     for i, row in enumerate(chain.rows):
         if not robot.prismatic[i]:
-            torque[i] += dot(pad(row.z, torque.ndim - 1), moment)
+            own = dot(pad(row.z, torque.ndim - 1), moment)
+            torque[i] += -own if i < robot.behind else own
     return torque
 
 
@@ -169,13 +184,24 @@ def _carried(robot: Robot, chain: Frames) -> list[tuple[float, Array]]:
     if mass:
         centre = chain.position + chain.rotation @ robot.payload_com
         moment = mass * components(centre)
+    robots = _heaped(robot, chain, list(range(robot.behind, robot.n))[::-1], mass, moment)
+    if not robot.behind:
+        return robots[::-1]
+    outward = list(range(robot.behind))
+    return _heaped(robot, chain, outward, 0.0, np.zeros((3, *samples))) + robots[::-1]
+
+
+def _heaped(
+    robot: Robot, chain: Frames, inward: list[int], mass: float, moment: Array
+) -> list[tuple[float, Array]]:
+    """Return mass and first moment beyond each joint, from the outermost joint to the foot."""
     carried = []
-    for i in reversed(range(robot.n)):
+    for i in inward:
         if robot.mass is not None and robot.com is not None:
             moment = moment + robot.mass[i] * link_point(robot, chain, i, robot.com[i])
             mass += robot.mass[i]
         carried.append((mass, moment - mass * chain.rows[i].z_point))
-    return carried[::-1]
+    return carried
 
 
 def torque_slope(
@@ -219,7 +245,10 @@ def payload_slope(robot: Robot, chain: Frames, mass: Array | float, com: Array) 
     """
     centre = _carried_point(chain, com)
     levers = [mass * (centre - pad(row.z_point, centre.ndim - 1)) for row in chain.rows]
-    return _weight_slope(robot, chain, [(mass, lever) for lever in levers])
+    carried: list[tuple[Any, Array]] = [(mass, lever) for lever in levers]
+    for i in range(robot.behind):
+        carried[i] = (0.0, np.zeros_like(levers[i]))
+    return _weight_slope(robot, chain, carried)
 
 
 def _weight_slope(robot: Robot, chain: Frames, carried: Sequence[tuple[Any, Array]]) -> Array:
@@ -231,7 +260,8 @@ def _weight_slope(robot: Robot, chain: Frames, carried: Sequence[tuple[Any, Arra
         z = pad(chain.rows[j].z, axes)
         shifted = mass * z if robot.prismatic[j] else cross(z, lever)
         pull = cross(shifted, gravity)
-        for i in range(j + 1):
+        # The joints between joint j and the foot carry what it moves.
+        for i in range(j, robot.behind) if j < robot.behind else range(robot.behind, j + 1):
             if not robot.prismatic[i]:
                 slope[i, j] = slope[j, i] = dot(pad(chain.rows[i].z, axes), pull)
     return slope
@@ -243,18 +273,19 @@ def _wrench_slope(robot: Robot, chain: Frames, wrench: Array, frame: str) -> Arr
     tip, still = components(chain.position), np.zeros_like(force)
     slides = robot.prismatic
     levers = [tip - row.z_point for row in chain.rows]
+    ways = [-row.z if i < robot.behind else row.z for i, row in enumerate(chain.rows)]
     slope = np.zeros((robot.n, robot.n, *chain.position.shape[:-1]))
-    for j, row in enumerate(chain.rows):
-        turned = np.zeros_like(row.z) if slides[j] else row.z
-        moved = row.z if slides[j] else cross(row.z, levers[j])
+    for j, way in enumerate(ways):
+        turned = np.zeros_like(way) if slides[j] else way
+        moved = way if slides[j] else cross(way, levers[j])
         for i in range(robot.n):
             beyond = j > i
-            # The force turns against what carries joint i: with the tool, or not with the arm.
-            turns = turned * (beyond if frame == 'tool' else -(not beyond))
+            # The force turns with the tool, or with the arm's foot, against what carries joint i.
+            turns = turned * ((frame == 'tool' or j < robot.behind) - (not beyond))
             by_force, by_moment = cross(turns, force), cross(turns, moment)
             shifted = moved if beyond else still
             own = by_moment + cross(levers[i], by_force) + cross(shifted, force)
-            slope[i, j] = dot(chain.rows[i].z, by_force if slides[i] else own)
+            slope[i, j] = dot(ways[i], by_force if slides[i] else own)
     return slope
 
 
@@ -273,6 +304,10 @@ def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
         In that DH frame.
 
     """
+    if i < robot.behind:
+        x, y, z, origin = chain.ends[i]
+        outer: Array = origin + point[0] * x + point[1] * y + point[2] * z
+        return outer
     if i + 1 == robot.n:
         return components(chain.flange_point + chain.flange_rotation @ point)
     # The frame at the end of row i is where row i + 1 starts.
@@ -291,7 +326,7 @@ def base_moment(
     robot: Robot, chain: Frames, wrench: Array | None = None, frame: str = 'tool'
 ) -> Array:
     """
-    Return the moment of all load about the base's origin, world frame, shape (3, ...) [N m].
+    Return the moment of all load about the arm's foot, world frame, shape (3, ...) [N m].
 
     What a pedestal has to hold: weights of links and payload, and the wrench on the tool.
 
@@ -308,11 +343,12 @@ def base_moment(
 
     """
     samples = chain.position.shape[:-1]
-    origin = pad(components(chain.base_point), len(samples))
+    origin = pad(components(chain.root_point), len(samples))
     lever = np.zeros((3, *samples))
     if robot.mass is not None and robot.com is not None:
-        for i, (mass, com) in enumerate(zip(robot.mass, robot.com, strict=True)):
-            lever = lever + mass * (link_point(robot, chain, i, com) - origin)
+        for i in range(robot.behind, robot.n):
+            place = link_point(robot, chain, i, robot.com[i])
+            lever = lever + robot.mass[i] * (place - origin)
     if robot.payload_mass:
         centre = chain.position + chain.rotation @ robot.payload_com
         lever = lever + robot.payload_mass * (components(centre) - origin)

@@ -30,5 +30,6 @@ def fingerprint(robot: Robot) -> str:
     turned = np.angle(np.exp(1j * (angles + 0.25 * GRID))) - 0.25 * GRID
     rows = np.concatenate([turned, np.stack([robot.a, robot.d])])
     steps = np.round(rows / GRID).astype(np.int64)
-    text = f'{robot.convention}{robot.prismatic.astype(int).tolist()}{steps.tolist()}'
+    behind = f'{robot.behind} behind ' if robot.behind else ''
+    text = f'{behind}{robot.convention}{robot.prismatic.astype(int).tolist()}{steps.tolist()}'
     return hashlib.sha256(text.encode()).hexdigest()[:16]

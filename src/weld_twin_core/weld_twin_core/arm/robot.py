@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,9 @@ _TOP_KEYS = {
     'source',
     'plausible',
     'controller',
+    'workpiece',
 }
+_WORKPIECE_KEYS = {'name', 'convention', 'base', 'tool', 'joints', 'links', 'payload'}
 _JOINT_KEYS = {
     'name',
     'type',
@@ -45,17 +48,22 @@ _JOINT_KEYS = {
     'max_velocity',
     'max_acceleration',
 }
+_LIMITS = ('lower', 'upper', 'max_velocity', 'max_acceleration')
 
 
 @dataclass(frozen=True, eq=False)
 class Robot:
     """
-    A serial robot.
+    A serial robot, or the chain from a workpiece that is moved to the tool of a robot.
 
     A standard row is Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta), the seed equation of the paper
     with Hayati's beta at its end; a modified (Craig) row is
     Rx(alpha) Ry(beta) Tx(a) Rz(theta) Tz(d). A joint moves ``theta`` (revolute) or ``d``
     (prismatic).
+
+    The joints of a positioner come first, the one at the workpiece foremost. The chain passes
+    their rows backwards: a row is of its own chain, from the positioner's foot outward, and so are
+    the sign of its joint and every error of it.
 
     Attributes
     ----------
@@ -64,10 +72,16 @@ class Robot:
     prismatic : array of bool, shape (n,)
     lower, upper, max_velocity, max_acceleration : array, shape (n,) [rad or m, per s, per s^2]
     T_world_base, T_flange_tool : array, shape (4, 4)
+        Where the chain begins and ends; it begins at the end of a positioner's rows.
+    behind : int
+        Rows that the chain passes backwards: joints of the positioner, 0 for a robot alone.
+    T_root_base : array, shape (4, 4) [m]
+        Where the robot's rows begin, in the frame where those of the positioner begin.
     mass : array, shape (n,) [kg]; com : array, shape (n, 3) [m]
         Link masses and centres in the DH frame at the end of each link.
     payload_mass : float [kg]; payload_com : array, shape (3,) [m], in the tool frame
-    gravity : array, shape (3,) [m/s^2], in the base frame
+    gravity : array, shape (3,) [m/s^2]
+        In the frame where the robot's rows begin, which stands still.
     source : str
         Where the numbers come from.
     plausible : mapping
@@ -120,6 +134,8 @@ class Robot:
     source: str = ''
     plausible: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
     controller: ControllerFrames | None = None
+    behind: int = 0
+    T_root_base: Array = field(default_factory=lambda: np.eye(4))
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)
@@ -138,12 +154,17 @@ class Robot:
             'gravity': (3,),
             'T_world_base': (4, 4),
             'T_flange_tool': (4, 4),
+            'T_root_base': (4, 4),
         }
+        if not 0 <= self.behind < n:
+            raise ModelError(
+                f'robot {self.name!r} has {n} joints; {self.behind} of them cannot be a positioner'
+            )
         if self.mass is not None:
             shapes |= {'mass': (n,), 'com': (n, 3)}
         for key, shape in shapes.items():
             self._set(key, readonly(getattr(self, key), shape, f'{key} of robot {self.name!r}'))
-        for key in ('lower', 'upper', 'max_velocity', 'max_acceleration'):
+        for key in _LIMITS:
             value = readonly(getattr(self, key), (n,), f'{key} of {self.name!r}', finite=False)
             self._set(key, value)
         prismatic = readonly(self.prismatic, (n,), f'prismatic of {self.name!r}').astype(bool)
@@ -166,10 +187,21 @@ class Robot:
 
     @property
     def T_base_origin(self) -> Array:
-        """Return the link that the arm stands in, in the base frame of the rows, (4, 4) [m]."""
+        """
+        Return the link that poses are measured from, in the frame where the chain begins, (4, 4).
+
+        The arm stands in it; of a workpiece on a positioner it is the table.
+        """
         if self.controller is None or self.controller.foot is None:
             return np.eye(4)
         return self.controller.foot
+
+    @property
+    def T_base_foot(self) -> Array:
+        """Return the link that the arm stands in, in the frame where its rows begin, (4, 4) [m]."""
+        if not self.behind:
+            return self.T_base_origin
+        return np.eye(4) if self.controller is None else self.controller.base
 
     @property
     def T_world_origin(self) -> Array:
@@ -177,6 +209,33 @@ class Robot:
         if self.controller is None:
             return self.T_world_base
         return np.asarray(self.T_world_base @ self.T_base_origin)
+
+    @cached_property
+    def branches(self) -> tuple[Robot, Robot]:
+        """
+        Return the positioner and the robot beside it, each from its own foot outward.
+
+        Both stand in the frame where the positioner's rows begin. The tool of the positioner is the
+        frame that the chain is measured in.
+
+        Raises
+        ------
+        ModelError
+            The robot has no positioner.
+
+        """
+        if not self.behind:
+            raise ModelError(f'robot {self.name!r} has no joints between workpiece and foot')
+        still = np.eye(4)
+        first = self._rows(
+            np.arange(self.behind)[::-1],
+            T_world_base=still,
+            T_flange_tool=np.linalg.inv(self.T_world_base),
+            gravity=self.T_root_base[:3, :3] @ self.gravity,
+            payload_mass=0.0,
+            controller=None,
+        )
+        return first, self._rows(np.arange(self.behind, self.n), T_world_base=self.T_root_base)
 
     def index(self, joint: str) -> int:
         """
@@ -217,6 +276,7 @@ class Robot:
         if all(frame is getattr(self, key) for key, frame in new.items()):
             return self
         out = copy(self)  # everything else has been checked already
+        out.__dict__.pop('branches', None)
         for key, frame in new.items():
             out._set(key, readonly(frame, (4, 4), f'{key} of robot {self.name!r}'))
         return out
@@ -233,6 +293,75 @@ class Robot:
         if self.controller is None:
             return self.with_frames(base=T_world_origin)
         return self.with_frames(base=T_world_origin @ np.linalg.inv(self.T_base_origin))
+
+    def _rows(self, which: Array, **changes: Any) -> Robot:
+        """Return some of the rows as a robot alone."""
+        keys = ('a', 'alpha', 'd', 'theta', 'beta', 'prismatic', *_LIMITS)
+        keys += () if self.mass is None else ('mass', 'com')
+        rows = {key: getattr(self, key)[which] for key in keys}
+        names = tuple(self.joint_names[k] for k in which)
+        alone = {'behind': 0, 'T_root_base': np.eye(4), 'joint_names': names}
+        return replace(self, **{**rows, **alone, **changes})
+
+    def behind_workpiece(self, positioner: Robot) -> Robot:
+        """
+        Return the chain from the tool of a positioner to the tool of this robot.
+
+        Parameters
+        ----------
+        positioner : Robot
+            It stands in the same world; its payload is the workpiece. The bases of both say where.
+
+        Raises
+        ------
+        ModelError
+            Both have a joint of one name, or their rows are of two conventions.
+
+        """
+        if positioner.convention != self.convention:
+            raise ModelError(
+                f'the workpiece has {positioner.convention} rows and the robot {self.convention} '
+                'ones; give both the same convention'
+            )
+        keys = ('a', 'alpha', 'd', 'theta', 'beta', 'prismatic', *_LIMITS)
+        chains = _laden(positioner), self
+        if any(chain.mass is not None for chain in chains):
+            keys += ('mass', 'com')
+            chains = _weighed(chains[0]), _weighed(chains[1])
+        rows = {
+            key: np.concatenate([getattr(chains[0], key)[::-1], getattr(chains[1], key)])
+            for key in keys
+        }
+        return replace(
+            self,
+            **rows,
+            joint_names=positioner.joint_names[::-1] + self.joint_names,
+            behind=positioner.n,
+            T_world_base=np.linalg.inv(positioner.T_flange_tool),
+            T_root_base=np.linalg.inv(positioner.T_world_base) @ self.T_world_base,
+        )
+
+    def refuse_positioner(self, what: str) -> None:
+        """
+        Refuse what is only there for a robot alone.
+
+        Parameters
+        ----------
+        what : str
+            What was asked for, as a noun.
+
+        Raises
+        ------
+        ModelError
+            The robot has a positioner.
+
+        """
+        if self.behind:
+            moved = ', '.join(self.joint_names[: self.behind])
+            raise ModelError(
+                f'{what} is not there yet for a workpiece that a positioner moves ({moved}); take '
+                "the robot alone: in a URDF --base-link of its foot, in a robot file no 'workpiece'"
+            )
 
     def check_positions(self, q: Array) -> None:
         """
@@ -283,6 +412,19 @@ class Robot:
             raise ModelError(f'a robot file must be a mapping of keys, got {type(data).__name__}')
         _known(data, _TOP_KEYS, 'robot file')
         name = str(data.get('name', 'robot'))
+        robot = cls._alone(name, data)
+        if data.get('workpiece') is None:
+            return robot
+        other = data['workpiece']
+        if not isinstance(other, Mapping):
+            raise ModelError(f"'workpiece' of robot {name!r} must be a mapping with joints")
+        _known(other, _WORKPIECE_KEYS, f'workpiece of robot {name!r}')
+        shared = {'convention': robot.convention, 'name': f'{name}, workpiece'}
+        return robot.behind_workpiece(cls._alone(f'{name}, workpiece', {**shared, **other}))
+
+    @classmethod
+    def _alone(cls, name: str, data: Mapping[str, Any]) -> Robot:
+        """Return the robot of a mapping without what holds its workpiece."""
         rows = data.get('joints')
         if not isinstance(rows, Sequence) or isinstance(rows, str) or not rows:
             raise ModelError(f"robot {name!r} needs a list 'joints' in chain order")
@@ -336,6 +478,18 @@ class Robot:
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the mapping that `from_mapping` reads: plain numbers, lists and strings."""
+        if not self.behind:
+            return self._own_mapping()
+        positioner, robot = self.branches
+        # People know where the positioner stands in the robot's base: so they type it in.
+        out = robot.with_frames(base=np.eye(4))._own_mapping()
+        foot = positioner.with_frames(base=np.linalg.inv(self.T_root_base))._own_mapping()
+        kept = _WORKPIECE_KEYS - {'name', 'convention', 'payload'}
+        out['workpiece'] = {key: value for key, value in foot.items() if key in kept}
+        return out
+
+    def _own_mapping(self) -> dict[str, Any]:
+        """Return the mapping of a robot alone."""
         joints = []
         for k, name in enumerate(self.joint_names):
             row: dict[str, Any] = {'name': name, 'a': float(self.a[k])}
@@ -345,7 +499,7 @@ class Robot:
                 row['beta'] = float(self.beta[k])
             if self.prismatic[k]:
                 row['type'] = 'prismatic'
-            for key in ('lower', 'upper', 'max_velocity', 'max_acceleration'):
+            for key in _LIMITS:
                 value = float(getattr(self, key)[k])
                 if np.isfinite(value):
                     row[key] = value
@@ -371,6 +525,27 @@ class Robot:
         if self.controller is not None:
             out['controller'] = self.controller.to_mapping()
         return out
+
+
+def _laden(positioner: Robot) -> Robot:
+    """Return a positioner whose payload is part of its last link."""
+    if not positioner.payload_mass:
+        return positioner
+    weighed = _weighed(positioner)
+    assert weighed.mass is not None and weighed.com is not None
+    load, mass, com = positioner.payload_mass, weighed.mass.copy(), weighed.com.copy()
+    tool = positioner.T_flange_tool
+    moment = mass[-1] * com[-1] + load * (tool[:3, :3] @ positioner.payload_com + tool[:3, 3])
+    mass[-1] += load
+    com[-1] = moment / mass[-1]
+    return replace(weighed, mass=mass, com=com, payload_mass=0.0)
+
+
+def _weighed(robot: Robot) -> Robot:
+    """Return a robot with link masses, of zero where it has none."""
+    if robot.mass is not None:
+        return robot
+    return replace(robot, mass=np.zeros(robot.n), com=np.zeros((robot.n, 3)))
 
 
 def _known(mapping: Mapping[str, Any], keys: set[str], where: str) -> None:

@@ -32,6 +32,7 @@ from .predicting.allowed import allowed
 from .predicting.alone import alone
 from .result import Diagnosis, Shrink
 from .soundness import Examined, Given, examine, refuse_reused
+from .soundness.efforts import with_sign
 from .unseen.carrying import carrying
 from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
 from .unseen.leftover_structure import structure
@@ -128,6 +129,7 @@ def diagnose(
     beliefs = beliefs or Beliefs()
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     refuse_reused(recordings, holdout)
+    recordings = with_sign(recordings, robot)
     given = Given(recordings, robot, frames_named(align), families_named(may_change))
     examined = examine(given, known, apply=apply, beliefs=beliefs)
     progress('data checked')
@@ -192,8 +194,9 @@ def _told(
     rival = curved(found, beliefs)
     left = missed(found, unseen, beliefs)
     table = table_of(found.slots, beliefs)
-    statements = stated(found, unseen, evidence, table, rival, left)
-    evidence = replace(evidence, believed=tuple(one.probability for one in statements.names))
+    statements = stated(found, unseen, evidence, table, rival)
+    believed = tuple(one.probability for one in statements.names)
+    evidence = replace(evidence, believed=believed, missed=left.in_words)
     verdict = no_noise(decide(evidence, beliefs), rival, left, beliefs)
     rival = standing(found, verdict, rival, beliefs)
     unseen.forget_other_parts()

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -411,6 +411,84 @@ class KnownLength:
 
 
 @dataclass(frozen=True)
+class JointEffort:
+    """
+    One joint: measured load beside the model's.
+
+    Attributes
+    ----------
+    joint : str
+    model_rms, difference_rms : float [N m, or N of a slide]
+        Load by the statics, about its mean, and measured minus statics.
+    factor : float or None
+        Measured load for each N m of the statics; None where the statics hardly load the joint.
+
+    """
+
+    joint: str
+    model_rms: float
+    difference_rms: float
+    factor: float | None
+
+
+@dataclass(frozen=True)
+class EffortCause:
+    """
+    What explains the difference by itself.
+
+    Attributes
+    ----------
+    name : str
+        'payload', 'torque_constant', 'link_mass' or 'link_masses'.
+    joint : str or None
+    value, std : float
+        Mass beyond the declared one [kg], what is measured for each N m, or the factor on masses.
+    left : float
+        Share of the squared difference that it leaves.
+
+    """
+
+    name: str
+    joint: str | None
+    value: float
+    std: float
+    left: float
+
+
+@dataclass(frozen=True)
+class Efforts:
+    """
+    Measured efforts beside the model's statics.
+
+    Attributes
+    ----------
+    holds : bool
+        The effort holds the load; else it is the load itself.
+    correlation : float
+        Of effort so taken and statics, all joints together; 0 where nothing is loaded.
+    weighed : bool
+        Whether the model has masses; without, every link counts alike, and only the sign is told.
+    joints : tuple of JointEffort
+    difference : float
+        RMS difference for each of the statics' load.
+    causes : tuple of EffortCause
+        What explains the difference by itself, what leaves least first.
+
+    """
+
+    holds: bool
+    correlation: float
+    weighed: bool
+    joints: tuple[JointEffort, ...]
+    difference: float
+    causes: tuple[EffortCause, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain numbers, lists and strings in the public schema."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
 class ContactResult:
     """
     How well contacts agree: mean distances of the tool points from where they touched [m].
@@ -542,6 +620,9 @@ class Diagnosis:
     complete: float = 0.0
     """Probability that no cause above the noise and a tenth of the squared gap is missing."""
 
+    efforts: Efforts | None = None
+    """Measured efforts of the joints beside the model's statics, where springs take them."""
+
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""
         sound = self.status != 'unsound'
@@ -560,6 +641,7 @@ class Diagnosis:
             'model': self._model() if sound else None,
             'changed': [item.as_dict() for item in self.changed],
             **({} if self.contacts is None else {'contacts': self.contacts.as_dict()}),
+            **({} if self.efforts is None else {'efforts': self.efforts.as_dict()}),
             'posterior': None if self.posterior is None else as_dict(self.posterior),
         }
 
@@ -613,7 +695,7 @@ class Diagnosis:
         return {
             'robot': robot.name,
             'kinematics': fingerprint(robot),
-            'statics': 'equilibrium',
+            'statics': _statics(self.recordings),
             'tool': _frame(robot.T_flange_tool),
             'bases': [_frame(base) for base in self.model.bases],
             'epochs_ns': [r.epoch_ns for r in self.recordings],
@@ -638,6 +720,13 @@ class Diagnosis:
                 'shares': [list(row) for row in where.map_shares],
             },
         }
+
+
+def _statics(recordings: Sequence[Recording]) -> str:
+    """Return what springs took for their load: the model's statics, or measured efforts."""
+    if not recordings or recordings[0].effort is None:
+        return 'equilibrium'
+    return 'effort' if recordings[0].effort_holds else 'effort_reversed'
 
 
 def _candidate(item: Candidate) -> dict[str, Any]:

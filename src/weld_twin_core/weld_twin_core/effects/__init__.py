@@ -28,6 +28,8 @@ from .frame_curve import FrameCurve
 from .friction import Friction
 from .gear_ratio import GearRatio
 from .gear_ratio_by_direction import GearRatioByDirection
+from .guide_bend import GuideBend
+from .guide_tilt import GuideTilt
 from .hose_pull import HosePull
 from .hysteresis import Hysteresis
 from .instrument_knock import InstrumentKnock
@@ -48,6 +50,7 @@ from .pedestal_tilt import PedestalTilt
 from .quantization import Quantization
 from .refraction import Refraction
 from .registry import REGISTRY, effect_from_mapping, effects_from_list, register
+from .root_pose import RootPose
 from .servo_lag import ServoLag
 from .setup_settling import SetupSettling
 from .setup_step import SetupStep
@@ -74,6 +77,8 @@ __all__ = [
     'Friction',
     'GearRatio',
     'GearRatioByDirection',
+    'GuideBend',
+    'GuideTilt',
     'HosePull',
     'Hysteresis',
     'InstrumentKnock',
@@ -95,6 +100,7 @@ __all__ = [
     'PedestalTilt',
     'Quantization',
     'Refraction',
+    'RootPose',
     'ServoLag',
     'SetupSettling',
     'SetupStep',

@@ -30,6 +30,7 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
+from .base_leans import base_leans
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
@@ -171,9 +172,14 @@ class BearingTilt(Effect):
 
 def _axes(view: View, i: int) -> list[dict[Channel, float]]:
     """Return the channels that turn the frame before joint i about its x and its y."""
-    if view.robot.convention == 'modified':
+    robot = view.robot
+    if robot.convention == 'modified':
         return [{('alpha', i): 1.0}, {('beta', i): 1.0}]
-    if i > 0:
-        return [{('alpha', i - 1): 1.0}, {('beta', i - 1): 1.0}]
-    axes = view.robot.T_world_base[:3, :2].T
-    return [{('base', 3 + k): float(axis[k]) for k in range(3)} for axis in axes]
+    behind = robot.behind
+    if i + 1 == behind:
+        axes = np.linalg.inv(robot.T_root_base)[:3, :2].T
+        return [{('root', 3 + k): float(axis[k]) for k in range(3)} for axis in axes]
+    if i == behind:
+        return base_leans(robot, np.eye(3)[:2])
+    inner = i + 1 if i < behind else i - 1
+    return [{('alpha', inner): 1.0}, {('beta', inner): 1.0}]

@@ -31,6 +31,9 @@ RELATIVE_STEP = 1e-5
 JOINT_STEP = 1e-5
 """Step of numerical derivatives by a joint's position [rad or m]: rounding and bend weigh alike."""
 
+SLIDING_UNITS = {'rad': 'm', 'rad/(N m)': 'm/N'}
+"""Units of a joint that turns, and those in their place where it slides."""
+
 
 @dataclass(frozen=True, eq=False)
 class Effect(Hooks, ABC):
@@ -107,6 +110,25 @@ class Effect(Hooks, ABC):
             for channel, value in high.items():
                 slope[channel[1], j] = (value - low[channel]) / (2.0 * JOINT_STEP)
         return slope
+
+    def on_slide(self, robot: Robot) -> bool:
+        """Return whether it displaces a joint that slides: m where its parameters say rad."""
+        at = self.site if self.of == 'joint' else None
+        return at in robot.joint_names and bool(robot.prismatic[robot.index(str(at))])
+
+    def unit(self, parameter: Parameter, robot: Robot | None = None) -> str:
+        """
+        Return the SI unit of one of its parameters on a robot.
+
+        Parameters
+        ----------
+        parameter : Parameter
+        robot : Robot, optional
+            Left out, its joint turns.
+
+        """
+        slides = robot is not None and self.on_slide(robot)
+        return SLIDING_UNITS.get(parameter.unit, parameter.unit) if slides else parameter.unit
 
     def check(self, robot: Robot) -> None:
         """

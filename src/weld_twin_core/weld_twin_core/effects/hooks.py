@@ -133,6 +133,11 @@ class Hooks(Parametric, ABC):
         """Return whether a spring takes the load of the posture that it has sagged to."""
         return True
 
+    @property
+    def by_effort(self) -> bool:
+        """Return whether it takes the joints' measured effort in the place of the statics."""
+        return False
+
     def slope(self, view: View) -> Shift:
         """Return d displacement / d own joint position, per ('q', i) channel; empty when none."""
         return {}

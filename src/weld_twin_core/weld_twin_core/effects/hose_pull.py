@@ -70,7 +70,7 @@ def _torques(view: View) -> list[Array]:
     chain = view.frames
     flange = components(chain.flange_point)
     width = flange.ndim - 1
-    away = flange - pad(components(chain.base_point), width)
+    away = flange - pad(components(chain.root_point), width)
     base = wrench_rotation(view.robot, chain, 'base')
     axes = [pad(components(base[..., k]), width) for k in range(3)]
     forces = [*(np.broadcast_to(axis, flange.shape) for axis in axes), -away]

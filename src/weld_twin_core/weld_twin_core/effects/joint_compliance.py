@@ -6,18 +6,27 @@ Joint compliance: q = theta + compliance * tau(q), a linear spring in the drive.
 A spring settles where it balances the load of the posture that it has sagged to, as elastic joints
 do at rest (Siciliano & Khatib 2016, chapter 11). Diagnoses written before this was so took the
 torque of the rigid arm, theta + compliance * tau(theta); ``statics: first_order`` replays them.
+
+Where the controller measures the effort of its joints, tau is given: ``statics: effort`` takes the
+load that the effort holds, tau = -effort, and ``statics: effort_reversed`` that of a controller that
+tells the load itself, tau = effort. No mass of a link counts then, nor does any load that nobody
+declared: both are in what was measured.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
-from ..errors import ModelError
+from ..arrays import Array
+from ..errors import DataError, ModelError
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
-STATICS = ('equilibrium', 'first_order')
+LOAD_OF_EFFORT = {'effort': -1.0, 'effort_reversed': 1.0}
+"""Load torque for each N m of measured effort: against it where it holds the load."""
+STATICS = ('equilibrium', 'first_order', *LOAD_OF_EFFORT)
 
 
 @register
@@ -52,12 +61,66 @@ class JointCompliance(Effect):
         """Return whether the load is the one of the posture that the springs have sagged to."""
         return self.statics == 'equilibrium'
 
+    @property
+    def by_effort(self) -> bool:
+        """Return whether it takes the joints' measured effort in the place of the statics."""
+        return self.statics in LOAD_OF_EFFORT
+
+    @property
+    def moved_by(self) -> str | None:
+        """Return the joint that must move for it to be seen: none where its load is measured."""
+        return None if self.by_effort else self.joint
+
     def displace(self, view: View) -> Shift:
         """Return compliance times load torque; a positive compliance sags."""
-        i = view.robot.index(self.joint)
-        return {('q', i): self.number('compliance') * view.shift[('tau', i)]}
+        return {
+            channel: self.number('compliance') * load for channel, load in self._load(view).items()
+        }
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return the load torque."""
+        return [self._load(view)]
+
+    def _load(self, view: View) -> Shift:
+        """Return the load torque, by the model's statics or as it was measured."""
         i = view.robot.index(self.joint)
-        return [{('q', i): view.shift[('tau', i)]}]
+        if not self.by_effort:
+            return {('q', i): view.shift[('tau', i)]}
+        if view.effort is None:
+            raise DataError(
+                f'joint_compliance of {self.joint} takes the measured effort of the joints '
+                f'(statics: {self.statics}), and none was recorded here; record it in '
+                'JointState.effort, or diagnose without --use-effort for a model that needs none'
+            )
+        return {('q', i): LOAD_OF_EFFORT[self.statics] * view.effort[..., i]}
+
+    @classmethod
+    def applicable(cls, view: View, joint: str | None) -> str | None:
+        """
+        Return why the data cannot show this effect at all, or None when they can.
+
+        Parameters
+        ----------
+        view : View
+        joint : str or None
+
+        """
+        return None if view.effort is not None else super().applicable(view, joint)
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
+        """
+        Yield the spring, by measured effort where it is there.
+
+        Parameters
+        ----------
+        view : View
+        joint : str or None
+        pull : array, shape (N,), optional
+            Not looked at: there is one spring.
+
+        """
+        if view.effort is None:
+            yield cls(str(joint))
+        else:
+            yield cls(str(joint), statics='effort' if view.effort_holds else 'effort_reversed')

@@ -21,6 +21,7 @@ from ..arm.channels import Channel, Shift
 from ..arm.dynamics import base_moment, wrench_rotation
 from ..arm.vectors import components, dot, pad
 from ..arrays import Array
+from .base_leans import base_leans
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
@@ -90,9 +91,10 @@ def _moments(view: View) -> tuple[Array, Array]:
 
 def _leans(view: View) -> tuple[dict[Channel, Array], dict[Channel, Array]]:
     """Return the turn of the base in the world for a compliance of one about its x, and its y."""
-    axes = view.robot.T_world_origin[:3, :2].T
+    robot = view.robot
+    axes = robot.T_base_foot[:3, :2].T
     x, y = (
-        {('base', 3 + k): axis[k] * moment for k in range(3)}
-        for axis, moment in zip(axes, _moments(view), strict=True)
+        {channel: share * moment for channel, share in lean.items()}
+        for lean, moment in zip(base_leans(robot, axes), _moments(view), strict=True)
     )
     return x, y

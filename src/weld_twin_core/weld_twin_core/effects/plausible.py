@@ -261,6 +261,19 @@ TABLE: dict[tuple[str, str], Plausible] = {
     ('vibration', 'gain'): _even(1.0, 5.0, 'derived: one is the whole inertia on one spring'),
     ('base_pose', 'xyz'): _even(5e-3, 0.5, 'derived: half a metre off is another place'),
     ('base_pose', 'rotvec'): _even(1e-2, 0.2, 'derived: ten degrees are seen by the eye'),
+    ('root_pose', 'xyz'): _even(
+        5e-3, 0.1, 'derived: a root that was measured by touch, or by hand'
+    ),
+    ('root_pose', 'rotvec'): _even(5e-3, 0.1, 'derived: five millimetres on a metre'),
+    ('guide_bend', 'curvature'): _even(
+        2e-4,
+        5e-3,
+        'derived: a rail laid to 0.1 mm on a metre; range derived: 2.5 mm on a metre is seen by the '
+        'eye',
+    ),
+    ('guide_tilt', 'rate'): _even(
+        2e-4, 5e-3, 'derived: rails laid to 0.1 mm on a metre, half a metre apart'
+    ),
     ('tool_pose', 'xyz'): _even(
         5e-3,
         0.1,

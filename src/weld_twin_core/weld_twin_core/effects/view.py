@@ -107,6 +107,10 @@ class View:
     wrench : array, shape t.shape + (6,), optional [N, N m]
     wrench_frame : str
     temperature : array, shape as t, optional [degC]
+    effort : array, shape t.shape + (n,), optional [N m, or N of a slide]
+        As the controller measured it; what springs take in the place of the statics.
+    effort_holds : bool
+        The effort holds the load; else it is the load itself.
     shift : mapping
         Channels displaced by the stages before.
 
@@ -130,6 +134,8 @@ class View:
     wrench: Array | None = None
     wrench_frame: str = 'tool'
     temperature: Array | None = None
+    effort: Array | None = None
+    effort_holds: bool = True
     shift: Shift = field(default_factory=dict)
 
     @cached_property

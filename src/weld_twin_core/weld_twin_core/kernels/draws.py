@@ -79,7 +79,7 @@ class SeamDraws:
     Raises
     ------
     ModelError
-        The robot has modified rows, Hayati angles or joints that slide.
+        The robot has modified rows, Hayati angles, joints that slide or a positioner.
 
     Attributes
     ----------
@@ -92,10 +92,11 @@ class SeamDraws:
     """
 
     def __init__(self, robot: Robot, q: Array, *, smooth: bool = True) -> None:
-        if robot.convention != 'standard' or robot.prismatic.any() or robot.beta.any():
+        plain = robot.convention == 'standard' and not robot.behind
+        if not plain or robot.prismatic.any() or robot.beta.any():
             raise ModelError(
-                f'robot {robot.name!r} must have standard rows, revolute joints and no beta for '
-                'fast draws of its DH values; the twin runs draws of any robot'
+                f'robot {robot.name!r} must have standard rows, revolute joints, no beta and no '
+                'positioner for fast draws of its DH values; the twin runs draws of any robot'
             )
         self.robot = robot
         features = _features(q[:, 1:SPLIT]), _features(q[:, SPLIT:])

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arm.chain import base_frame, tool_frame
+from ..arm.chain import base_frame, root_frame, tool_frame
 from ..arm.robot import Robot
 from ..arm.rotation import transform
 from ..effects.constant import ChannelError, FrameError
@@ -99,6 +99,8 @@ def _with_frame(robot: Robot, effect: FrameError) -> Robot:
     shift = {(effect.channel, k): vector[k] for k in range(6)}
     if effect.channel == 'base':
         return robot.with_frames(base=transform(*base_frame(robot, shift)))
+    if effect.channel == 'root':
+        return replace(robot, T_root_base=transform(*root_frame(robot, shift)))
     return robot.with_frames(tool=transform(*tool_frame(robot, shift)))
 
 

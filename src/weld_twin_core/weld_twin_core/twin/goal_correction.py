@@ -259,11 +259,12 @@ class _Work:
                 reasons.append(str(refused))
                 continue
             after = self._missing(course(found, self.meant.t))
-            worst = np.linalg.norm(after[:, :3], axis=1).max()
-            if worst > BETTER * size.max() + NOTHING:
+            worst = float(np.linalg.norm(after[:, :3], axis=1).max())
+            # How the arm comes to where a goal begins is one place; most of the way must gain.
+            if _rms(after) > BETTER * _rms(before) + NOTHING or worst > size.max() + NOTHING:
                 reasons.append(
-                    f'too little is gained: at worst {worst * 1e3:.3f} mm would be left of '
-                    f'{size.max() * 1e3:.3f} mm'
+                    f'too little is gained: {_rms(after) * 1e3:.3f} mm (at worst {worst * 1e3:.3f}) '
+                    f'would be left of {_rms(before) * 1e3:.3f} mm (at worst {size.max() * 1e3:.3f})'
                 )
                 continue
             left = [f'play is not corrected: {reasons[0]}'] if self.plays and not play else []
@@ -351,8 +352,9 @@ class _Work:
     def _bound(self, after: Array) -> float | None:
         """Return the RMS distance that is told not to be exceeded [m]."""
         sure = [self._covariances(framed=framed) for framed in (True, False)]
-        gap = after[self._places]
-        found = [likely_rms(gap, c, HOLDS) for c in sure if c is not None]
+        # Where joints turn around more is left than beside, and few places would miss that.
+        near = np.searchsorted(self._places, np.arange(len(after))).clip(max=self._places.size - 1)
+        found = [likely_rms(after, c[near], HOLDS) for c in sure if c is not None]
         return max(found) if found else None
 
     def _added(self, found: Goal, at: Array) -> Array:

@@ -54,6 +54,7 @@ class LivePosterior:
         wrench: Array | None = None,
         wrench_frame: str = 'tool',
         temperature: float | None = None,
+        effort: Array | None = None,
     ) -> Array:
         """
         Return the covariance of the true pose, shape (6, 6), held between two looks.
@@ -67,15 +68,16 @@ class LivePosterior:
         wrench : array, shape (6,), optional [N, N m]
         wrench_frame : str
         temperature : float, optional [degC]
+        effort : array, shape (n,), optional [N m, or N of a slide]
 
         """
         since = t - self._time
         if self._q is None or since < 0.0:
-            self._look(twin, q, np.zeros_like(q), wrench, wrench_frame, temperature)
+            self._look(twin, q, np.zeros_like(q), wrench, wrench_frame, temperature, effort)
         elif since >= EVERY and (self._moving or np.abs(q - self._q).max() > MOVED):
             speed = (q - self._q) / since
             self._moving = bool(np.abs(q - self._q).max() > MOVED)
-            self._look(twin, q, speed, wrench, wrench_frame, temperature)
+            self._look(twin, q, speed, wrench, wrench_frame, temperature, effort)
         else:
             return self._covariance
         self._time, self._q = t, np.array(q)
@@ -89,6 +91,7 @@ class LivePosterior:
         wrench: Array | None,
         wrench_frame: str,
         temperature: float | None,
+        effort: Array | None,
     ) -> None:
         motion = JointMotion(LEAD, q + LEAD[:, None] * speed, np.tile(speed, (LEAD.size, 1)))
         now = LEAD[-1:]
@@ -99,6 +102,7 @@ class LivePosterior:
             None if wrench is None else Signal(now, wrench[None]),
             wrench_frame,
             None if temperature is None else Signal(now, np.array([temperature])),
+            effort=None if effort is None else Signal(now, effort[None]),
         )
         self._covariance = self.posterior.pose_covariance(Features(twin, recording, now))[0]
         found = self.posterior.domain.outside(

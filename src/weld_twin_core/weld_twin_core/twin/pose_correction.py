@@ -262,7 +262,7 @@ def between(start: Array, end: Array) -> Array:
 
 def moved(pose: Array, twist: Array) -> Array:
     """Return a pose (4, 4) moved by twists (..., 6) [m, rad], shape (..., 4, 4)."""
-    out = np.broadcast_to(pose, (*twist.shape[:-1], 4, 4)).copy()
+    out: Array = np.broadcast_to(pose, (*twist.shape[:-1], 4, 4)).copy()
     out[..., :3, 3] += twist[..., :3]
     out[..., :3, :3] = rotation_matrix(twist[..., 3:]) @ out[..., :3, :3]
     return out

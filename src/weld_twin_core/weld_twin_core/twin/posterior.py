@@ -27,6 +27,7 @@ from ..errors import DataError, ModelError
 from ..recording import JointMotion, Recording, Signal
 from ..sequences import halton
 from .domain import Domain
+from .expected_effort import with_expected_effort
 from .features import Features
 from .twin import Twin
 
@@ -346,6 +347,7 @@ def usual_sigma(posterior: Posterior, twin: Twin, like: Recording, q: Array) -> 
         like.wrench_frame,
         None if warm is None else Signal(t[:1], np.array([float(np.median(warm.value))])),
     )
+    still = with_expected_effort(still, twin.robot, like)
     return float(np.median(largest_sigma(pose_covariances(posterior, twin, still, t))))
 
 

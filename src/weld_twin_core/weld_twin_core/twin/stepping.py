@@ -83,6 +83,7 @@ class LiveTwin:
         wrench: Array | None = None,
         temperature: float | None = None,
         wrench_frame: str = 'tool',
+        effort: Array | None = None,
     ) -> tuple[Array, Poses]:
         """
         Return the joint positions, shape (n,), and the pose, shapes (3,) and (3, 3).
@@ -99,6 +100,8 @@ class LiveTwin:
         temperature : float [degC], optional
         wrench_frame : str
             'tool' or 'base'.
+        effort : array, shape (n,), optional [N m, or N of a slide]
+            As the controller measured it; springs that were learned by it need it.
 
         Raises
         ------
@@ -113,7 +116,7 @@ class LiveTwin:
             self._command.remember(t, q)
         if not self.twin.effects:
             return q.copy(), self._nominal(q)
-        view = self._remembered(t, self._view(t, q, qd, wrench, temperature, wrench_frame))
+        view = self._remembered(t, self._view(t, q, qd, wrench, temperature, wrench_frame, effort))
         view = self.twin.displaced(view)
         joints = view.q[0].copy()
         others = {}
@@ -167,6 +170,7 @@ class LiveTwin:
         wrench: Array | None,
         temperature: float | None,
         wrench_frame: str,
+        effort: Array | None,
     ) -> View:
         stamp = np.array([t])
         return View(
@@ -179,6 +183,7 @@ class LiveTwin:
             wrench=None if wrench is None else np.asarray(wrench)[None],
             wrench_frame=wrench_frame,
             temperature=None if temperature is None else np.array([temperature]),
+            effort=None if effort is None else np.asarray(effort)[None],
         )
 
     def _remembered(self, t: float, view: View) -> View:

@@ -207,7 +207,7 @@ class Twin(EffectStages):
         return [
             (('q', channel[1]), effect.number('compliance'))
             for effect in self.of_stage(Stage.ELASTIC)
-            if self.robot.index(str(effect.site)) == channel[1]
+            if self.robot.index(str(effect.site)) == channel[1] and not effect.by_effort
         ]
 
     # Evaluation ------------------------------------------------------------------------------
@@ -272,6 +272,7 @@ def _view(
     qd: Array,
     wrench: Array | None,
     temperature: Array | None,
+    effort: Array | None,
 ) -> View:
     return View(
         robot=robot,
@@ -283,10 +284,12 @@ def _view(
         wrench=wrench,
         wrench_frame=recording.wrench_frame,
         temperature=temperature,
+        effort=effort,
+        effort_holds=recording.effort_holds,
     )
 
 
 def _sides(recording: Recording) -> list[Array | None]:
-    """Return wrench and temperature at the joint stamps."""
+    """Return wrench, temperature and effort at the joint stamps."""
     t = recording.joints.t
-    return [s if s is None else s.at(t) for s in (recording.wrench, recording.temperature)]
+    return [side if side is None else side.at(t) for side in recording.sides]

@@ -28,10 +28,14 @@ def goal_measures(rows: Sequence[Kept]) -> list[Measure]:
         As `judged.kept` gives them; none of them was learned from.
 
     """
+    return [*_of_causes(rows), *_of_foreign(rows)]
+
+
+def _of_causes(rows: Sequence[Kept]) -> list[Measure]:
+    """Return the measures of causes that the library has."""
     single = [r for r in rows if r['kind'] == 'single' and min(r['sizes']) >= SEEN]
     lone = [r for r in rows if len(r['sizes']) == 1 and min(r['sizes']) >= SEEN]
     lone = [r for r in lone if r['kind'] not in NOT_IN_LIBRARY]
-    foreign = [r for r in rows if r['kind'] in NOT_IN_LIBRARY]
     known = [r for r in rows if r['kind'] in ('single', 'double', 'triple', 'several')]
     known = [r for r in known if min(r['sizes']) >= SEEN]
     return [
@@ -49,6 +53,23 @@ def goal_measures(rows: Sequence[Kept]) -> list[Measure]:
             'triple_named', 'three causes, each 3 noise: all named', *_several(rows, 3, 0.85)
         ),
         _measure(
+            'needless_unknown',
+            'causes in the library, 1 noise or more: needlessly unknown',
+            known,
+            lambda r: r['status'] == 'unknown',
+            0.03,
+            least=False,
+        ),
+        Measure('fia', 'mean belief in the true family, one cause', _fia(single), 0.92),
+        Measure('seconds', 'processor seconds of a diagnosis, median', _seconds(rows)),
+    ]
+
+
+def _of_foreign(rows: Sequence[Kept]) -> list[Measure]:
+    """Return the measures of causes that the library does not have."""
+    foreign = [r for r in rows if r['kind'] in NOT_IN_LIBRARY]
+    return [
+        _measure(
             'honest',
             'withheld or outside: unknown, a set that holds it, or as good on sealed data',
             foreign,
@@ -61,16 +82,6 @@ def goal_measures(rows: Sequence[Kept]) -> list[Measure]:
         _measure(
             'dependence', 'the same: dependence right', foreign, lambda r: r['dependence'], 0.87
         ),
-        _measure(
-            'needless_unknown',
-            'causes in the library, 1 noise or more: needlessly unknown',
-            known,
-            lambda r: r['status'] == 'unknown',
-            0.03,
-            least=False,
-        ),
-        Measure('fia', 'mean belief in the true family, one cause', _fia(single), 0.92),
-        Measure('seconds', 'processor seconds of a diagnosis, median', _seconds(rows)),
     ]
 
 

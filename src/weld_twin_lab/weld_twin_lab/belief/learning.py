@@ -61,16 +61,13 @@ def learned(
         Probability that an answer may be sure and wrong.
 
     """
-    statements, unseen = {}, {}
-    for kind, terms in TERMS.items():
-        own = [e for e in examples if e.kind == kind]
-        terms = {**terms, **(_families(own) if kind in OF_FAMILIES else {})}
-        table = _table(own, list(terms))
-        signs = np.array(list(terms.values()), float)
+    statements, parts = {}, {}
+    for kind in TERMS:
+        terms, table, signs = _of_kind([e for e in examples if e.kind == kind], kind)
         statements[kind] = _content(table, terms, signs)
-        unseen[kind] = _unseen(table, signs), table.right
+        parts[kind] = _unseen(table, signs), table.right
     answers, causes = (
-        [np.concatenate(parts) for parts in zip(*(unseen[kind] for kind in kinds), strict=True)]
+        [np.concatenate(both) for both in zip(*(parts[kind] for kind in kinds), strict=True)]
         for kinds in ([kind for kind in TERMS if kind.startswith('answer')], CAUSES)
     )
     bounds = {
@@ -87,6 +84,36 @@ def learned(
         'sure_from': {what: bound.sure_from for what, bound in bounds.items()},
         'statements': statements,
     }
+
+
+def unseen(examples: Sequence[Example], content: Mapping[str, Any]) -> list[Example]:
+    """
+    Return examples as they are told by weights that had not seen their cases.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+    content : mapping
+        As `learned` returned it.
+
+    """
+    out = []
+    for kind in TERMS:
+        own = [e for e in examples if e.kind == kind]
+        table, signs = _of_kind(own, kind)[1:]
+        what = 'answer' if kind.startswith('answer') else 'cause' if kind in CAUSES else ''
+        bound = content['sure_from'].get(what, 2.0)
+        out += [
+            e._replace(told=float(p), sure=bool(p >= bound))
+            for e, p in zip(own, _unseen(table, signs), strict=True)
+        ]
+    return out
+
+
+def _of_kind(own: Sequence[Example], kind: str) -> tuple[dict[str, int], Table, Array]:
+    """Return the features of a kind of statement, its examples, and which way each may count."""
+    terms = {**TERMS[kind], **(_families(own) if kind in OF_FAMILIES else {})}
+    return terms, _table(own, list(terms)), np.array(list(terms.values()), float)
 
 
 def _families(examples: Sequence[Example]) -> dict[str, int]:

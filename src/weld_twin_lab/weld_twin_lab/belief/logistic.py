@@ -25,7 +25,14 @@ class Weights(NamedTuple):
     slopes: Array
 
 
-def fitted(columns: Array, right: Array, signs: Array, ridge: float, weight: Array) -> Weights:
+def fitted(
+    columns: Array,
+    right: Array,
+    signs: Array,
+    ridge: float,
+    weight: Array,
+    prior: Array | None = None,
+) -> Weights:
     """
     Return the weights of least penalised log loss.
 
@@ -37,11 +44,14 @@ def fitted(columns: Array, right: Array, signs: Array, ridge: float, weight: Arr
     signs : array, shape (P,)
         1 where a weight may not be negative, -1 where it may not be positive, 0 where it is free.
     ridge : float
-        Of half the squared weights, against log loss in nats.
+        Of half the squared distance from the prior, against log loss in nats.
     weight : array, shape (N,)
         Of every example.
+    prior : array, shape (P,), optional
+        Weights that the ridge pulls to; zeros when left out.
 
     """
+    prior = np.zeros(columns.shape[1]) if prior is None else prior
     # One more case of each outcome, with every sign at its middle: few cases are never certain.
     columns = np.concatenate([columns, np.zeros((2, columns.shape[1]))])
     target = np.concatenate([np.asarray(right, dtype=float), [0.0, 1.0]])
@@ -50,15 +60,16 @@ def fitted(columns: Array, right: Array, signs: Array, ridge: float, weight: Arr
 
     def loss(x: Array) -> tuple[float, Array]:
         odds = x[0] + columns @ x[1:]
+        off = x[1:] - prior
         value = (weight * (np.logaddexp(0.0, odds) - target * odds)).sum()
         error = weight * (1.0 / (1.0 + np.exp(-odds)) - target)
-        slope = np.concatenate([[error.sum()], columns.T @ error + ridge * x[1:]])
-        return float(value + 0.5 * ridge * x[1:] @ x[1:]), slope
+        slope = np.concatenate([[error.sum()], columns.T @ error + ridge * off])
+        return float(value + 0.5 * ridge * off @ off), slope
 
     bounds = [(None, None)] + [
         (0.0 if sign > 0 else None, 0.0 if sign < 0 else None) for sign in signs
     ]
-    start = np.concatenate([[np.log(share / (1.0 - share))], np.zeros(columns.shape[1])])
+    start = np.concatenate([[np.log(share / (1.0 - share))], prior])
     found = minimize(loss, start, jac=True, bounds=bounds, method='L-BFGS-B')
     return Weights(float(found.x[0]), np.asarray(found.x[1:]))
 

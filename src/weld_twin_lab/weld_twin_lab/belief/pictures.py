@@ -56,7 +56,7 @@ def _bins(
         if value is None or low is None or high is None:
             continue
         axes.plot([b.confidence + off] * 2, [low, high], color=colour, lw=1.3)
-        size = 3.0 + 0.9 * float(np.sqrt(count))
+        size = 3.0 + 0.15 * float(np.sqrt(count))
         axes.plot(b.confidence + off, value, 'o', color=colour, ms=size, label=label)
         label = None
 

@@ -81,7 +81,9 @@ def fit(rows: Sequence[Mapping[str, Any]], risk: float = learning.RISK) -> dict[
     return learning.learned(examples_of(own), card, risk)
 
 
-def judged(content: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def judged(
+    content: Mapping[str, Any], rows: Sequence[Mapping[str, Any]], examples: Sequence[Example]
+) -> dict[str, Any]:
     """
     Return what answers were worth on cases that nothing was learned from.
 
@@ -90,17 +92,19 @@ def judged(content: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dic
     content : mapping
         Of the file of weights that they were told by.
     rows : sequence of mappings
-        As `judged.kept` gives them.
+        As `judged.kept` gives them; none where the cases learned from are judged by weights that
+        had not seen them.
+    examples : sequence of Example
+        What was told.
 
     """
     own = [row for row in rows if row.get('examples')]
-    examples = examples_of(own)
     foreign = {str(row['name']) for row in own if row['kind'] in NOT_IN_LIBRARY}
     whole = _answers(examples)
     groups = {
         **{kind: [e for e in examples if e.kind == kind] for kind in content['statements']},
         'answers as a whole': whole,
-        'the same, in the library or none': [e for e in whole if e.case not in foreign],
+        'the same, in the library or none': [e for e in whole if own and e.case not in foreign],
         'the same, withheld or outside': [e for e in whole if e.case in foreign],
         'causes': [e for e in examples if e.kind in learning.CAUSES],
     }
@@ -115,7 +119,7 @@ def judged(content: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> dic
             'failed': [row['name'] for row in rows if row['error']],
         },
         'statements': {name: worth(part) for name, part in groups.items() if part},
-        'goals': [measure.as_dict() for measure in goal_measures(own)],
+        'goals': [measure.as_dict() for measure in goal_measures(own)] if own else [],
         'wrong_and_sure': [_in_words(row) for row in own if row['sure'] and not row['right']],
     }
 
@@ -165,7 +169,12 @@ def _in_words(row: Mapping[str, Any]) -> dict[str, Any]:
     return {**own, 'said': f'{row["status"]} {row["said"]}'.strip()}
 
 
-def write(out: Path, content: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> str:
+def write(
+    out: Path,
+    content: Mapping[str, Any],
+    rows: Sequence[Mapping[str, Any]],
+    taught: Sequence[Mapping[str, Any]] = (),
+) -> str:
     """
     Write the file of weights, what it is worth, the page and its pictures; return the page.
 
@@ -175,12 +184,16 @@ def write(out: Path, content: Mapping[str, Any], rows: Sequence[Mapping[str, Any
     content : mapping
         Of the file of weights.
     rows : sequence of mappings
-        Cases that it did not learn from.
+        Cases that it did not learn from; where there are none, those learned from are judged by
+        weights that had not seen them.
+    taught : sequence of mappings
+        Cases that it learned from.
 
     """
-    result = judged(content, rows)
-    whole = told_of(_answers(examples_of(rows)))
-    causes = told_of([e for e in examples_of(rows) if e.kind in learning.CAUSES])
+    examples = examples_of(rows) if rows else learning.unseen(examples_of(taught), content)
+    result = judged(content, rows, examples)
+    whole = told_of(_answers(examples))
+    causes = told_of([e for e in examples if e.kind in learning.CAUSES])
     text = page(result)
     for name, body in (
         (FILE, json.dumps(content, indent=1) + '\n'),

@@ -68,7 +68,7 @@ MECHANISMS = {
     'formulas_lost_motion': Mechanism('levels.formulas', 'beside_names', nothing),
     'formulas_scatter': Mechanism('levels.formulas', 'scatter', nothing),
     'whole_arm': Mechanism('levels.free_form', 'whole_arm_groups', nothing),
-    'names_against_curves': Mechanism('levels.formulas', 'held_against', first),
+    'none_against_curves': Mechanism('pipeline', 'no_noise', first),
     'open_frames': Mechanism('pipeline', '_held', first),
 }
 """Every mechanism that can be taken out, by the name that the command takes."""

@@ -38,24 +38,35 @@ def page(result: Mapping[str, Any]) -> str:
             *_bounds(result['learned_from'], result['judged_on']),
             '',
             markdown.table(HEAD, *(_row(*item) for item in result['statements'].items())),
-            'Beside the goals:',
-            '',
-            markdown.table(
-                ('measure', 'value', '95 % interval', 'cases', 'goal', 'reached'),
-                *(_goal(item) for item in result['goals']),
-            ),
-            *_failures(result['wrong_and_sure']),
+            *(_beside_goals(result) if result['goals'] else ()),
         ]
     )
 
 
+def _beside_goals(result: Mapping[str, Any]) -> list[str]:
+    """Return the measures beside their goals, and what was sure and wrong."""
+    return [
+        'Beside the goals:',
+        '',
+        markdown.table(
+            ('measure', 'value', '95 % interval', 'cases', 'goal', 'reached'),
+            *(_goal(item) for item in result['goals']),
+        ),
+        *_failures(result['wrong_and_sure']),
+    ]
+
+
 def _bounds(taught: Mapping[str, Any], tried: Mapping[str, Any]) -> list[str]:
     """Return what was learned from, and from where a statement is told as sure."""
+    by = (
+        f'judged on {tried["cases"]} cases of seed {_listed(tried["seeds"])}, none of which was '
+        'learned from'
+        if tried['cases']
+        else 'each judged by weights that had not seen it'
+    )
     return [
         f'{taught["weights"]} weights, learned from {taught["cases"]} cases of seed '
-        f'{_listed(taught["seeds"])}; judged on {tried["cases"]} cases of seed '
-        f'{_listed(tried["seeds"])}, none of which was learned from. From where a statement is '
-        'told as sure, each judged by weights that had not seen its case:',
+        f'{_listed(taught["seeds"])}; {by}. From where a statement is told as sure:',
         '',
         markdown.table(
             ('statement', 'number', 'sure from', 'sure', 'of these wrong'),

@@ -37,6 +37,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--goals', type=int, default=500, metavar='N', help='goals of all arms (default: 500)'
     )
+    parser.add_argument(
+        '--without-cell',
+        type=int,
+        default=500,
+        metavar='N',
+        help='goals of all arms that are judged without nodes, 0 for none (default: 500)',
+    )
     parser.add_argument('--seed', type=int, default=7, metavar='N', help='decides what is drawn')
     parser.add_argument(
         '--go-on', action='store_true', help='keep the arms that the file has, and try the others'
@@ -70,8 +77,25 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
             write_result(args.out, 'compensator', time.monotonic() - begun, made)
         other = other_arm(args.seed)
         tell(other)
+        more = without_cell(args.without_cell, args.seed, tell)
         poses = race(args.turns, POSES, tell) if args.turns else None
-    return {**summary(rows, changes, other, poses), 'seed': args.seed, 'goals': rows}
+    found = summary(rows, changes, other, poses)
+    return {**found, 'without_cell': more, 'seed': args.seed, 'goals': rows}
+
+
+def without_cell(goals: int, seed: int, tell: Callable[[str], None]) -> dict[str, Any] | None:
+    """Return what goals come to that are judged without nodes, by arm and in all."""
+    from .compensating.drawn_cells import HOMES
+    from .compensating.without_cell import judged
+
+    if not goals:
+        return None
+    rows: dict[str, list[dict[str, Any]]] = {}
+    for name in HOMES:
+        rows[name] = judged(name, seed + 1, -(-goals // len(HOMES)))
+        tell(f'{name}, without a cell: {_told(rows[name])}')
+    arms = {name: counted(own) for name, own in rows.items()}
+    return {'robots': arms, 'totals': counted([row for own in rows.values() for row in own])}
 
 
 def _before(args: argparse.Namespace) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
@@ -163,52 +187,29 @@ def _names(rows: Sequence[dict[str, Any]]) -> list[str]:
     return list(dict.fromkeys(row['robot'] for row in rows))
 
 
+HEAD = (
+    'arm',
+    'goals',
+    'corrected',
+    'of those that gain half',
+    'refused of those outside',
+    'worse',
+    'before, mm',
+    'after',
+    'true causes',
+    'bound told',
+    'within it',
+)
+
+
 def table(result: dict[str, Any]) -> str:
-    """Return the tables of the page."""
-
-    def mm(value: float | None) -> str:
-        return '' if value is None else f'{value * 1e3:.4f}'
-
-    def row(name: str, one: dict[str, Any]) -> tuple[str, ...]:
-        return (
-            name,
-            str(one['goals']),
-            str(one['corrected']),
-            f'{one["of_them_corrected"]} of {one["to_correct"]}',
-            f'{one["outside"] - one["outside_corrected"]} of {one["outside"]}',
-            str(one['worse']),
-            *(mm(one['median'][key]) for key in ('before_m', 'after_m', 'best_m', 'bound_m')),
-            f'{one["held"]} of {one["bounds"]}',
-        )
-
-    head = (
-        'arm',
-        'goals',
-        'corrected',
-        'of those that gain half',
-        'refused of those outside',
-        'worse',
-        'before, mm',
-        'after',
-        'true causes',
-        'bound told',
-        'within it',
-    )
-    body = [row(name, one) for name, one in result['robots'].items()]
-    lines = [markdown.table(head, *body, row('all', result['totals']))]
-    seconds = {
-        kind: max(c['seconds'] for c in result['changes'] if c['change'] == kind)
-        for kind in result['after_a_change']
-    }
-    rows = [
-        (kind, str(one['goals']), str(one['refused']), str(one['worse']), f'{seconds[kind]:.1f} s')
-        for kind, one in result['after_a_change'].items()
-    ]
-    lines.append(
-        markdown.table(
-            ('change', 'goals after its notice', 'refused', 'worse', 'noticed within'), *rows
-        )
-    )
+    """Return the tables of the page: the arms, the changes, the race of poses."""
+    arms = [*result['robots'].items(), ('all', result['totals'])]
+    lines = [markdown.table(HEAD, *(_row(name, one) for name, one in arms)), _changes(result)]
+    more = result.get('without_cell')
+    if more is not None:
+        arms = [*more['robots'].items(), ('all', more['totals'])]
+        lines.append(markdown.table(HEAD, *(_row(name, one) for name, one in arms)))
     poses = result['poses']
     if poses is not None:
         rows = [
@@ -218,3 +219,28 @@ def table(result: dict[str, Any]) -> str:
         rows.append(('ratio', *(f'{poses["ratio"][key]:.2f}' for key in ('p50_us', 'p99_us'))))
         lines.append(markdown.table(('500 poses a second', 'p50', 'p99'), *rows))
     return '\n\n'.join(lines)
+
+
+def _row(name: str, one: dict[str, Any]) -> tuple[str, ...]:
+    """Return a row of an arm."""
+    middle = [one['median'][key] for key in ('before_m', 'after_m', 'best_m', 'bound_m')]
+    return (
+        name,
+        str(one['goals']),
+        str(one['corrected']),
+        f'{one["of_them_corrected"]} of {one["to_correct"]}',
+        f'{one["outside"] - one["outside_corrected"]} of {one["outside"]}',
+        str(one['worse']),
+        *('' if value is None else f'{value * 1e3:.4f}' for value in middle),
+        f'{one["held"]} of {one["bounds"]}',
+    )
+
+
+def _changes(result: dict[str, Any]) -> str:
+    """Return a row for each kind of change."""
+    rows = []
+    for kind, one in result['after_a_change'].items():
+        noticed = max(c['seconds'] for c in result['changes'] if c['change'] == kind)
+        rows.append((kind, one['goals'], one['refused'], one['worse'], f'{noticed:.1f} s'))
+    head = ('change', 'goals after its notice', 'refused', 'worse', 'noticed within')
+    return markdown.table(head, *rows)

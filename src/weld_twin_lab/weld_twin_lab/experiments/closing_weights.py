@@ -81,7 +81,8 @@ def weights(taught: Heard) -> Weights:
 
     """
     ones = np.ones(len(taught.right))
-    return fitted(taught.signs, taught.right, WAYS, np.array([1.0, 0.0, 0.0]), RIDGE, ones)
+    prior = np.array([1.0, 0.0, 0.0])
+    return fitted(taught.signs, taught.right, WAYS, RIDGE, ones, prior)
 
 
 def unseen(all_: Heard) -> Array:

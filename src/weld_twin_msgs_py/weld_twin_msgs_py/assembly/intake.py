@@ -43,7 +43,8 @@ class Taken(NamedTuple):
     ----------
     stamp : int [ns]
     row : array, shape (width,)
-        Joints: positions, then velocities, NaN where they are not told. Pose: position,
+        Joints: positions, then velocities, NaN where they are not told, then efforts where they
+        were asked for. Pose: position,
         quaternion x y z w, sigma [m] or NaN. Point, sigma: three numbers. Wrench: force and
         torque. Temperature: one number.
     restarted : bool
@@ -68,7 +69,7 @@ class Intake:
         Whether joint positions beyond the limits are refused; see `JointStates`.
     measuring_frame : str
         What poses and points must be given in; empty for the first frame that comes.
-    joint_names, mend
+    joint_names, mend, efforts
         See `JointStates`.
 
     Attributes
@@ -87,9 +88,13 @@ class Intake:
         measuring_frame: str = '',
         joint_names: tuple[str, ...] | None = None,
         mend: bool = False,
+        efforts: bool = False,
     ) -> None:
         self.measuring_frame = MeasuringFrame(measuring_frame)
-        self.joints = JointStates(robot, limits=limits, joint_names=joint_names, mend=mend)
+        self.joints = JointStates(
+            robot, limits=limits, joint_names=joint_names, mend=mend, efforts=efforts
+        )
+        self._runs = 2 + efforts
         self.wrench_frame = WrenchFrame(robot)
         self._orders = {role: Forward() for role in Role}
         self._rows: dict[Role, Callable[[Any], Array]] = {
@@ -101,10 +106,10 @@ class Intake:
         }
 
     @staticmethod
-    def width(role: Role, robot: Robot) -> int:
+    def width(role: Role, robot: Robot, *, efforts: bool = False) -> int:
         """Return how many numbers a row has."""
         widths = {Role.POSE: 8, Role.POINT: 3, Role.SIGMA: 3, Role.WRENCH: 6, Role.TEMPERATURE: 1}
-        return widths.get(role, 2 * robot.n)
+        return widths.get(role, (2 + efforts) * robot.n)
 
     @property
     def remarks(self) -> list[str]:
@@ -154,9 +159,11 @@ class Intake:
         taken = self.joint_sample(message)
         if taken is None:
             return None
-        (stamp, q, qd), restarted = taken
-        row = np.empty(2 * q.size)
-        row[: q.size], row[q.size :] = q, nan if qd is None else qd
+        (stamp, q, qd, effort), restarted = taken
+        row = np.empty(self._runs * q.size)
+        row[: q.size], row[q.size : 2 * q.size] = q, nan if qd is None else qd
+        if effort is not None:
+            row[2 * q.size :] = effort
         return Taken(stamp, row, restarted)
 
     def _wrench_row(self, message: Any) -> Array:

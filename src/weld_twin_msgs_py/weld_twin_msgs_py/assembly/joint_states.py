@@ -71,11 +71,16 @@ def _picker(index: Sequence[int]) -> Callable[[Any], tuple[float, ...]]:
 
 
 class JointSample(NamedTuple):
-    """Stamp [ns], positions (n,) and velocities (n,), None where the controller tells none."""
+    """
+    Stamp [ns], positions (n,), velocities (n,), None where the controller tells none; efforts (n,).
+
+    Efforts are None where nobody asked for them.
+    """
 
     stamp: int
     q: Array
     qd: Array | None
+    effort: Array | None = None
 
 
 class Incomplete(DataError):
@@ -103,6 +108,8 @@ class JointStates:
     joint_names : sequence of str, optional
         What the joint states call the joints of the robot, in its order; left out, as the robot
         does, or with one prefix.
+    efforts : bool
+        Whether every joint state has to tell the measured efforts of the joints.
     mend : bool
         Whether velocities are left out that stay zero while joints move. A running node does; of a
         recording it is told as what it is.
@@ -129,8 +136,10 @@ class JointStates:
         limits: bool = True,
         joint_names: Sequence[str] | None = None,
         mend: bool = False,
+        efforts: bool = False,
     ) -> None:
         self._robot = robot
+        self.efforts = efforts
         self._given = joint_names is not None
         self._names = robot.joint_names if joint_names is None else tuple(joint_names)
         self._mend = mend
@@ -174,6 +183,8 @@ class JointStates:
 
         """
         sample = self._taken(message)
+        if sample is not None and self.efforts:
+            sample = sample._replace(effort=from_messages.joint_efforts(message, self._names))
         if sample is None or not self._mend or sample.qd is None:
             return sample
         return sample._replace(qd=None) if self._only_zeros(sample.q, sample.qd) else sample
@@ -311,6 +322,11 @@ class JointStates:
                 self._robot.check_positions(q)
 
     def _part(self, stamp: int, message: Any, present: tuple[str, ...]) -> JointSample | None:
+        if self.efforts:
+            raise DataError(
+                'several publishers tell the joints, and their efforts are not put together; '
+                'publish all joints in one message, or leave --use-effort out'
+            )
         q = from_messages.joint_positions(message, present)
         qd = from_messages.joint_velocities(message, present)
         left, before = self._missing(self._parts), self._stamp

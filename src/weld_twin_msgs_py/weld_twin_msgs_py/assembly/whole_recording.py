@@ -75,7 +75,7 @@ def assembled(
 
     """
     epoch = int(streams[Role.JOINTS].ns[0])
-    motion = _motion(robot, streams[Role.JOINTS])
+    motion, effort = _motion(robot, streams[Role.JOINTS])
     measured = _measurements(streams, epoch)
     if static is None:
         static = looks_static(robot, motion, measured)
@@ -97,6 +97,7 @@ def assembled(
         _signal(streams.get(Role.TEMPERATURE), epoch, static),
         epoch,
         notes,
+        effort=effort,
     )
 
 
@@ -113,14 +114,19 @@ def seconds(ns: np.ndarray, epoch: int) -> Array:
     return np.asarray((ns - epoch) * 1e-9)
 
 
-def _motion(robot: Robot, joints: Samples) -> JointMotion:
-    """Return the joint stream; velocities some messages lack are steps since the one before."""
-    t = seconds(joints.ns, int(joints.ns[0]))
-    q, qd = joints.rows[:, : robot.n], joints.rows[:, robot.n :]
+def _motion(robot: Robot, joints: Samples) -> tuple[JointMotion, Signal | None]:
+    """
+    Return the joint stream, and its efforts where they were read.
+
+    Velocities some messages lack are steps since the one before.
+    """
+    t, n = seconds(joints.ns, int(joints.ns[0])), robot.n
+    q, qd, effort = joints.rows[:, :n], joints.rows[:, n : 2 * n], joints.rows[:, 2 * n :]
+    told = Signal(t, effort) if effort.size else None
     untold = np.isnan(qd).any(axis=1, keepdims=True)
     if untold.all():
-        return JointMotion(t, q)
-    return JointMotion(t, q, np.where(untold, backward_rates(t, q), qd))
+        return JointMotion(t, q), told
+    return JointMotion(t, q, np.where(untold, backward_rates(t, q), qd)), told
 
 
 def _measurements(streams: Mapping[Role, Samples], epoch: int) -> Measurements | None:

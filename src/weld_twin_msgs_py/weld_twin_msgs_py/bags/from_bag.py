@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -193,9 +194,10 @@ def _read(
 def _empty(
     names: TopicNames, roles: Mapping[Role, str], robot: Robot
 ) -> tuple[dict[Role, Stream], Intake]:
-    streams = {role: Stream(topic, Intake.width(role, robot)) for role, topic in roles.items()}
     joint_names = names_called(robot, names.joint_prefix, dict(names.joint_map))
-    return streams, Intake(robot, limits=False, joint_names=joint_names)
+    intake = Intake(robot, limits=False, joint_names=joint_names, efforts=names.use_effort)
+    width = partial(Intake.width, robot=robot, efforts=names.use_effort)
+    return {role: Stream(topic, width(role)) for role, topic in roles.items()}, intake
 
 
 def _fill(

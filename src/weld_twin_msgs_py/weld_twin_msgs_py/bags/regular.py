@@ -55,7 +55,11 @@ class _Topic:
         ns, runs = read
         if ns[0] <= self._last or (np.diff(ns) <= 0).any():
             raise Unusual
-        rows = _joint_rows(runs, self._index) if self._index else _ROWS[self._role](runs[0])
+        rows = (
+            _joint_rows(runs, self._index, self.stream.width)
+            if self._index
+            else _ROWS[self._role](runs[0])
+        )
         if first is not None and not np.array_equal(rows[0], first, equal_nan=True):
             raise Unusual
         self._last = int(ns[-1])
@@ -116,8 +120,12 @@ def fill_regular(
     return all(len(streams[role]) == bag.topics[topic][1] for topic, role in roles.items())
 
 
-def _joint_rows(runs: list[Array], index: list[int]) -> Array:
-    """Return positions and velocities; a state that does not tell every velocity tells none."""
+def _joint_rows(runs: list[Array], index: list[int], width: int) -> Array:
+    """
+    Return positions, velocities and, in rows so wide, efforts.
+
+    A state that does not tell every velocity tells none.
+    """
     position, velocity = runs[0][:, index], runs[1]
     if velocity.shape[1] == runs[0].shape[1]:
         velocity = velocity[:, index]
@@ -126,7 +134,12 @@ def _joint_rows(runs: list[Array], index: list[int]) -> Array:
             raise Unusual
     else:
         velocity = np.full_like(position, np.nan)
-    return np.hstack([_finite(position), velocity])
+    rows = [_finite(position), velocity]
+    if width > 2 * len(index):
+        if runs[2].shape[1] != runs[0].shape[1]:
+            raise Unusual
+        rows.append(_finite(runs[2][:, index]))
+    return np.hstack(rows)
 
 
 def _pose_rows(values: Array) -> Array:

@@ -127,7 +127,9 @@ class _Entries:
         """Yield the streams of the recording itself."""
         motion, measured = self.recording.joints, self.recording.measured
         wrench, temperature = self.recording.wrench, self.recording.temperature
-        yield self.joints(JOINT_STATES.name, robot, motion.q, motion.qd)
+        effort = self.recording.effort
+        told = None if effort is None else effort.at(motion.t)
+        yield self.joints(JOINT_STATES.name, robot, motion.q, motion.qd, told)
         if measured is not None:
             yield from self.measured(measured)
         if self.recording.contacts is not None:
@@ -142,16 +144,20 @@ class _Entries:
             first = partial(self.make.temperature, celsius=degrees[0])
             yield self._alike(TEMPERATURE.name, temperature.t, first, rows)
 
-    def joints(self, topic: str, robot: Robot, q: Array, qd: Array | None) -> Iterator[_Entry]:
-        """Return the joint states, q and qd shape (N, n)."""
+    def joints(
+        self, topic: str, robot: Robot, q: Array, qd: Array | None, effort: Array | None = None
+    ) -> Iterator[_Entry]:
+        """Return the joint states, q, qd and effort shape (N, n)."""
         t, none = self.recording.joints.t, np.zeros((q.shape[0], 0))
         first = partial(
             self.make.joint_state,
             names=robot.joint_names,
             q=q[0],
             qd=None if qd is None else qd[0],
+            effort=None if effort is None else effort[0],
         )
-        return self._alike(topic, t, first, q, none if qd is None else qd, none)
+        runs = (none if run is None else run for run in (q, qd, effort))
+        return self._alike(topic, t, first, *runs)
 
     def measured(self, measured: Measurements) -> Iterator[Iterator[_Entry]]:
         """Yield poses or points, and their standard deviations where they are known."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from struct import Struct, error, unpack_from
-from typing import Any
+from typing import Any, NamedTuple
 
 from weld_twin_core.errors import DataError
 
@@ -47,6 +47,8 @@ from .cdr_types import (
 
 HEADER = 4
 """Bytes of encapsulation before the first field; alignment counts from behind them."""
+_MORE = 12
+"""Bytes behind what was read that hold an effort at least: its count, padding, one number."""
 _STAMP_END = HEADER + 8
 """Where the frame name begins: behind seconds and nanoseconds."""
 
@@ -100,13 +102,24 @@ class _Cursor:
         return PoseStamped(header, Pose(Xyz(*v[:3]), Xyzw(*v[3:])))
 
 
+class _Kept(NamedTuple):
+    """How to read joint states like one that came: where numbers begin and end; efforts among them."""
+
+    frame: str
+    name: tuple[str, ...]
+    body: Struct
+    at: int
+    end: int
+    efforts: bool
+
+
 class JointStateDecoder:
     """Decodes joint states; one that repeats its frame and names is read without parsing them."""
 
     _KEPT = 8
 
     def __init__(self) -> None:
-        self._known: dict[bytes, tuple[str, tuple[str, ...], Struct, int]] = {}
+        self._known: dict[bytes, _Kept] = {}
 
     def __call__(self, data: bytes) -> JointState:
         """
@@ -118,31 +131,40 @@ class JointStateDecoder:
             The bytes are none.
 
         """
-        for head, (frame, name, body, at) in self._known.items():
-            if data.startswith(head, _STAMP_END) and len(data) >= at + body.size:
+        for head, (frame, name, body, at, end, told) in self._known.items():
+            if data.startswith(head, _STAMP_END) and 0 <= len(data) - end < _MORE:
                 sec, nanosec = _STAMP.unpack_from(data, HEADER)
                 values = body.unpack_from(data, at)
                 n = len(name)
-                velocity = values[n + 2 :]
+                velocity = values[n + 2 : 2 * n + 2] if told else values[n + 2 :]
                 if values[n] == len(velocity) and data[1] == 1 and data[0] == 0:
                     header = Header(Time(sec, nanosec), frame)
-                    return JointState(header, name, values[:n], velocity)
+                    if not told:
+                        return JointState(header, name, values[:n], velocity)
+                    if values[2 * n + 2] == n:
+                        return JointState(header, name, values[:n], velocity, values[2 * n + 4 :])
         state: JointState = decoded('sensor_msgs/msg/JointState', self._slow, data)
         return state
 
     def _slow(self, cursor: _Cursor) -> JointState:
         header, name = cursor.header(), cursor.strings()
         head_end = cursor.at
-        position, velocity = cursor.sequence(), cursor.sequence()
-        cursor.sequence()
-        self._remember(cursor.data, head_end, header.frame_id, name, len(position), len(velocity))
-        return JointState(header, name, position, velocity)
+        position, velocity, effort = cursor.sequence(), cursor.sequence(), cursor.sequence()
+        if len(effort) in (0, len(name)) and not (effort and not velocity):
+            counts = len(position), len(velocity), len(effort)
+            self._remember(cursor.data, head_end, header.frame_id, name, counts)
+        return JointState(header, name, position, velocity, effort)
 
     def _remember(
-        self, data: bytes, end: int, frame: str, name: tuple[str, ...], q: int, qd: int
+        self,
+        data: bytes,
+        end: int,
+        frame: str,
+        name: tuple[str, ...],
+        counts: tuple[int, int, int],
     ) -> None:
         """Keep the bytes of frame, names and count: of one position per name, one velocity or none."""
-        n = len(name)
+        n, (q, qd, effort) = len(name), counts
         if q != n or qd not in (0, n) or data[1] != 1:
             return
         counted = end + -(end - HEADER) % 4 + 4
@@ -150,8 +172,10 @@ class JointStateDecoder:
         if len(self._known) >= self._KEPT:
             self._known.clear()
         # The velocities' count lies on a multiple of 8; behind it four bytes of padding.
-        body = Struct(f'<{n}dII{n}d' if qd else f'<{n}dI')
-        self._known[bytes(data[_STAMP_END:counted])] = (frame, name, body, at)
+        body = Struct(f'<{n}dII{n}d' + (f'II{n}d' if effort else '') if qd else f'<{n}dI')
+        self._known[bytes(data[_STAMP_END:counted])] = _Kept(
+            frame, name, body, at, at + body.size, bool(effort)
+        )
 
 
 _STAMP = Struct('<iI')

@@ -124,12 +124,13 @@ class Temperature(NamedTuple):
 
 
 class JointState(NamedTuple):
-    """sensor_msgs/JointState without the effort."""
+    """sensor_msgs/JointState."""
 
     header: Header
     name: tuple[str, ...]
     position: tuple[float, ...]
     velocity: tuple[float, ...]
+    effort: tuple[float, ...] = ()
 
 
 class TrajectoryPoint(NamedTuple):

@@ -122,6 +122,32 @@ def joint_velocities(message: Any, joint_names: Sequence[str]) -> Array | None:
     return np.array(chosen, dtype=np.float64)
 
 
+def joint_efforts(message: Any, joint_names: Sequence[str]) -> Array:
+    """
+    Return the measured efforts of the joints, shape (n,) [N m, or N of a slide].
+
+    Raises
+    ------
+    DataError
+        None is told, there are fewer efforts than names, or one is not finite.
+
+    """
+    values = getattr(message, 'effort', ())
+    if not len(values):
+        raise DataError(
+            'the joint state tells no effort; have the driver publish it, or leave --use-effort out'
+        )
+    if len(values) != len(message.name):
+        raise DataError(
+            f'the joint state has {len(message.name)} names but {len(values)} efforts; it must '
+            'give one effort per name, or --use-effort be left out'
+        )
+    index = _indices(tuple(message.name), tuple(joint_names))
+    chosen = [values[k] for k in index]
+    _refuse_unfinite(chosen, joint_names, 'effort')
+    return np.array(chosen, dtype=np.float64)
+
+
 def _refuse_unfinite(values: Sequence[float], joint_names: Sequence[str], what: str) -> None:
     """Refuse in plain numbers: for one sample of an arm numpy costs more than the arithmetic."""
     if not all(map(isfinite, values)):

@@ -84,22 +84,6 @@ def _values(points: Sequence[Any], kind: str, columns: tuple[int, ...]) -> Array
     return np.array(rows, dtype=np.float64).reshape(len(rows), -1)[:, list(columns)]
 
 
-def point_messages(goal: Goal) -> list[Any]:
-    """Return the points of a goal as messages; needs a ROS installation."""
-    from trajectory_msgs.msg import JointTrajectoryPoint  # only nodes have it
-
-    out = []
-    for k, t in enumerate(goal.t):
-        point = JointTrajectoryPoint()
-        for kind, values in zip(('positions', *RATES), goal[1:], strict=True):
-            if values is not None:
-                setattr(point, kind, values[k].tolist())
-        since = divmod(round(float(t) * NANOSECONDS), NANOSECONDS)
-        point.time_from_start.sec, point.time_from_start.nanosec = since
-        out.append(point)
-    return out
-
-
 def corrected_trajectory(trajectory: Any, columns: Sequence[int], goal: Goal, waits: float) -> Any:
     """
     Return a copy of a JointTrajectory with the robot's joints at other points.

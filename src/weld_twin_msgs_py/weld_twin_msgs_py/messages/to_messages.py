@@ -52,9 +52,15 @@ class Messages:
         return self._make('std_msgs/msg/Header', stamp=self.time(ns), frame_id=frame_id)
 
     def joint_state(
-        self, ns: int, names: Sequence[str], q: Array, qd: Array | None = None, frame_id: str = ''
+        self,
+        ns: int,
+        names: Sequence[str],
+        q: Array,
+        qd: Array | None = None,
+        frame_id: str = '',
+        effort: Array | None = None,
     ) -> Any:
-        """Return a JointState from positions and velocities, shape (n,) each [rad, rad/s]."""
+        """Return a JointState from positions, velocities, efforts, (n,) each [rad, rad/s, N m]."""
         empty = np.zeros(0)
         return self._make(
             'sensor_msgs/msg/JointState',
@@ -62,7 +68,7 @@ class Messages:
             name=list(names),
             position=self._numbers(np.asarray(q, dtype=np.float64)),
             velocity=self._numbers(empty if qd is None else np.asarray(qd, dtype=np.float64)),
-            effort=self._numbers(empty),
+            effort=self._numbers(empty if effort is None else np.asarray(effort, dtype=float)),
         )
 
     def _xyz(self, kind: str, value: Array) -> Any:
@@ -200,23 +206,29 @@ class Messages:
             values=pairs,
         )
 
-    def joint_trajectory(self, ns: int, names: Sequence[str], motion: JointMotion) -> Any:
-        """Return a JointTrajectory of a motion; its first point is at time zero."""
-        points = []
-        for t, q, qd in zip(motion.t - motion.t[0], motion.q, motion.velocity, strict=True):
-            sec, nanosec = divmod(round(float(t) * NANOSECONDS), NANOSECONDS)
-            points.append(
+    def trajectory_points(
+        self, t: Array, q: Array, qd: Array | None = None, qdd: Array | None = None
+    ) -> list[Any]:
+        """Return JointTrajectoryPoints at times (N,) [s]; rates (N, n) where they are known."""
+        out = []
+        for k, since in enumerate(t):
+            sec, nanosec = divmod(round(float(since) * NANOSECONDS), NANOSECONDS)
+            rows = [np.zeros(0) if each is None else each[k] for each in (q, qd, qdd, None)]
+            fields = ('positions', 'velocities', 'accelerations', 'effort')
+            out.append(
                 self._make(
                     'trajectory_msgs/msg/JointTrajectoryPoint',
-                    positions=self._numbers(q),
-                    velocities=self._numbers(qd),
-                    accelerations=self._numbers(np.zeros(0)),
-                    effort=self._numbers(np.zeros(0)),
+                    **dict(zip(fields, map(self._numbers, rows), strict=True)),
                     time_from_start=self._make(
                         'builtin_interfaces/msg/Duration', sec=sec, nanosec=nanosec
                     ),
                 )
             )
+        return out
+
+    def joint_trajectory(self, ns: int, names: Sequence[str], motion: JointMotion) -> Any:
+        """Return a JointTrajectory of a motion; its first point is at time zero."""
+        points = self.trajectory_points(motion.t - motion.t[0], motion.q, motion.velocity)
         return self._make(
             'trajectory_msgs/msg/JointTrajectory',
             header=self.header(ns, ''),

@@ -338,6 +338,8 @@ class TopicNames:
         Joints of the robot and what the joint states call them, before the prefix.
     measured_inverse : bool
         Whether measured poses are those of something fixed seen from the arm, to be inverted.
+    use_effort : bool
+        Whether the measured efforts of the joints are read, and have to be there.
 
     """
 
@@ -351,6 +353,7 @@ class TopicNames:
     joint_prefix: str = field(default='', metadata=NO_TOPIC)
     joint_map: tuple[tuple[str, str], ...] = field(default=(), metadata=NO_TOPIC)
     measured_inverse: bool = field(default=False, metadata=NO_TOPIC)
+    use_effort: bool = field(default=False, metadata=NO_TOPIC)
 
     @classmethod
     def topics(cls) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from ..files.whole_files import write_text
 from ..files.yaml_file import read_text
 from .axes_to_dh import inverse
 from .controller_links import FLANGE
-from .urdf_read import chain_of, read_urdf
+from .urdf_read import Chain, chain_of, read_urdf
 from .urdf_tree import MOVABLE, Joint, read_tree
 from .urdf_write import add_fixed, fix, joint_frames, numbers, roll_pitch_yaw
 
@@ -84,27 +84,69 @@ def write_urdf_like(
         The given file cannot be read.
 
     """
-    nominal = read_urdf(*given)
-    based = replace(robot, T_world_base=nominal.T_world_base)
-    chain, start = chain_of(*given[:3])
+    chain = chain_of(*given[:3])
+    nominal, arm = read_urdf(*given), robot
+    moved: list[tuple[Joint, Array]] = []
+    table: Hand | None = None
+    if chain.up:
+        nominal, arm, moved, table = _beside(given, chain, nominal, robot)
+    based = replace(arm, T_world_base=nominal.T_world_base)
     root = fromstring(read_text(given.path, 'URDF'), forbid_dtd=True)
     joints = {
         item.get('name'): item for item in root.iter('joint') if item.find('parent') is not None
     }
-    last = max(k for k, joint in enumerate(chain) if joint.kind in MOVABLE)
+    last = _last(chain.down)
     was, now = joint_frames(nominal), joint_frames(based)
-    origins, carrier = _moving(chain[: last + 1], start, was, now)
+    origins, carrier = _moving(chain.down[: last + 1], chain.start, was, now)
     plain = now[-1] @ inverse(based.T_flange_tool) @ nominal.T_flange_tool
     hand = Hand(carrier, plain, now[-1])
-    carried = _carried(given, nominal, chain[-1].child)
-    for joint, origin in [*origins, *_fixed(chain[last + 1 :], hand, carried)]:
+    carried = _carried(given, nominal, chain.down[-1].child)
+    for joint, origin in [*moved, *origins, *_fixed(chain.down[last + 1 :], hand, carried)]:
         _set(joints[joint.name], origin)
     if carried:
-        _put_between(root, joints[chain[-1].name], hand, len(chain) > last + 1, nominal)
+        at = hand.plain if len(chain.down) > last + 1 else hand.carrier
+        end = _put_between(root, joints[chain.down[-1].name], inverse(at) @ hand.tip)
+        if end:
+            assert nominal.controller is not None
+            flange = inverse(nominal.T_flange_tool) @ nominal.controller.flange
+            add_fixed(root, end, FLANGE, inverse(at) @ hand.plain @ flange)
+    if table is not None and chain.up[-1].kind in MOVABLE:
+        _put_between(root, joints[chain.up[-1].name], inverse(table.carrier) @ table.tip)
     for k, note in enumerate(notes):
         root.insert(k, Comment(f' {note.replace("--", "-")} '))
     text = '<?xml version="1.0"?>\n' + tostring(root, encoding='unicode') + '\n'
     write_text(path, text, overwrite=overwrite)
+
+
+def _last(joints: list[Joint]) -> int:
+    """Return the place of the last joint that moves."""
+    return max(k for k, joint in enumerate(joints) if joint.kind in MOVABLE)
+
+
+def _beside(
+    given: GivenUrdf, chain: Chain, nominal: Robot, robot: Robot
+) -> tuple[Robot, Robot, list[tuple[Joint, Array]], Hand]:
+    """
+    Return given and corrected robot without their positioner, and what becomes of that.
+
+    The robot stays where it stands, and the positioner moves. Where the recording was measured on
+    the table is not written.
+    """
+    root = chain.down[0].parent
+    alone = read_urdf(given.path, root, chain.down[-1].child, given.flange_link)
+    (was, _), (now, arm) = nominal.branches, robot.branches
+    frames = [
+        joint_frames(
+            foot.with_frames(
+                base=alone.T_world_base @ inverse(cell.T_root_base), tool=was.T_flange_tool
+            )
+        )
+        for foot, cell in ((was, nominal), (now, robot))
+    ]
+    last = _last(chain.up)
+    origins, carrier = _moving(chain.up[: last + 1], np.eye(4), *frames)
+    table = Hand(carrier, frames[1][-1], frames[1][-1])
+    return alone, arm, [*origins, *_fixed(chain.up[last + 1 :], table, False)], table
 
 
 def _moving(
@@ -148,21 +190,17 @@ def _fixed(behind: list[Joint], hand: Hand, carried: bool) -> list[tuple[Joint, 
     return out
 
 
-def _put_between(root: Element, joint: Element, hand: Hand, fixed: bool, nominal: Robot) -> None:
-    """Let the last joint lead to a link that the tip and the controller's flange are fixed to."""
-    assert nominal.controller is not None
-    at = hand.plain if fixed else hand.carrier
-    T_tip, T_plain = inverse(at) @ hand.tip, inverse(at) @ hand.plain
-    if np.abs(T_tip - np.eye(4)).max() < SAME:
-        return
+def _put_between(root: Element, joint: Element, T_end_tip: Array) -> str:
+    """Let a joint lead to a new link that its child is fixed to; return it, empty for no need."""
+    if np.abs(T_end_tip - np.eye(4)).max() < SAME:
+        return ''
     child = joint.find('child')
     assert child is not None
     tip, end = str(child.get('link')), f'{joint.get("name")}_end'
     child.set('link', end)
     SubElement(root, 'link', {'name': end})
-    fix(root, f'{end}_to_{tip}', end, tip, T_tip)
-    flange = inverse(nominal.T_flange_tool) @ nominal.controller.flange
-    add_fixed(root, end, FLANGE, T_plain @ flange)
+    fix(root, f'{end}_to_{tip}', end, tip, T_end_tip)
+    return end
 
 
 def _set(joint: Element, origin: Array) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,15 +31,16 @@ def read_urdf(
     Read a URDF.
 
     The world frame of the robot is the base link, its tool the tip link; poses agree with the
-    URDF's to rounding. Links on fixed joints, and whatever else hangs on the chain, lend their
-    mass to the link that carries them.
+    URDF's to rounding. Where joints of a positioner lie between the base link and the link that
+    both branches hang on, the chain leads up one branch and down the other. Links on fixed joints,
+    and whatever else hangs on the chain, lend their mass to the link that carries them.
 
     Parameters
     ----------
     path : Path or str
     base_link, tip_link : str, optional
         Left out: the root, and the only leaf that moves or ``tool0``. The base may also be a link
-        that is fixed beside the chain, as ``base`` of a UR arm is.
+        that is fixed beside the chain, as ``base`` of a UR arm is, or the table of a positioner.
     flange_link : str, optional
         Where the controller has its flange; left out, it is found by its name, see
         `controller_links`. Its base is the base link that was asked for; left out, ``base`` beside
@@ -72,11 +74,29 @@ def parse_urdf(
     return _of_tree(parse_tree(text, source), source, base_link, tip_link, flange_link)
 
 
-def chain_of(
-    path: Path | str, base_link: str | None = None, tip_link: str | None = None
-) -> tuple[list[Joint], Array]:
+class Chain(NamedTuple):
     """
-    Return the joints from base to tip, fixed ones too, and where the first hangs in the base.
+    The joints from base to tip, fixed ones too.
+
+    Attributes
+    ----------
+    up : list of Joint
+        Those of a positioner, from its foot to the base link; empty for a robot alone.
+    down : list of Joint
+        Those of the robot, from the link that both hang on to the tip.
+    start : array, shape (4, 4)
+        That link in the frame of reference: the base link, or itself beside a positioner.
+
+    """
+
+    up: list[Joint]
+    down: list[Joint]
+    start: Array
+
+
+def chain_of(path: Path | str, base_link: str | None = None, tip_link: str | None = None) -> Chain:
+    """
+    Return the joints from base to tip.
 
     Parameters
     ----------
@@ -86,9 +106,7 @@ def chain_of(
     """
     tree = read_tree(path)
     base = _base(tree, base_link)
-    tip = _tip(tree, base, tip_link)
-    start, T_base_start = _start(tree, base, tip)
-    return _chain(tree, start, tip), T_base_start
+    return _chain(tree, base, _tip(tree, base, tip_link))
 
 
 def _of_tree(
@@ -101,16 +119,28 @@ def _of_tree(
     try:
         base = _base(tree, base_link)
         tip = _tip(tree, base, tip_link)
-        start, T_base_start = _start(tree, base, tip)
-        chain = _chain(tree, start, tip)
-        origin = foot_of(tree, base, chain, base_link)
-        flange = flange_link_of(tree, chain, tip, flange_link)
-        robot = _robot(tree, chain, base, T_base_start, f'URDF {Path(path).name}')
+        chain = _chain(tree, base, tip)
+        root = chain.down[0].parent if chain.up else base
+        robot = _robot(tree, chain.down, _gravity(tree, root), chain.start, path)
+        origin = foot_of(tree, root, chain.down, None if chain.up else base_link)
+        flange = flange_link_of(tree, chain.down, tip, flange_link)
         robot = replace(robot, controller=_controller(robot, origin, flange))
+        if chain.up:
+            robot = _beside(tree, chain, robot, path)
         refuse_wrong_units(robot)
     except ModelError as error:
         raise ModelError(f"URDF '{path}': {error}") from None
     return robot
+
+
+def _beside(tree: Tree, chain: Chain, robot: Robot, path: Path | str) -> Robot:
+    """Return the chain from the base link on a positioner to the tool of a robot."""
+    gravity = _gravity(tree, chain.up[0].parent)
+    cell = robot.behind_workpiece(_robot(tree, chain.up, gravity, np.eye(4), path))
+    assert robot.controller is not None
+    # What people call the base is the link that was asked for: the table.
+    table = replace(robot.controller, foot=inverse(cell.T_world_base))
+    return replace(cell, controller=table)
 
 
 def _controller(
@@ -160,51 +190,61 @@ def _known(tree: Tree, link: str, end: str) -> str:
     return link
 
 
-def _start(tree: Tree, base: str, tip: str) -> tuple[str, Array]:
+def _chain(tree: Tree, base: str, tip: str) -> Chain:
     """
-    Return the link above both base and tip that is fixed to the base, and where it is in the base.
+    Return the joints from base to tip, up to the link that both hang on and down from it.
 
-    The description of a UR arm has 'base' and the arm side by side below 'base_link'.
+    The description of a UR arm has 'base' and the arm side by side below 'base_link'; joints that
+    are fixed on the way up only say where the base is.
     """
-    above, link = {tip}, tip
-    while link in tree.above and tree.above[link].parent not in above:
-        link = tree.above[link].parent
-        above.add(link)
-    T_base_link, link = np.eye(4), base
-    for _ in tree.links:
-        if link in above:
-            return link, T_base_link
-        joint = tree.above.get(link)
-        if joint is None or joint.kind != 'fixed':
-            break
-        T_base_link, link = T_base_link @ inverse(joint.T_parent_joint), joint.parent
-    return base, np.eye(4)
+    down, up = _to_root(tree, tip), _to_root(tree, base)
+    while down and up and down[-1] is up[-1]:
+        down.pop()
+        up.pop()
+    if (down[-1].parent if down else tip) != (up[-1].parent if up else base):
+        raise ModelError(f'no chain of joints leads from {base!r} to {tip!r}')
+    down.reverse()
+    up.reverse()
+    _refuse_unfit([*up, *down])
+    climbs, moves = (any(j.kind in MOVABLE for j in joints) for joints in (up, down))
+    if climbs and not moves:
+        raise ModelError(f'no joint moves between {tip!r} and the foot of {base!r}; swap the two')
+    if not moves:
+        raise ModelError(f'no joint moves between {base!r} and {tip!r}')
+    if climbs:
+        return Chain(up, down, np.eye(4))
+    T_start_base = np.eye(4)
+    for joint in up:
+        T_start_base = T_start_base @ joint.T_parent_joint
+    return Chain([], down, inverse(T_start_base))
 
 
-def _chain(tree: Tree, base: str, tip: str) -> list[Joint]:
-    """Return the joints from base to tip."""
-    joints: list[Joint] = []
-    link = tip
-    while link != base:
-        joint = tree.above.get(link)
-        if joint is None or len(joints) > len(tree.links):
-            raise ModelError(f'no chain of joints leads from {base!r} to {tip!r}')
-        joints.append(joint)
-        link = joint.parent
-    joints.reverse()
+def _refuse_unfit(joints: list[Joint]) -> None:
+    """Refuse joints that no arm has."""
     for joint in joints:
         if joint.kind not in MOVABLE | {'fixed'}:
             raise ModelError(f'joint {joint.name!r} is {joint.kind}; an arm cannot have that')
         if joint.mimic and joint.kind in MOVABLE:
             raise ModelError(f'joint {joint.name!r} mimics another; a serial arm cannot have that')
-    if not any(joint.kind in MOVABLE for joint in joints):
-        raise ModelError(f'no joint moves between {base!r} and {tip!r}')
-    return joints
 
 
-def _robot(tree: Tree, chain: list[Joint], base: str, T_base_start: Array, source: str) -> Robot:
+def _to_root(tree: Tree, link: str) -> list[Joint]:
+    """Return the joints above a link, the nearest first."""
+    out: list[Joint] = []
+    while link in tree.above:
+        out.append(tree.above[link])
+        link = out[-1].parent
+        if len(out) > len(tree.links):
+            raise ModelError(f'no chain of joints leads to {link!r}: they go round in a circle')
+    return out
+
+
+def _robot(
+    tree: Tree, chain: list[Joint], gravity: Array, start: Array, path: Path | str
+) -> Robot:
+    """Return a robot of the joints of one branch; gravity is in the link where they start."""
     moving = [joint for joint in chain if joint.kind in MOVABLE]
-    T = T_base_start
+    T = start
     axes: list[Axis] = []
     carried: list[list[tuple[float, Array]]] = []
     on_chain = {joint.name for joint in chain}
@@ -217,7 +257,6 @@ def _robot(tree: Tree, chain: list[Joint], base: str, T_base_start: Array, sourc
             carried[-1] += _masses(tree, joint.child, T, on_chain)
     T_base_first, rows, frames = dh_rows(axes, T)
     mass, com = _merged(carried, frames)
-    gravity = T_base_first[:3, :3].T @ _gravity(tree, base)
     theta, d, a, alpha, beta = np.array(rows).T
     limits = np.array([(joint.lower, joint.upper, joint.velocity) for joint in moving])
     return Robot(
@@ -237,8 +276,8 @@ def _robot(tree: Tree, chain: list[Joint], base: str, T_base_start: Array, sourc
         T_flange_tool=inverse(frames[-1]) @ T,
         mass=mass,
         com=com,
-        gravity=gravity,
-        source=source,
+        gravity=T_base_first[:3, :3].T @ gravity,
+        source=f'URDF {Path(path).name}',
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from weld_twin_core.arm.controller_lookup import controller_frames
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.arm.rotation import transform
+from weld_twin_core.arm.rotation import rotation_matrix, transform
 from weld_twin_core.arrays import Array
 
 from ..files.whole_files import write_text
@@ -21,6 +21,8 @@ from .controller_links import BASE, FLANGE
 from .urdf_tree import turn
 
 EFFORT = '1000.0'
+ROOT = 'root'
+"""The link that positioner and robot stand on."""
 _NOTE = (
     ' Kinematics and masses of {name}. Effort limits and inertias are placeholders: a model of '
     'positional accuracy has none. Gravity in the base frame: {gravity} m/s^2. '
@@ -33,7 +35,8 @@ def write_urdf(
     """
     Write a URDF from the measuring frame (link ``world``) to the tool (link ``tool``).
 
-    The controller's base and flange are links too, so that they are read again.
+    The controller's base and flange are links too, so that they are read again. Where a positioner
+    moves the measuring frame, both stand on a link ``root`` that is upright.
 
     Parameters
     ----------
@@ -55,27 +58,64 @@ def write_urdf(
     for note in notes:
         root.append(Comment(f' {note.replace("--", "-")} '))
     SubElement(root, 'link', {'name': 'world'})
-    parent, ahead = 'world', robot.T_world_base
-    for k, name in enumerate(robot.joint_names):
-        before, after = _split_row(robot, k)
-        joint = fix(root, name, parent, f'link_{k + 1}', ahead @ before)
-        _motion(joint, robot, k)
-        parent, ahead = f'link_{k + 1}', after
-        link = SubElement(root, 'link', {'name': parent})
-        if robot.mass is not None and robot.com is not None:
-            _inertial(link, float(robot.mass[k]), after[:3, :3] @ robot.com[k] + after[:3, 3])
-    frames = controller_frames(robot)
-    tool_on_flange = inverse(frames.flange) @ robot.T_flange_tool
-    add_fixed(root, 'world', BASE, robot.T_world_base @ frames.base)
-    add_fixed(root, 'world', 'base_link', robot.T_world_origin)
+    arm, foot = robot, 'world'
+    if robot.behind:
+        arm, foot = _write_positioner(root, robot), ROOT
+    parent, ahead = _write_rows(root, arm, foot)
+    frames = controller_frames(arm)
+    tool_on_flange = inverse(frames.flange) @ arm.T_flange_tool
+    add_fixed(root, foot, BASE, arm.T_world_base @ frames.base)
+    if not robot.behind:
+        add_fixed(root, foot, 'base_link', arm.T_world_origin)
     add_fixed(root, parent, FLANGE, ahead @ frames.flange)
     fix(root, 'flange_to_tool', FLANGE, 'tool', tool_on_flange)
     tool = SubElement(root, 'link', {'name': 'tool'})
-    if robot.payload_mass > 0.0:
-        _inertial(tool, robot.payload_mass, robot.payload_com)
+    if arm.payload_mass > 0.0:
+        _inertial(tool, arm.payload_mass, arm.payload_com)
     indent(root)
     text = '<?xml version="1.0"?>\n' + tostring(root, encoding='unicode') + '\n'
     write_text(path, text, overwrite=overwrite)
+
+
+def _write_positioner(root: Element, robot: Robot) -> Robot:
+    """Write a positioner from its foot to the measuring frame; return the robot beside it."""
+    upright = _upright(robot.T_root_base[:3, :3] @ robot.gravity)
+    positioner, arm = (
+        branch.with_frames(base=upright @ branch.T_world_base) for branch in robot.branches
+    )
+    SubElement(root, 'link', {'name': ROOT})
+    parent, ahead = _write_rows(root, positioner, ROOT, 'workpiece')
+    fix(root, f'{parent}_to_world', parent, 'world', ahead @ positioner.T_flange_tool)
+    return arm
+
+
+def _upright(gravity: Array) -> Array:
+    """Return the turn (4, 4) that lets gravity pull down z, as that of a URDF does."""
+    weight = float(np.linalg.norm(gravity))
+    if weight == 0.0:
+        return np.eye(4)
+    down = gravity / weight
+    across = np.cross(down, [0.0, 0.0, -1.0])
+    sine = float(np.linalg.norm(across))
+    axis = across / sine if sine > 0.0 else np.array([1.0, 0.0, 0.0])
+    angle = float(np.arctan2(sine, -down[2]))
+    return transform(rotation_matrix(angle * axis), np.zeros(3))
+
+
+def _write_rows(
+    root: Element, robot: Robot, foot: str, link_name: str = 'link'
+) -> tuple[str, Array]:
+    """Write joints and links from a foot; return the last link, and where the rows end in it."""
+    parent, ahead = foot, robot.T_world_base
+    for k, name in enumerate(robot.joint_names):
+        before, after = _split_row(robot, k)
+        joint = fix(root, name, parent, f'{link_name}_{k + 1}', ahead @ before)
+        _motion(joint, robot, k)
+        parent, ahead = f'{link_name}_{k + 1}', after
+        link = SubElement(root, 'link', {'name': parent})
+        if robot.mass is not None and robot.com is not None:
+            _inertial(link, float(robot.mass[k]), after[:3, :3] @ robot.com[k] + after[:3, 3])
+    return parent, ahead
 
 
 def add_fixed(root: Element, parent: str, name: str, T: Array) -> None:

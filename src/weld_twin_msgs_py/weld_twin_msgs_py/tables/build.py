@@ -45,6 +45,8 @@ _KELVINS = {'degC': 1.0, 'K': 1.0, 'degF': 5.0 / 9.0}
 """Units of temperature, and their degree [K]."""
 _FREEZING = {'degC': 0.0, 'K': 273.15, 'degF': 32.0}
 """Where water freezes, in each unit."""
+_TORQUES = {'N m': 1.0, 'N mm': 1e-3, 'N': 1.0}
+"""Units of efforts [N m, or N of a slide]."""
 _HOT = 150.0
 """No arm is so warm [degC]: without a unit, larger numbers are kelvins."""
 _WRONG = 0.05
@@ -125,6 +127,7 @@ def _read(
         JointMotion(t, q, static=True),
         Measurements(t, position, rotation, sigma),
         temperature=_temperature(cells, columns, t, said),
+        effort=_effort(cells, robot, columns, t, said),
         epoch_ns=epoch,
         notes=tuple(said),
     )
@@ -154,6 +157,32 @@ def _temperature(cells: Cells, columns: Columns, t: Array, said: list[str]) -> S
     scale = factor(_KELVINS, unit, name, 'the temperature')
     said.append(f'temperature is {name!r} in {unit}')
     return Signal(t, (values - _FREEZING[unit]) * scale)
+
+
+def _effort(
+    cells: Cells, robot: Robot, columns: Columns, t: Array, said: list[str]
+) -> Signal | None:
+    """Return the measured efforts; what cannot be used is left out, for few ask for it."""
+    names = columns.effort
+    if not names:
+        return None
+    units = [columns.unit(name) for name in names]
+    if not {unit or 'N m' for unit in units} <= set(_TORQUES):
+        said.append(
+            f'the efforts {", ".join(names)} are in {units[0]} and left out: springs take N m'
+        )
+        return None
+    values = cells.stack(names)
+    empty = np.argwhere(~np.isfinite(values))
+    if empty.size:
+        row, column = empty[0]
+        said.append(
+            f'the efforts are left out, for line {cells.lines[row]} has none in {names[column]!r}'
+        )
+        return None
+    unit = next((unit for unit in units if unit), 'N m, as the header names no unit')
+    said.append(f'efforts are {", ".join(names)} in {unit}; --use-effort has springs take them')
+    return Signal(t, values * [_TORQUES[unit or 'N m'] for unit in units])
 
 
 def _relative_misfit(

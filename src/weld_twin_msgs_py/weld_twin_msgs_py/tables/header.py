@@ -17,6 +17,7 @@ from .words import (
     CLOCK,
     DATE,
     DIFFERENCE,
+    EFFORT,
     EXTERNAL,
     FANUC,
     JOINT,
@@ -63,6 +64,7 @@ class Columns:
     target: tuple[str, ...] = ()
     difference: tuple[str, ...] = ()
     rotation: tuple[str, ...] = ()
+    effort: tuple[str, ...] = ()
     sigma: tuple[str, ...] = ()
     temperature: str | None = None
     time: str | None = None
@@ -94,6 +96,8 @@ def find_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> 
             'named in --joint-columns'
         )
     left = [part for part in parts if part.name not in out.joints]
+    out.effort = _efforts(left, robot)
+    left = [part for part in left if part.name not in out.effort]
     names = [part.name for part in left]
     out.temperature = options.temperature_column or _first(names, TEMPERATURE)
     given = options.time_column
@@ -218,6 +222,28 @@ def _in_order(
             '--joint-columns decides'
         )
     return tuple(chosen[0][k] for k in sorted(chosen[0]))
+
+
+def _efforts(parts: Sequence[Named], robot: Robot) -> tuple[str, ...]:
+    """Return the columns of efforts, called as joints or numbered; nothing where one is missing."""
+    named: dict[str, str] = {}
+    numbered: dict[int, str] = {}
+    for part in parts:
+        words = parted(part.name)[0]
+        pieces = [piece for word in words for piece in re.findall(r'[^0-9]+|[0-9]+', word)]
+        if not set(pieces) & EFFORT:
+            continue
+        rest = [piece for piece in pieces if piece not in EFFORT]
+        named.setdefault('_'.join(rest), part.name)
+        numbers = [int(piece) for piece in rest if piece.isdecimal()]
+        if len(numbers) == 1 and set(rest) - {str(numbers[0])} <= JOINT | MEASURED:
+            numbered.setdefault(numbers[0], part.name)
+    keys = ['_'.join(re.findall(r'[^0-9_]+|[0-9]+', joint.lower())) for joint in robot.joint_names]
+    if all(key in named for key in keys):
+        return tuple(named[key] for key in keys)
+    first = 0 if 0 in numbered else 1
+    wanted = range(first, first + robot.n)
+    return tuple(numbered[k] for k in wanted) if sorted(numbered) == list(wanted) else ()
 
 
 def _rank(words: tuple[str, ...]) -> int:

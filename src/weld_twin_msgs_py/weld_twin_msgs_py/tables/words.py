@@ -40,6 +40,8 @@ JOINT = {
 EXTERNAL = {'e', 'eax', 'extax', 'ext', 'external', 'extern', 'zusatzachse'}
 """With a number or a letter from a to f: an axis beside the arm, such as a track."""
 NAMES_A_JOINT = JOINT - {'angle', 'angles', 'winkel', 'pos', 'position'}
+EFFORT = {'effort', 'efforts', 'torque', 'torques', 'tau', 'moment', 'drehmoment', 'moments'}
+"""With a joint: what the controller measured that it bears."""
 LETTERS = ('s', 'l', 'u', 'r', 'b', 't')
 """The joints of six-axis arms of Yaskawa."""
 TURNS = {
@@ -75,6 +77,8 @@ UNITS = {
 IN_BRACKETS = {
     **UNITS, 'in': 'in', '"': 'in', 'k': 'K', 'f': 'degF', 'c': 'degC', '\'': 'ft', 'ft': 'ft',
     'min': 'min', 'h': 'h', 'msec': 'ms', '\N{GREEK SMALL LETTER MU}s': 'us',
+    'n m': 'N m', 'nm': 'N m', 'n*m': 'N m', 'n.m': 'N m', 'n\N{MIDDLE DOT}m': 'N m',
+    'n mm': 'N mm', 'nmm': 'N mm', 'n': 'N', '%': '%', 'percent': '%',
 }  # fmt: skip
 """What is a unit between brackets alone, and may be a word of its own elsewhere."""
 TEMPERATURE = re.compile(r'temp')

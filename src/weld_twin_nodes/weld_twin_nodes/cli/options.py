@@ -123,6 +123,12 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
         help='the measured poses are those of something fixed seen from the arm, such as of a board '
         'by a camera on the arm; they are inverted',
     )
+    group.add_argument(
+        '--use-effort',
+        action='store_true',
+        help='springs of joints take JointState.effort [N m] for their load, in the place of the '
+        "model's statics; a model that was learned so has it read without this",
+    )
 
 
 def topics_of(args: argparse.Namespace) -> TopicNames:
@@ -147,7 +153,16 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
         joint_prefix=args.joint_prefix,
         joint_map=tuple(pairs),
         measured_inverse=args.measured_inverse,
+        use_effort=args.use_effort or _learned_by_effort(args),
     )
+
+
+def _learned_by_effort(args: argparse.Namespace) -> bool:
+    """Return whether springs of the model that is given take measured efforts."""
+    from ..offline.told_twin import by_effort
+
+    given = (getattr(args, name, None) for name in ('model', 'effects_known'))
+    return any(by_effort(path) for path in given if path)
 
 
 def add_pool(parser: argparse.ArgumentParser) -> None:

@@ -49,6 +49,7 @@ class ForwardKinematicsTwin(ModelNode):
             sample.wrench,
             sample.wrench_frame,
             sample.temperature,
+            sample.effort,
         )
         self._tell_outside(self._sureness.outside)
         self._sure_pose.publish(

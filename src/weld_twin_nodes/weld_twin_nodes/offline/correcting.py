@@ -15,8 +15,9 @@ from weld_twin_core import __version__
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
+from weld_twin_core.effects import Effect
 from weld_twin_core.effects.setup_motion import of_the_robot
-from weld_twin_core.errors import DataError
+from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.motion.programs.repeated import repeated
 from weld_twin_core.twin.program_accuracy import Accuracy, along_seams
 from weld_twin_core.twin.program_correction import Caps, ProgramCorrection, correct_program
@@ -108,10 +109,22 @@ def program_model(
     ):
         twin = load_model(robot, path, setup)
         effects = of_the_robot(twin.effects)
+        _refuse_by_effort(effects, path)
         posterior = read_posterior(robot, path)
         return ProgramModel(twin.robot, tuple(effects), posterior, temperature, setup)
     twin = build_twin(robot, path, mended=True)
+    _refuse_by_effort(twin.effects, path)
     return ProgramModel(twin.robot, tuple(twin.effects), None, temperature)
+
+
+def _refuse_by_effort(effects: Sequence[Effect], path: Path | str) -> None:
+    """Refuse springs that take measured efforts: nobody has measured those of a motion to come."""
+    taking = [effect.site for effect in effects if effect.by_effort]
+    if taking:
+        raise ModelError(
+            f"the model '{path}' takes the measured effort of {taking[0]}, and a motion that is still "
+            'to come has none; correct with a model that was diagnosed without --use-effort'
+        )
 
 
 def corrected_program(

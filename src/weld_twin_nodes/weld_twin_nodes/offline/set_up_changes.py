@@ -115,6 +115,7 @@ def _loaded(recording: Recording, numbers: Sequence[float], robot: Robot) -> Rec
     """Return the recording with the weight of a load on the tool, unless forces were measured."""
     if recording.wrench is not None:
         return recording
+    robot.refuse_positioner('a load that was changed')
     t, poses = recording.joints.t, forward(robot, recording.joints.q)
     pull = numbers[0] * (robot.T_base_origin[:3, :3].T @ robot.gravity)
     force = np.tile(pull, (t.size, 1))

@@ -10,13 +10,14 @@ from typing import Any
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects import Effect, effects_from_list
+from weld_twin_core.effects.joint_compliance import LOAD_OF_EFFORT
 from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.errors import ModelError
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis
 from weld_twin_msgs_py.files.effects_file import read_effects
-from weld_twin_msgs_py.files.yaml_file import parse_yaml
+from weld_twin_msgs_py.files.yaml_file import parse_yaml, read_yaml
 
 IMPOSSIBLE = 10.0
 """Times the range of a parameter beyond which a value of a file is a slip of its unit: degrees taken
@@ -72,6 +73,31 @@ def build_twin(
         )
     known = _diagnosed(robot, model)
     return Twin(known.robot, of_the_robot(known.effects) + more)
+
+
+def by_effort(path: Path | str) -> bool:
+    """
+    Return whether springs of a model file take the measured efforts of the joints.
+
+    Parameters
+    ----------
+    path : Path or str
+        diagnosis.json, or an effects file.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read.
+
+    """
+    if Path(path).suffix.lower() == '.json':
+        model = read_diagnosis(path).get('model')
+        entries = [*model.get('known', ()), *model.get('found', ())] if model else []
+    else:
+        entries = read_yaml(path, 'effects file') or []
+    return any(
+        isinstance(entry, dict) and entry.get('statics') in LOAD_OF_EFFORT for entry in entries
+    )
 
 
 def other_readings(content: Mapping[str, Any]) -> str:

@@ -33,6 +33,8 @@ class Sample(NamedTuple):
     wrench_frame : str
         'tool' or 'base'.
     temperature : float, optional [degC]
+    effort : array, shape (n,), optional [N m, or N of a slide]
+        As measured, where effects of the twin take it.
 
     """
 
@@ -43,6 +45,7 @@ class Sample(NamedTuple):
     wrench: Array | None = None
     wrench_frame: str = 'tool'
     temperature: float | None = None
+    effort: Array | None = None
 
 
 class JointStream:
@@ -64,6 +67,7 @@ class JointStream:
         self._twin = twin
         self._live = twin.live()
         self._intake = Intake(twin.robot, joint_names=joint_names, mend=True)
+        self._take_efforts()
         self._epoch: int | None = None
         self._wrench = HeldSignal()
         self._temperature = HeldSignal()
@@ -91,6 +95,11 @@ class JointStream:
     def change(self, twin: Twin) -> None:
         """Go on with other effects; those that stay keep their memory."""
         self._twin = self._live.twin = twin
+        self._take_efforts()
+
+    def _take_efforts(self) -> None:
+        """Ask the joint states for efforts where effects take them."""
+        self._intake.joints.efforts = any(effect.by_effort for effect in self._twin.effects)
 
     def reset(self) -> None:
         """Begin anew, as after a jump of the clock; wrench and temperature hold."""
@@ -124,7 +133,7 @@ class JointStream:
         taken = self._intake.joint_sample(message)
         if taken is None:
             return None
-        (stamp, q, qd), restarted = taken
+        (stamp, q, qd, effort), restarted = taken
         if restarted:
             self._forget()
         if self._epoch is None:
@@ -140,9 +149,10 @@ class JointStream:
             wrench,
             temperature,
             frame,
+            effort,
         )
         late = round(float(self._twin.late(elapsed)) * NANOSECONDS)
-        return Sample(stamp, stamp + late, joints, poses, wrench, frame, temperature)
+        return Sample(stamp, stamp + late, joints, poses, wrench, frame, temperature, effort)
 
 
 def _keep(signal: HeldSignal, taken: Taken | None) -> None:

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.result import Diagnosis, Shrink
-from weld_twin_core.effects import Effect, Parameter
+from weld_twin_core.effects import Effect
 from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 
 DEGREES = 180.0 / pi
@@ -187,15 +188,28 @@ def _signed(number: str) -> str:
     return number.replace('-', '\N{MINUS SIGN}')
 
 
-def short_rows(effect: Effect, std: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return the parameters of an effect as `in_short`; of a vector the axes that count."""
+def short_rows(
+    effect: Effect, std: dict[str, Any], robot: Robot | None = None
+) -> list[tuple[str, str]]:
+    """
+    Return the parameters of an effect as `in_short`; of a vector the axes that count.
+
+    Parameters
+    ----------
+    effect : Effect
+    std : dict
+        Standard errors by parameter.
+    robot : Robot, optional
+        Tells which joints slide; left out, all turn.
+
+    """
     if isinstance(effect, TransmissionRipple):
-        return _orders(effect, std)
+        return _orders(effect, std, slides=robot is not None and effect.on_slide(robot))
     out = []
     for p in effect.parameters:
         value: Any = getattr(effect, p.name)
         error: Any = std.get(p.name)
-        factor, unit = display_unit(p.name, p.unit)
+        factor, unit = display_unit(p.name, effect.unit(p, robot))
         if np.ndim(value):
             told = _that_count(
                 value, error, *((DEGREES, '°') if unit == 'mrad' else (factor, unit))
@@ -220,16 +234,29 @@ def _that_count(value: Any, std: Any, factor: float, unit: str) -> str:
     )
 
 
-def parameter_rows(effect: Effect, std: dict[str, Any]) -> list[tuple[str, str]]:
-    """Return name and value of every parameter of an effect; a ripple has a row per order."""
+def parameter_rows(
+    effect: Effect, std: dict[str, Any], robot: Robot | None = None
+) -> list[tuple[str, str]]:
+    """
+    Return name and value of every parameter of an effect; a ripple has a row per order.
+
+    Parameters
+    ----------
+    effect, std, robot
+        As for `short_rows`.
+
+    """
     if isinstance(effect, TransmissionRipple):
-        return _orders(effect, std)
+        return _orders(effect, std, slides=robot is not None and effect.on_slide(robot))
     told = [p for p in effect.parameters if np.size(getattr(effect, p.name))]
-    return [(p.name, _shown(p, getattr(effect, p.name), std.get(p.name))) for p in told]
+    return [
+        (p.name, _shown(p.name, effect.unit(p, robot), getattr(effect, p.name), std.get(p.name)))
+        for p in told
+    ]
 
 
-def _shown(parameter: Parameter, value: Any, std: Any) -> str:
-    factor, unit = display_unit(parameter.name, parameter.unit)
+def _shown(name: str, si: str, value: Any, std: Any) -> str:
+    factor, unit = display_unit(name, si)
     if np.ndim(value):
         return _listed(value, std, *((DEGREES, '°') if unit == 'mrad' else (factor, unit)))
     error = None if np.ndim(std) else std
@@ -254,8 +281,16 @@ def _listed(value: Any, std: Any, factor: float, unit: str) -> str:
     return f'{", ".join(parts)}{"" if unit == "°" else " "}{unit}'.rstrip()
 
 
-def _orders(ripple: TransmissionRipple, std: dict[str, Any]) -> list[tuple[str, str]]:
+def _orders(
+    ripple: TransmissionRipple, std: dict[str, Any], *, slides: bool
+) -> list[tuple[str, str]]:
     """Return amplitude and phase for every order, the largest first."""
+
+    def told(size: float, error: float | None) -> str:
+        if slides:
+            return uncertain(size, error, 1e3, 'mm')
+        return f'{uncertain(size, error, DEGREES, "°")} ({uncertain(size, None, 1e3, "mrad")})'
+
     columns = [np.atleast_1d(getattr(ripple, p.name)).tolist() for p in ripple.parameters]
     errors = [
         np.atleast_1d(std[key]).tolist() if key in std else [None] * len(columns[0])
@@ -265,8 +300,7 @@ def _orders(ripple: TransmissionRipple, std: dict[str, Any]) -> list[tuple[str, 
     return [
         (
             f'order {order:g}',
-            f'{uncertain(size, error, DEGREES, "°")} ({uncertain(size, None, 1e3, "mrad")}) at '
-            f'{uncertain(phase, turn, DEGREES, "°")}',
+            f'{told(size, error)} at {uncertain(phase, turn, DEGREES, "°")}',
         )
         for size, order, phase, error, turn in rows
     ]

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,6 @@ from weld_twin_core.twin.goal_motion import Goal, course
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.messages import from_messages
-from weld_twin_msgs_py.messages.goals import point_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, MEASURED_POSE, POSE_IN, POSE_OUT
 from weld_twin_nodes.harness import Cell, Tap
 
@@ -32,6 +32,8 @@ STANDS = 30
 """Poses at standstill before a stream sets off, for the correction to set in."""
 BEAT = 20_000_000
 """Nanoseconds between two poses."""
+Weld = Callable[[bool], Seam]
+"""Welds the seam, corrected or not."""
 
 
 def close_loop(job: Job, progress: Progress) -> None:
@@ -42,7 +44,7 @@ def close_loop(job: Job, progress: Progress) -> None:
     except TimeoutError as error:
         raise TwinError(str(error)) from None
     before, after = (seam.rms for seam in seams)
-    write_text(job.folder / PAGE, closed_loop_page(job.robot.name, seams, how))
+    write_text(job.folder / PAGE, closed_loop_page(job.robot.name, seams, how, _noise(job)))
     content = {
         'schema': 'weld_twin/closed_loop/1',
         'how': how,
@@ -70,11 +72,12 @@ def _welded(cell: Cell, job: Job, progress: Progress) -> tuple[tuple[Seam, Seam]
         **common,
     )
     measured = cell.collect(MEASURED_POSE.name)
+    weld: Weld
     weld, how = _by_poses(cell, job, measured), 'poses'
     try:
         from weld_twin_nodes.harness.controller import Controller
 
-        weld, how = _by_goals(cell, job, measured, Controller), 'goals'
+        weld, how = _ByGoals(cell, job, measured, Controller), 'goals'
     except ImportError:
         pass
     seams = []
@@ -84,57 +87,55 @@ def _welded(cell: Cell, job: Job, progress: Progress) -> tuple[tuple[Seam, Seam]
     return (seams[0], seams[1]), how
 
 
-Weld = Callable[[bool], Seam]
+class _ByGoals:
+    """Welds the seam as a goal of a trajectory controller."""
 
+    def __init__(self, cell: Cell, job: Job, measured: Tap, controller: Any) -> None:
+        from control_msgs.action import FollowJointTrajectory
+        from rclpy.action import ActionClient
 
-def _by_goals(cell: Cell, job: Job, measured: Tap, controller: Any) -> Weld:
-    """Return what welds the seam as a goal of a trajectory controller."""
-    from control_msgs.action import FollowJointTrajectory
-    from rclpy.action import ActionClient
+        self.cell, self.job, self.measured, self.kind = cell, job, measured, FollowJointTrajectory
+        self.arm = cell.add(controller, job.robot.joint_names, job.plan.motion.q[0], PACE)
+        servers = {False: 'joint_trajectory_controller', True: 'compensator'}
+        self.clients = {
+            corrected: ActionClient(cell.node, self.kind, f'/{name}/follow_joint_trajectory')
+            for corrected, name in servers.items()
+        }
+        for client in self.clients.values():
+            cell.wait(client.server_is_ready, 'the actions')
+        cell.meet()
+        cell.wait(lambda: len(measured) > 0, 'the tool to be measured')
 
-    motion, action = job.plan.motion, 'follow_joint_trajectory'
-    names = {False: f'/joint_trajectory_controller/{action}', True: f'/compensator/{action}'}
-    arm = cell.add(controller, job.robot.joint_names, motion.q[0], PACE)
-    clients = {
-        k: ActionClient(cell.node, FollowJointTrajectory, name) for k, name in names.items()
-    }
-    for client in clients.values():
-        cell.wait(client.server_is_ready, 'the actions')
-    cell.meet()
-    cell.wait(lambda: len(measured) > 0, 'the tool to be measured')
-
-    def run(goal: Goal, corrected: bool) -> None:
-        message = FollowJointTrajectory.Goal()
-        message.trajectory.joint_names = list(job.robot.joint_names)
-        message.trajectory.points = point_messages(goal)
-        asked = clients[corrected].send_goal_async(message)
-        cell.wait(asked.done, 'the answer to the goal')
+    def run(self, goal: Goal, corrected: bool) -> None:
+        """Run a goal to its end."""
+        message = self.kind.Goal()
+        message.trajectory.joint_names = list(self.job.robot.joint_names)
+        message.trajectory.points = self.cell.messages.trajectory_points(*goal)
+        asked = self.clients[corrected].send_goal_async(message)
+        self.cell.wait(asked.done, 'the answer to the goal')
         if not asked.result().accepted:
-            raise TwinError(f'the goal was rejected: {cell.processes[-1].log[-600:]}')
+            raise TwinError(f'the goal was rejected: {self.cell.processes[-1].log[-600:]}')
         done = asked.result().get_result_async()
-        cell.wait(done.done, 'the seam to be welded', limit=120.0)
+        self.cell.wait(done.done, 'the seam to be welded', limit=120.0)
 
-    def weld(corrected: bool) -> Seam:
+    def __call__(self, corrected: bool) -> Seam:
+        """Return the seam as it was welded, each time begun from the same side."""
+        motion, arm, measured = self.job.plan.motion, self.arm, self.measured
         t = motion.t - motion.t[0]
-        # From the same side both times: play remembers where the arm came from.
         back = arm.q + np.linspace(0.0, 1.0, 60)[:, None] ** 2 * (motion.q[0] - arm.q)
-        run(Goal(np.linspace(0.0, 6.0, 60), back), False)
+        self.run(Goal(np.linspace(0.0, 6.0, 60), back), False)
         goal = Goal(t, motion.q, motion.velocity)
-        run(goal, corrected)
-        track = dict(arm.track)
-        waits = max(track.values()) - float(t[-1])
+        self.run(goal, corrected)
+        waits = max(at for _, at in arm.track) - float(t[-1])
+        track = {stamp: at - waits for stamp, at in arm.track if at >= waits}
         last = max(track)
-        cell.wait(lambda: from_messages.stamp_ns(measured.last) >= last, 'the tool to be measured')
-        kept = [
-            (track[from_messages.stamp_ns(m)] - waits, from_messages.pose(m)[0])
-            for m in measured.messages
-            if from_messages.stamp_ns(m) in track
-        ]
-        kept = [pair for pair in kept if pair[0] >= 0.0]
-        at = np.array([pair[0] for pair in kept])
-        return _seam(job, course(goal, np.minimum(at, t[-1])).q, np.array([p for _, p in kept]))
-
-    return weld
+        self.cell.wait(
+            lambda: from_messages.stamp_ns(measured.last) >= last, 'the tool to be measured'
+        )
+        kept = [m for m in measured.messages if from_messages.stamp_ns(m) in track]
+        at = np.array([track[from_messages.stamp_ns(m)] for m in kept])
+        real = np.array([from_messages.pose(m)[0] for m in kept])
+        return _seam(self.job, course(goal, np.clip(at, 0.0, t[-1])).q, real)
 
 
 def _by_poses(cell: Cell, job: Job, measured: Tap) -> Weld:
@@ -158,7 +159,7 @@ def _by_poses(cell: Cell, job: Job, measured: Tap) -> Weld:
             stamp += BEAT
             if corrected and k:
                 given.publish(cell.messages.pose(stamp, pose[:3, 3], pose[:3, :3], 'base'))
-                cell.wait(lambda k=k: len(out) >= k, 'a corrected pose')
+                cell.wait(partial(_has, out, k), 'a corrected pose')
                 position, rotation = from_messages.pose(out.last)
                 goal = np.eye(4)
                 goal[:3, :3], goal[:3, 3] = rotation, position
@@ -166,13 +167,23 @@ def _by_poses(cell: Cell, job: Job, measured: Tap) -> Weld:
             else:
                 q = there
             joints.publish(cell.messages.joint_state(stamp, robot.joint_names, q))
-            cell.wait(lambda k=k: len(measured) > k, 'the tool to be measured')
+            cell.wait(partial(_has, measured, k + 1), 'the tool to be measured')
         begun[0] = stamp + 5_000_000_000
         real = np.array([from_messages.pose(m)[0] for m in measured.messages])
         cell.node.destroy_publisher(given)
         return _seam(job, path[STANDS:], real[STANDS:])
 
     return weld
+
+
+def _has(tap: Tap, count: int) -> bool:
+    return len(tap) >= count
+
+
+def _noise(job: Job) -> float:
+    """Return the RMS distance that the noise of the measurement alone makes [m]."""
+    sigmas = [e.number('sigma') for e in job.effects if e.name == 'measurement_noise']
+    return float(np.sqrt(3.0) * sum(sigmas))
 
 
 def _seam(job: Job, q: Array, real: Array) -> Seam:

@@ -62,7 +62,7 @@ class Seam:
         return float(self.off.max())
 
 
-def closed_loop_page(robot: str, seams: tuple[Seam, Seam], how: str) -> str:
+def closed_loop_page(robot: str, seams: tuple[Seam, Seam], how: str, noise: float) -> str:
     """
     Return the page.
 
@@ -73,6 +73,8 @@ def closed_loop_page(robot: str, seams: tuple[Seam, Seam], how: str) -> str:
         As it is, and corrected.
     how : str
         A key of `WAYS`.
+    noise : float [m]
+        RMS distance that measuring alone makes.
 
     """
     before, after = seams
@@ -99,7 +101,8 @@ def closed_loop_page(robot: str, seams: tuple[Seam, Seam], how: str) -> str:
             tag(
                 'p',
                 'The error injector stands in for the arm. The diagnosis of its first run is the model. '
-                f'The seam was corrected {WAYS[how]}.',
+                f'The seam was corrected {WAYS[how]}. The noise of the measurement alone is '
+                f'{noise * 1e3:.3f} mm.',
             ),
             id_='how',
         ),

@@ -82,7 +82,9 @@ def _found(diagnosis: Diagnosis) -> Html | None:
     heads = ['Effect', 'Parameter', 'Value ± standard error']
     rows: list[list[Child]] = []
     for found in diagnosis.effects:
-        for k, (name, value) in enumerate(parameter_rows(found.effect, found.std)):
+        for k, (name, value) in enumerate(
+            parameter_rows(found.effect, found.std, diagnosis.model.robot)
+        ):
             rows.append([found_name(found) if k == 0 else '', parameter_word(name), value])
     return joined([tag('h3', 'Effects found'), table(heads, rows, 'effects')])
 

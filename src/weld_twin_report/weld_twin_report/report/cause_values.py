@@ -48,7 +48,9 @@ def values(diagnosis: Diagnosis, cause: Cause) -> list[str]:
         if isinstance(effect, ServoLag):
             rows.append(_trail(diagnosis, effect))
         rows += _in_a_quarter(effect)
-        for name, value in short_rows(effect, errors.get((effect.name, effect.site), {})):
+        for name, value in short_rows(
+            effect, errors.get((effect.name, effect.site), {}), diagnosis.model.robot
+        ):
             rows.append(f'{parameter_word(name)} {value}')
     return rows
 

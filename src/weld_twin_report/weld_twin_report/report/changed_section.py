@@ -22,7 +22,7 @@ def changed_rows(diagnosis: Diagnosis) -> list[list[str]]:
             *row,
         ]
         for item in diagnosis.changed
-        for row in parameter_rows(item.effect, item.std)
+        for row in parameter_rows(item.effect, item.std, diagnosis.model.robot)
     ]
 
 

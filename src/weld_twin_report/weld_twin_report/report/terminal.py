@@ -121,7 +121,9 @@ def _print_families(diagnosis: Diagnosis, console: Console) -> None:
 def _print_effects(diagnosis: Diagnosis, console: Console) -> None:
     rows = []
     for found in diagnosis.effects[:_MOST]:
-        for k, (name, value) in enumerate(parameter_rows(found.effect, found.std)):
+        for k, (name, value) in enumerate(
+            parameter_rows(found.effect, found.std, diagnosis.model.robot)
+        ):
             rows.append([found_name(found) if k == 0 else '', name, value])
     _print_table(console, 'effects found', ('effect', 'parameter', 'value ± standard error'), rows)
     more = len(diagnosis.effects) - _MOST

@@ -15,7 +15,7 @@ from ...arm.rotation import rotation_matrix
 from ...arrays import Array
 from ...effects.effect import Effect
 from ..soundness.mending import turned_joints
-from .readable import frame, metres, number, radians, size, turn
+from .readable import frame, metres, number, radians, size, travel, turn
 from .zeros import TURNED_ROUND, stands, to_mend
 
 Sentence = Callable[[Effect, Robot], str]
@@ -50,9 +50,15 @@ def _value(effect: Effect, name: str) -> float:
     return float(np.asarray(getattr(effect, name)))
 
 
+def _moved(effect: Effect, robot: Robot, value: float) -> str:
+    """Return how far its joint moves, in mm where that slides."""
+    return travel(value, sliding=effect.on_slide(robot))
+
+
 def _general(effect: Effect, robot: Robot) -> str:
     parameters = ', '.join(
-        f'{p.name} {np.array2string(np.asarray(getattr(effect, p.name)), precision=4)} {p.unit}'
+        f'{p.name} {np.array2string(np.asarray(getattr(effect, p.name)), precision=4)} '
+        f'{effect.unit(p, robot)}'
         for p in effect.parameters
     )
     where = f' of {effect.site}' if effect.site else ''
@@ -114,8 +120,57 @@ def _tool_pose(effect: Effect, robot: Robot) -> str:
     return f'Correct the tool centre point by {moved}; a bent torch looks like this too.'
 
 
+def _root_pose(effect: Effect, robot: Robot) -> str:
+    rows = robot.T_base_foot
+    step = (effect.vector().reshape(2, 3) @ rows[:3, :3]).ravel()
+    now = np.linalg.inv(robot.T_root_base @ rows)
+    new = np.eye(4)
+    new[:3, :3] = rotation_matrix(step[3:]) @ now[:3, :3]
+    new[:3, 3] = now[:3, 3] + step[:3]
+    moved = frame(step, 'of the base', 'of the positioner')
+    return (
+        f'Correct the root frame of the positioner by {moved}: in the base of the robot it '
+        f'stands at {_placed(new)} in place of {_placed(now)}.'
+    )
+
+
+def _placed(pose: Array) -> str:
+    """Return a frame as controllers take it: mm, and turns about fixed x, y and z in degrees."""
+    place = ', '.join(f'{value * 1e3:.3f}' for value in pose[:3, 3])
+    yaw = np.arctan2(pose[1, 0], pose[0, 0])
+    pitch = np.arctan2(-pose[2, 0], np.hypot(pose[0, 0], pose[1, 0]))
+    roll = np.arctan2(pose[2, 1], pose[2, 2])
+    angles = ', '.join(f'{np.degrees(value):.4f}' for value in (roll, pitch, yaw))
+    return f'x, y, z = ({place}) mm, turned by ({angles}) deg about them'
+
+
+def _guide_bend(effect: Effect, robot: Robot) -> str:
+    x, y = np.asarray(effect.curvature) * 0.125e3  # type: ignore[attr-defined]
+    return (
+        f'Align the guide of {effect.site}: over a metre it is bent by {size(float(x))} mm along x '
+        f'and {size(float(y))} mm along y of its row; until then compensate the motion.'
+    )
+
+
+def _guide_tilt(effect: Effect, robot: Robot) -> str:
+    each = ', '.join(
+        number(float(np.degrees(v)))
+        for v in np.asarray(effect.rate)  # type: ignore[attr-defined]
+    )
+    return (
+        f'Level the guide of {effect.site}: its carriage turns by ({each}) deg about x, y, z of '
+        'its row on every metre; until then compensate the motion.'
+    )
+
+
 def _gear_ratio(effect: Effect, robot: Robot) -> str:
     scale = _value(effect, 'scale')
+    if effect.on_slide(robot):
+        return (
+            f'Enter the feed of {effect.site} (mm of travel per turn of the motor) times '
+            f'{1.0 + scale:.6f}: it goes {number(scale * 1e3)} mm further on every metre than it '
+            'reads.'
+        )
     return (
         f'Enter the gear ratio of {effect.site} times {1.0 + scale:.6f} where it is turns of the joint '
         f'per turn of the motor, divided by it where it is turns of the motor per turn of the joint: '
@@ -137,8 +192,12 @@ def _ripple(effect: Effect, robot: Robot) -> str:
     amplitude = np.atleast_1d(np.asarray(effect.amplitude))  # type: ignore[attr-defined]
     order = np.atleast_1d(np.asarray(effect.order))  # type: ignore[attr-defined]
     strongest = np.argsort(-np.abs(amplitude))[:3]
+    slides = effect.on_slide(robot)
     waves = ', '.join(
-        f'{size(np.degrees(amplitude[k]), 2)} deg at {order[k]:g} per turn' for k in strongest
+        f'{size(amplitude[k] * 1e3, 2)} mm every {2e3 * np.pi / order[k]:.3g} mm'
+        if slides
+        else f'{size(np.degrees(amplitude[k]), 2)} deg at {order[k]:g} per turn'
+        for k in strongest
     )
     more = f' and {amplitude.size - 3} smaller orders' if amplitude.size > 3 else ''
     return (
@@ -157,14 +216,14 @@ def _joint_coupling(effect: Effect, robot: Robot) -> str:
 
 
 def _backlash(effect: Effect, robot: Robot) -> str:
+    play = _moved(effect, robot, _value(effect, 'width'))
     if effect.form == 'coast':  # type: ignore[attr-defined]
         return (
             f'Approach stations with {effect.site} always from one side, or preload its gear: '
-            f'where it stops it coasts across {turn(_value(effect, "width"))} of play and '
-            'rests ahead of its command.'
+            f'where it stops it coasts across {play} of play and rests ahead of its command.'
         )
     return (
-        f'Service the gear of {effect.site}: it has {turn(_value(effect, "width"))} of play; '
+        f'Service the gear of {effect.site}: it has {play} of play; '
         'until then approach seams from one side.'
     )
 
@@ -172,22 +231,23 @@ def _backlash(effect: Effect, robot: Robot) -> str:
 def _hysteresis(effect: Effect, robot: Robot) -> str:
     return (
         f'Compensate the lost motion of {effect.site}, or approach seams from one side: it trails '
-        f'by {turn(_value(effect, "amplitude"))} once it has turned '
-        f'{turn(3.0 * _value(effect, "travel"))} one way; see to its gear if that grows.'
+        f'by {_moved(effect, robot, _value(effect, "amplitude"))} once it has moved '
+        f'{_moved(effect, robot, 3.0 * _value(effect, "travel"))} one way; see to its gear if that '
+        'grows.'
     )
 
 
 def _friction(effect: Effect, robot: Robot) -> str:
     return (
         f'Give the controller of {effect.site} feed-forward against friction, and see to its '
-        f'lubrication: in motion it trails by {turn(_value(effect, "windup"))}.'
+        f'lubrication: in motion it trails by {_moved(effect, robot, _value(effect, "windup"))}.'
     )
 
 
 def _loaded_play(effect: Effect, robot: Robot) -> str:
     return (
         f'Service or preload the gear of {effect.site}: its load lays it on one flank or the other '
-        f'of {turn(_value(effect, "width"))} of play.'
+        f'of {_moved(effect, robot, _value(effect, "width"))} of play.'
     )
 
 
@@ -209,14 +269,16 @@ def _wear(effect: Effect, robot: Robot) -> str:
 
 def _joint_compliance(effect: Effect, robot: Robot) -> str:
     compliance = _value(effect, 'compliance')
+    slides = effect.on_slide(robot)
     stiffness = (
-        f'a stiffness of {size(1e-3 / compliance)} kN m/rad'
+        f'a stiffness of {size(1e-3 / compliance)} kN{"/m" if slides else " m/rad"}'
         if compliance > 0.0
         else 'which no spring does'
     )
     return (
-        f'Compensate the yielding of {effect.site} under load: {radians(compliance * 1e2)} under '
-        f'100 N m, {stiffness}.'
+        f'Compensate the yielding of {effect.site} under load: '
+        f'{metres(compliance * 1e2) if slides else radians(compliance * 1e2)} under '
+        f'100 N{"" if slides else " m"}, {stiffness}.'
     )
 
 
@@ -298,7 +360,7 @@ def _vibration(effect: Effect, robot: Robot) -> str:
 def _quantization(effect: Effect, robot: Robot) -> str:
     return (
         f'Read {effect.site} with a finer encoder or more digits: it is rounded to '
-        f'{turn(_value(effect, "step"))}.'
+        f'{_moved(effect, robot, _value(effect, "step"))}.'
     )
 
 
@@ -396,6 +458,9 @@ _SENTENCES: dict[str, Sentence] = {
     'axis_parallelism': _row('dbeta', 'beta', 'the axes are out of parallel by'),
     'base_pose': _base_pose,
     'tool_pose': _tool_pose,
+    'root_pose': _root_pose,
+    'guide_bend': _guide_bend,
+    'guide_tilt': _guide_tilt,
     'gear_ratio': _gear_ratio,
     'gear_ratio_by_direction': _gear_ratio_by_direction,
     'transmission_ripple': _ripple,

@@ -45,6 +45,11 @@ def turn(value: float) -> str:
     return f'{size(np.degrees(value))} deg'
 
 
+def travel(value: float, *, sliding: bool) -> str:
+    """Return how far a joint moves, [m] where it slides or [rad], without its sign."""
+    return f'{size(value * 1e3)} mm' if sliding else turn(value)
+
+
 def frame(step: Array, shifted: str, turned: str) -> str:
     """
     Return a displacement [m] and a turn [rad] of a frame, shape (6,), in mm and degrees.

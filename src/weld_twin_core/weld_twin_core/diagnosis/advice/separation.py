@@ -25,6 +25,7 @@ import numpy as np
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...recording import Measurements, Recording
+from ...twin.expected_effort import with_expected_effort
 from ..algebra.fit import design, with_weights
 from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem, Scale
@@ -214,7 +215,8 @@ def _ahead(
     scale: Scale,
 ) -> Side:
     """Return what the alternatives say of one recording of a candidate."""
-    made = _measured(candidate.model, recording, points=max(problem.rows) == 3)
+    ahead = with_expected_effort(recording, candidate.model.robot, problem.recordings[0])
+    made = _measured(candidate.model, ahead, points=max(problem.rows) == 3)
     align = set(problem.align)
     align |= {'base'} if candidate.new_base else set()
     align |= {'tool'} if candidate.new_tool else set()

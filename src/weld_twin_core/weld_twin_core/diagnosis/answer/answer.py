@@ -19,6 +19,7 @@ from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
 from ..result import Cause, Diagnosis, Shares, Shrink
 from ..soundness import Examined
+from ..soundness.efforts import compared
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
 from ..verdict.decision import Verdict
@@ -69,16 +70,8 @@ def answer(
         What the next experiment may cost, and where it has to stay; None plans none.
 
     """
-    told, shares = causes(
-        found,
-        unseen,
-        before.table,
-        verdict,
-        rival,
-        evidence.floor,
-        found.work.beliefs,
-        placing,
-    )
+    forms = rival, evidence.floor, found.work.beliefs, placing
+    told, shares = causes(found, unseen, before.table, verdict, *forms)
     verdict, told, statements = calibrated(verdict, told, before, placing)
     told = with_intervals(told, found, unseen, verdict, evidence.floor)
     effects, verdict, told = named_effects(found, unseen, verdict, told)
@@ -127,6 +120,7 @@ def _compared(found: Search, examined: Examined, verdict: Verdict) -> dict[str, 
     """Return the recordings, what they say of each other, and what no recording can say."""
     named = examined.given.may_change
     return {
+        'efforts': compared(found.problem.recordings, found.baseline.model.robot),
         'recordings': found.problem.recordings,
         'traces': traces(found),
         'absent': found.library.absent | dict.fromkeys(not_told(found.problem), NOT_TOLD),

@@ -10,7 +10,6 @@ from typing import TypeVar
 
 from ..hypotheses.search import Search
 from ..levels.curved import Curved
-from ..levels.formulas import Missed
 from ..levels.free_form import FreeForm
 from ..posterior.table import Row
 from ..result import NAMING, Cause
@@ -81,7 +80,6 @@ def stated(
     evidence: Evidence,
     table: tuple[Row, ...],
     rival: Curved | None,
-    left: Missed,
 ) -> Stated:
     """
     Return how probable it is of every effect found that one of its names is right.
@@ -96,8 +94,6 @@ def stated(
         The table of answers.
     rival : Curved or None
         The free-form explanation in place of all names.
-    left : Missed
-        What the formulas miss.
 
     """
     learned = usual_calibration()
@@ -108,7 +104,7 @@ def stated(
     sizes = [unseen.rms(part) / max(evidence.floor, 1e-12) for part in unseen.targets[1:]]
     each = zip(table, sizes, unseen.wandered(), strict=False)
     on = evidence.structure.depends_on
-    every = [of_name(row, size, float(wandered), left, on) for row, size, wandered in each]
+    every = [of_name(row, size, float(wandered), on) for row, size, wandered in each]
     names = [_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every)]
     return Stated(table, tuple(names), situation, rival)
 

@@ -16,9 +16,8 @@ import numpy as np
 
 from ..hypotheses.search import Search
 from ..levels.curved import Curved, gain_of
-from ..levels.formulas import Missed
 from ..levels.free_form import FreeForm
-from ..posterior.table import Row, dependence_of, place_of
+from ..posterior.table import Row, dependence_of
 from ..result import Cause
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.evidence import Evidence
@@ -103,9 +102,7 @@ def _of_curves(unseen: Unseen, rival: Curved | None, floor: float) -> Numbers:
     }
 
 
-def of_name(
-    row: Row, size: float, wandered: float, missed: Missed, left_at: Sequence[str] = ()
-) -> Numbers:
+def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ()) -> Numbers:
     """
     Return the features of the name of an effect found, from its row of the table of answers.
 
@@ -117,13 +114,11 @@ def of_name(
     wandered : float
         How far its values move from stretch to stretch, over what noise makes them: a formula that
         stands in for another wants other values on every stretch.
-    missed : Missed
-        What the formulas miss.
     left_at : sequence of str
         What the most of what is left depends on, in words.
 
     """
-    on, at = dependence_of(row.leader), place_of(row.leader)
+    on = dependence_of(row.leader)
     return plain(
         {
             'weight': odds(row.mass),
@@ -134,8 +129,6 @@ def of_name(
             'wander': log(wandered),
             'members': len(row.listed),
             'left at its joint': float(any(str(row.leader.site.joint) in w for w in left_at[:1])),
-            'formula misses': missed.by_forms(at),
-            'noise of the joint': missed.by_noise(at),
             'constant': float(on == 'constant'),
             'angle': float(on == 'angle'),
             f'{ONLY}{row.leader.site.effect}': float(len(row.listed) == 1),

@@ -44,7 +44,6 @@ SHARES = (0.02, 0.1, 0.4)
 """Shares of the joint's largest speed about which what depends on the way may set in."""
 SLIDING = 0.1
 """Metres of a joint that slides which are looked at as a radian of one that turns."""
-
 FIELD = 'instrument'
 """A free field over the workspace speaks against every formula: it is what each of them bends to."""
 
@@ -84,23 +83,20 @@ class Missed(NamedTuple):
         Joints that noise comes from beyond doubt, largest first.
     forms : tuple of Beside
         Free forms that predict beyond doubt what a name should.
-    sizes : mapping from str to float
-        The largest effect at every place, RMS in units of noise.
 
     """
 
     scattered: tuple[Scatter, ...] = ()
     forms: tuple[Beside, ...] = ()
-    sizes: dict[str, float] = {}
 
-    def by_forms(self, at: str) -> float:
-        """Return the RMS that free forms take off at a place, as a share of the largest effect."""
-        return max((one.share for one in self.forms if one.at in (at, FIELD)), default=0.0)
-
-    def by_noise(self, at: str) -> float:
-        """Return the RMS of the noise that comes from a place, as a share of the largest effect."""
-        own = [one.size for one in self.scattered if one.joint == at]
-        return max(own, default=0.0) / max(self.sizes.get(at, 0.0), 1e-12)
+    @property
+    def in_words(self) -> tuple[tuple[str, str], ...]:
+        """Return the places where formulas do not hold, each with the free form that predicts most."""
+        best: dict[str, Beside] = {}
+        for one in self.forms:
+            if one.at not in best or one.gain > best[one.at].gain:
+                best[one.at] = one
+        return tuple((at, _misses(one)) for at, one in best.items())
 
 
 def missed(found: Search, unseen: Unseen, beliefs: Beliefs) -> Missed:
@@ -122,8 +118,8 @@ def missed(found: Search, unseen: Unseen, beliefs: Beliefs) -> Missed:
         for one in sorted(scatter(found, unseen), key=lambda one: -one.share)
         if one.share >= beliefs.beaten_share and one.steady >= beliefs.scatter_sure
     ]
-    forms = tuple(one for one in beside_names(found, unseen) if _clear(one, beliefs))
-    return Missed(tuple(loose), forms, _sizes(found, unseen))
+    forms = tuple(one for one in beside_names(found, unseen) if _fails(one, beliefs))
+    return Missed(tuple(loose), forms)
 
 
 def no_noise(verdict: Verdict, rival: Curved | None, left: Missed, beliefs: Beliefs) -> Verdict:
@@ -157,19 +153,21 @@ def no_noise(verdict: Verdict, rival: Curved | None, left: Missed, beliefs: Beli
     return replace(verdict, status='unknown', reasons=tuple(reasons)) if reasons else verdict
 
 
-def _sizes(found: Search, unseen: Unseen) -> dict[str, float]:
-    """Return the largest effect at every place, RMS in units of noise."""
-    out: dict[str, float] = {}
-    for effect, part in zip(found.final.model.found, unseen.targets[1:], strict=True):
-        out[effect.at] = max(out.get(effect.at, 0.0), float(np.sqrt((part**2).mean())))
-    return out
-
-
-def _clear(one: Beside, beliefs: Beliefs) -> bool:
-    """Return whether a free form takes off more than chance would."""
+def _fails(one: Beside, beliefs: Beliefs) -> bool:
+    """Return whether a free form takes off more than what a formula may miss."""
     if one.on == 'place':
-        return one.gain >= beliefs.dependence_gain and one.steady >= beliefs.dependence_sure
-    return one.gain >= beliefs.group_share and one.steady >= beliefs.structure_sure
+        clear = one.gain >= beliefs.dependence_gain and one.steady >= beliefs.dependence_sure
+        return clear and one.share >= beliefs.field_misses
+    clear = one.gain >= beliefs.group_share and one.steady >= beliefs.structure_sure
+    return clear and one.share >= beliefs.misfit_share
+
+
+def _misses(one: Beside) -> str:
+    return (
+        f'a free curve at {one.at}, depending on {one.on}, still predicts '
+        f'{100.0 * one.gain:.0f} % of what is left on unseen stretches: the formula of what was '
+        'found does not hold'
+    )
 
 
 def beside_names(found: Search, unseen: Unseen) -> list[Beside]:

@@ -74,7 +74,7 @@ def placed(
     if verdict.status != 'unknown':
         return None
     form = _grouped(found, verdict, rival, beliefs)
-    if any(one.on == 'place' and one.share >= beliefs.field_misses for one in missed.forms):
+    if any(one.on == 'place' for one in missed.forms):
         form = _with_field(form, beliefs)
     form = arm_first(found, form, ROWS, beliefs)
     return _with_scatter(form, missed.scattered)

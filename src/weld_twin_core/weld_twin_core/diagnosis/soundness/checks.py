@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from .computed import computed, source
+from .efforts import efforts
 from .evidence import Checker
 from .mixups import mixups
 from .orientation import gravity, orientation
@@ -21,6 +22,7 @@ CHECKS: dict[str, tuple[Checker, str]] = {
     'tools': (parted, 'No recording has another tool than the first.'),
     'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
     'gravity': (gravity, 'Gravity pulls down where the base stands.'),
+    'efforts': (efforts, 'No measured effort of the joints is used.'),
     'orientation': (orientation, 'Orientations turn as the joints say.'),
     'instrument': (computed, 'The poses have the noise of an instrument.'),
     'clocks': (clocks, 'Joint and measurement stamps belong to one clock.'),

@@ -56,6 +56,9 @@ def joints_as(given: Given, matrix: Array, offset: Array) -> Given:
     """
     Return what was given with joint positions q matrix' + offset.
 
+    Efforts go with the joints that they are of, in the sense that these are counted in; they keep
+    their size where only the unit of the positions was wrong.
+
     Parameters
     ----------
     given : Given
@@ -68,7 +71,12 @@ def joints_as(given: Given, matrix: Array, offset: Array) -> Given:
     for r in given.recordings:
         qd = None if r.joints.qd is None else r.joints.qd @ matrix.T
         joints = replace(r.joints, q=r.joints.q @ matrix.T + offset, qd=qd)
-        out.append(replace(r, joints=joints))
+        effort = r.effort
+        if effort is not None:
+            working = np.linalg.inv(matrix).T
+            working /= np.abs(working).max(axis=1, keepdims=True)
+            effort = replace(effort, value=effort.value @ working.T)
+        out.append(replace(r, joints=joints, effort=effort))
     return replace(given, recordings=tuple(out))
 
 
@@ -192,6 +200,7 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
         joints=replace(own.joints, t=moved(own.joints.t), qd=qd),
         wrench=signal(own.wrench),
         temperature=signal(own.temperature),
+        effort=signal(own.effort),
     )
     return replace(given, recordings=tuple(recordings))
 

@@ -272,6 +272,7 @@ class Place:
         out[2, :, :3] = z.swapaxes(0, 1)
         out[3, :, :3] = cross(x, tip[:, None] - x_point).swapaxes(0, 1)
         out[3, :, 3:] = x.swapaxes(0, 1)
+        out[:, : robot.behind] *= -1.0  # the chain passes these rows backwards
         flat = out.reshape(4 * n, 2, 3, samples)
         return self._in_world(flat).reshape(4 * n, 6, samples)
 

@@ -3,8 +3,9 @@
 """
 From the table of answers to a verdict: what is told, and is it more than what has no name?
 
-One rule decides. An effect counts as named where its name is likelier right than wrong. What the
-others explain, and what nothing explains, has no name; where that is more, the gap is unknown.
+One rule decides. An effect counts as named where its name is likelier right than wrong, and nothing
+free at its place predicts what its formula should. What the others explain, and what nothing
+explains, has no name; where that is more, the gap is unknown.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from ..result import Family, Site
 from .evidence import Evidence
 from .left import Left
 
+FIELD = 'instrument'
+"""A free field over the workspace speaks against every formula: it is what each of them bends to."""
 LIKELIER = 0.5
 """Probability from which on a cause counts as named: it is likelier right than wrong."""
 _MANY_IMITATE = (
@@ -66,13 +69,23 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
     if not evidence.slots:
         return _of_nothing(left)
     sets = tuple(named_together(slot, left.beliefs) for slot in evidence.slots)
-    likely = [p > LIKELIER for p in evidence.believed]
+    likely = [
+        p > LIKELIER and _holds(group, evidence)
+        for p, group in zip(evidence.believed, sets, strict=True)
+    ]
     named = left.explained * _share_of(likely, evidence)
     if named <= left.share + left.explained * _share_of([not one for one in likely], evidence):
         told = tuple(group for group, holds in zip(sets, likely, strict=True) if holds)
         return Verdict('unknown', told, _why_unknown(left, sets, likely))
     reasons = tuple(_alike(group) for group in sets if len(group) > 1)
     return Verdict('ambiguous' if reasons else 'identified', sets, reasons)
+
+
+def _holds(group: tuple[Site, ...], evidence: Evidence) -> bool:
+    """Return whether nothing free predicts what the formulas of a set should."""
+    return not any(
+        at == FIELD or at in [site.joint for site in group] for at, _ in evidence.missed
+    )
 
 
 def _share_of(some: list[bool], evidence: Evidence) -> float:
@@ -89,10 +102,11 @@ def _why_unknown(
     """Return why something has no name, the gravest first."""
     told = left.evidence
     out = [_absurd(told)] if told.refused or told.lacking else []
+    out += [sentence for _, sentence in told.missed]
     if left.share > left.beliefs.unexplained:
         out.append(_depends(told))
     doubted = [group[0] for group, holds in zip(sets, likely, strict=True) if not holds]
-    if doubted:
+    if doubted and not told.missed:
         names = ', '.join(map(str, doubted))
         out.append(
             f'what would fit best is {names}, and where the evidence was like this, such a name '

@@ -47,6 +47,9 @@ class Evidence:
     believed : tuple of float
         How probable it is of every effect found that its name is right, as the calibration has it;
         of many small errors, of all that are named.
+    missed : tuple of (str, str)
+        Places at which something free predicts beyond doubt what the formula of a name should, and
+        that in words; at 'instrument' it speaks against every name.
 
     """
 
@@ -65,3 +68,4 @@ class Evidence:
     least: float | None = None
     chance: float = 1.0
     believed: tuple[float, ...] = ()
+    missed: tuple[tuple[str, str], ...] = ()

@@ -41,6 +41,8 @@ def solve(robot: Robot, pose: Array, seed: Array | None = None) -> Array:
     ------
     ReachError
         No joint positions within the limits reach the pose.
+    ModelError
+        The robot has a positioner.
 
     Examples
     --------
@@ -53,6 +55,7 @@ def solve(robot: Robot, pose: Array, seed: Array | None = None) -> Array:
     (8, True)
 
     """
+    robot.refuse_positioner('inverse kinematics')
     if family(robot) is None:
         found, _ = search(robot, pose, seed)
     else:

@@ -111,6 +111,8 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
     ------
     ReachError
         Names the first sample out of reach, where it is and why.
+    ModelError
+        The robot has a positioner.
 
     Examples
     --------
@@ -124,6 +126,7 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
     ((20, 6), True)
 
     """
+    robot.refuse_positioner('a path of the tool')
     poses = np.asarray(poses, dtype=np.float64)
     if seed is not None:
         q = follow(robot, poses, np.asarray(seed, dtype=np.float64))

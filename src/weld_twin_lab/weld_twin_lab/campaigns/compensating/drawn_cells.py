@@ -42,6 +42,7 @@ SECONDS, RATE = 40.0, 50.0
 NOISE = (2e-5, 1e-4)
 """Standard deviation of a measured coordinate there [m]: a laser tracker, a good camera."""
 TRIES = 200
+"""Goals that are drawn for an arm before it is given up: many are out of its reach."""
 
 
 class DrawnGoal(NamedTuple):
@@ -55,9 +56,9 @@ def drawn_causes(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]
     """Return three causes of a usual size, two constants and one that hangs on the posture or way."""
     joints = robot.joint_names
     signs = rng.choice([-1.0, 1.0], 2)
-    first = {'effect': 'joint_offset', 'joint': joints[int(rng.integers(1, 4))]}
+    first: dict[str, Any] = {'effect': 'joint_offset', 'joint': joints[int(rng.integers(1, 4))]}
     first['offset'] = float(signs[0] * rng.uniform(4e-4, 1.2e-3))
-    second = {'effect': 'link_twist', 'joint': joints[int(rng.integers(0, 4))]}
+    second: dict[str, Any] = {'effect': 'link_twist', 'joint': joints[int(rng.integers(0, 4))]}
     second['dalpha'] = float(signs[1] * rng.uniform(3e-4, 8e-4))
     at = joints[int(rng.integers(0, 3))]
     others: list[dict[str, Any]] = [
@@ -143,7 +144,7 @@ def _along(bare: Robot, begin: Array, rng: np.random.Generator) -> Goal | None:
         q[k] = at
     if np.abs(np.diff(q, axis=0)).max() > 0.2:
         return None
-    qd = np.gradient(q, t, axis=0, edge_order=2)
+    qd: Array = np.asarray(np.gradient(q, t, axis=0, edge_order=2))
     qd[0] = qd[-1] = 0.0
     return Goal(t, q, qd) if rng.random() < 0.7 else Goal(t, q)
 

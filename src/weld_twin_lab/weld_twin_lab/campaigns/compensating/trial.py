@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 from rclpy.action import ActionClient
-from std_msgs.msg import String
 
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
@@ -29,14 +28,13 @@ from weld_twin_core.twin.goal_motion import Goal, course
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.messages import from_messages
-from weld_twin_msgs_py.messages.goals import point_messages
 from weld_twin_msgs_py.messages.topics import AUDIT, DEVIATION, MEASURED_POSE
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.controller import Controller
 
 from .drawn_cells import DrawnGoal, cell_of, drawn_causes, drawn_goal, learned, true_effects
 
-PACE = 12.0
+PACE = 10.0
 """How many times as fast as they say goals run: nothing in these cells hangs on speed."""
 RETURN = 3.0
 """Length of a way back, or to where a goal begins [s]."""
@@ -78,9 +76,9 @@ class CellTrial:
         )
         self.audit: list[dict[str, Any]] = []
         cell.node.create_subscription(
-            String,
+            AUDIT.message_class(),
             '/compensator/audit',
-            lambda line: self.audit.append(json.loads(line.data)),
+            self._audited,
             AUDIT.requested.to_rclpy(),
         )
         self.measured = cell.collect(MEASURED_POSE.name)
@@ -93,6 +91,9 @@ class CellTrial:
         cell.meet()
         cell.wait(lambda: len(self.deviations) > 0, 'a deviation')
 
+    def _audited(self, message: Any) -> None:
+        self.audit.append(json.loads(message.data))
+
     def _effects(self, *more: dict[str, Any]) -> str:
         return yaml_text([*self.causes, *more])
 
@@ -102,7 +103,7 @@ class CellTrial:
         """Run a goal; return whether it was taken, and its audit line."""
         message = self.kind.Goal()
         message.trajectory.joint_names = list(self.robot.joint_names)
-        message.trajectory.points = point_messages(goal)
+        message.trajectory.points = self.cell.messages.trajectory_points(*goal)
         client, lines = (self._through if through else self._direct), len(self.audit)
         asked = client.send_goal_async(message)
         self.cell.wait(asked.done, 'the answer')

@@ -5,8 +5,9 @@
 Draws cases, diagnoses them, and fits for every kind of statement how often it is right, with the
 threshold from which it is told as sure. Writes weights.json (the file the diagnosis reads), what
 answers are worth on the cases to judge on, pictures, and the tables of statements: with --learn-from
-and --judge-on it is fitted anew from such tables without a diagnosis. Stopped, it goes on where it
-was when run again.
+and --judge-on it is fitted anew from such tables without a diagnosis. Without cases to judge on,
+those learned from are judged by weights that had not seen them. Stopped, it goes on where it was
+when run again.
 """
 
 from __future__ import annotations
@@ -74,9 +75,10 @@ def run(args: argparse.Namespace) -> int:
         tried += study.rows_of(args.held_out_seed, args.held_out, runner, args.mix)
     _refuse_shared(taught, tried)
     write_rows(out / LEARNED, taught)
-    write_rows(out / JUDGED, tried)
+    if tried:
+        write_rows(out / JUDGED, tried)
     content = study.fit(taught, args.risk)
-    print(study.write(out, content, tried), end='')
+    print(study.write(out, content, tried, taught), end='')
     return 0
 
 
@@ -89,8 +91,5 @@ def _refuse_shared(taught: list[dict[str, object]], tried: list[dict[str, object
         raise DataError(
             f'case {min(map(str, shared))} is in a table to learn from and in one to judge on'
         )
-    if not taught or not tried:
-        raise DataError(
-            'there are no cases to learn from, or none to judge on; give --cases and --held-out, '
-            'or --learn-from and --judge-on'
-        )
+    if not taught:
+        raise DataError('there are no cases to learn from; give --cases or --learn-from')

@@ -1,0 +1,303 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Measured efforts of the joints, held against the model's statics: sign, unit, payload, torque constant.
+
+Poses see a measured torque only as its product with a compliance. So a wrong torque constant, and a
+load that nobody declared, show here or nowhere: by what differs between effort and statics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...arm.chain import Frames, frames
+from ...arm.dynamics import chain_gravity_torque, payload_torque
+from ...arm.robot import Robot
+from ...arrays import Array
+from ...effects.curve import AT_REST
+from ...errors import DataError
+from ...recording import Recording
+from ...twin.expected_effort import with_expected_effort
+from ..result import EffortCause, Efforts, JointEffort
+from .evidence import Case, Finding
+
+ROWS = 400
+"""Samples of a recording that are compared; neighbours of a moving arm say the same."""
+CLEAR = 0.5
+"""Correlation of all joints together from which a sign is told: rough masses keep 0.9, chance on
+some twenty postures stays below 0.3."""
+LOADED = 0.2
+"""Share of the largest load's spread below which a joint's own load tells nothing of units."""
+SHAPED = 0.8
+"""Correlation from which a joint's effort has the shape of its load, whatever the masses."""
+FACTOR = 4.0
+"""Factor between effort and load beyond which the unit is another: masses of links are known within
+a half, payloads add as much again; currents and per cent are off by tens."""
+MILLI = (250.0, 4000.0)
+"""Factors that N mm in the place of N m make, with masses as uncertain as above."""
+AGREES = 0.02
+"""Share of the load's RMS below which effort and statics agree: what torque sensors are good for."""
+EXPLAINS = 0.02
+"""
+Share of the squared difference, without what all causes together leave, that one may leave and be
+told: a seventh of its RMS.
+"""
+
+
+@dataclass(frozen=True)
+class _Loads:
+    """
+    Load by the statics and as measured, (n, N) each; what may add to it, (K, n, N).
+
+    ``payload`` is of 1 kg and of 1 kg m along each axis of the tool, ``links`` of every link's mass.
+    """
+
+    robot: Robot
+    statics: Array
+    measured: Array
+    payload: Array
+    links: Array
+    beside: Array
+
+    def correlation(self) -> float:
+        """Return how alike both are, every joint about its mean, all together."""
+        a, b = (x - x.mean(axis=1, keepdims=True) for x in (self.statics, self.measured))
+        size = float(np.sqrt((a * a).sum() * (b * b).sum()))
+        return float((a * b).sum()) / size if size > 0.0 else 0.0
+
+
+def with_sign(recordings: Sequence[Recording], robot: Robot) -> tuple[Recording, ...]:
+    """
+    Return recordings whose efforts are known to hold the load, or to be it.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    robot : Robot
+
+    Raises
+    ------
+    DataError
+        Some recordings have efforts and others none, or none ever changes, or they are in another
+        unit than N m.
+
+    """
+    told = [recording.effort is not None for recording in recordings]
+    if not any(told):
+        return tuple(recordings)
+    if not all(told):
+        raise DataError(
+            f'{recordings[told.index(False)].name} has no effort of the joints and other recordings '
+            'have; record it in all of them, or leave --use-effort out'
+        )
+    if not any(np.ptp(r.effort.value, axis=0).any() for r in recordings if r.effort is not None):
+        raise DataError(
+            f'the efforts of {recordings[0].name} never change, so nothing measured them; leave '
+            '--use-effort out'
+        )
+    loads = _loads(recordings, _weighing(robot))
+    if robot.mass is not None:
+        _refuse_units(loads)
+    if loads.correlation() > -CLEAR:
+        return tuple(recordings)
+    return tuple(replace(r, effort_holds=not r.effort_holds) for r in recordings)
+
+
+def compared(recordings: Sequence[Recording], robot: Robot) -> Efforts | None:
+    """
+    Return what efforts say beside the model's statics; None where none were measured.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    robot : Robot
+
+    """
+    if any(recording.effort is None for recording in recordings):
+        return None
+    loads = _loads(recordings, _weighing(robot))
+    gap = loads.measured - loads.statics
+    spread = loads.statics - loads.statics.mean(axis=1, keepdims=True)
+    size = np.sqrt((spread**2).mean(axis=1))
+    factors = _factors(loads, size) if robot.mass is not None else {}
+    whole = float(np.sqrt((spread**2).mean()))
+    joints = tuple(
+        JointEffort(name, float(size[i]), float(np.sqrt((gap[i] ** 2).mean())), factors.get(i))
+        for i, name in enumerate(robot.joint_names)
+    )
+    difference = float(np.sqrt((gap**2).mean())) / whole if whole > 0.0 else 0.0
+    found = robot.mass is not None and difference > AGREES
+    return Efforts(
+        recordings[0].effort_holds,
+        loads.correlation(),
+        robot.mass is not None,
+        joints,
+        difference,
+        _causes(loads, gap) if found else (),
+    )
+
+
+def efforts(case: Case) -> Iterator[Finding]:
+    """Yield what the efforts are, and what they say of payload and torque constants."""
+    found = compared(case.recordings, case.model.robot)
+    if found is None:
+        return
+    yield _told_sign(found)
+    if not found.weighed:
+        yield Finding(
+            'note',
+            'The robot model has no link masses, so the unit of the efforts is not checked; a '
+            'compliance found with them is for each unit of effort.',
+        )
+    elif found.causes:
+        yield Finding('warning', _told_causes(found))
+    elif found.difference > AGREES:
+        factors = [f'{j.joint} {j.factor:.2f}' for j in found.joints if j.factor is not None]
+        yield Finding(
+            'note',
+            f'Efforts and statics differ by {found.difference:.0%} of the load, and neither a '
+            'payload nor the torque constant of one joint explains it: the masses of the links may '
+            f'be rough. Measured for each N m of the model: {", ".join(factors)}.',
+        )
+
+
+def _told_sign(found: Efforts) -> Finding:
+    meaning = 'what holds the load' if found.holds else 'the load itself, not what holds it'
+    if abs(found.correlation) < CLEAR:
+        return Finding(
+            'warning',
+            f'Springs take the measured efforts as {meaning}, and nothing confirms that: with '
+            f'gravity on the links they correlate by {found.correlation:.2f}.',
+        )
+    sentence = (
+        f'Springs take the measured efforts as {meaning}: so taken they correlate by '
+        f'{found.correlation:.2f} with gravity on the links.'
+    )
+    return Finding('note', sentence)
+
+
+def _told_causes(found: Efforts) -> str:
+    words = {
+        'payload': '{value:+.2f} kg of payload (standard error {std:.2f}; left {left:.1%})',
+        'torque_constant': 'an effort of {joint} that is {value:.3f} times the torque (standard error '
+        '{std:.3f}; left {left:.1%})',
+        'link_mass': 'a link behind {joint} of {value:.2f} times its mass (left {left:.1%})',
+        'link_masses': 'links of {value:.2f} times their masses (left {left:.1%})',
+    }
+    each = [words[cause.name].format(**vars(cause)) for cause in found.causes]
+    alone = 'explains it' if len(each) == 1 else 'explain it, each by itself'
+    return (
+        f'Efforts and statics differ by {found.difference:.0%} of the load; {" or ".join(each)} '
+        f'{alone}. The springs do not need to know which, a planned motion does: weigh what hangs on '
+        'the flange, or hold the efforts against a known weight.'
+    )
+
+
+def _weighing(robot: Robot) -> Robot:
+    """Return a robot whose links weigh something: every one alike where none is known."""
+    if robot.mass is not None:
+        return robot
+    return replace(robot, mass=np.ones(robot.n), com=np.zeros((robot.n, 3)))
+
+
+def _loads(recordings: Sequence[Recording], robot: Robot) -> _Loads:
+    parts = [_of_one(recording, robot) for recording in recordings]
+    joined = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
+    return _Loads(robot, *joined)
+
+
+def _of_one(recording: Recording, robot: Robot) -> tuple[Array, ...]:
+    """Return statics, measured load, what payload and links add, and what else may, by rows."""
+    motion = recording.joints
+    expected = with_expected_effort(recording, robot, recording).effort
+    assert expected is not None and recording.effort is not None
+    at = np.unique(np.linspace(0, motion.t.size - 1, ROWS).round().astype(int))
+    sign = -1.0 if recording.effort_holds else 1.0
+    measured = sign * recording.effort.at(motion.t[at]).T
+    chain = frames(robot, motion.q[at])
+    centred = payload_torque(robot, chain, 1.0, np.zeros(3))
+    levers = [payload_torque(robot, chain, 1.0, axis) - centred for axis in np.eye(3)]
+    one = np.ones_like(measured)
+    beside = [one]
+    if not motion.static:
+        speed = motion.velocity[at].T
+        beside += [np.tanh(speed / AT_REST), speed]
+    payload, statics = np.array([centred, *levers]), sign * expected.value[at].T
+    return statics, measured, payload, _of_links(robot, chain), np.array(beside)
+
+
+def _of_links(robot: Robot, chain: Frames) -> Array:
+    """Return what each link weighs on the joints, shape (n, n, N): link, joint, sample."""
+    assert robot.mass is not None
+    each = np.diag(robot.mass)
+    return np.array(
+        [chain_gravity_torque(replace(robot, mass=m, payload_mass=0.0), chain) for m in each]
+    )
+
+
+def _factors(loads: _Loads, size: Array) -> dict[int, float]:
+    """Return measured load for each N m of the statics, of joints that the statics load."""
+    out = {}
+    for i in np.flatnonzero(size > LOADED * size.max()):
+        slope, _ = np.polyfit(loads.statics[i], loads.measured[i], 1)
+        out[int(i)] = float(slope)
+    return out
+
+
+def _refuse_units(loads: _Loads) -> None:
+    """Refuse efforts that have the shape of the load and another size."""
+    size = loads.statics.std(axis=1)
+    for i, factor in _factors(loads, size).items() if size.max() > 0.0 else ():
+        alike = np.corrcoef(loads.statics[i], loads.measured[i])[0, 1]
+        if not abs(alike) > SHAPED or 1.0 / FACTOR <= abs(factor) <= FACTOR:
+            continue
+        milli = MILLI[0] <= abs(factor) <= MILLI[1]
+        unit = 'N mm in the place of N m' if milli else 'per cent, or the currents of motors'
+        raise DataError(
+            f'the effort of {loads.robot.joint_names[i]} is {abs(factor):.3g} times the torque that '
+            f'the links of the model weigh: it may be in {unit}; give efforts in N m, mend the '
+            'masses of the robot file if they are wrong, or leave --use-effort out'
+        )
+
+
+def _causes(loads: _Loads, gap: Array) -> tuple[EffortCause, ...]:
+    """Return what explains the difference by itself, beside offsets and friction of each joint."""
+    names = loads.robot.joint_names
+    plain = [np.zeros((0, *gap.shape)), *(_only(i, loads.beside) for i in range(len(names)))]
+    nuisance = np.concatenate(plain)
+    before = _left(nuisance, gap)[2]
+    offered = [('payload', None, loads.payload)]
+    offered += [
+        ('torque_constant', name, _only(i, loads.statics[None])) for i, name in enumerate(names)
+    ]
+    offered += [('link_mass', name, loads.links[[i]]) for i, name in enumerate(names)]
+    offered += [('link_masses', None, loads.links.sum(axis=0)[None])]
+    found, every = [], np.concatenate([*(columns for *_, columns in offered), nuisance])
+    noise = _left(every, gap)[2]
+    for name, joint, columns in offered:
+        values, spread, left = _left(np.concatenate([columns, nuisance]), gap)
+        if left - noise < EXPLAINS * (before - noise):
+            value = float(values[0]) + (name != 'payload')
+            found.append(EffortCause(name, joint, value, float(spread[0]), left / before))
+    return tuple(sorted(found, key=lambda cause: cause.left))
+
+
+def _only(i: int, columns: Array) -> Array:
+    """Return columns, (K, n, N) or (1, n, N), of which one joint has something."""
+    out = np.zeros_like(columns)
+    out[:, i] = columns[:, i]
+    return out
+
+
+def _left(columns: Array, gap: Array) -> tuple[Array, Array, float]:
+    """Return coefficients, their standard errors, and the squared difference that is left."""
+    matrix = columns.reshape(len(columns), -1).T
+    values, *_ = np.linalg.lstsq(matrix, gap.ravel(), rcond=None)
+    left = float(((gap.ravel() - matrix @ values) ** 2).sum())
+    variance = left / max(gap.size - len(columns), 1)
+    spread = np.sqrt(variance * np.diag(np.linalg.pinv(matrix.T @ matrix)).clip(0.0))
+    return values, spread, left

@@ -1,0 +1,92 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The carriage of a joint that slides: what moves where it leaves its straight guide."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arm.channels import Shift
+from ..arm.robot import Robot
+from ..arm.vectors import components, cross, pad
+from ..arrays import Array
+from ..errors import ModelError
+from .effect import Effect
+from .view import View
+
+
+class GuideError(Effect):
+    """An error of a guide; its carriage leaves the straight line by the posture of one joint."""
+
+    of = 'joint'
+    depends_on = 'angle'
+    by_motion = True
+    common = False
+
+    def check(self, robot: Robot) -> None:
+        """
+        Refuse an effect this robot cannot have.
+
+        Parameters
+        ----------
+        robot : Robot
+
+        Raises
+        ------
+        ModelError
+            As of every effect, or its joint turns.
+
+        """
+        super().check(robot)
+        if not self.on_slide(robot):
+            raise ModelError(f'{self.name} is of a joint that slides, and {self.site!r} turns')
+
+    @classmethod
+    def applicable(cls, view: View, joint: str | None) -> str | None:
+        """
+        Return why the data cannot show it: an axis that turns has no guide.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            The joint it would sit on.
+
+        """
+        if joint is not None and not view.robot.prismatic[view.robot.index(joint)]:
+            return 'a joint that turns has no guide'
+        return super().applicable(view, joint)
+
+
+def carriage_axes(view: View, i: int) -> tuple[Array, Array, Array]:
+    """Return the x, y and z of a guide in the world at the samples, each (3, ...); z is along it."""
+    row, width = view.frames.rows[i], view.frames.position.ndim - 1
+    z = pad(row.z, width)
+    x = pad(row.x if view.robot.convention == 'standard' else cross(row.y, row.z), width)
+    return x, cross(z, x), z
+
+
+def carried(view: View, i: int, slide: Array | None, turn: Array | None) -> Shift:
+    """
+    Return how the pose moves where the carriage of joint i is slid, or turned about itself.
+
+    Parameters
+    ----------
+    view : View
+    i : int
+        The joint, counted from 0.
+    slide, turn : array, shape (3, ...) [m, rad], optional
+        In the world, components first; what is carried moves so against the guide.
+
+    """
+    way = -1.0 if i < view.robot.behind else 1.0
+    if turn is None:
+        assert slide is not None
+        return {('pose', k): way * slide[k] for k in range(3)}
+    row, tip = view.frames.rows[i], components(view.frames.position)
+    travel = view.robot.d[i] + view.joint(i)
+    origin = pad(row.z_point, tip.ndim - 1) + travel * pad(row.z, tip.ndim - 1)
+    moved = cross(turn, tip - origin)
+    parts = np.broadcast_arrays(*moved, *turn)
+    return {('pose', k): way * part for k, part in enumerate(parts)}

@@ -1,0 +1,50 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Guide bend: the track of a joint that slides is not straight.
+
+A constant and a slope of the guide are errors of links; what is left of a bent guide is first of all
+a parabola.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..arm.channels import Shift
+from .carriage import GuideError, carriage_axes, carried
+from .registry import register
+from .view import Parameter, Stage, Value, View
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class GuideBend(GuideError):
+    """The carriage is off by curvature * q^2 / 2 along the x and the y of its row."""
+
+    joint: str
+    curvature: Value = (0.0, 0.0)
+
+    name = 'guide_bend'
+    stage = Stage.POSE
+    parameters = (Parameter('curvature', '1/m', size=2, typical=2e-4),)
+
+    def displace(self, view: View) -> Shift:
+        """Return how the tool moves with the carriage."""
+        parts = self._parts(view)
+        return {
+            channel: sum(
+                self.number('curvature', k) * part[channel] for k, part in enumerate(parts)
+            )
+            for channel in parts[0]
+        }
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return the same for a curvature of one along each axis."""
+        return list(self._parts(view))
+
+    def _parts(self, view: View) -> list[Shift]:
+        i = view.robot.index(self.joint)
+        x, y, _ = carriage_axes(view, i)
+        bow = 0.5 * view.joint(i) ** 2
+        return [carried(view, i, bow * axis, None) for axis in (x, y)]

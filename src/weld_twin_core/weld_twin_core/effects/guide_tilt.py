@@ -1,0 +1,47 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Guide tilt: a carriage pitches, yaws and rolls along its travel.
+
+A lever makes it large: a carriage that pitches by 0.1 mrad moves a tool two metres above it by 0.2 mm,
+and its mean over the travel is an error of links.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..arm.channels import Shift
+from .carriage import GuideError, carriage_axes, carried
+from .registry import register
+from .view import Parameter, Stage, Value, View
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class GuideTilt(GuideError):
+    """The carriage turns by rate * q about the x, y and z of its row; z is along the travel."""
+
+    joint: str
+    rate: Value = (0.0, 0.0, 0.0)
+
+    name = 'guide_tilt'
+    stage = Stage.POSE
+    parameters = (Parameter('rate', 'rad/m', size=3, typical=2e-4),)
+
+    def displace(self, view: View) -> Shift:
+        """Return how the tool moves with the carriage."""
+        parts = self._parts(view)
+        return {
+            channel: sum(self.number('rate', k) * part[channel] for k, part in enumerate(parts))
+            for channel in parts[0]
+        }
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return the same for a rate of one about each axis."""
+        return list(self._parts(view))
+
+    def _parts(self, view: View) -> list[Shift]:
+        i = view.robot.index(self.joint)
+        axes = carriage_axes(view, i)
+        return [carried(view, i, None, view.joint(i) * axis) for axis in axes]

@@ -1,0 +1,36 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a controller would measure of its joints on a motion that nobody has run yet."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..arm.robot import Robot
+from ..recording import Recording, Signal
+from .stages import load_torque
+from .twin import Twin
+
+
+def with_expected_effort(recording: Recording, robot: Robot, like: Recording) -> Recording:
+    """
+    Return a motion with the effort that the model's statics expect, where efforts are measured.
+
+    Parameters
+    ----------
+    recording : Recording
+        A motion that is thought of: a measurement to come, postures elsewhere.
+    robot : Robot
+        Links without masses weigh nothing.
+    like : Recording
+        Of the same controller; without efforts the motion stays as it is.
+
+    """
+    if like.effort is None:
+        return recording
+    load = load_torque(Twin(robot).joint_view(recording))
+    each = np.stack([load['tau', i] for i in range(robot.n)], axis=-1)
+    effort = Signal(recording.joints.t, -each if like.effort_holds else each)
+    return replace(recording, effort=effort, effort_holds=like.effort_holds)

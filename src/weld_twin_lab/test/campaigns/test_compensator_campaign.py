@@ -1,0 +1,93 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the campaign of the compensator counts and judges, on goals whose answer is known."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.chain import forward
+from weld_twin_lab.campaigns.compensating.drawn_cells import HOMES, RECORDED, drawn_goal
+from weld_twin_lab.campaigns.compensator import counted, summary, table, worse
+
+KEPT = Path(__file__).parents[4] / 'docs/results/robustness/compensator.json'
+OTHER = 'exit code 2: weld_twin: diagnosis is of the robot ur10e'
+
+
+def row(**change):
+    return {
+        'robot': 'ur5',
+        'after': '',
+        'inside': True,
+        'verdict': 'corrected',
+        'before_m': 4e-4,
+        'after_m': 1e-5,
+        'best_m': 0.0,
+        'bound_m': 2e-5,
+        **change,
+    }
+
+
+def after(what, **change):
+    return row(after=what, verdict='refused', after_m=4e-4, bound_m=None, **change)
+
+
+CHANGE = {'robot': 'ur5', 'change': 'load changed', 'noticed': True, 'seconds': 1.0}
+
+
+@pytest.mark.parametrize(
+    ('before', 'found', 'expected'),
+    [(1e-4, 1.19e-4, False), (1e-4, 1.21e-4, True), (1e-3, 1.04e-3, False), (1e-3, 1.06e-3, True)],
+)
+def test_worse_is_by_more_than_both_allowances(before, found, expected):
+    assert worse(row(before_m=before, after_m=found)) is expected
+
+
+def test_nine_bounds_of_ten_pass_and_ten_of_ten_do_not():
+    ten = [row() for _ in range(9)] + [row(after_m=3e-5)]
+    rows = [*ten, after('load changed')]
+    assert summary(rows, [CHANGE], OTHER, None)['passed']
+    assert not summary([row() for _ in range(10)], [CHANGE], OTHER, None)['passed']
+    told = table({**summary(rows, [CHANGE], OTHER, None)})
+    assert '9 of 10' in told
+
+
+@pytest.mark.parametrize(
+    ('rows', 'changes', 'other'),
+    [
+        ([row(after='load changed')], [CHANGE], OTHER),
+        ([row(after_m=5e-4)], [CHANGE], OTHER),
+        ([row(verdict='refused', after_m=4e-4)] * 3, [CHANGE], OTHER),
+        ([], [{**CHANGE, 'noticed': False}], OTHER),
+        ([], [CHANGE], 'exit code 0: active'),
+    ],
+)
+def test_one_miss_of_any_kind_fails_the_campaign(rows, changes, other):
+    nine = [row() for _ in range(18)] + [row(after_m=3e-5), row(after_m=3e-5)]
+    assert summary(nine, [CHANGE], OTHER, None)['passed']
+    assert not summary(nine + rows, changes, other, None)['passed']
+
+
+def test_goals_are_seams_and_those_inside_lie_where_the_arm_was_recorded():
+    rng = np.random.default_rng(3)
+    for name in ('ur5', 'abb_irb1600'):
+        robot = load(name)
+        for _ in range(3):
+            goal, inside = drawn_goal(robot, rng)
+            away = np.abs(goal.q - np.array(HOMES[name])).max()
+            assert inside == (away <= RECORDED)
+            way = np.linalg.norm(np.diff(forward(robot, goal.q)[:, :3, 3], axis=0), axis=1).sum()
+            assert 0.04 < way < 0.6
+
+
+@pytest.mark.skipif(not KEPT.exists(), reason='the result is not kept yet')
+def test_the_kept_result_is_what_its_goals_come_to():
+    kept = json.loads(KEPT.read_text())
+    again = counted([goal for goal in kept['goals'] if not goal['after']])
+    assert again == kept['totals']
+    assert again['worse'] == 0

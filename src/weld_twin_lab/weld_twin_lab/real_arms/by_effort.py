@@ -1,0 +1,127 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Springs by measured efforts and by statics, both judged on stretches of time that were not fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion, Recording, Signal
+
+from ..real_robots.unseen_stations import ALIGN, residual
+from ..transfer.plain import PLAIN, plain_fit
+
+WAYS = ('frames', 'geometry', 'statics', 'efforts')
+"""Plain fits of the frames and of the geometry; diagnoses with springs by statics and by efforts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """
+    One stretch of time that was not fitted.
+
+    Attributes
+    ----------
+    away : dict of str to array, shape (M,) [m]
+        Distance of measured from predicted, for each of `WAYS`.
+    told : tuple of str
+        What was found with efforts, one text each.
+
+    """
+
+    away: dict[str, Array]
+    told: tuple[str, ...]
+
+
+def folds(
+    recording: Recording, robot: Robot, count: int, tell: Callable[[str], None]
+) -> list[Fold]:
+    """
+    Return every stretch predicted by models of all the others.
+
+    Parameters
+    ----------
+    recording : Recording
+        Stations with measured poses and efforts.
+    robot : Robot
+    count : int
+        Stretches, of equal numbers of stations in the order of time.
+    tell : callable
+        Told of each stretch that is done.
+
+    Raises
+    ------
+    DataError
+        No efforts, no measurements, or no stations.
+
+    """
+    if recording.effort is None or recording.measured is None or not recording.joints.static:
+        raise DataError(f'{recording.name} needs stations with measured poses and efforts')
+    rows = np.arange(recording.joints.t.size)
+    out = []
+    for stretch in np.array_split(rows, count):
+        train, test = _part(recording, np.setdiff1d(rows, stretch)), _part(recording, stretch)
+        plain = replace(train, effort=None)
+        found = diagnose(train, robot, align=ALIGN, experiment=False).model
+        models: dict[str, Model] = {
+            'frames': plain_fit(plain, robot, PLAIN['frames'], ALIGN),
+            'geometry': plain_fit(plain, robot, PLAIN['geometry'], ALIGN),
+            'statics': diagnose(plain, robot, align=ALIGN, experiment=False).model,
+            'efforts': found,
+        }
+        away = {
+            name: np.linalg.norm(residual(model, train, test)[:3], axis=0)
+            for name, model in models.items()
+        }
+        told = tuple(f'{e.name} of {e.site}' if e.site else e.name for e in found.found)
+        out.append(Fold(away, told))
+        tell(f'stretch {len(out)} of {count}: efforts {away["efforts"].mean() * 1e3:.3f} mm')
+    return out
+
+
+def _part(recording: Recording, rows: np.ndarray) -> Recording:
+    """Return some stations of a recording with their efforts."""
+    joints, effort, measured = recording.joints, recording.effort, recording.measured
+    assert effort is not None and measured is not None
+    return replace(
+        recording,
+        joints=JointMotion(joints.t[rows], joints.q[rows], None, static=True),
+        measured=measured.take(rows),
+        effort=Signal(effort.t[rows], effort.value[rows]),
+    )
+
+
+def table(name: str, done: Sequence[Fold]) -> str:
+    """Return means and maxima of all stretches as a page of Markdown."""
+    each = {way: np.concatenate([fold.away[way] for fold in done]) for way in WAYS}
+    start = float(each['frames'].mean())
+    words = {
+        'frames': 'frames alone, plain fit',
+        'geometry': 'frames and geometry, plain fit',
+        'statics': "diagnosis, springs by the model's statics",
+        'efforts': 'diagnosis, springs by measured efforts (`--use-effort`)',
+    }
+    lines = [
+        f'# {name}: {len(each["frames"])} stations, {len(done)} stretches of time left out in turn',
+        '',
+        '| model | mean mm | max mm | mean over frames alone |',
+        '|---|---|---|---|',
+        *(
+            f'| {words[way]} | {away.mean() * 1e3:.3f} | {away.max() * 1e3:.3f} '
+            f'| {away.mean() / start:.3f} |'
+            for way, away in each.items()
+        ),
+        '',
+        'Found with efforts, stretch by stretch:',
+        '',
+        *(f'* {", ".join(fold.told) or "nothing"}' for fold in done),
+    ]
+    return '\n'.join(lines) + '\n'

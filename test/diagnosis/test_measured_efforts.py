@@ -1,0 +1,157 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Springs driven by the measured effort of the joints; MuJoCo says what the joints bear."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from weld_twin_core import JointMotion, Measurements, Recording, load
+from weld_twin_core.recording import Signal
+from weld_twin_lab.plant.compliance import Compliant
+from weld_twin_lab.plant.exponentials import arm_from
+from weld_twin_lab.plant.plant import run
+from weld_twin_lab.plant.plant_recording import Command
+from weld_twin_lab.plant.textbook_effects import LIBRARY, causes_from
+from weld_twin_lab.plant.tracker import Tracker
+from weld_twin_msgs_py.bags import BagReader, read_recording, write_recording
+from weld_twin_msgs_py.files.diagnosis_model import load_model
+from weld_twin_msgs_py.messages.topics import TopicNames
+from weld_twin_nodes.cli import main
+from weld_twin_nodes.streams.twin_stream import JointStream
+
+ROBOT = load('ur10e')
+SOFT = {'shoulder_lift_joint': 3e-5, 'elbow_joint': 5e-5}
+CAUSES = [
+    {'effect': 'joint_compliance', 'joint': joint, 'compliance': value}
+    for joint, value in SOFT.items()
+]
+SIGMA = 2e-5
+COUNT = 45
+
+
+def commanded(*words):
+    return main([str(word) for word in words])
+
+
+def pulled(seed=3, payload=0.0):
+    """Return stations of an arm that somebody pulls at its tool by up to 90 N; nobody records that."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-1.4, 1.4, (COUNT, 6)) + [0.0, -1.2, 1.0, 0.0, 0.0, 0.0]
+    t = np.arange(float(COUNT))
+    wrench = np.hstack([rng.uniform(-90.0, 90.0, (COUNT, 3)), np.zeros((COUNT, 3))])
+    causes = [*CAUSES, {'effect': 'payload', 'mass': payload, 'com': [0.0, 0.0, 0.1]}]
+    if payload:
+        wrench *= 0.0
+    robot = ROBOT.to_mapping()
+    command = Command(t, q, static=True, wrench=wrench)
+    seen = run(robot, causes, command, Tracker(sigma=SIGMA, orientation=False), rng, 0.0)
+    arm = arm_from(robot)
+    plant = Compliant(robot, arm, causes_from(causes, arm, LIBRARY), 0.0)
+    torque = plant.torque(q + plant.sag(q, wrench), wrench)
+    torque += rng.normal(scale=0.2, size=torque.shape)
+    measured = Measurements(t, seen.position)
+    return Recording('pulled', JointMotion(t, q, static=True), measured, effort=Signal(t, -torque))
+
+
+@pytest.fixture(scope='module')
+def cell(tmp_path_factory):
+    """A bag with the efforts, its diagnosis by them, and what was told."""
+    folder = tmp_path_factory.mktemp('efforts')
+    write_recording(folder / 'bag', pulled(), ROBOT)
+    words = ('diagnose', folder / 'bag', '--robot', 'ur10e', '--align', 'base,tool')
+    assert commanded(*words, '--use-effort', '--out', folder / 'found') == 0
+    return folder
+
+
+def read(path):
+    return json.loads(path.read_text())
+
+
+def test_springs_by_effort_explain_a_pull_that_nobody_recorded(cell):
+    found = read(cell / 'found' / 'diagnosis.json')
+    springs = {
+        each['joint']: each
+        for each in found['model']['found']
+        if each['effect'] == 'joint_compliance'
+    }
+    assert found['model']['statics'] == 'effort'
+    for joint, value in SOFT.items():
+        assert springs[joint]['statics'] == 'effort'
+        assert springs[joint]['compliance'] == pytest.approx(value, rel=0.1)
+    assert found['shrink']['rms_after_m'] < 2.0 * SIGMA * 3**0.5
+    assert found['efforts']['holds'] and found['efforts']['correlation'] > 0.5
+
+
+def test_springs_by_statics_do_not(cell):
+    words = ('diagnose', cell / 'bag', '--robot', 'ur10e', '--align', 'base,tool')
+    assert commanded(*words, '--out', cell / 'statics') == 0
+    found = read(cell / 'statics' / 'diagnosis.json')
+    assert 'efforts' not in found and found['model']['statics'] == 'equilibrium'
+    assert found['shrink']['rms_after_m'] > 5.0 * SIGMA * 3**0.5
+
+
+def test_a_model_by_effort_is_replayed_by_it_and_refuses_without(cell, tmp_path, capsys):
+    words = ('--robot', 'ur10e', '--model', cell / 'found' / 'diagnosis.json')
+    assert commanded('predict', cell / 'bag', *words, '--out', tmp_path / 'twin') == 0
+    told = capsys.readouterr().out
+    assert float(told.split('RMS ')[1].split(' mm')[0]) < 0.07
+    bare = replace(read_recording(cell / 'bag', ROBOT), effort=None)
+    write_recording(tmp_path / 'bare', bare, ROBOT)
+    assert commanded('predict', tmp_path / 'bare', *words, '--out', tmp_path / 'none') == 2
+    error = capsys.readouterr().err
+    assert 'the joint state tells no effort' in error and error.count('\n') == 1
+    assert not (tmp_path / 'none').exists()
+
+
+def test_a_running_twin_takes_the_efforts_as_the_twin_over_the_bag_does(cell):
+    twin = load_model(ROBOT, cell / 'found' / 'diagnosis.json')
+    offline = twin.poses(read_recording(cell / 'bag', ROBOT, TopicNames(use_effort=True)))
+    stream = JointStream(twin)
+    with BagReader(cell / 'bag') as bag:
+        live = [stream.step(message) for *_, message in bag.messages(['/joint_states'])]
+    got = np.array([sample.poses.position for sample in live])
+    np.testing.assert_allclose(got, offline.position, rtol=0.0, atol=1e-12)
+
+
+def test_a_program_is_not_corrected_by_efforts_to_come(cell, tmp_path, capsys):
+    program = tmp_path / 'joints.csv'
+    program.write_text(','.join(ROBOT.joint_names) + '\n0,-1.2,1,0,0,0\n0.1,-1.2,1,0,0,0\n')
+    words = ('--robot', 'ur10e', '--model', cell / 'found' / 'diagnosis.json')
+    assert commanded('correct-program', program, *words, '--out', tmp_path / 'better') == 2
+    assert 'a motion that is still to come has none' in capsys.readouterr().err
+
+
+def in_bag(tmp_path, effort, holds=True):
+    recording = pulled(seed=4, payload=3.0)
+    value = recording.effort.value * (1.0 if holds else -1.0)
+    told = replace(recording, effort=Signal(recording.effort.t, effort(value)))
+    write_recording(tmp_path / 'bag', told, ROBOT)
+    words = ('diagnose', tmp_path / 'bag', '--robot', 'ur10e', '--align', 'base,tool')
+    return commanded(*words, '--use-effort', '--out', tmp_path / 'found')
+
+
+def test_a_payload_and_a_sign_show_in_the_efforts(tmp_path):
+    assert in_bag(tmp_path, lambda value: value, holds=False) == 0
+    found = read(tmp_path / 'found' / 'diagnosis.json')
+    assert found['model']['statics'] == 'effort_reversed' and not found['efforts']['holds']
+    first = found['efforts']['causes'][0]
+    assert first['name'] == 'payload' and first['value'] == pytest.approx(3.0, abs=0.1)
+    said = [check['sentence'] for check in found['checks'] if check['name'] == 'efforts']
+    assert 'the load itself, not what holds it' in said[0] and '+3.0' in said[1]
+
+
+@pytest.mark.parametrize(
+    ('effort', 'said'),
+    [
+        (lambda value: 1e3 * value, 'N mm in the place of N m'),
+        (lambda value: 100.0 * value / (330.0, 330.0, 5.0, 54.0, 54.0, 54.0), 'per cent'),
+    ],
+)
+def test_efforts_that_are_none_are_refused_in_one_sentence(tmp_path, capsys, effort, said):
+    assert in_bag(tmp_path, effort) == 2
+    error = capsys.readouterr().err
+    assert said in error and error.count('\n') == 1
+    assert not (tmp_path / 'found').exists()

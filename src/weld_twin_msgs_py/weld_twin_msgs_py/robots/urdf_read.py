@@ -32,8 +32,8 @@ def read_urdf(
 
     The world frame of the robot is the base link, its tool the tip link; poses agree with the
     URDF's to rounding. Where joints of a positioner lie between the base link and the link that
-    both branches hang on, the chain leads up one branch and down the other. Links on fixed joints, and whatever else hangs on the chain, lend their
-    mass to the link that carries them.
+    both branches hang on, the chain leads up one branch and down the other. Links on fixed joints,
+    and whatever else hangs on the chain, lend their mass to the link that carries them.
 
     Parameters
     ----------

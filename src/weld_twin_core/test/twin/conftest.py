@@ -99,7 +99,7 @@ ROBOTS = {
     'gantry': random_robot(4, slides=(0, 3), convention='standard'),
     'modified gantry': random_robot(5, slides=(1,), convention='modified'),
     'positioner': random_cell(6, slides=(0,)),
-    'modified positioner': random_cell(7, convention='modified'),
+    'modified positioner': random_cell(8, convention='modified'),
 }
 
 
@@ -113,6 +113,12 @@ def robot(request):
 def arm():
     """Return the UR5."""
     return ROBOTS['ur5']
+
+
+@pytest.fixture
+def positioner():
+    """Return a robot on a track (j2) beside a positioner."""
+    return ROBOTS['positioner']
 
 
 def elementary(axis, angle=0.0, slide=0.0):

@@ -31,6 +31,8 @@ ALIKE = 1e-3
 other differ by rounding."""
 UPRIGHT = 0.99
 """Cosine of the angle to the vertical [1] from which an arm stands upright, within 8 degrees."""
+GROUND = -1
+"""Stands for the line from a positioner's foot to the robot's, where nothing is."""
 PLACES = 5
 """Places along each of two lines between which their distance is looked at."""
 
@@ -74,13 +76,16 @@ def _whole(robot: Robot, q: Array) -> Body:
     points, link = _line(robot, frames(robot, np.asarray(q, dtype=float)))
     whole = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
     radius = np.where(link == robot.n, TORCH, THICK * whole)
-    return Body(points[..., :-1, :], points[..., 1:, :], radius, link)
+    return Body(points[..., :-1, :], points[..., 1:, :], radius, link).of(link != GROUND)
 
 
 def _line(robot: Robot, chain: Frames) -> tuple[Array, Array]:
     """Return the points from base to tool, shape (..., S + 1, 3), and the link of every line."""
     points, link = [chain.base_point], []
     for k, row in enumerate(chain.rows):
+        if 0 < k == robot.behind:
+            points.append(chain.root_point)
+            link.append(GROUND)
         x, at, turned = (np.moveaxis(v, 0, -1) for v in (row.x, row.x_point, row.z_point))
         if robot.convention == 'standard':
             ends = [at - robot.a[k] * x, at]
@@ -155,7 +160,8 @@ class Space:
         self._known = _whole(robot, seen)
         self._usual: dict[bytes, Array] = {}
         self._up = robot.T_world_base[:3, :3] @ up(robot)
-        self._upright = rising(robot) * up(robot)[2] > UPRIGHT
+        # The floor tilts with a workpiece that the positioner moves.
+        self._upright = not robot.behind and rising(robot) * up(robot)[2] > UPRIGHT
         known = self._known.of(self._known.long)
         standing = float(robot.T_world_base[:3, 3] @ self._up)
         self._foot = min(standing, _lowest(known.end @ self._up).min())

@@ -280,6 +280,8 @@ def _paced(joints: JointMotion) -> JointMotion:
 _WAYS: dict[frozenset[str], str] = {
     frozenset({'joint_offset', 'base_pose'}): 'measure where the base stands (points on its '
     'foot), or master the joint with its own gauge',
+    frozenset({'joint_offset', 'root_pose'}): 'measure where the positioner stands beside the '
+    'robot (points on both feet), or master the joint with its own gauge',
     frozenset({'joint_offset', 'tool_pose'}): 'measure the tool by itself, or master the joint '
     'with its own gauge',
     frozenset({'base_pose', 'tool_pose'}): 'measure the tool by itself',

@@ -27,6 +27,7 @@ def run(args: argparse.Namespace) -> int:
     from ...offline.compensating import compensated, told_trust, write_compensated
 
     robot = robot_of(args)
+    robot.refuse_positioner('a compensated motion')
     recording = read_recording(args.bag, robot, topics_of(args))
     made = compensated(robot, args.model, recording)
     say_doubts(made.model.twin, args.model)

@@ -99,7 +99,7 @@ ROBOTS = {
     'gantry': random_robot(4, slides=(0, 3), convention='standard'),
     'modified gantry': random_robot(5, slides=(1,), convention='modified'),
     'positioner': random_cell(6, slides=(0,)),
-    'modified positioner': random_cell(8, convention='modified'),
+    'modified positioner': random_cell(12, convention='modified'),
 }
 
 

@@ -61,7 +61,7 @@ class Frames(NamedTuple):
     base_point: Array
     root_rotation: Array
     root_point: Array
-    ends: tuple[tuple[Array, Array, Array, Array], ...] = ()
+    ends: tuple[tuple[Array, ...], ...] = ()
 
 
 def _six(shift: Shift, name: str) -> Array | None:
@@ -140,7 +140,8 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
     axes = max([q.ndim - 1, *(np.ndim(value) for value in shift.values())])
     triad, p = _started(base_rotation, base_point, axes)
     root_rotation, root_point = base_rotation, base_point
-    rows, ends = [], []
+    rows: list[RowAxes] = []
+    ends: list[tuple[Array, ...]] = []
     for i in range(robot.n):
         values: dict[str, Any] = {key: getattr(robot, key)[i] for key in ROW_CHANNELS}
         moved = 'd' if robot.prismatic[i] else 'theta'
@@ -210,14 +211,14 @@ def _row(
 
 def displaced_robot(robot: Robot, shift: Mapping[Channel, float]) -> Robot:
     """Return the robot with displacements of rows, base and tool built in, one number each."""
-    rows = {key: getattr(robot, key).copy() for key in ROW_CHANNELS}
+    rows: dict[str, Any] = {key: getattr(robot, key).copy() for key in ROW_CHANNELS}
     for (name, i), value in shift.items():
         if name in rows:
             rows[name][i] += value
     arrays = {key: np.asarray(value) for key, value in shift.items()}
     kinds = {'T_world_base': base_frame, 'T_root_base': root_frame, 'T_flange_tool': tool_frame}
-    moved = {key: transform(*frame(robot, arrays)) for key, frame in kinds.items()}
-    return replace(robot, **rows, **moved)
+    moved: dict[str, Any] = {key: transform(*frame(robot, arrays)) for key, frame in kinds.items()}
+    return replace(robot, **(rows | moved))
 
 
 def positions(robot: Robot, q: ArrayLike) -> Array:

@@ -49,6 +49,7 @@ _JOINT_KEYS = {
     'max_acceleration',
 }
 _LIMITS = ('lower', 'upper', 'max_velocity', 'max_acceleration')
+_PER_ROW: tuple[str, ...] = ('a', 'alpha', 'd', 'theta', 'beta', 'prismatic', *_LIMITS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,14 +229,14 @@ class Robot:
             raise ModelError(f'robot {self.name!r} has no joints between workpiece and foot')
         still = np.eye(4)
         first = self._rows(
-            np.arange(self.behind)[::-1],
+            range(self.behind)[::-1],
             T_world_base=still,
             T_flange_tool=np.linalg.inv(self.T_world_base),
             gravity=self.T_root_base[:3, :3] @ self.gravity,
             payload_mass=0.0,
             controller=None,
         )
-        return first, self._rows(np.arange(self.behind, self.n), T_world_base=self.T_root_base)
+        return first, self._rows(range(self.behind, self.n), T_world_base=self.T_root_base)
 
     def index(self, joint: str) -> int:
         """
@@ -294,11 +295,10 @@ class Robot:
             return self.with_frames(base=T_world_origin)
         return self.with_frames(base=T_world_origin @ np.linalg.inv(self.T_base_origin))
 
-    def _rows(self, which: Array, **changes: Any) -> Robot:
+    def _rows(self, which: Sequence[int], **changes: Any) -> Robot:
         """Return some of the rows as a robot alone."""
-        keys = ('a', 'alpha', 'd', 'theta', 'beta', 'prismatic', *_LIMITS)
-        keys += () if self.mass is None else ('mass', 'com')
-        rows = {key: getattr(self, key)[which] for key in keys}
+        keys = _PER_ROW if self.mass is None else (*_PER_ROW, 'mass', 'com')
+        rows = {key: getattr(self, key)[list(which)] for key in keys}
         names = tuple(self.joint_names[k] for k in which)
         alone = {'behind': 0, 'T_root_base': np.eye(4), 'joint_names': names}
         return replace(self, **{**rows, **alone, **changes})
@@ -323,12 +323,11 @@ class Robot:
                 f'the workpiece has {positioner.convention} rows and the robot {self.convention} '
                 'ones; give both the same convention'
             )
-        keys = ('a', 'alpha', 'd', 'theta', 'beta', 'prismatic', *_LIMITS)
-        chains = _laden(positioner), self
+        keys, chains = _PER_ROW, (_laden(positioner), self)
         if any(chain.mass is not None for chain in chains):
-            keys += ('mass', 'com')
+            keys = (*_PER_ROW, 'mass', 'com')
             chains = _weighed(chains[0]), _weighed(chains[1])
-        rows = {
+        rows: dict[str, Any] = {
             key: np.concatenate([getattr(chains[0], key)[::-1], getattr(chains[1], key)])
             for key in keys
         }
@@ -337,8 +336,8 @@ class Robot:
             **rows,
             joint_names=positioner.joint_names[::-1] + self.joint_names,
             behind=positioner.n,
-            T_world_base=np.linalg.inv(positioner.T_flange_tool),
-            T_root_base=np.linalg.inv(positioner.T_world_base) @ self.T_world_base,
+            T_world_base=np.asarray(np.linalg.inv(positioner.T_flange_tool)),
+            T_root_base=np.asarray(np.linalg.inv(positioner.T_world_base) @ self.T_world_base),
         )
 
     def refuse_positioner(self, what: str) -> None:
@@ -483,7 +482,8 @@ class Robot:
         positioner, robot = self.branches
         # People know where the positioner stands in the robot's base: so they type it in.
         out = robot.with_frames(base=np.eye(4))._own_mapping()
-        foot = positioner.with_frames(base=np.linalg.inv(self.T_root_base))._own_mapping()
+        there = np.asarray(np.linalg.inv(self.T_root_base))
+        foot = positioner.with_frames(base=there)._own_mapping()
         kept = _WORKPIECE_KEYS - {'name', 'convention', 'payload'}
         out['workpiece'] = {key: value for key, value in foot.items() if key in kept}
         return out

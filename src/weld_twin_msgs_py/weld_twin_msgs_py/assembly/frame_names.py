@@ -143,7 +143,8 @@ class WrenchFrame:
         if name in BASE_NAMES:
             return 'base', ''
         if name in MEASURING_NAMES:
-            if not np.allclose(self._robot.T_world_origin[:3, :3], np.eye(3), atol=1e-9):
+            turned = not np.allclose(self._robot.T_world_origin[:3, :3], np.eye(3), atol=1e-9)
+            if turned or self._robot.behind:
                 raise DataError(
                     f'the wrench is given in the measuring frame, {frame_id!r}, which is turned '
                     'against the base; publish it in the tool or base frame'

@@ -68,18 +68,26 @@ def _robot() -> Schema:
     mass = {'mass': _said(NUMBER, '[kg]'), 'com': _vector(3, 'centre of mass [m]')}
     limits = _object({'sd': NUMBER, 'low': NUMBER, 'high': NUMBER})
     effects = {effect for effect, _ in TABLE}
+    chain: dict[str, Schema] = {
+        'name': TEXT,
+        'convention': {'enum': ['standard', 'modified'], 'description': 'kind of DH rows'},
+        'base': _said(frame, 'the base in the world'),
+        'tool': _said(frame, 'the tool at the flange'),
+        'joints': {'type': 'array', 'items': _joint(), 'minItems': 1},
+        'links': {'type': 'array', 'items': _object(mass), 'description': 'one per joint'},
+        'payload': _object(mass),
+    }
     return _object(
         {
-            'name': TEXT,
-            'convention': {'enum': ['standard', 'modified'], 'description': 'kind of DH rows'},
+            **chain,
             'gravity': _vector(
                 3, 'in the base frame [m/s^2]: (0, 0, 9.80665) for an arm on a ceiling'
             ),
-            'base': _said(frame, 'the base in the world'),
-            'tool': _said(frame, 'the tool at the flange'),
-            'joints': {'type': 'array', 'items': _joint(), 'minItems': 1},
-            'links': {'type': 'array', 'items': _object(mass), 'description': 'one per joint'},
-            'payload': _object(mass),
+            'workpiece': _said(
+                _object(chain, ('joints',)),
+                'the positioner that moves the workpiece: its tool is the measuring frame, its '
+                'payload the workpiece',
+            ),
             'controller': _said(
                 _object(
                     dict.fromkeys(('base', 'flange', 'foot'), frame)

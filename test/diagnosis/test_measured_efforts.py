@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from weld_twin_core import JointMotion, Measurements, Recording, load
+from weld_twin_core.diagnosis.soundness.efforts import compared
+from weld_twin_core.diagnosis.soundness.mending import Given, joints_as
 from weld_twin_core.recording import Signal
 from weld_twin_lab.plant.compliance import Compliant
 from weld_twin_lab.plant.exponentials import arm_from
@@ -155,3 +157,30 @@ def test_efforts_that_are_none_are_refused_in_one_sentence(tmp_path, capsys, eff
     error = capsys.readouterr().err
     assert said in error and error.count('\n') == 1
     assert not (tmp_path / 'found').exists()
+
+
+def test_a_torque_constant_shows_where_all_weights_are_declared():
+    recording = pulled(seed=5, payload=3.0)
+    declared = replace(ROBOT, payload_mass=3.0, payload_com=np.array([0.0, 0.0, 0.1]))
+    wrong = recording.effort.value * (1.0, 1.0, 1.12, 1.0, 1.0, 1.0)
+    told = replace(recording, effort=Signal(recording.effort.t, wrong))
+    sound, found = compared([recording], declared), compared([told], declared)
+    assert sound.causes == () and sound.difference < 0.02
+    assert [(cause.name, cause.joint) for cause in found.causes] == [
+        ('torque_constant', 'elbow_joint')
+    ]
+    assert found.causes[0].value == pytest.approx(1.12, abs=0.01)
+
+
+def test_efforts_go_with_joints_that_are_put_right():
+    recording = pulled(seed=6)
+    matrix = np.eye(6)[[0, 2, 1, 3, 4, 5]]
+    matrix[4, 4], matrix[5, 5] = -1.0, np.pi / 180.0
+    given = joints_as(Given((recording,), ROBOT), matrix, np.zeros(6))
+    got, was = given.recordings[0].effort.value, recording.effort.value
+    np.testing.assert_allclose(got, was[:, [0, 2, 1, 3, 4, 5]] * (1, 1, 1, 1, -1, 1))
+
+
+def test_efforts_that_never_change_are_refused(tmp_path, capsys):
+    assert in_bag(tmp_path, np.zeros_like) == 2
+    assert 'never change, so nothing measured them' in capsys.readouterr().err

@@ -48,7 +48,8 @@ class Sudden(Effect):
     def displace(self, view: View) -> Shift:
         """Return the constant displacement from the instant on."""
         after = self.after(view)
-        return {channel: value * after for channel, value in super().displace(view).items()}  # type: ignore[safe-super]
+        whole = super().displace(view)  # type: ignore[safe-super]
+        return {channel: value * after for channel, value in whole.items()}
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return the constant derivatives from the instant on."""

@@ -135,12 +135,12 @@ class PoseCorrection:
         if before is None or looked is None:
             self._reach, self._bend, self._way = REACH[1], np.zeros((6, 6)), np.zeros(6)
             return
-        size = _away(before, looked.pose)[1]
-        told = _told(before, self._bend, looked.pose)[0]
+        way, size = _away(before, looked.pose)
+        told = _told(before, self._bend, way, size)
         off = float(np.linalg.norm((told - looked.added)[:3]))
         if size > REACH[0]:
             self._bend = (looked.slope - before.slope) / size
-            self._way = between(before.pose, looked.pose)
+            self._way = way
         # The error of what bends evenly grows with the third power of its length.
         best = size * float(np.cbrt(EXACT / max(off, 1e-2 * EXACT)))
         best = min(best, 1.5 * self._reach) if off < EXACT else best
@@ -162,9 +162,10 @@ class PoseCorrection:
 
         """
         assert self._at is not None
-        added, size = _told(self._at, self._bend, pose)
-        onward = _onward(self._way, between(self._at.pose, pose))
-        return added, size / (self._reach if onward else min(self._reach, REACH[1]))
+        way, size = _away(self._at, pose)
+        onward = _onward(self._way, way)
+        reach = self._reach if onward else min(self._reach, REACH[1])
+        return _told(self._at, self._bend, way, size), size / reach
 
     def refusal(self, looked: Looked, limits: GoalLimits) -> str:
         """Return why a pose must not be corrected; empty where it may."""
@@ -243,10 +244,9 @@ def _away(at: Looked, pose: Array) -> tuple[Array, float]:
     return way, sqrt(way[:3] @ way[:3]) + LEVER * sqrt(way[3:] @ way[3:])
 
 
-def _told(at: Looked, bend: Array, pose: Array) -> tuple[Array, float]:
-    """Return what a look tells to add to a pose, its slope bent onwards, and how far that is [m]."""
-    way, size = _away(at, pose)
-    return np.asarray(at.added + (at.slope + 0.5 * size * bend) @ way), size
+def _told(at: Looked, bend: Array, way: Array, size: float) -> Array:
+    """Return what a look tells to add a way (6,) from it, its slope bent onwards with its size [m]."""
+    return np.asarray(at.added + (at.slope + 0.5 * size * bend) @ way)
 
 
 def _onward(before: Array, way: Array) -> bool:

@@ -185,7 +185,7 @@ def examples_of(rows: Sequence[Mapping[str, Any]]) -> list[Example]:
 
     """
     return [
-        Example(str(row['name']), *one, weight=float(row.get('weight', 1.0)))
+        Example._make((str(row['name']), *one, float(row.get('weight', 1.0))))
         for row in rows
         for one in row.get('examples', ())
     ]

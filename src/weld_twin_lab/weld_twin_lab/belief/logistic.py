@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from weld_twin_core.arrays import Array
@@ -27,7 +28,7 @@ class Weights(NamedTuple):
 
 def fitted(
     columns: Array,
-    right: Array,
+    right: Array | NDArray[np.bool_],
     signs: Array,
     ridge: float,
     weight: Array,
@@ -74,7 +75,7 @@ def fitted(
     return Weights(float(found.x[0]), np.asarray(found.x[1:]))
 
 
-def log_loss(probability: Array, right: Array, weight: Array) -> float:
+def log_loss(probability: Array, right: Array | NDArray[np.bool_], weight: Array) -> float:
     """
     Return the mean log loss in nats.
 

@@ -84,5 +84,5 @@ TERMS: dict[str, dict[str, int]] = {
     'answer, many': {'structure': -1, 'left': -1, 'gap': 0},
 }
 """By kind of statement, as `weld_twin_core.diagnosis.calibration.features.KINDS` lists them."""
-OF_FAMILIES = frozenset({'name', 'answer, named'})
+OF_FAMILIES = frozenset({'name'})
 """Kinds of statements that each family named alone is a feature of: some imitate others often."""

@@ -110,7 +110,9 @@ def table(name: str, done: Sequence[Fold]) -> str:
         'efforts': 'diagnosis, springs by measured efforts (`--use-effort`)',
     }
     lines = [
-        f'# {name}: {len(each["frames"])} stations, {len(done)} stretches of time left out in turn',
+        f'# Springs by measured efforts: {len(each["frames"])} {name}',
+        '',
+        f'Position on stations that were not fitted, {len(done)} stretches of time left out in turn.',
         '',
         '| model | mean mm | max mm | mean over frames alone |',
         '|---|---|---|---|',

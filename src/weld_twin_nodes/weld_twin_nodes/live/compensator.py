@@ -169,6 +169,7 @@ class Compensator(ManagedNode):
         self._active = False
         self._told, self._looked_at, self._outdated = '', -np.inf, ''
         self._watch = Supervision()
+        self._listened, self._most_age = False, self.setting('max_age')
         self._stream: PoseStream | None = None
         self._beside, self._goals = (ThreadPoolExecutor(1) for _ in range(2))
         self._out = self.offer(POSE_OUT)
@@ -312,6 +313,7 @@ class Compensator(ManagedNode):
 
     def _look(self) -> None:
         """Look at the model file, and tell that the model is withdrawn, or is not any more."""
+        self._listened = self._correction.get_subscription_count() > 0
         if self._model is not None:
             self._outdated = self._model.outdated(self.setting('max_model_age'))
         why = self._withdrawn() if self._active else ''
@@ -374,13 +376,13 @@ class Compensator(ManagedNode):
                 self._out.publish(encode(stamp, position, rotation))
             return
         now = time.monotonic()
-        start = self._arm.start(now, self.setting('max_age'))
+        arm = self._arm.where(now, self._most_age)
         # Of poses that come in a burst, the stamps tell how far they are apart; where they are set.
         at = stamp * 1e-9 or now
-        given = stream.take(transform(rotation, position), at, start.q, self._withdrawn())
+        given = stream.take(transform(rotation, position), at, arm, self._withdrawn())
         if given.pose is not None:
             self._out.publish(encode(stamp, given.pose[:3, 3], given.pose[:3, :3]))
-        if given.added is not None:
+        if given.added is not None and self._listened:
             self._correction.publish(encode_twist(stamp, given.added))
         if given.why:
             self.refuse(self.resolve_topic_name(POSE_IN.relative), given.why)

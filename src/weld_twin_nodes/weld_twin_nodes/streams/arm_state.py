@@ -51,10 +51,16 @@ class ArmState:
         # What goes on the way it came takes its mark along; the other way has to be gone first.
         self._turned = np.where(ahead | turned, q, self._turned)
 
+    def where(self, now: float, most_age: float) -> Array | None:
+        """Return where the arm stands (n,) [rad or m]; None where the last state is too old."""
+        if not self._lately or now - self._lately[-1][0] > most_age:
+            return None
+        return self._lately[-1][1]
+
     def start(self, now: float, most_age: float) -> Start:
         """Return where a goal begins; nothing is known of it where the last state is too old."""
-        if not self._lately or now - self._lately[-1][0] > most_age:
+        q = self.where(now, most_age)
+        if q is None:
             return Start()
-        q = self._lately[-1][1]
         moving = any(np.abs(q - then).max() > STILL for _, then in self._lately)
         return Start(q, moving, self._came)

@@ -347,6 +347,6 @@ class PoseStream:
     def _rested(self, pose: Array, now: float) -> float:
         """Return for how long the stream has stood still [s]."""
         at = self._rest_pose
-        if at is None or np.abs(between(at, pose)).max() > STILL:
+        if at is None or np.abs(pose - at).max() > STILL:
             self._rest_pose, self._rest_since = pose, now
         return now - self._rest_since

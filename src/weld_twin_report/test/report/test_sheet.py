@@ -462,8 +462,13 @@ def test_pictures_are_drawn_in_light_colours_before_a_dark_page_is_printed(brows
     assert page.evaluate(ink) == dark
 
 
-def test_small_errors_of_one_link_are_no_alternatives():
-    sites = [Site(name, 'joint_a2') for name in ('link_length', 'link_twist')]
-    cause = replace(THREE.causes[0], name=tuple((site, 0.75) for site in sites))
-    named = cause_name(replace(THREE, families=('some',)), cause)
-    assert named == 'errors of link length and twist of joint_a2'
+def test_joints_of_a_kind_are_no_alternatives_and_what_would_do_as_well_is_one():
+    sites = [Site('link_length', f'joint_a{k}') for k in (2, 3)]
+    more = [*sites, Site('link_twist', 'joint_a2')]
+    both = [
+        replace(THREE.causes[0], name=tuple((site, 0.25) for site in some))
+        for some in (sites, more)
+    ]
+    told = [cause_name(replace(THREE, families=('some',)), cause) for cause in both]
+    assert told[0] == 'link length error of joint_a2 and joint_a3'
+    assert told[1] == f'{told[0]} or link twist error of joint_a2'

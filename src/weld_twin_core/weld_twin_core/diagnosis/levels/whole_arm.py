@@ -66,8 +66,9 @@ def _yielded(features: list[Features]) -> Iterator[tuple[str, str, list[Array]]]
     knots = _knots([_distance(maker) for maker in features], RANGES, NEAR)
     if knots is not None:
         yield 'instrument', 'place', [_sighted(maker, knots) for maker in features]
-    yield 'load', 'load', [_weighed_down(maker) for maker in features]
-    yield 'load', 'load', [_carried(maker) for maker in features]
+    if any(maker.view.effort is None for maker in features):  # else what hangs there was measured
+        yield 'load', 'load', [_weighed_down(maker) for maker in features]
+        yield 'load', 'load', [_carried(maker) for maker in features]
     if all(maker.view.temperature is not None for maker in features):
         warmth = [np.asarray(maker.view.temperature) for maker in features]
         knots = _knots(warmth, WARM, LEAST['temperature'])

@@ -141,12 +141,13 @@ def compared(recordings: Sequence[Recording], robot: Robot) -> Efforts | None:
     )
 
 
-def efforts(case: Case) -> Iterator[Finding]:
-    """Yield what the efforts are, and what they say of payload and torque constants."""
+def efforts(case: Case) -> Sequence[Finding]:
+    """Return what the efforts are, and what they say of payload and torque constants."""
     found = compared(case.recordings, case.model.robot)
-    if found is None:
-        return
-    yield _told_sign(found)
+    return [] if found is None else [_told_sign(found), *_told_differences(found)]
+
+
+def _told_differences(found: Efforts) -> Iterator[Finding]:
     if not found.weighed:
         yield Finding(
             'note',
@@ -270,7 +271,7 @@ def _causes(loads: _Loads, gap: Array) -> tuple[EffortCause, ...]:
     plain = [np.zeros((0, *gap.shape)), *(_only(i, loads.beside) for i in range(len(names)))]
     nuisance = np.concatenate(plain)
     before = _left(nuisance, gap)[2]
-    offered = [('payload', None, loads.payload)]
+    offered: list[tuple[str, str | None, Array]] = [('payload', None, loads.payload)]
     offered += [
         ('torque_constant', name, _only(i, loads.statics[None])) for i, name in enumerate(names)
     ]

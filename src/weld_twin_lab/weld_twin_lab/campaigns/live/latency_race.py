@@ -71,6 +71,8 @@ class Contender:
     def hear(self, data: bytes) -> None:
         """Take an answer, whose stamp is when the question was sent."""
         now = time.monotonic_ns()
+        if not self.turns:  # late, of a turn that does not count
+            return
         sec, nanosec = unpack_from('<iI', data, HEADER)
         self.turns[-1].append(now - sec * 1_000_000_000 - nanosec)
 

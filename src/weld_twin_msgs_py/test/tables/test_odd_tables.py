@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import forward
@@ -231,3 +232,32 @@ def test_a_name_is_no_formula_in_a_table_and_comes_back_as_it_was(tmp_path):
     text = csv_text([*names, *XYZ], [[*d, *p] for d, p in zip(DEG, MM, strict=True)])
     assert all(cell[0] not in '=@+' for cell in text.splitlines()[0].split(','))
     np.testing.assert_allclose(of(tmp_path, text, robot)[0].joints.q, Q, atol=1e-9)
+
+
+def test_two_axes_before_a_camera_are_no_wrong_robot(tmp_path):
+    """The plate goes along an arc, and a target far above it along one that bends the other way."""
+    robot = Robot.from_mapping(
+        {
+            'name': 'positioner',
+            'joints': [
+                {'name': 'tilt', 'alpha': -0.5 * np.pi},
+                {'name': 'turn', 'd': -0.5, 'theta_offset': -0.5 * np.pi},
+            ],
+        }
+    )
+    rng = np.random.default_rng(8)
+    tilt, turn = (rng.uniform(-span, span, 120) for span in (0.6, 3.0))
+    axis, level = np.array([[0.0, 0.0, 1.0]]), Rotation.from_rotvec([-0.5 * np.pi, 0.0, 0.0])
+    plate = Rotation.from_rotvec(tilt[:, None] * axis) * level
+    target = plate.apply([0.0, 0.0, -0.5])
+    turned = Rotation.from_rotvec((turn[:, None] - 0.5 * np.pi) * axis)
+    target += (plate * turned).apply([0.3, -0.1, 1.2])
+    camera = Rotation.from_rotvec([2.0, -1.0, 0.7])
+    seen = camera.apply(target) + [-0.5, 0.2, 1.4] + rng.normal(scale=3e-4, size=(120, 3))
+    rows = np.column_stack([tilt, turn, seen]).tolist()
+    text = '\n'.join(','.join(map(str, row)) for row in rows)
+    path = tmp_path / 'camera.csv'
+    path.write_text(f'tilt [rad],turn [rad],x [m],y [m],z [m]\n{text}\n')
+    said = ' '.join(read_table(path, robot).assumptions)
+    assert 'wrong robot' not in said
+    assert 'with base and tool fitted, positions are 0.' in said

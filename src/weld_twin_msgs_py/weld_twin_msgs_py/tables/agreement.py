@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from itertools import permutations, product
+
 import numpy as np
 
 from weld_twin_core.arm.chain import forward
@@ -12,6 +14,18 @@ from weld_twin_core.arrays import Array
 
 _ROUNDS = 30
 """Rounds of fitting the frames in turn; a guess of units needs no more digits."""
+_FIRST = 3
+"""Rounds after which the best of several beginnings is told from the others."""
+_FAR = 0.02
+"""Share of the measured span that a fit may leave before others are begun elsewhere: units differ by
+more, and errors of arms are less."""
+_CORNERS = tuple(
+    turn
+    for order in permutations(range(3))
+    for signs in product((1.0, -1.0), repeat=3)
+    if np.linalg.det(turn := np.diag(signs) @ np.eye(3)[list(order)]) > 0.0
+)
+"""The 24 turns that put axes on axes: every turn is within 63 degrees of one of them."""
 
 
 def misfit(robot: Robot, q: Array, position: Array) -> Array:
@@ -35,16 +49,25 @@ def misfit(robot: Robot, q: Array, position: Array) -> Array:
     seen_turn = (seen.T @ turn.reshape(count, 9)).reshape(3, 3, 3)
     seen_flange = seen.T @ flange
     turned_flange = np.einsum('mbc,mb->c', turn, flange)
-    tool = np.zeros(3)
-    for _ in range(_ROUNDS):
-        R = _best_turn(seen_flange + seen_turn @ tool)
-        cross, own = R @ turns, count * np.eye(3)
-        normal = np.block([[own, cross.T], [cross, own]])
-        right = [np.einsum('ab,abc->c', R, seen_turn) - turned_flange, -R @ flanges]
-        solution = np.linalg.lstsq(normal, np.concatenate(right), rcond=None)[0]
-        tool = solution[:3]
-    rest = seen - (flange + turn @ tool) @ R.T - solution[3:]
-    return np.asarray(np.linalg.norm(rest, axis=1))
+
+    def fitted(R: Array, rounds: int) -> tuple[Array, Array]:
+        """Return what is left of every position, and the turn of the frame after so many rounds."""
+        for _ in range(rounds):
+            cross, own = R @ turns, count * np.eye(3)
+            normal = np.block([[own, cross.T], [cross, own]])
+            right = [np.einsum('ab,abc->c', R, seen_turn) - turned_flange, -R @ flanges]
+            solution = np.linalg.lstsq(normal, np.concatenate(right), rcond=None)[0]
+            last, R = R, _best_turn(seen_flange + seen_turn @ solution[:3])
+        rest = seen - (flange + turn @ solution[:3]) @ last.T - solution[3:]
+        return np.asarray(np.linalg.norm(rest, axis=1)), R
+
+    found, _ = fitted(_best_turn(seen_flange), _ROUNDS)
+    if np.median(found) > _FAR * np.linalg.norm(seen, axis=1).max(initial=0.0):
+        # Few axes bring the flange along an arc: then the turns have ends that are not the best.
+        begun = [fitted(turn, _FIRST) for turn in _CORNERS]
+        _, R = min(begun, key=lambda one: float(np.median(one[0])))
+        found = min(found, fitted(R, _ROUNDS)[0], key=np.median)
+    return found
 
 
 def _best_turn(products: Array) -> Array:

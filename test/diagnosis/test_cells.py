@@ -9,6 +9,7 @@ sees is the one in the other.
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -108,6 +109,8 @@ def test_a_track_of_another_pitch_and_a_tilt_whose_zero_is_off(tmp_path, robot_f
     assert any(('gear_ratio', 'rail') in one for one in sets)
     assert found['shrink']['ratio'] < 0.1
     said = ' '.join(capfd.readouterr().out.split())
+    page = (tmp_path / 'found' / 'report.html').read_text(encoding='utf-8')
+    assert re.search(r'off by 0\.\d+ mm in every metre', page)
     assert 'mm further on every metre' in said
     assert 'measure where the positioner stands beside the robot' in said
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.result import Cause, Diagnosis
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.frame_curve import FrameCurve
@@ -47,7 +48,7 @@ def values(diagnosis: Diagnosis, cause: Cause) -> list[str]:
             continue
         if isinstance(effect, ServoLag):
             rows.append(_trail(diagnosis, effect))
-        rows += _in_a_quarter(effect)
+        rows += _in_a_quarter(effect, diagnosis.model.robot)
         for name, value in short_rows(
             effect, errors.get((effect.name, effect.site), {}), diagnosis.model.robot
         ):
@@ -55,11 +56,13 @@ def values(diagnosis: Diagnosis, cause: Cause) -> list[str]:
     return rows
 
 
-def _in_a_quarter(effect: Effect) -> list[str]:
-    """Return what an error that grows with the angle makes of a quarter turn, in degrees."""
+def _in_a_quarter(effect: Effect, robot: Robot) -> list[str]:
+    """Return what an error that grows with the angle makes of a quarter turn, or of a metre."""
     share = next((getattr(effect, n) for n in _SHARES if hasattr(effect, n)), None)
     if share is None or effect.of != 'joint':
         return []
+    if effect.on_slide(robot):
+        return [f'off by {in_short(1e3 * float(share), None, 1.0, "mm")} in every metre']
     return [f'off by {in_short(_QUARTER * float(share), None, 1.0, "°")} in every 90°']
 
 

@@ -21,6 +21,7 @@ _KINDS = {
     'joint_slip': 'zero',
     'base_pose': 'base',
     'setup_step': 'base',
+    'root_pose': 'root',
     'tool_pose': 'tool',
     'tool_slip': 'tool',
     'wear': 'tool',
@@ -43,17 +44,24 @@ _PLACES = {
     ('kuka', 'zero'): 'Start-up > Master: $MAMES of the axis, in degrees: new value = old value '
     '{degrees}; then master the axis at its notch.',
     ('kuka', 'base'): 'Start-up > Calibrate > Base: change BASE_DATA[n], or $ROBROOT of the cell.',
+    (
+        'kuka',
+        'root',
+    ): 'Start-up > Calibrate > External kinematic system: change the root point, ROOT '
+    'of MACHINE_DEF[n].',
     ('kuka', 'tool'): 'Start-up > Calibrate > Tool: change TOOL_DATA[n].',
     ('kuka', 'load'): 'Start-up > Calibrate > Tool > Payload data: change LOAD_DATA[n].',
     ('abb', 'zero'): 'Calibration > Calib. parameters: motor calibration offset of the axis, in '
     'radians of the motor: new value = old value {radians_back} * G, where G is radians of the '
     'motor per radian of the joint, with its sign.',
     ('abb', 'base'): 'Change wobj.uframe of the work object, or Base Frame in the topic Motion.',
+    ('abb', 'root'): 'Change Base Frame of the positioner (topic Motion, type Single).',
     ('abb', 'tool'): 'Change tframe of the tooldata.',
     ('abb', 'load'): 'Change the loaddata, or run LoadIdentify.',
     ('fanuc', 'zero'): 'MENU > SYSTEM > Master/Cal > Single axis master: MSTR POS of the axis, in '
     'degrees: new value = what it reads now {degrees}; then EXEC, without moving it before.',
     ('fanuc', 'base'): 'MENU > SETUP > Frames: change the user frame UFRAME[n].',
+    ('fanuc', 'root'): 'MENU > SETUP > Coord: change the frame of the coordinated pair.',
     ('fanuc', 'tool'): 'MENU > SETUP > Frames: change the tool frame UTOOL[n].',
     ('fanuc', 'load'): 'MENU > SYSTEM > Motion: change the payload schedule.',
     (
@@ -93,6 +101,7 @@ _ANYWHERE = {
     'zero': 'As the zero of this axis, by mastering it anew: new reading = old reading {far}, with '
     'the joint left where it is',
     'base': 'As the frame of the base or of the work object',
+    'root': "As the frame where the positioner stands in the robot's base",
     'tool': 'As the tool centre point',
     'load': 'As the payload',
     'model': 'In the kinematic model, where the controller has one that can be edited; else correct '
@@ -186,7 +195,6 @@ _BY_PROGRAM = (
     'joint_compliance',
     'bearing_tilt',
     'pedestal_tilt',
-    'root_pose',
     'guide_bend',
     'guide_tilt',
     'hose_pull',

@@ -463,11 +463,12 @@ class Recording:
         A running twin has to hold what it heard last; an analysis of the past knows the sample
         after as well.
         """
-        wrench, temperature, effort = (
-            None if signal is None else replace(signal, held=False) for signal in self.sides
+        wrench, temperature = (
+            None if signal is None else replace(signal, held=False)
+            for signal in (self.wrench, self.temperature)
         )
-        looking = replace(self, wrench=wrench, temperature=temperature)
-        return looking if effort is None else replace(looking, effort=effort)
+        effort = None if self.effort is None else replace(self.effort, held=False)
+        return replace(self, wrench=wrench, temperature=temperature, effort=effort)
 
     def thinned(self, measurements: int, joints: int) -> Recording:
         """

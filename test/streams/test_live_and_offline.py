@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import rotation_matrix
 from weld_twin_core.effects import (
     REGISTRY,
@@ -78,6 +79,28 @@ EXAMPLES = {
     'tool_pose': {'xyz': [1e-3, 2e-3, -1e-3], 'rotvec': [1e-3, 0.0, 2e-3]},
     'transmission_ripple': {**ELBOW, 'amplitude': 1e-3, 'order': 100.0, 'phase': 0.3},
     'vibration': {**ELBOW, 'frequency': 8.0, 'damping': 0.05, 'gain': 0.3},
+}
+CELL = Robot.from_mapping(
+    ARM.to_mapping()
+    | {
+        'joints': [
+            {'name': 'track', 'type': 'prismatic', 'alpha': -1.57},
+            *ARM.to_mapping()['joints'],
+        ],
+        'links': [{'mass': 90.0, 'com': [0.0, 0.0, 0.1]}, *ARM.to_mapping()['links']],
+        'workpiece': {
+            'base': {'xyz': [1.2, 0.3, 0.4]},
+            'tool': {'xyz': [0.1, 0.0, 0.2]},
+            'joints': [{'name': 'tilt', 'a': 0.1, 'alpha': 1.5}, {'name': 'turn', 'd': 0.2}],
+            'links': [{'mass': 60.0, 'com': [0.1, 0, 0]}, {'mass': 30.0, 'com': [0, 0.1, 0]}],
+        },
+    }
+)
+"""The same arm on a track beside a positioner."""
+OF_CELLS = {
+    'root_pose': {'xyz': [1e-3, 2e-3, -1e-3], 'rotvec': [1e-3, 0.0, 2e-3]},
+    'guide_bend': {'joint': 'track', 'curvature': [1e-3, -2e-3]},
+    'guide_tilt': {'joint': 'track', 'rate': [1e-3, 0.0, 2e-3]},
 }
 SPRING = effect_from_mapping({'effect': 'joint_compliance', **ELBOW, 'compliance': 1e-5})
 LAG = effect_from_mapping({'effect': 'servo_lag', **ELBOW, 'time_constant': 0.02})
@@ -175,7 +198,25 @@ def example(name):
     return effect_from_mapping({'effect': name, **EXAMPLES[name]})
 
 
-@pytest.mark.parametrize('name', sorted(REGISTRY))
+def in_a_cell():
+    """Yield joint states of two drivers: the robot on its track, and the positioner."""
+    for ns, q, rate in zip(*motion(), strict=True):
+        more = q[:3] * [0.3, 1.0, 2.0], rate[:3]
+        arm = np.append(more[0][0], q), np.append(more[1][0], rate)
+        yield ns, '/joint_states', MAKE.joint_state(ns, ('track', *NAMES), *arm)
+        yield ns, '/joint_states', MAKE.joint_state(ns, ('tilt', 'turn'), more[0][1:], more[1][1:])
+
+
+@pytest.mark.parametrize('name', ['', *OF_CELLS, 'joint_compliance', 'backlash', 'pedestal_tilt'])
+def test_a_cell_of_two_drivers_is_the_same_live_and_offline(tmp_path, name):
+    entry = {**EXAMPLES, **OF_CELLS}.get(name, {}) | {'effect': name}
+    if name in ('joint_compliance', 'backlash'):
+        entry['joint'] = 'tilt'
+    effects = (effect_from_mapping(entry), SPRING) if name else ()
+    compare(tmp_path / 'bag', in_order(sides(), in_a_cell()), effects, CELL)
+
+
+@pytest.mark.parametrize('name', sorted(set(REGISTRY) - set(OF_CELLS)))
 def test_every_effect_is_the_same_live_and_offline(tmp_path, name):
     assert name in EXAMPLES, f'give an example of {name} here'
     compare(tmp_path / 'bag', in_order(sides(), joints()), (example(name), SPRING))

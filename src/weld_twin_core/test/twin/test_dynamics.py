@@ -15,8 +15,8 @@ def positions(robot, count=4, seed=0):
     return np.random.default_rng(seed).uniform(-1.5, 1.5, (count, robot.n))
 
 
-def pinocchio_model(pin, robot):
-    """Build the chain joint by joint: constant parts of a row go before or after its joint."""
+def add_branch(pin, model, robot, place, rows):
+    """Add rows from a place on what stands still; return the last joint, and the end in it."""
 
     def turn(axis, angle):
         return pin.SE3(pin.AngleAxis(angle, np.eye(3)['xyz'.index(axis)]).matrix(), np.zeros(3))
@@ -24,38 +24,42 @@ def pinocchio_model(pin, robot):
     def slide(axis, length):
         return pin.SE3(np.eye(3), length * np.eye(3)['xyz'.index(axis)])
 
-    def branch(place, rows):
-        """Add rows from a place on what stands still; return the last joint, and the end in it."""
-        parent, after = 0, pin.SE3(place)
-        for i in rows:
-            before = turn('x', robot.alpha[i]) * turn('y', robot.beta[i]) * slide('x', robot.a[i])
-            fixed = turn('z', robot.theta[i]) * slide('z', robot.d[i])
-            if robot.convention == 'standard':
-                at = after
-                fixed = (
-                    fixed
-                    * slide('x', robot.a[i])
-                    * turn('x', robot.alpha[i])
-                    * turn('y', robot.beta[i])
-                )
-            else:
-                at = after * before
-            joint = pin.JointModelPZ() if robot.prismatic[i] else pin.JointModelRZ()
-            parent, after = model.addJoint(parent, joint, at, f'j{i}'), fixed
-            inertia = pin.Inertia(robot.mass[i], robot.com[i], np.zeros((3, 3)))
-            model.appendBodyToJoint(parent, inertia, fixed)
-        return parent, after
+    parent, after = 0, pin.SE3(place)
+    for i in rows:
+        before = turn('x', robot.alpha[i]) * turn('y', robot.beta[i]) * slide('x', robot.a[i])
+        fixed = turn('z', robot.theta[i]) * slide('z', robot.d[i])
+        if robot.convention == 'standard':
+            at = after
+            fixed = (
+                fixed
+                * slide('x', robot.a[i])
+                * turn('x', robot.alpha[i])
+                * turn('y', robot.beta[i])
+            )
+        else:
+            at = after * before
+        joint = pin.JointModelPZ() if robot.prismatic[i] else pin.JointModelRZ()
+        parent, after = model.addJoint(parent, joint, at, f'j{i}'), fixed
+        inertia = pin.Inertia(robot.mass[i], robot.com[i], np.zeros((3, 3)))
+        model.appendBodyToJoint(parent, inertia, fixed)
+    return parent, after
 
+
+def pinocchio_model(pin, robot):
+    """Build the chain joint by joint: constant parts of a row go before or after its joint."""
     model, k = pin.Model(), robot.behind
     # A robot stands in the measuring frame; beside a positioner all stand in the robot's base.
     base = np.eye(4) if k else robot.T_world_base
     model.gravity = pin.Motion(base[:3, :3] @ robot.gravity, np.zeros(3))
-    parent, after = branch(np.linalg.inv(robot.T_root_base), range(k)[::-1]) if k else (0, base)
+    parent, after = (0, base)
+    if k:
+        foot = np.linalg.inv(robot.T_root_base)
+        parent, after = add_branch(pin, model, robot, foot, range(k)[::-1])
     table = (
         pin.SE3(after) * pin.SE3(np.linalg.inv(robot.T_world_base)) if k else pin.SE3.Identity()
     )
     model.addFrame(pin.Frame('table', parent, table, pin.FrameType.OP_FRAME))
-    parent, after = branch(base, range(k, robot.n))
+    parent, after = add_branch(pin, model, robot, base, range(k, robot.n))
     tool = after * pin.SE3(robot.T_flange_tool)
     payload = pin.Inertia(robot.payload_mass, robot.payload_com, np.zeros((3, 3)))
     model.appendBodyToJoint(parent, payload, tool)

@@ -156,17 +156,11 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
         triad, p, row_axes = _row(order, triad, p, values)
         rows.append(row_axes)
         if i + 1 == robot.behind:
-            rotation, origin = root_frame(robot, shift)
-            at, foot = _ended(triad, p)
-            root_rotation = at @ rotation
-            root_point = foot + (at @ origin[..., None])[..., 0]
+            root_rotation, root_point = _beyond(*_ended(triad, p), root_frame(robot, shift))
             triad, p = _started(root_rotation, root_point, axes)
     flange, flange_point = _ended(triad, p)
-    tool_rotation, tool_point = tool_frame(robot, shift)
-    position = flange_point + (flange @ tool_point[..., None])[..., 0]
     return Frames(
-        flange @ tool_rotation,
-        position,
+        *_beyond(flange, flange_point, tool_frame(robot, shift)),
         tuple(rows),
         flange,
         flange_point,
@@ -176,6 +170,11 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
         root_point,
         tuple(ends),
     )
+
+
+def _beyond(rotation: Array, point: Array, frame: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Return rotation and origin of a frame that is given in another one."""
+    return rotation @ frame[0], point + (rotation @ frame[1][..., None])[..., 0]
 
 
 def _started(rotation: Array, point: Array, axes: int) -> tuple[tuple[Array, ...], Array]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..arm.channels import Shift
-from .carriage import GuideError, carriage_axes, carried
+from .carriage import GuideError, carriage_axes, carried, summed
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
@@ -31,13 +31,8 @@ class GuideBend(GuideError):
 
     def displace(self, view: View) -> Shift:
         """Return how the tool moves with the carriage."""
-        parts = self._parts(view)
-        return {
-            channel: sum(
-                self.number('curvature', k) * part[channel] for k, part in enumerate(parts)
-            )
-            for channel in parts[0]
-        }
+        values = [self.number('curvature', k) for k in range(2)]
+        return summed(values, self._parts(view))
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return the same for a curvature of one along each axis."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..arm.channels import Shift
-from .carriage import GuideError, carriage_axes, carried
+from .carriage import GuideError, carriage_axes, carried, summed
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
@@ -31,11 +31,8 @@ class GuideTilt(GuideError):
 
     def displace(self, view: View) -> Shift:
         """Return how the tool moves with the carriage."""
-        parts = self._parts(view)
-        return {
-            channel: sum(self.number('rate', k) * part[channel] for k, part in enumerate(parts))
-            for channel in parts[0]
-        }
+        values = [self.number('rate', k) for k in range(3)]
+        return summed(values, self._parts(view))
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return the same for a rate of one about each axis."""

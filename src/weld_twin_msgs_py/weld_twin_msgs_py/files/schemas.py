@@ -61,36 +61,43 @@ def _joint() -> Schema:
     )
 
 
-def _robot() -> Schema:
-    frame = _object(
+def _frame() -> Schema:
+    return _object(
         {'xyz': _vector(3, 'position [m]'), 'quat_xyzw': _vector(4, 'orientation, scalar last')}
     )
+
+
+def _chain() -> dict[str, Schema]:
+    """Return the keys that the chain of a robot and that of its workpiece have alike."""
     mass = {'mass': _said(NUMBER, '[kg]'), 'com': _vector(3, 'centre of mass [m]')}
-    limits = _object({'sd': NUMBER, 'low': NUMBER, 'high': NUMBER})
-    effects = {effect for effect, _ in TABLE}
-    chain: dict[str, Schema] = {
+    return {
         'name': TEXT,
         'convention': {'enum': ['standard', 'modified'], 'description': 'kind of DH rows'},
-        'base': _said(frame, 'the base in the world'),
-        'tool': _said(frame, 'the tool at the flange'),
+        'base': _said(_frame(), 'the base in the world'),
+        'tool': _said(_frame(), 'the tool at the flange'),
         'joints': {'type': 'array', 'items': _joint(), 'minItems': 1},
         'links': {'type': 'array', 'items': _object(mass), 'description': 'one per joint'},
         'payload': _object(mass),
     }
+
+
+def _robot() -> Schema:
+    limits = _object({'sd': NUMBER, 'low': NUMBER, 'high': NUMBER})
+    effects = {effect for effect, _ in TABLE}
     return _object(
         {
-            **chain,
+            **_chain(),
             'gravity': _vector(
                 3, 'in the base frame [m/s^2]: (0, 0, 9.80665) for an arm on a ceiling'
             ),
             'workpiece': _said(
-                _object(chain, ('joints',)),
+                _object(_chain(), ('joints',)),
                 'the positioner that moves the workpiece: its tool is the measuring frame, its '
                 'payload the workpiece',
             ),
             'controller': _said(
                 _object(
-                    dict.fromkeys(('base', 'flange', 'foot'), frame)
+                    dict.fromkeys(('base', 'flange', 'foot'), _frame())
                     | {'base_link': TEXT, 'flange_link': TEXT}
                 ),
                 "the controller's base, and the link the arm stands in (foot), in the base; the "

@@ -123,7 +123,7 @@ def _tool_pose(effect: Effect, robot: Robot) -> str:
 def _root_pose(effect: Effect, robot: Robot) -> str:
     rows = robot.T_base_foot
     step = (effect.vector().reshape(2, 3) @ rows[:3, :3]).ravel()
-    now = np.linalg.inv(robot.T_root_base @ rows)
+    now = np.asarray(np.linalg.inv(robot.T_root_base @ rows))
     new = np.eye(4)
     new[:3, :3] = rotation_matrix(step[3:]) @ now[:3, :3]
     new[:3, 3] = now[:3, 3] + step[:3]

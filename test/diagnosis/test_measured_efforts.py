@@ -11,7 +11,7 @@ import pytest
 from weld_twin_core import JointMotion, Measurements, Recording, load
 from weld_twin_core.diagnosis.soundness.efforts import compared
 from weld_twin_core.diagnosis.soundness.mending import Given, joints_as
-from weld_twin_core.recording import Signal
+from weld_twin_core.recording import JointSignal
 from weld_twin_lab.plant.compliance import Compliant
 from weld_twin_lab.plant.exponentials import arm_from
 from weld_twin_lab.plant.plant import run
@@ -55,7 +55,9 @@ def pulled(seed=3, payload=0.0):
     torque = plant.torque(q + plant.sag(q, wrench), wrench)
     torque += rng.normal(scale=0.2, size=torque.shape)
     measured = Measurements(t, seen.position)
-    return Recording('pulled', JointMotion(t, q, static=True), measured, effort=Signal(t, -torque))
+    return Recording(
+        'pulled', JointMotion(t, q, static=True), measured, effort=JointSignal(t, -torque)
+    )
 
 
 @pytest.fixture(scope='module')
@@ -129,7 +131,7 @@ def test_a_program_is_not_corrected_by_efforts_to_come(cell, tmp_path, capsys):
 def in_bag(tmp_path, effort, holds=True):
     recording = pulled(seed=4, payload=3.0)
     value = recording.effort.value * (1.0 if holds else -1.0)
-    told = replace(recording, effort=Signal(recording.effort.t, effort(value)))
+    told = replace(recording, effort=JointSignal(recording.effort.t, effort(value)))
     write_recording(tmp_path / 'bag', told, ROBOT)
     words = ('diagnose', tmp_path / 'bag', '--robot', 'ur10e', '--align', 'base,tool')
     return commanded(*words, '--use-effort', '--out', tmp_path / 'found')
@@ -163,7 +165,7 @@ def test_a_torque_constant_shows_where_all_weights_are_declared():
     recording = pulled(seed=5, payload=3.0)
     declared = replace(ROBOT, payload_mass=3.0, payload_com=np.array([0.0, 0.0, 0.1]))
     wrong = recording.effort.value * (1.0, 1.0, 1.12, 1.0, 1.0, 1.0)
-    told = replace(recording, effort=Signal(recording.effort.t, wrong))
+    told = replace(recording, effort=JointSignal(recording.effort.t, wrong))
     sound, found = compared([recording], declared), compared([told], declared)
     assert sound.causes == () and sound.difference < 0.02
     assert [(cause.name, cause.joint) for cause in found.causes] == [

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -240,8 +240,8 @@ class Signal:
     ----------
     t : array, shape (K,) [s]
         Stamps on the joint clock, strictly increasing.
-    value : array, shape (K,) or (K, m)
-        Temperatures [degC]; force and torque [N, N m], m = 6; efforts of m joints [N m, or N].
+    value : array, shape (K,) or (K, 6)
+        Temperatures [degC], or force and torque [N, N m].
     held : bool
         A sample is in force until the next one, as a running twin has it; else the signal is
         straight between samples.
@@ -264,11 +264,13 @@ class Signal:
     value: Array
     held: bool = False
 
+    _columns: ClassVar[int | None] = 6
+
     def __post_init__(self) -> None:
         t = increasing(self.t, 'signal stamps')
         if t.size == 0:
             raise DataError('a signal is empty; leave it out of the recording')
-        shape = (t.size,) if np.ndim(self.value) == 1 else (t.size, None)
+        shape = (t.size,) if np.ndim(self.value) == 1 else (t.size, self._columns)
         object.__setattr__(self, 't', t)
         object.__setattr__(self, 'value', readonly(self.value, shape, 'signal values'))
 
@@ -288,6 +290,13 @@ class Signal:
             return np.interp(t, self.t, self.value)
         columns = [np.interp(t, self.t, column) for column in self.value.T]
         return np.stack(columns, axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class JointSignal(Signal):
+    """A sampled signal with a value for every joint, shape (K, n), such as efforts [N m, or N]."""
+
+    _columns: ClassVar[int | None] = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +325,7 @@ class Recording:
         What the tool point touched in every posture, in place of measured positions.
     simulated : bool
         Whether it says of itself that a simulator made it, with or without noise of an instrument.
-    effort : Signal, value shape (K, n) [N m, or N of a slide], optional
+    effort : JointSignal, value shape (K, n) [N m, or N of a slide], optional
         Effort of each joint as the controller measured it; there where springs are to take it.
     effort_holds : bool
         The effort is what holds the load, as ROS means it; else it is the load itself.
@@ -349,7 +358,7 @@ class Recording:
     incomplete: tuple[str, ...] = ()
     contacts: Contacts | None = None
     simulated: bool = False
-    effort: Signal | None = None
+    effort: JointSignal | None = None
     effort_holds: bool = True
 
     def __post_init__(self) -> None:
@@ -378,7 +387,7 @@ class Recording:
                 )
 
     @property
-    def sides(self) -> tuple[Signal | None, Signal | None, Signal | None]:
+    def sides(self) -> tuple[Signal | None, Signal | None, JointSignal | None]:
         """Return wrench, temperature and effort."""
         return self.wrench, self.temperature, self.effort
 
@@ -454,9 +463,11 @@ class Recording:
         A running twin has to hold what it heard last; an analysis of the past knows the sample
         after as well.
         """
-        wrench, temperature, effort = (
-            None if signal is None else replace(signal, held=False) for signal in self.sides
+        wrench, temperature = (
+            None if signal is None else replace(signal, held=False)
+            for signal in (self.wrench, self.temperature)
         )
+        effort = None if self.effort is None else replace(self.effort, held=False)
         return replace(self, wrench=wrench, temperature=temperature, effort=effort)
 
     def thinned(self, measurements: int, joints: int) -> Recording:

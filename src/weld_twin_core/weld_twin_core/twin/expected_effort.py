@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arm.robot import Robot
-from ..recording import Recording, Signal
+from ..recording import JointSignal, Recording
 from .stages import load_torque
 from .twin import Twin
 
@@ -32,5 +32,5 @@ def with_expected_effort(recording: Recording, robot: Robot, like: Recording) ->
         return recording
     load = load_torque(Twin(robot).joint_view(recording))
     each = np.stack([load['tau', i] for i in range(robot.n)], axis=-1)
-    effort = Signal(recording.joints.t, -each if like.effort_holds else each)
+    effort = JointSignal(recording.joints.t, -each if like.effort_holds else each)
     return replace(recording, effort=effort, effort_holds=like.effort_holds)

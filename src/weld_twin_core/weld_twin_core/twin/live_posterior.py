@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Array
-from ..recording import JointMotion, Recording, Signal
+from ..recording import JointMotion, JointSignal, Recording, Signal
 from .features import Features
 from .posterior import Posterior
 from .twin import Twin
@@ -102,7 +102,7 @@ class LivePosterior:
             None if wrench is None else Signal(now, wrench[None]),
             wrench_frame,
             None if temperature is None else Signal(now, np.array([temperature])),
-            effort=None if effort is None else Signal(now, effort[None]),
+            effort=None if effort is None else JointSignal(now, effort[None]),
         )
         self._covariance = self.posterior.pose_covariance(Features(twin, recording, now))[0]
         found = self.posterior.domain.outside(

@@ -14,7 +14,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Recording, Signal
+from weld_twin_core.recording import JointMotion, JointSignal, Recording
 
 from ..real_robots.unseen_stations import ALIGN, residual
 from ..transfer.plain import PLAIN, plain_fit
@@ -95,7 +95,7 @@ def _part(recording: Recording, rows: np.ndarray) -> Recording:
         recording,
         joints=JointMotion(joints.t[rows], joints.q[rows], None, static=True),
         measured=measured.take(rows),
-        effort=Signal(effort.t[rows], effort.value[rows]),
+        effort=JointSignal(effort.t[rows], effort.value[rows]),
     )
 
 

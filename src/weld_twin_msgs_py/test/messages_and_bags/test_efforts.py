@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import Signal
+from weld_twin_core.recording import JointSignal
 from weld_twin_msgs_py.bags import BagReader, BagWriter, from_bag, read_recording, write_recording
 from weld_twin_msgs_py.messages.cdr_read import decoder
 from weld_twin_msgs_py.messages.to_messages import bag_messages
@@ -27,7 +27,7 @@ NAMES = ('elbow', 'gripper', 'shoulder')
 def borne(recording):
     """A recording with efforts: numbers without meaning."""
     value = np.random.default_rng(8).normal(size=recording.joints.q.shape)
-    return replace(recording, effort=Signal(recording.joints.t, value))
+    return replace(recording, effort=JointSignal(recording.joints.t, value))
 
 
 def test_efforts_come_back_from_a_bag_at_once_and_one_by_one(tmp_path, borne, robot, monkeypatch):

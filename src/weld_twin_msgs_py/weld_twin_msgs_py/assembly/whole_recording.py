@@ -14,6 +14,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import (
     JointMotion,
+    JointSignal,
     Measurements,
     Recording,
     Signal,
@@ -114,7 +115,7 @@ def seconds(ns: np.ndarray, epoch: int) -> Array:
     return np.asarray((ns - epoch) * 1e-9)
 
 
-def _motion(robot: Robot, joints: Samples) -> tuple[JointMotion, Signal | None]:
+def _motion(robot: Robot, joints: Samples) -> tuple[JointMotion, JointSignal | None]:
     """
     Return the joint stream, and its efforts where they were read.
 
@@ -122,7 +123,7 @@ def _motion(robot: Robot, joints: Samples) -> tuple[JointMotion, Signal | None]:
     """
     t, n = seconds(joints.ns, int(joints.ns[0])), robot.n
     q, qd, effort = joints.rows[:, :n], joints.rows[:, n : 2 * n], joints.rows[:, 2 * n :]
-    told = Signal(t, effort) if effort.size else None
+    told = JointSignal(t, effort) if effort.size else None
     untold = np.isnan(qd).any(axis=1, keepdims=True)
     if untold.all():
         return JointMotion(t, q), told

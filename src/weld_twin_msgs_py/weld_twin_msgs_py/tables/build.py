@@ -15,7 +15,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
+from weld_twin_core.recording import JointMotion, JointSignal, Measurements, Recording, Signal
 
 from .agreement import misfit
 from .cells import Cells, read_cells
@@ -161,7 +161,7 @@ def _temperature(cells: Cells, columns: Columns, t: Array, said: list[str]) -> S
 
 def _effort(
     cells: Cells, robot: Robot, columns: Columns, t: Array, said: list[str]
-) -> Signal | None:
+) -> JointSignal | None:
     """Return the measured efforts; what cannot be used is left out, for few ask for it."""
     names = columns.effort
     if not names:
@@ -182,7 +182,7 @@ def _effort(
         return None
     unit = next((unit for unit in units if unit), 'N m, as the header names no unit')
     said.append(f'efforts are {", ".join(names)} in {unit}; --use-effort has springs take them')
-    return Signal(t, values * [_TORQUES[unit or 'N m'] for unit in units])
+    return JointSignal(t, values * [_TORQUES[unit or 'N m'] for unit in units])
 
 
 def _relative_misfit(

@@ -200,7 +200,7 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
         joints=replace(own.joints, t=moved(own.joints.t), qd=qd),
         wrench=signal(own.wrench),
         temperature=signal(own.temperature),
-        effort=signal(own.effort),
+        effort=None if own.effort is None else replace(own.effort, t=moved(own.effort.t)),
     )
     return replace(given, recordings=tuple(recordings))
 

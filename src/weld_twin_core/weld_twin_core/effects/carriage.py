@@ -44,21 +44,9 @@ class GuideError(Effect):
             raise ModelError(f'{self.name} is of a joint that slides, and {self.site!r} turns')
 
     @classmethod
-    def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: an axis that turns has no guide.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on.
-
-        """
-        if joint is not None and not view.robot.prismatic[view.robot.index(joint)]:
-            return 'a joint that turns has no guide'
-        return super().applicable(view, joint)
+    def fits(cls, robot: Robot, joint: str | None) -> bool:
+        """Return whether the joint slides."""
+        return joint is not None and bool(robot.prismatic[robot.index(joint)])
 
 
 def carriage_axes(view: View, i: int) -> tuple[Array, Array, Array]:

@@ -10,7 +10,7 @@ from ..arm.robot import Robot
 from ..errors import ModelError
 from .constant import FrameError
 from .registry import register
-from .view import Value, View
+from .view import Value
 
 
 @register
@@ -47,16 +47,6 @@ class RootPose(FrameError):
             )
 
     @classmethod
-    def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: a robot alone has no positioner beside it.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            None: it is of the whole cell.
-
-        """
-        return super().applicable(view, joint) if view.robot.behind else 'there is no positioner'
+    def fits(cls, robot: Robot, joint: str | None) -> bool:
+        """Return whether there is a positioner."""
+        return robot.behind > 0

@@ -44,6 +44,25 @@ class GuideError(Effect):
             raise ModelError(f'{self.name} is of a joint that slides, and {self.site!r} turns')
 
     @classmethod
+    def applicable(cls, view: View, joint: str | None) -> str | None:
+        """
+        Return why the data cannot show it: the robot may have no such thing.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            The joint it would sit on.
+
+        """
+        return (
+            super().applicable(view, joint)
+            if cls.fits(view.robot, joint)
+            else 'a joint that turns has no guide'
+        )
+
+    @classmethod
     def fits(cls, robot: Robot, joint: str | None) -> bool:
         """Return whether the joint slides."""
         return joint is not None and bool(robot.prismatic[robot.index(joint)])

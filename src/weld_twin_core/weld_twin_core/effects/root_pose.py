@@ -10,7 +10,7 @@ from ..arm.robot import Robot
 from ..errors import ModelError
 from .constant import FrameError
 from .registry import register
-from .view import Value
+from .view import Value, View
 
 
 @register
@@ -45,6 +45,25 @@ class RootPose(FrameError):
             raise ModelError(
                 f'{self.name} is of a positioner, and robot {robot.name!r} has none; use base_pose'
             )
+
+    @classmethod
+    def applicable(cls, view: View, joint: str | None) -> str | None:
+        """
+        Return why the data cannot show it: the robot may have no such thing.
+
+        Parameters
+        ----------
+        view : View
+            The samples that reach the effect.
+        joint : str or None
+            The joint it would sit on.
+
+        """
+        return (
+            super().applicable(view, joint)
+            if cls.fits(view.robot, joint)
+            else 'there is no positioner'
+        )
 
     @classmethod
     def fits(cls, robot: Robot, joint: str | None) -> bool:

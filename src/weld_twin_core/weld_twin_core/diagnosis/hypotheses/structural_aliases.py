@@ -285,12 +285,15 @@ def _of(site: Site) -> Effect:
 
 
 def _candidates(robot: Robot, kinds: Sequence[str], align: frozenset[str]) -> Iterator[Effect]:
+    view = _anywhere(robot).view
     for name in kinds:
         kind = REGISTRY[name]
         if kind.fitted_with in align:
             continue
         for joint in joints_of(kind, robot):
-            yield _of(Site(name, joint))
+            # A robot without a positioner has no foot of one, whatever is taken out.
+            if kind.applicable(view, joint) is None:
+                yield _of(Site(name, joint))
 
 
 def same_error(robot: Robot, one: Effect, other: Effect) -> bool:

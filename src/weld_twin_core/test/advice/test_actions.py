@@ -4,6 +4,7 @@
 
 import pytest
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.diagnosis.advice.readable import number
 from weld_twin_core.effects import REGISTRY, effects_from_list
@@ -80,8 +81,30 @@ def test_the_number_and_the_unit_are_those_to_enter(ur5, entry, parts):
     assert all(part in sentence for part in parts), sentence
 
 
+OF_CELLS = ('root_pose', 'guide_bend', 'guide_tilt')
+
+
+def test_errors_of_a_cell_have_sentences_in_mm_and_degrees(ur5):
+    track = {'name': 'track', 'type': 'prismatic', 'alpha': 1.5}
+    data = ur5.to_mapping()
+    joints, links = [track, *data['joints']], [{'mass': 9.0}, *data.get('links', [])]
+    more = {'links': links} if 'links' in data else {}
+    foot = {'base': {'xyz': [1.5, 0.0, 0.5]}, 'joints': [{'name': 'tilt', 'alpha': 1.5}]}
+    cell = Robot.from_mapping(data | {'joints': joints, 'workpiece': foot} | more)
+    root = said(cell, effect='root_pose', xyz=[2e-3, 0.0, 0.0], rotvec=[0.0, 0.0, 0.0])
+    assert 'x, y, z = (1502.000, 0.000, 500.000) mm' in root
+    assert 'in place of x, y, z = (1500.000, 0.000, 500.000) mm' in root
+    bend = said(cell, effect='guide_bend', joint='track', curvature=[8e-4, 0.0])
+    assert 'over a metre it is bent by 0.100 mm along x' in bend
+    tilt = said(cell, effect='guide_tilt', joint='track', rate=[1e-3, 0.0, 0.0])
+    assert '(+0.0573, 0, 0) deg about x, y, z' in tilt
+    assert '0.300 mm of play' in said(cell, effect='backlash', joint='track', width=3e-4)
+
+
 def test_nothing_is_told_in_milliradians_or_with_an_exponent(ur5):
     for name, kind in REGISTRY.items():
+        if name in OF_CELLS:
+            continue
         where = {'joint': 'elbow_joint'} if kind.of in ('joint', 'link') else {}
         more = {'source': 'wrist_1_joint'} if name == 'joint_coupling' else {}
         sizes = {
@@ -96,6 +119,8 @@ def test_nothing_is_told_in_milliradians_or_with_an_exponent(ur5):
 
 def test_every_effect_of_the_library_has_its_own_sentence_but_noise(ur5):
     for name, kind in REGISTRY.items():
+        if name in OF_CELLS:
+            continue
         entry = {'effect': name}
         if kind.of in ('joint', 'link'):
             entry['joint'] = 'elbow_joint'

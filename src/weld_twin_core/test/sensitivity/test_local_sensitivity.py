@@ -24,6 +24,7 @@ POINTWISE = tuple(
     if kind.stage in (Stage.JOINT, Stage.ELASTIC, Stage.LINK, Stage.POSE)
     and name not in ('quantization', 'joint_coupling', 'thermal_growth', 'bearing_tilt')
     and not kind.needs
+    and name not in ('root_pose', 'guide_bend', 'guide_tilt')  # of other robots than these arms
 )
 
 # Arms that differ in kind; more of a kind would only repeat them.

@@ -46,7 +46,7 @@ class GuideError(Effect):
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
         """
-        Return why the data cannot show it: an axis that turns has no guide.
+        Return why the data cannot show it: the robot may have no such thing.
 
         Parameters
         ----------
@@ -56,9 +56,16 @@ class GuideError(Effect):
             The joint it would sit on.
 
         """
-        if joint is not None and not view.robot.prismatic[view.robot.index(joint)]:
-            return 'a joint that turns has no guide'
-        return super().applicable(view, joint)
+        return (
+            super().applicable(view, joint)
+            if cls.fits(view.robot, joint)
+            else 'a joint that turns has no guide'
+        )
+
+    @classmethod
+    def fits(cls, robot: Robot, joint: str | None) -> bool:
+        """Return whether the joint slides."""
+        return joint is not None and bool(robot.prismatic[robot.index(joint)])
 
 
 def carriage_axes(view: View, i: int) -> tuple[Array, Array, Array]:

@@ -111,6 +111,11 @@ class Effect(Hooks, ABC):
                 slope[channel[1], j] = (value - low[channel]) / (2.0 * JOINT_STEP)
         return slope
 
+    @classmethod
+    def fits(cls, robot: Robot, joint: str | None) -> bool:
+        """Return whether a robot, or one of its joints, has what this can be an error of."""
+        return True
+
     def on_slide(self, robot: Robot) -> bool:
         """Return whether it displaces a joint that slides: m where its parameters say rad."""
         at = self.site if self.of == 'joint' else None

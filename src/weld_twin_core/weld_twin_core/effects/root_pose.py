@@ -49,14 +49,23 @@ class RootPose(FrameError):
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
         """
-        Return why the data cannot show it: a robot alone has no positioner beside it.
+        Return why the data cannot show it: the robot may have no such thing.
 
         Parameters
         ----------
         view : View
             The samples that reach the effect.
         joint : str or None
-            None: it is of the whole cell.
+            The joint it would sit on.
 
         """
-        return super().applicable(view, joint) if view.robot.behind else 'there is no positioner'
+        return (
+            super().applicable(view, joint)
+            if cls.fits(view.robot, joint)
+            else 'there is no positioner'
+        )
+
+    @classmethod
+    def fits(cls, robot: Robot, joint: str | None) -> bool:
+        """Return whether there is a positioner."""
+        return robot.behind > 0

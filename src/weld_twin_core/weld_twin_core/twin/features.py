@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arm.channels import Channel, Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects.effect import Effect, Stage, View
 from ..recording import Recording
@@ -149,6 +150,7 @@ class Features:
         return seeds, kind.trials(view, joint) or float(len(seeds))
 
 
-def joints_of(kind: type[Effect], joints: Sequence[str]) -> Sequence[str | None]:
+def joints_of(kind: type[Effect], robot: Robot) -> Sequence[str | None]:
     """Return the joints an effect can sit on, or one None for effects of the whole robot."""
-    return joints if kind.of in ('joint', 'link') else (None,)
+    sites = robot.joint_names if kind.of in ('joint', 'link') else (None,)
+    return [site for site in sites if kind.fits(robot, site)]

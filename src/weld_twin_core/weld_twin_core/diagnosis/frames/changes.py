@@ -152,7 +152,7 @@ def _candidates(problem: Problem, robot: Robot, families: Sequence[str]) -> tupl
             kind = REGISTRY[name]
             if 'base' in problem.align and kind.fitted_with == 'base':
                 continue
-            for joint in joints_of(kind, robot.joint_names):
+            for joint in joints_of(kind, robot):
                 out.append(Change(k, kind(**({} if joint is None else {'joint': joint}))))
     return tuple(out)
 

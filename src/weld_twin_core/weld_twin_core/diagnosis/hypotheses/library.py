@@ -97,7 +97,7 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
     pulls = _pulls(problem, model, scale)
     shelf = _Shelf(problem, scale, features, pulls, dict.fromkeys(exclude, EXCLUDED))
     for kind in candidate_kinds(exclude, problem.align):
-        for joint in joints_of(kind, model.robot.joint_names):
+        for joint in joints_of(kind, model.robot):
             shelf.add(kind, joint)
     for sudden in problem.dated:
         if sudden.name not in exclude:
@@ -217,7 +217,7 @@ def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
     for kind in REGISTRY.values():
         if kind.of not in ('joint', 'link') or not kind.cause or kind.dated:
             continue
-        for joint in joints_of(kind, robot.joint_names):
+        for joint in joints_of(kind, robot):
             if kind.applicable(view, joint) is None:
                 out |= {e.key: e for e in kind.small(view, joint, 1) if e.on in on}
     return list(out.values())

@@ -121,7 +121,7 @@ def _settable(robot: Robot, exclude: frozenset[str]) -> Iterator[Effect]:
     """Yield every error of no size that a person can set."""
     for name, kind in REGISTRY.items():
         if kind.set_at_controller and name not in exclude:
-            for joint in joints_of(kind, robot.joint_names):
+            for joint in joints_of(kind, robot):
                 yield _of(Site(name, joint))
 
 
@@ -290,7 +290,7 @@ def _candidates(robot: Robot, kinds: Sequence[str], align: frozenset[str]) -> It
         kind = REGISTRY[name]
         if kind.fitted_with in align:
             continue
-        for joint in joints_of(kind, robot.joint_names):
+        for joint in joints_of(kind, robot):
             # A robot without a positioner has no foot of one, whatever is taken out.
             if kind.applicable(view, joint) is None:
                 yield _of(Site(name, joint))

@@ -98,7 +98,7 @@ def _everything(
         if kind.stage in (Stage.SERVO, Stage.CLOCK) or not kind.common:
             out += [e for e in model.found if e.name == kind.name]
             continue
-        for joint in joints_of(kind, model.robot.joint_names):
+        for joint in joints_of(kind, model.robot):
             view = features[moved_most(features, joint)].view
             if kind.applicable(view, joint) is not None:
                 continue

@@ -115,7 +115,7 @@ def _freed(constants: Model, *, many: bool) -> Model:
         kind(joint)  # type: ignore[call-arg]
         for kind in REGISTRY.values()
         if kind.set_at_controller
-        for joint in joints_of(kind, robot.joint_names)
+        for joint in joints_of(kind, robot)
         if (kind.name, joint) not in own
     )
     if many:

@@ -40,7 +40,7 @@ def directions(robot: Robot, found: Sequence[Effect]) -> tuple[Effect, ...]:
     """Return the effects whose coordinates are uncertain, at the values found or at zero."""
     out: list[Effect] = []
     for kind in [kind for kind in REGISTRY.values() if kind.everywhere]:
-        for joint in joints_of(kind, robot.joint_names):
+        for joint in joints_of(kind, robot):
             here = [e for e in found if (e.name, e.site) == (kind.name, joint)]
             if kind.waves is None:
                 out += here[:1] or [_none_yet(kind, joint)]

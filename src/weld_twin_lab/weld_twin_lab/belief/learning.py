@@ -29,6 +29,9 @@ ENDS = (0.005, 0.995)
 """Quantiles of a feature between which it counts: beyond, single cases would decide."""
 RISK, CAUSE_RISK = 0.002, 0.01
 """Probability that an answer is sure and wrong, and that a cause told as sure is wrong."""
+OF_TODAY = 1.0
+"""Weight of a case from which on the engine at hand diagnosed it. What is sure of causes is read off
+these alone, as older engines told fewer causes; a bound on whole answers needs more cases than these."""
 CAUSES = ('name', 'name of many', 'place of the rest')
 """Kinds of statements by which a cause is sure."""
 FEWEST_NAMED = 30
@@ -65,7 +68,8 @@ def learned(
     for kind in TERMS:
         terms, table, signs = _of_kind([e for e in examples if e.kind == kind], kind)
         statements[kind] = _content(table, terms, signs)
-        parts[kind] = _unseen(table, signs), table.right
+        counts = (table.weight >= OF_TODAY) | (kind not in CAUSES)
+        parts[kind] = _unseen(table, signs)[counts], table.right[counts]
     answers, causes = (
         [np.concatenate(both) for both in zip(*(parts[kind] for kind in kinds), strict=True)]
         for kinds in ([kind for kind in TERMS if kind.startswith('answer')], CAUSES)

@@ -35,7 +35,8 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_nodes.cli.options import given_urdf, output, robot_of
     from weld_twin_report.report.diagnosis_files import RESULT, write_results
 
-    from ...real_arms.by_effort import ALIGN, folds, table
+    from ...real_arms.by_effort import folds, table
+    from ...real_robots.unseen_stations import ALIGN
 
     if args.folds < 2:
         raise ModelError(f'--folds {args.folds}: give two stretches or more')

@@ -134,14 +134,15 @@ def test_the_files_that_contributing_names_exist():
     assert len(rows) >= 10
     missing = []
     for row in rows:
-        package = re.search(r'\| (core|msgs_py|nodes|lab): ', row)
-        inside = ROOT / f'src/weld_twin_{package[1]}' if package else ROOT
+        packages = re.findall(r'\b(core|msgs_py|nodes|report|lab)\b', row)
+        inside = [ROOT / f'src/weld_twin_{package}' for package in packages]
         lab = ROOT / 'src/weld_twin_lab/weld_twin_lab'
         room = ''
         for path in re.findall(r'`([\w/]+\.(?:py|md|toml))`', row):
             room = path.rpartition('/')[0] or room
             name = path.replace('NAME', '__init__') if path.endswith('.py') else path
-            places = [ROOT, inside, inside / inside.name, inside / inside.name / room, lab]
+            places = [ROOT, *inside, lab, *(own / own.name for own in inside)]
+            places += [own / own.name / room for own in inside]
             if 'NAME.md' not in name and not any((place / name).exists() for place in places):
                 missing.append(path)
     assert missing == []

@@ -539,7 +539,7 @@ class CellNode(Node):
 
     def _look_at_partners(self) -> None:
         """Tell of every partner that does not match, as long as it is there."""
-        for key in [key for key in self.health.lasting if key.startswith('/')]:
+        for key in [key for key in self.health.lasting if key.startswith('/') and ' ' not in key]:
             if not self.count_publishers(key) * self.count_subscribers(key):
                 del self.health.lasting[key]
         looks = (*self._partners, *(source.unheard for source in self._sources))

@@ -104,6 +104,8 @@ NEEDED = (
 SUPPORTS = ('rosidl_typesupport_fastrtps_c', 'rosidl_typesupport_introspection_c')
 """Type supports that rmw_fastrtps_cpp asks for; the second tells of the type on the graph."""
 PREFIX = Path(sys.prefix)
+BUILT = 'weld_twin_messages_'
+"""How the folders of packages begin that were built here."""
 
 
 def folder_of_messages() -> Path | None:
@@ -120,7 +122,7 @@ def folder_of_messages() -> Path | None:
     if not absent:
         return None
     name = hashlib.sha256(f'{DEFINITIONS}{ACTIONS}{PREFIX}{sys.version}'.encode()).hexdigest()[:12]
-    kept = Path(tempfile.gettempdir()) / f'weld_twin_messages_{os.getuid()}_{name}'
+    kept = Path(tempfile.gettempdir()) / f'{BUILT}{os.getuid()}_{name}'
     if kept.is_dir():
         return kept
     _refuse_unable()
@@ -139,22 +141,25 @@ def messages_importable() -> Iterator[None]:
     if folder is None:
         yield
         return
-    before = os.environ.get('PYTHONPATH')
-    os.environ['PYTHONPATH'] = os.pathsep.join(filter(None, [str(folder), before]))
+    # Several may ask at once and end in any order: each takes away what it has put there.
+    given = os.environ.get('PYTHONPATH')
+    os.environ['PYTHONPATH'] = os.pathsep.join(filter(None, [str(folder), given]))
     sys.path.insert(0, str(folder))
     try:
         yield
     finally:
         sys.path.remove(str(folder))
-        if before is None:
+        left = os.environ.get('PYTHONPATH', '').split(os.pathsep)
+        if str(folder) in left:
+            left.remove(str(folder))
+        os.environ['PYTHONPATH'] = os.pathsep.join(left)
+        if not any(left):
             del os.environ['PYTHONPATH']
-        else:
-            os.environ['PYTHONPATH'] = before
 
 
 def _installed(package: str) -> bool:
     spec = find_spec(package)
-    return spec is not None and spec.origin is not None
+    return spec is not None and spec.origin is not None and BUILT not in spec.origin
 
 
 def _refuse_unable() -> None:

@@ -30,6 +30,8 @@ include_patterns = [
     'docs/results/blind/scores.md',
     'docs/results/contacts/contacts.md',
     'docs/results/coverage/coverage.md',
+    'docs/results/efforts/efforts.md',
+    'docs/results/real_arms/*.md',
     'docs/results/gate/gate.md',
     'docs/results/history/*.md',
     'docs/results/sensitivity/README.md',

@@ -135,7 +135,8 @@ class Supervision:
         if off > hypot(left, SURE * doubt):
             self._break(
                 f'the mean of the last {COUNT * GROUPS} measurements is {off * 1e3:.3f} mm from the '
-                f'twin, sure to {doubt * 1e3:.3f} mm; beside the noise it leaves {left * 1e3:.3f} mm at most'
+                f'twin, sure to {doubt * 1e3:.3f} mm; beside the noise it leaves at most '
+                f'{left * 1e3:.3f} mm'
             )
 
     def _break(self, why: str) -> None:

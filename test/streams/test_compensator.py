@@ -324,8 +324,16 @@ def test_a_model_exchanged_meanwhile_counts_from_the_next_goal_on(planner):
 
 def test_deviations_that_the_model_does_not_leave_withdraw_it(planner):
     deviation = planner.cell.publisher(DEVIATION)
-    for k in range(20):
-        deviation.publish(planner.cell.messages.vector3(k, np.array([3e-4, 0.0, 0.0])))
+
+    def deviate():
+        for k in range(20):
+            deviation.publish(planner.cell.messages.vector3(k, np.array([3e-4, 0.0, 0.0])))
+
+    planner.to(HOME + 1.0)  # where nothing was recorded, nothing was promised
+    deviate()
+    planner.to(HOME)
+    assert 'does not hold' not in planner.process.log
+    deviate()
     planner.cell.wait(lambda: 'does not hold' in planner.process.log, 'the notice')
     planner.refused(planner.goal(sway()), 'does not hold any more')
     planner.cell.node.destroy_publisher(deviation)

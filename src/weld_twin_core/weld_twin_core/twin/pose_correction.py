@@ -20,6 +20,7 @@ from ..arm.rotation import angle_between, rotation_matrix
 from ..arrays import Array
 from ..effects.effect import MemoryEffect
 from ..errors import DataError
+from ..kernels.single_turn import turn_between, turn_matrix
 from ..motion.inverse.newton import chain_jacobian, least_step
 from ..recording import JointMotion
 from .goal_correction import GoalLimits, not_corrected, too_large
@@ -256,12 +257,20 @@ def _onward(before: Array, way: Array) -> bool:
 
 def between(start: Array, end: Array) -> Array:
     """Return what takes poses to others, shape (M, 6) [m, rad], linear part first, in fixed axes."""
+    if start.ndim == end.ndim == 2:
+        turned = turn_between(end[:3, :3], start[:3, :3])
+        return np.array([*(end[:3, 3] - start[:3, 3]).tolist(), *turned])
     turn = angle_between(end[..., :3, :3], start[..., :3, :3])
     return np.concatenate([end[..., :3, 3] - start[..., :3, 3], turn], axis=-1)
 
 
 def moved(pose: Array, twist: Array) -> Array:
     """Return a pose (4, 4) moved by twists (..., 6) [m, rad], shape (..., 4, 4)."""
+    if twist.ndim == 1:
+        one = pose.copy()
+        one[:3, 3] += twist[:3]
+        one[:3, :3] = turn_matrix(twist[3:]) @ pose[:3, :3]
+        return one
     out: Array = np.broadcast_to(pose, (*twist.shape[:-1], 4, 4)).copy()
     out[..., :3, 3] += twist[..., :3]
     out[..., :3, :3] = rotation_matrix(twist[..., 3:]) @ out[..., :3, :3]

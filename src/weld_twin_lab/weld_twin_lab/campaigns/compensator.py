@@ -119,7 +119,7 @@ def race(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any
 @contextmanager
 def _beside() -> Iterator[Executor]:
     """Give a process that computes whenever the cell leaves it time."""
-    pool = ProcessPoolExecutor(1, get_context('spawn'), initializer=os.nice, initargs=(19,))
+    pool = ProcessPoolExecutor(1, get_context('spawn'), initializer=os.nice, initargs=(5,))
     try:
         yield pool
     finally:

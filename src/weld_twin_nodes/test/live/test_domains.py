@@ -30,8 +30,9 @@ with own_domain() as domain:
 @pytest.fixture
 def same_start(monkeypatch):
     """All processes of a test begin to look at one domain, as those do whose numbers are so apart."""
-    monkeypatch.setattr(os, 'getpid', lambda number=os.getpid(): number)
-    return os.getpid()
+    number = os.getpid()
+    monkeypatch.setattr(os, 'getpid', lambda: number)
+    return number
 
 
 def test_processes_with_other_folders_for_temporary_files_get_other_domains(same_start, tmp_path):

@@ -303,7 +303,16 @@ class Compensator(ManagedNode):
         self._arm.take(taken[0][1], time.monotonic())
 
     def _on_deviation(self, message: Any) -> None:
-        self._watch.take(from_messages.vector3(message), time.monotonic())
+        now = time.monotonic()
+        arm = self._arm.where(now, self._most_age)
+        if (
+            arm is not None
+            and self._model is not None
+            and not self._model.read.recorded(arm[None])[0]
+        ):
+            self._watch.pass_over(now)
+            return
+        self._watch.take(from_messages.vector3(message), now)
 
     def _withdrawn(self) -> str:
         """Return why nothing is to be corrected now; empty where there is nothing."""

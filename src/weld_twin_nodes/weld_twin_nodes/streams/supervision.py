@@ -98,9 +98,13 @@ class Supervision:
             kept.clear()
         self._heard, self._count = None, 0
 
+    def pass_over(self, now: float) -> None:
+        """Take note that a deviation came at a time [s] of a posture of which nothing is promised."""
+        self._heard = now
+
     def take(self, deviation: Array, now: float) -> None:
         """Take a deviation (3,) [m] that came at a time [s]."""
-        self._heard = now
+        self.pass_over(now)
         if self._promise is None or self._broken:
             return
         self._lately.append(deviation)

@@ -295,12 +295,16 @@ class CellNode(Node):
         """Return what takes the type and the bytes of a message, whatever they are."""
         read, turn = {usual: reader(usual)}, self._plain_turn(topic)
 
+        counted = topic.stamped and topic.steady
+
         def use(message: Any) -> None:
-            if topic.stamped and topic.steady:
-                at = message.header.stamp
-                state.stamped(at.sec * 1_000_000_000 + at.nanosec)
-            callback(message)
-            state.used = state.last
+            try:
+                callback(message)
+                state.used = state.last
+            finally:  # whoever waits for the answer does not wait for the books
+                if counted:
+                    at = message.header.stamp
+                    state.stamped(at.sec * 1_000_000_000 + at.nanosec)
 
         def guarded(kind: str, data: bytes) -> None:
             state.arrived()

@@ -23,6 +23,8 @@ from typing import TYPE_CHECKING, Any
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
 
+from .latency import pose_table
+
 if TYPE_CHECKING:
     from .compensating.trial import Known
 
@@ -265,12 +267,7 @@ def table(result: dict[str, Any]) -> str:
         lines.append(markdown.table(HEAD, *(_row(name, one) for name, one in arms)))
     poses = result['poses']
     if poses is not None:
-        rows = [
-            (name, *(f'{poses[name][key] / 1e3:.2f} ms' for key in ('p50_us', 'p99_us')))
-            for name in ('relay', 'compensator')
-        ]
-        rows.append(('ratio', *(f'{poses["ratio"][key]:.2f}' for key in ('p50_us', 'p99_us'))))
-        lines.append(markdown.table(('500 poses a second', 'p50', 'p99'), *rows))
+        lines.append(pose_table(poses))
     return '\n\n'.join(lines)
 
 

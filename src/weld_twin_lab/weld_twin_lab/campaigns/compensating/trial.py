@@ -24,7 +24,7 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.twin.goal_correction import GoalLimits, Refusal, corrected_goal
-from weld_twin_core.twin.goal_motion import Goal, course
+from weld_twin_core.twin.goal_motion import Goal, course, fine_times
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.messages import from_messages
@@ -48,6 +48,8 @@ PACE = 10.0
 """How many times as fast as they say goals run: nothing in these cells hangs on speed."""
 RETURN = 1.5
 """Length of a way back, or to where a goal begins [s]."""
+NEAR_TURN = np.arange(-0.2, 0.2, 0.01)
+"""Times around a turn [s] at which the arm is looked at too: play is taken up in some hundredths."""
 NOTICE = 30.0
 """Longest time [s] after a change until goals count."""
 SETTLED = 1.5
@@ -88,7 +90,9 @@ class CellTrial:
 
     def _begin(self) -> None:
         cell, robot = self.cell, self.robot
-        self.controller = cell.add(Controller, robot.joint_names, HOMES[self.name], PACE)
+        self.controller = cell.add(
+            Controller, robot.joint_names, HOMES[self.name], PACE, beside=self._turns
+        )
         common = {'robot': self.name, 'reliable_inputs': True}
         cell.start('error_injector', effects=self._effects(), **common)
         cell.start('forward_kinematics_twin', model=str(self.model), **common)
@@ -112,6 +116,15 @@ class CellTrial:
             cell.wait(client.server_is_ready, 'the actions')
         cell.meet()
         cell.wait(lambda: len(self.deviations) > 0, 'a deviation')
+
+    def _turns(self, goal: Goal) -> Array:
+        """Return times [s] of a goal around where joints with play turn around: much happens there."""
+        at = fine_times(goal)
+        played = [e['joint'] for e in self.causes if e['effect'] == 'backlash']
+        ways = [course(goal, at).qd[:, self.robot.joint_names.index(name)] for name in played]
+        turns = [at[1:][np.diff(np.sign(qd)) != 0.0] for qd in ways]
+        near = np.concatenate([*turns, at[:1]])[:, None] + NEAR_TURN
+        return np.asarray(near[(near > at[0]) & (near < at[-1])])
 
     def _audited(self, message: Any) -> None:
         self.audit.append(json.loads(message.data))
@@ -159,7 +172,9 @@ class CellTrial:
         self.deviations.messages.clear()
         way = course(goal, np.minimum(np.array(meant), goal.t[-1]))
         apart = np.array(real) - forward(self.robot, way.q)[:, :3, 3]
-        return float(np.sqrt((apart**2).sum(axis=1).mean()))
+        # The arm is looked at more often where it turns; each look stands for its part of the time.
+        share = np.gradient(np.array(meant)) if len(meant) > 1 else np.ones(1)
+        return float(np.sqrt(np.average((apart**2).sum(axis=1), weights=share)))
 
     def measured_until(self, stamp: int) -> None:
         """Wait until the tool was measured at a stamp [ns]."""
@@ -191,6 +206,7 @@ class CellTrial:
             'before_m': offs[0],
             'after_m': offs[1] if taken else offs[0],
             'best_m': min(best, offs[0]),
+            'expected_m': line.get('expected_after_m'),
             'bound_m': line.get('bound_m'),
             'largest_m': line.get('largest_m'),
         }
@@ -218,9 +234,9 @@ class CellTrial:
         elif what == 'load changed':
             acting = _load(self.robot)
         self._inject(*acting, noise)
+        begun = time.monotonic()
         if what == 'tracker lost':
             self.analyzer.stop()
-        begun = time.monotonic()
 
         def noticed() -> bool:
             told = self.compensator.log[count:]

@@ -102,12 +102,14 @@ class Unseen:
             Prior precision of the fit coordinates, one over variance.
 
         """
+        made: Unseen
         for given, made in fit.prepared:
             same = made.problem is problem and made.scale is scale
             if same and np.array_equal(given, precision):
                 return made
-        fit.prepared[:] = [(precision, _prepared(problem, scale, fit, precision))]
-        return fit.prepared[0][1]
+        made = _prepared(problem, scale, fit, precision)
+        fit.prepared[:] = [(precision, made)]
+        return made
 
     def by(self, labels: Array) -> Unseen:
         """Return the same with other parts left out in turn, told by a label of every row."""

@@ -64,7 +64,7 @@ MECHANISMS = {
     'many_lines': Mechanism('many.small_errors', 'with_lines', second),
     'many_setup': Mechanism('many.small_errors', 'with_setup', second),
     'many_frames': Mechanism('many.small_errors', '_apart_from_frames', third),
-    'held_out_likes': Mechanism('pipeline', 'carrying', first),
+    'held_out_likes': Mechanism('unseen.elsewhere', '_exchanged', first),
     'formulas_lost_motion': Mechanism('levels.formulas', 'beside_names', nothing),
     'formulas_scatter': Mechanism('levels.formulas', 'scatter', nothing),
     'whole_arm': Mechanism('levels.free_form', 'whole_arm_groups', nothing),

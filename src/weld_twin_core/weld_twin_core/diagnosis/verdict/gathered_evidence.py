@@ -43,7 +43,7 @@ def gathered(
     floor : NoiseFloor
     beliefs : Beliefs
     least : float or None
-        As `parted_elsewhere` gives it.
+        As `borne_out` gives it.
     chance : float
         As `reached_by_chance` gives it.
 

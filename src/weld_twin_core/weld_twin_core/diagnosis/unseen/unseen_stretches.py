@@ -25,7 +25,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
-from ..algebra.atoms import Rows
+from ..algebra.atoms import Rows, rows_of
 from ..algebra.definite import Triangle, inverses
 from ..algebra.designed import Design, designed
 from ..algebra.fit import Fit, trusted
@@ -490,14 +490,6 @@ def _solved(factor: tuple[Array, bool], size: Array, right: Array) -> Array:
     """Return the solution of scaled normal equations, shape as the right-hand side (P, ...)."""
     unit = size if right.ndim == 1 else size[:, None]
     return np.asarray(cho_solve(factor, right / unit) / unit)
-
-
-def rows_of(labels: Array) -> list[Rows]:
-    """Return the rows of every label, a slice each where they lie together."""
-    if (np.diff(labels) >= 0).all():
-        bounds = np.searchsorted(labels, np.arange(int(labels[-1]) + 2))
-        return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
-    return [np.flatnonzero(labels == k) for k in range(int(labels.max()) + 1)]
 
 
 def _spread(normal: Array) -> Array:

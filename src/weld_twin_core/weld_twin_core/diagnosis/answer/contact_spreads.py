@@ -108,7 +108,7 @@ def _of(problem: Problem, model: Model) -> tuple[dict[str, Array], list[Length]]
 
 def _held_out(unseen: Unseen) -> dict[str, Array]:
     """Return distances from every contact as predicted where it was not fitted."""
-    parts = unseen.problem.by_sample(unseen.predict(range(len(unseen.parts))))
+    parts = unseen.problem.by_sample(unseen.whole)
     out: dict[str, Array] = {}
     for recording, part, weight in zip(
         unseen.problem.recordings, parts, unseen.scale.weights, strict=True

@@ -23,7 +23,6 @@ from ..algebra.fit import design
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Unseen
 from .shrinkage import believed, groups, learned_precision, projected
 from .small_errors import many_small
@@ -172,7 +171,7 @@ def _many(found: Search, best: Search, beliefs: Beliefs) -> bool:
 def _members(found: Search, beliefs: Beliefs) -> int:
     """Return how many effects move the tool by much of what all of them leave."""
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    least = beliefs.member * unseen.rms(unseen.base(range(len(unseen.parts))).residual)
+    least = beliefs.member * unseen.rms(unseen.whole)
     sizes = np.array([unseen.rms(part) for part in unseen.targets[1:]])
     return int((sizes > least).sum())
 
@@ -248,13 +247,7 @@ def _one_number(kind: type[Effect]) -> bool:
 def unseen_rms(found: Search) -> float:
     """Return the RMS [m] on stretches and on regions of posture left out, both together."""
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    everything = range(len(unseen.parts))
-    parts = [unseen]
-    # Regions would have places of contacts on both sides.
-    if not found.problem.untracked or found.problem.places < PLACES:
-        parts.append(unseen.by(posture_regions(found.problem)))
-    squares = [each.rms(each.base(everything).residual) ** 2 for each in parts]
-    return float(np.sqrt(np.mean(squares)))
+    return float(np.sqrt(np.mean([each.rms(each.whole) ** 2 for each in unseen.every_way()])))
 
 
 def members_beside(few: Search, many: Search, beliefs: Beliefs) -> int:
@@ -291,6 +284,6 @@ def members_beside(few: Search, many: Search, beliefs: Beliefs) -> int:
     mean = np.linalg.lstsq(normal + np.diag(ridge), right, rcond=1e-12)[0]
     basis = np.linalg.lstsq(own.T, columns[len(own) :].T, rcond=1e-12)[0]
     parts = mean[:, None] * (columns[len(own) :] - basis.T @ own)
-    least = beliefs.member * unseen.rms(unseen.base(range(len(unseen.parts))).residual)
+    least = beliefs.member * unseen.rms(unseen.whole)
     ends = np.cumsum([len(part) for part in each])[:-1]
     return sum(unseen.rms(part.sum(axis=0)) > least for part in np.split(parts, ends))

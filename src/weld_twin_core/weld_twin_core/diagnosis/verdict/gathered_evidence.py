@@ -49,14 +49,13 @@ def gathered(
 
     """
     robot = found.final.model.robot
-    everything = range(len(found.final.model.found))
     return Evidence(
         slots=found.slots,
         structure=leftover,
         gap=shrink.rms_before_m,
         after=shrink.rms_after_m,
         floor=floor.rms_m,
-        fitted=unseen.rms(unseen.predict(everything)),
+        fitted=unseen.rms(unseen.whole),
         independent=floor.independent,
         parts=_parts(unseen),
         glimpsed=glimpsed(found.problem, found.final.model, beliefs),

@@ -20,7 +20,7 @@ from ...arrays import Array
 from .atoms import rows_of
 from .definite import inverted, well_conditioned
 from .designed import Design
-from .gram import unit_diagonal
+from .unit_scale import unit_diagonal
 
 BLOCKS = 24
 """Stretches whose scores are held apart: enough to tell a variance to a third."""

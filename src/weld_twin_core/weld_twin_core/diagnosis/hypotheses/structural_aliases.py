@@ -26,6 +26,7 @@ from ...effects.registry import REGISTRY
 from ...recording import JointMotion, Recording
 from ...twin.features import Features, joints_of
 from ...twin.twin import Twin
+from ..algebra.alias import outside, share_outside, span_of
 from ..algebra.fit import Fit, fit
 from ..beliefs import Beliefs
 from ..result import Site
@@ -344,12 +345,10 @@ def always(robot: Robot, one: Effect, other: Effect, align: frozenset[str]) -> b
     a, b = _columns(robot, one), _columns(robot, other)
     frames = [_frame_columns(robot, name) for name in sorted(align)]
     if frames:
-        span = np.linalg.qr(np.concatenate(frames).T)[0]
-        whole = [np.linalg.norm(rows, axis=1) for rows in (a, b)]
-        a, b = (rows - (rows @ span) @ span.T for rows in (a, b))
-        pairs = zip((a, b), whole, strict=True)
-        if any((np.linalg.norm(rows, axis=1) < SAME * size).any() for rows, size in pairs):
+        span = span_of(np.concatenate(frames))
+        if min(share_outside(rows, span).min() for rows in (a, b)) < SAME:
             return False  # A frame is what they are.
+        a, b = (outside(rows, span) for rows in (a, b))
     return _inside(a, b) and _inside(b, a)
 
 
@@ -381,8 +380,4 @@ def _levered(columns: Array) -> Array:
 
 def _inside(rows: Array, span: Array, share: float = SAME) -> bool:
     """Return whether every row lies in the span of others, but for a share of it."""
-    size = np.linalg.norm(rows, axis=1)
-    if not (size > 0.0).all():
-        return False
-    left = rows.T - span.T @ np.linalg.lstsq(span.T, rows.T, rcond=None)[0]
-    return bool((np.linalg.norm(left, axis=0) < share * size).all())
+    return bool(rows.any(axis=1).all() and (share_outside(rows, span_of(span)) < share).all())

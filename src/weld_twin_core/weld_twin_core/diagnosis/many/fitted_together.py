@@ -19,12 +19,13 @@ from ...arm.robot import Robot
 from ...effects.effect import Effect, Stage
 from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
+from ..algebra.alias import outside, span_of
 from ..algebra.fit import design
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..unseen.unseen_stretches import Unseen
-from .shrinkage import believed, groups, learned_precision, projected
+from .shrinkage import believed, groups, learned_precision
 from .small_errors import many_small
 
 BEAR = (10, 30, 100)
@@ -267,23 +268,23 @@ def members_beside(few: Search, many: Search, beliefs: Beliefs) -> int:
     others = tuple(effect for effect in many.final.model.found if effect.key not in have)
     if not others:
         return 0
-    own, _ = design(problem, model, scale)
+    span = span_of(design(problem, model, scale)[0])
     features = problem.features(model)
     each = [
-        problem.whitened(problem.effect_columns(features, effect, atoms=False), scale)
+        outside(
+            problem.whitened(problem.effect_columns(features, effect, atoms=False), scale), span
+        )
         for effect in others
     ]
-    columns = np.concatenate([own, *each])
-    residual = problem.whitened(problem.residuals(model), scale)
-    normal, right, rss = projected(
-        columns @ columns.T, columns @ residual, float(residual @ residual), len(own)
-    )
+    columns = np.concatenate(each)
+    residual = outside(problem.whitened(problem.residuals(model), scale), span)
+    normal, right = columns @ columns.T, columns @ residual
+    rss = float(residual @ residual)
     labels, scales = groups(others, beliefs)
     held = believed(model.with_found(others))
     ridge, _ = learned_precision(normal, right, rss, residual.size, labels, scales, held)
     mean = np.linalg.lstsq(normal + np.diag(ridge), right, rcond=1e-12)[0]
-    basis = np.linalg.lstsq(own.T, columns[len(own) :].T, rcond=1e-12)[0]
-    parts = mean[:, None] * (columns[len(own) :] - basis.T @ own)
+    parts = mean[:, None] * columns
     least = beliefs.member * unseen.rms(unseen.whole)
     ends = np.cumsum([len(part) for part in each])[:-1]
     return sum(unseen.rms(part.sum(axis=0)) > least for part in np.split(parts, ends))

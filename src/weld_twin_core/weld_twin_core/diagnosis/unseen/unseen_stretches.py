@@ -28,9 +28,9 @@ from ..algebra.atoms import Rows, rows_of
 from ..algebra.definite import Triangle, inverses
 from ..algebra.designed import Design, designed
 from ..algebra.fit import Fit, trusted
-from ..algebra.gram import Index, unit_diagonal
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
+from ..algebra.unit_scale import Index, unit_diagonal
 from .folds import STRETCHES, Gain, gain, ways_to_divide
 
 DAMPING = 1e-11

@@ -15,7 +15,6 @@ from ..result import Shrink, Site
 from ..unseen.leftover_structure import Structure
 from ..unseen.unseen_stretches import Unseen
 from .evidence import Evidence
-from .partial_waves import glimpsed
 
 
 def gathered(
@@ -58,7 +57,6 @@ def gathered(
         fitted=unseen.rms(unseen.whole),
         independent=floor.independent,
         parts=_parts(unseen),
-        glimpsed=glimpsed(found.problem, found.final.model, beliefs),
         refused=tuple(_refused(robot, e) for e in found.refused if beyond(robot, e)),
         lacking=tuple(_lacking(e) for e in found.refused if not beyond(robot, e)),
         families=weighed_families(found, unseen, beliefs) if found.dense else None,

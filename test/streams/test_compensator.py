@@ -339,6 +339,26 @@ def test_deviations_that_the_model_does_not_leave_withdraw_it(planner):
     planner.cell.node.destroy_publisher(deviation)
 
 
+def test_a_tracker_that_was_lost_must_bear_the_model_out_again(planner):
+    deviation = planner.cell.publisher(DEVIATION)
+
+    def deviate(count):
+        for k in range(count):
+            deviation.publish(planner.cell.messages.vector3(k, np.array([1e-5, 0.0, 0.0])))
+        seen(planner.cell, 0.3)
+
+    deviate(5)
+    seen(planner.cell, 2.2)
+    planner.refused(planner.goal(sway()), 'the tracker is lost')
+    deviate(19)
+    planner.refused(planner.goal(sway()), '19 of the 20 measurements')
+    deviate(1)
+    handle, line = planner.send(planner.goal(sway()))
+    assert handle.accepted, line
+    planner.result(handle)
+    planner.cell.node.destroy_publisher(deviation)
+
+
 def test_a_controller_that_dies_ends_its_goal(planner):
     handle, _ = planner.send(planner.goal(sway(40.0)))
     assert handle.accepted

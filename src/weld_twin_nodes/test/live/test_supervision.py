@@ -85,3 +85,20 @@ def test_without_a_promise_nothing_is_held_against_it():
         watch.take(np.array([1.0, 0.0, 0.0]), k / RATE)
     assert not watch.withdrawn(50 / RATE)
     assert 'is lost' in watch.withdrawn(53.0)
+
+
+def test_after_a_loss_the_model_is_used_once_twenty_measurements_bear_it_out():
+    """A load may have been changed meanwhile: the first of them tell nothing yet."""
+    rng = np.random.default_rng(7)
+    for change, used in ((0.0, True), (1e-3, False)):
+        watch = Supervision(Promise.of(SPREAD, 5e-6, 2000))
+        for k in range(60):
+            watch.take(white(rng, 1)[0], k / RATE)
+        assert not watch.withdrawn(60 / RATE)
+        assert 'is lost' in watch.withdrawn(60 / RATE + 3.0)
+        back = 60 / RATE + 4.0
+        watch.pass_over(back)
+        for k in range(20):
+            assert f'was lost: {k} of the 20' in watch.withdrawn(back)
+            watch.take(white(rng, 1)[0] + np.array([change, 0.0, 0.0]), back + k / RATE)
+        assert (not watch.withdrawn(back + 1.0)) is used

@@ -87,6 +87,7 @@ class Supervision:
         )
         self._heard: float | None = None
         self._broken = ''
+        self._owed = 0
         self._lately: deque[Array] = deque(maxlen=COUNT)
         self._far: deque[bool] = deque(maxlen=COUNT)
         self._groups: deque[Array] = deque(maxlen=GROUPS)
@@ -96,15 +97,20 @@ class Supervision:
         """Forget what came so far, as after a jump of the clock."""
         for kept in (self._lately, self._far, self._groups):
             kept.clear()
-        self._heard, self._count = None, 0
+        self._heard, self._count, self._owed = None, 0, 0
 
     def pass_over(self, now: float) -> None:
         """Take note that a deviation came at a time [s] of a posture of which nothing is promised."""
+        if self._heard is not None and now - self._heard > LOST:
+            # What changed meanwhile is not known: what came before tells nothing of the arm any more.
+            self.forget()
+            self._owed = COUNT
         self._heard = now
 
     def take(self, deviation: Array, now: float) -> None:
         """Take a deviation (3,) [m] that came at a time [s]."""
         self.pass_over(now)
+        self._owed = max(self._owed - 1, 0)
         if self._promise is None or self._broken:
             return
         self._lately.append(deviation)
@@ -157,5 +163,10 @@ class Supervision:
             return (
                 f'the tracker is lost: the last deviation came {now - self._heard:.1f} s ago; '
                 'whether the model holds is not watched any more'
+            )
+        if self._owed:
+            return (
+                f'the tracker was lost: {COUNT - self._owed} of the {COUNT} measurements have come '
+                'since, in postures that were recorded, that tell whether the model still holds'
             )
         return ''

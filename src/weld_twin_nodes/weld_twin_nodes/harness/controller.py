@@ -55,8 +55,8 @@ class Controller(Node):
         joint_names: Sequence[str],
         q: Array,
         pace: float = 1.0,
-        name: str = 'joint_trajectory_controller',
         beside: Callable[[Goal], Array] | None = None,
+        name: str = 'joint_trajectory_controller',
         **kwargs: Any,
     ) -> None:
         from control_msgs.action import FollowJointTrajectory

@@ -91,7 +91,7 @@ class CellTrial:
     def _begin(self) -> None:
         cell, robot = self.cell, self.robot
         self.controller = cell.add(
-            Controller, robot.joint_names, HOMES[self.name], PACE, beside=self._turns
+            Controller, robot.joint_names, HOMES[self.name], PACE, self._turns
         )
         common = {'robot': self.name, 'reliable_inputs': True}
         cell.start('error_injector', effects=self._effects(), **common)

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from types import ModuleType
 
 from ..offline.environment import THREADS
 from .options import add_command
@@ -175,11 +176,11 @@ def _path(name: str) -> str:
     return f'{COMMANDS[name]}.{name}{"_" * (name == "import")}'
 
 
-def _module(name: str) -> object:
+def _module(name: str) -> ModuleType:
     return import_module(_path(name))
 
 
-def _jobs(module: object) -> list[str]:
+def _jobs(module: ModuleType | None) -> list[str]:
     """Return the jobs of a command that is a folder, none of another."""
     return list(getattr(module, 'JOBS', ()))
 

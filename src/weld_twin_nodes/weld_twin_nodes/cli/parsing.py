@@ -86,7 +86,7 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **more: Any) -> None:
         super().__init__(**more | {'add_help': False})
         self.example = ''
-        hidden = {'nargs': 0, 'help': argparse.SUPPRESS, 'default': argparse.SUPPRESS}
+        hidden: dict[str, Any] = {'nargs': 0, 'help': argparse.SUPPRESS, 'default': argparse.SUPPRESS}
         self.add_argument('-h', '--help', action=_Help, **hidden)
         self.add_argument('--help-all', action=_Help, **hidden)
 
@@ -98,9 +98,9 @@ class Parser(argparse.ArgumentParser):
         for group in self._action_groups:
             formatter.start_section(group.title)
             for action in group._group_actions:
-                jobs = isinstance(action, argparse._SubParsersAction)
                 if everything or not isinstance(action.help, Rare):
-                    formatter.add_arguments(action._get_subactions() if jobs else [action])
+                    jobs: Any = isinstance(action, argparse._SubParsersAction) and action
+                    formatter.add_arguments(jobs._get_subactions() if jobs else [action])
             formatter.end_section()
         left_out = 0 if everything else sum(isinstance(a.help, Rare) for a in self._actions)
         end = [f'example: {self.example}'] if self.example else []

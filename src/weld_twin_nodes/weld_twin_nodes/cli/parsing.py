@@ -86,7 +86,11 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **more: Any) -> None:
         super().__init__(**more | {'add_help': False})
         self.example = ''
-        hidden: dict[str, Any] = {'nargs': 0, 'help': argparse.SUPPRESS, 'default': argparse.SUPPRESS}
+        hidden: dict[str, Any] = {
+            'nargs': 0,
+            'help': argparse.SUPPRESS,
+            'default': argparse.SUPPRESS,
+        }
         self.add_argument('-h', '--help', action=_Help, **hidden)
         self.add_argument('--help-all', action=_Help, **hidden)
 

@@ -92,8 +92,8 @@ def _add_causes(parser: argparse.ArgumentParser) -> None:
     add = Adder(parser, 'what is known of the causes')
     text = 'effects file or diagnosis.json; the twin has these effects from the start'
     add('--effects-known', 'FILE', text, default='')
-    more = {'action': 'extend', 'nargs': '+', 'default': []}
-    add('--exclude-effect', 'NAME', 'effects that cannot be the cause', **more)
+    text = 'effects that cannot be the cause'
+    add('--exclude-effect', 'NAME', text, action='extend', nargs='+', default=[])
 
 
 def _add_sheet(parser: argparse.ArgumentParser) -> None:

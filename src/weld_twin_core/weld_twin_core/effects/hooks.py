@@ -78,8 +78,8 @@ class Hooks(Parametric, ABC):
     everywhere: ClassVar[bool] = False
     """Whether a prediction allows for it on every joint, or clock, where it was not found."""
     waves: ClassVar[Waves | None] = None
-    """Set by an effect that is a sum of waves in its joint's angle; it also gives `orders` and
-    `with_orders`."""
+    """Set by an effect that is a sum of waves in its joint's angle; it also gives `orders`,
+    `with_orders` and `lines`."""
 
     bends: ClassVar[bool] = False
     """Whether it stands for waves of a joint that travels too little for them; then gives
@@ -277,6 +277,11 @@ class Hooks(Parametric, ABC):
     def orders(self) -> Array:
         """Return the orders of the waves that this instance is a sum of, in cycles per turn."""
         return np.zeros(0)
+
+    @classmethod
+    def lines(cls, joint: str, orders: Array) -> list[Any]:
+        """Return an instance of a single wave of no size for each order, shape (K,) [1/rev]."""
+        return []
 
     def with_orders(self: H, orders: Array) -> H:
         """Return its waves of these orders and no others, shape (K,); new ones of no size yet."""

@@ -129,7 +129,7 @@ class TransmissionRipple(Effect):
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """
-        Yield one instance per integer order that the joint's range of motion can tell.
+        Return one instance per integer order that the joint's range of motion can tell.
 
         Parameters
         ----------
@@ -143,13 +143,17 @@ class TransmissionRipple(Effect):
 
         """
         told = highest_order(view.joint(view.robot.index(str(joint))))
-        for order in range(1, min(MAX_ORDER, int(told)) + 1):
-            yield cls(str(joint), 0.0, float(order), 0.0)
+        return cls.lines(str(joint), np.arange(1.0, min(MAX_ORDER, int(told)) + 1.0))
+
+    @classmethod
+    def lines(cls, joint: str, orders: Array) -> list[TransmissionRipple]:
+        """Return an instance of no size for each order, shape (K,) [1/rev]."""
+        return [cls(joint, 0.0, float(order), 0.0) for order in orders]
 
     @classmethod
     def small(cls, view: View, joint: str | None, most: int) -> list[TransmissionRipple]:
         """
-        Return one ripple of all orders that the measurements can hold apart.
+        Return one ripple of all orders up to the highest that the measurements can hold apart.
 
         Parameters
         ----------
@@ -158,11 +162,10 @@ class TransmissionRipple(Effect):
         joint : str or None
             The joint it sits on.
         most : int
-            How many numbers the measurements can hold apart.
+            How many orders.
 
         """
-        told = int(highest_order(view.joint(view.robot.index(str(joint)))))
-        orders = np.arange(1.0, min(MAX_ORDER, most, told) + 1.0)
+        orders = np.arange(1.0, min(MAX_ORDER, most) + 1.0)
         zero = np.zeros(orders.size)
         return [cls(str(joint), zero, orders, zero)] if orders.size else []
 

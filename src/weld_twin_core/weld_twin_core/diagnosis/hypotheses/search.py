@@ -25,8 +25,6 @@ from .selection import (
     forward,
     implausible,
     possible_part,
-    without_misfit,
-    without_negligible,
 )
 
 SEARCH_ROWS = 9000
@@ -236,10 +234,7 @@ def _chosen(
         refused = []
         steps = forward(work, now, hopeful, beliefs.many, progress, refused.append)
         if steps:
-            now = steps[-1].fit
-            now = backward(work, now, effective)
-            now = without_negligible(work, now)
-            now = without_misfit(work, now)
+            now = backward(work, steps[-1].fit, effective)
         # Of what enters one by one, what came later may stand for some that came before.
         crowded = small.at_rest and len(now.model.found) >= beliefs.many
         model = now.model

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from .parametric import Parametric
 from .view import Stage, View
@@ -291,6 +292,20 @@ class Hooks(Parametric, ABC):
     def causes(self) -> int:
         """Return how many separate causes this instance stands for."""
         return max(1, self.orders().size)
+
+    # The advice ---------------------------------------------------------------------------------
+
+    @abstractmethod
+    def remedy(self, robot: Robot) -> str:
+        """
+        Return what to mend where it was found, as one sentence with its size.
+
+        Parameters
+        ----------
+        robot : Robot
+            The nominal model: what is entered in the controller now.
+
+        """
 
     # The prediction -----------------------------------------------------------------------------
 

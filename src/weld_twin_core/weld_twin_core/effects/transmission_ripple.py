@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect
 from .hooks import Waves, highest_order
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import size
 
 MAX_ORDER = 100
 """Highest order a search considers: one per tooth of a 100:1 strain-wave gear."""
@@ -246,6 +248,24 @@ class TransmissionRipple(Effect):
     def coordinate_scales(self) -> Array:
         """Return the typical amplitude for every coefficient."""
         return np.full(2 * np.size(self.order), self.parameters[0].typical)
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        amplitude = np.atleast_1d(np.asarray(self.amplitude))
+        order = np.atleast_1d(np.asarray(self.order))
+        strongest = np.argsort(-np.abs(amplitude))[:3]
+        slides = self.on_slide(robot)
+        waves = ', '.join(
+            f'{size(amplitude[k] * 1e3, 2)} mm every {2e3 * np.pi / order[k]:.3g} mm'
+            if slides
+            else f'{size(np.degrees(amplitude[k]), 2)} deg at {order[k]:g} per turn'
+            for k in strongest
+        )
+        more = f' and {amplitude.size - 3} smaller orders' if amplitude.size > 3 else ''
+        return (
+            f'Compensate the ripple of {self.site} by table ({waves}{more}); inspect its gear and '
+            'encoder if it grows.'
+        )
 
 
 def _sum(waves: Iterable[Array]) -> Array:

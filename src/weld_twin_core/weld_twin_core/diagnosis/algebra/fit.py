@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,12 +56,16 @@ class Fit:
         Whitened residual at the solution.
     coordinates : array, shape (K,)
         Fit coordinates of all found effects.
+    prepared : list
+        What was last prepared of it for unseen stretches, as several steps ask for the same. It
+        lies here, and goes with the fit: it holds the fit itself.
 
     """
 
     model: Model
     residual: Array
     coordinates: Array
+    prepared: list[Any] = field(default_factory=list, init=False, repr=False)
 
     @property
     def rss(self) -> float:

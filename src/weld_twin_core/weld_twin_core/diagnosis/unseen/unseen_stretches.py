@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from itertools import pairwise
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -101,13 +100,14 @@ class Unseen:
             Prior precision of the fit coordinates, one over variance.
 
         """
-        if fit in _MADE:
-            given, made = _MADE[fit]
+        made: Unseen
+        for given, made in fit.prepared:
             same = made.problem is problem and made.scale is scale
             if same and np.array_equal(given, precision):
                 return made
-        _MADE[fit] = precision, _prepared(problem, scale, fit, precision)
-        return _MADE[fit][1]
+        made = _prepared(problem, scale, fit, precision)
+        fit.prepared[:] = [(precision, made)]
+        return made
 
     def by(self, labels: Array) -> Unseen:
         """Return the same with other parts left out in turn, told by a label of every row."""
@@ -427,10 +427,6 @@ class Base:
     def _own(self) -> list[Design]:
         """Return the columns of the model on every stretch."""
         return [part.chosen(self.index) for part in self.unseen._stretches]
-
-
-_MADE: WeakKeyDictionary[Fit, tuple[Array, Unseen]] = WeakKeyDictionary()
-"""What was prepared of every fit that somebody still holds: several steps ask for the same."""
 
 
 def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:

@@ -67,7 +67,6 @@ def unit_inverse(columns: Design, ridge: Array) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    columns : Design
     ridge : array, shape (P,)
         Prior precision.
 

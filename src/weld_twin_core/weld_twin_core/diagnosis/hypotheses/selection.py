@@ -42,7 +42,6 @@ class Workspace:
 
         Parameters
         ----------
-        model : Model
         residual : array, shape (rows,)
             What the model leaves, whitened.
 
@@ -74,7 +73,6 @@ def forward(
 
     Parameters
     ----------
-    work : Workspace
     start : Fit
         The baseline: frames and known effects.
     effective : callable
@@ -204,18 +202,7 @@ def possible_part(model: Model) -> Model:
 
 
 def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:
-    """
-    Return the fit of a model with one more effect, merged where its kind can merge.
-
-    Parameters
-    ----------
-    work : Workspace
-        The problem with its library, multiplied out.
-    model : Model
-        What is believed so far; everything is taken about it.
-    effect : Effect
-
-    """
+    """Return the fit of a model with one more effect, merged where its kind can merge."""
     effect = started(work.problem, model, work.scale, effect)
     return fit(work.problem, model.with_found(merged(model.found, effect)), work.scale, None, 5)
 
@@ -249,19 +236,7 @@ def restarted(work: Workspace, now: Fit) -> Fit:
 
 
 def backward(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fit:
-    """
-    Return the fit with every effect dropped that is not needed given the others, the least first.
-
-    Parameters
-    ----------
-    work : Workspace
-        The problem with its library, multiplied out.
-    now : Fit
-        The fit so far.
-    effective : callable
-        From a fit to the number of its independent rows.
-
-    """
+    """Return the fit with every effect dropped that is not needed given the others, the least first."""
     now = restarted(work, now)
     while now.model.found:
         every = range(len(now.model.found))

@@ -56,10 +56,8 @@ def rivals(
 
     Parameters
     ----------
-    work : Workspace
     now : Fit
         The final fit, on the workspace's problem and scale.
-    k : int
     effective : callable
         Number of independent rows of a fit.
 

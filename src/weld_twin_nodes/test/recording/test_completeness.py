@@ -278,7 +278,7 @@ def test_a_played_bag_is_recorded_whole_and_counted(cell, tmp_path):
     process = recorder(cell, tmp_path)
     bag = Path(__file__).parents[4] / 'bags/elbow_play'
     words = [str(bag), '--rate', '8', '--wait', '60', '--topics', '/joint_states', '/deviation']
-    player = cell.start([sys.executable, '-m', 'weld_twin_nodes', 'play', *words])
+    player = cell.start([sys.executable, '-m', 'weld_twin_nodes', 'bag', 'play', *words])
     cell.wait(lambda: player.code is not None, 'the bag to be played', limit=120.0)
     assert finish(cell, process) == 0
     told = provenance(tmp_path / 'bag')['completeness']
@@ -291,7 +291,7 @@ def test_a_played_bag_is_recorded_whole_and_counted(cell, tmp_path):
 def test_a_player_says_whom_nobody_listens_to(cell):
     bag = Path(__file__).parents[4] / 'bags/elbow_play'
     words = [str(bag), '--rate', '100', '--wait', '0.5', '--topics', '/deviation']
-    player = cell.start([sys.executable, '-m', 'weld_twin_nodes', 'play', *words])
+    player = cell.start([sys.executable, '-m', 'weld_twin_nodes', 'bag', 'play', *words])
     assert player.end(60.0) == 0
     assert 'waited 0.5 s for 1 subscribers of /deviation; playing without' in player.log
 

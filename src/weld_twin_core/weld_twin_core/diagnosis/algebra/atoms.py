@@ -144,12 +144,10 @@ class MovedJoint:
 
         Parameters
         ----------
-        problem : Problem
         features : sequence of Features
             Of every recording, at the model.
         scale : Scale
             What the rows are divided by.
-        joint : int
 
         """
         parts = [
@@ -189,7 +187,6 @@ class Amounts:
 
     Attributes
     ----------
-    joint : MovedJoint
     each : array, shape (K, samples) [rad or m]
         By how much each moves it.
 
@@ -262,7 +259,6 @@ def amounts(shifts: Sequence[Sequence[Shift]], joint: int, samples: Sequence[int
     ----------
     shifts : sequence of sequence of Shift
         Of every recording, K features each.
-    joint : int
     samples : sequence of int
         Of every recording.
 

@@ -136,7 +136,6 @@ def well_conditioned(matrix: Array, least: float) -> bool:
     ----------
     matrix : array, shape (P, P)
         Symmetric.
-    least : float
 
     """
     factor, failed = dpotrf(matrix.T, lower=1, clean=0)

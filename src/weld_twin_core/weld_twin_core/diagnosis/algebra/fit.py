@@ -51,7 +51,6 @@ class Fit:
 
     Attributes
     ----------
-    model : Model
     residual : array, shape (rows,)
         Whitened residual at the solution.
     coordinates : array, shape (K,)
@@ -74,19 +73,7 @@ class Fit:
 
 
 def design(problem: Problem, model: Model, scale: Scale) -> tuple[Array, list[str]]:
-    """
-    Return the whitened columns of frames and found effects, shape (P, rows), and names.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-
-    """
+    """Return the whitened columns of frames and found effects, shape (P, rows), and names."""
     columns, names = designed(problem, model, scale)
     return columns.written_out(), names
 
@@ -97,10 +84,6 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
     step : array, shape (P,)
         Of base and tool frames (xyz, rotvec), changes between recordings, and fit coordinates.
 
@@ -151,7 +134,6 @@ def fit(
     precision : array, shape (K,), optional
         Prior precision of every effect coordinate, about zero, in whitened units; that of
         machines at large when left out.
-    iterations : int
     tolerance : float
         Stops when the objective falls by less than this share.
 
@@ -185,8 +167,6 @@ def descended(start: P, iterations: int, tolerance: float) -> P:
 
     Parameters
     ----------
-    start : Point
-    iterations : int
     tolerance : float
         Stops when the cost falls by less than this share.
 
@@ -228,12 +208,6 @@ class _Point:
 
         Parameters
         ----------
-        problem : Problem
-            The recordings to explain, and the frames that are fitted along.
-        model : Model
-            What is believed so far; everything is taken about it.
-        scale : Scale
-            The noise that residuals are measured in, and the weight of every sample.
         prior : array, shape (K,)
             Prior precision of every effect coordinate, about zero.
 
@@ -297,7 +271,6 @@ def robust_scale(
 
     Parameters
     ----------
-    problem : Problem
     residuals : list of array, shape (c, M)
     least : Scale, optional
         Never return less noise than this.
@@ -365,12 +338,6 @@ def robust_fit(
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
     precision : array, shape (K,), optional
         Prior precision of the fit coordinates; left out, there is no prior.
     rounds : int

@@ -51,7 +51,7 @@ def covariance(
 
     """
     inverse, size = unit_inverse(columns, ridge)
-    stretches = rows_of(np.unique(labels, return_inverse=True)[1])
+    stretches = rows_of(np.unique(labels, return_inverse=True)[1].astype(float))
     each = [columns.within(rows).times(residual[rows]) / size for rows in stretches]
     scores = inverse @ np.stack(each, axis=1)
     blocks = max(len(each), 2)
@@ -67,7 +67,6 @@ def unit_inverse(columns: Design, ridge: Array) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    columns : Design
     ridge : array, shape (P,)
         Prior precision.
 

@@ -50,12 +50,6 @@ def answer(
 
     Parameters
     ----------
-    found : Search
-    unseen : Unseen
-        Of the final model.
-    evidence : Evidence
-    verdict : Verdict
-    shrink : Shrink
     examined : Examined
         Whether the data are sound, and what was mended.
     posterior : Posterior

@@ -26,11 +26,8 @@ def named_effects(
 
     Parameters
     ----------
-    found : Search
     unseen : Unseen
         Of the final model; tells how far each effect moves the tool.
-    verdict : Verdict
-    causes : sequence of Cause
 
     Returns
     -------

@@ -49,11 +49,6 @@ def with_intervals(
 
     Parameters
     ----------
-    told : sequence of Cause
-    found : Search
-    unseen : Unseen
-        Of its final model.
-    verdict : Verdict
     floor : float
         RMS of the noise alone [m].
 
@@ -96,8 +91,6 @@ def _coordinates(rng: np.random.Generator, found: Search, missed: float) -> Arra
 
     Parameters
     ----------
-    rng : Generator
-    found : Search
     missed : float
         Share of what is left that is no noise. It spreads over a number of directions, as what
         formulas are believed to miss does.

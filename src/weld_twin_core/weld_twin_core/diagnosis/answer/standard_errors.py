@@ -117,13 +117,6 @@ def _elsewhere(problem: Problem, model: Model, scale: Scale, k: int, share: floa
 
 
 def idealised(effect: Effect) -> Array:
-    """
-    Return how far real arms differ from the formulas, per coordinate.
-
-    Parameters
-    ----------
-    effect : Effect
-
-    """
+    """Return how far real arms differ from the formulas, per coordinate."""
     specs = [effect.components()[k][0] for k in effect.fitted()]
     return np.array([p.idealised for p in specs]) * np.abs(effect.coordinates())

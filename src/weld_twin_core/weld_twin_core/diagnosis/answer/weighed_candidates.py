@@ -48,9 +48,6 @@ def unexplained(
 
     Parameters
     ----------
-    beliefs : Beliefs
-    evidence : Evidence
-    verdict : Verdict
     shrink : Shrink
         Of the model that is carried.
     placing : FreeForm or None

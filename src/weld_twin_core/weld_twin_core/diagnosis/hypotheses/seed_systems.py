@@ -36,7 +36,6 @@ class Unit:
 
     Attributes
     ----------
-    family : str
     joint : str or None
     seeds : tuple of Effect
         Instances that span it; more than one where a parameter bends the response.
@@ -286,8 +285,6 @@ class Choice:
 
     Attributes
     ----------
-    unit : Unit
-    seed : int
     columns : array of int
         Of the seed, those that earn their place.
     nats : float

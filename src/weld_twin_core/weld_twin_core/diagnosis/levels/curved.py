@@ -32,7 +32,6 @@ class Curved:
 
     Attributes
     ----------
-    form : FreeForm
     kept : tuple of Effect
         Effects that stayed beside it: those named beyond doubt, and the set-up's own motion.
     found : Search
@@ -61,7 +60,6 @@ def curved(found: Search, beliefs: Beliefs) -> Curved | None:
     ----------
     found : Search
         The set-up's own motion that it holds stays beside the curves.
-    beliefs : Beliefs
 
     """
     if found.dense:
@@ -77,12 +75,10 @@ def standing(
 
     Parameters
     ----------
-    found : Search
     verdict : Verdict
         Of any other status, nothing changes.
     alone : Curved or None
         The free-form explanation without names.
-    beliefs : Beliefs
 
     """
     if verdict.status != 'unknown' or found.dense:
@@ -158,12 +154,9 @@ def carried(
     ----------
     found, unseen, shrink
         Of the effects found.
-    verdict : Verdict
     rival : Curved or None
         The free-form explanation; carried where the verdict is 'unknown' and it predicts as well.
         What makes unseen data worse than the nominal robot does is not carried at all, nor told.
-    holdout : sequence of Recording
-    beliefs : Beliefs
 
     """
     if verdict.status != 'unknown':

@@ -29,8 +29,6 @@ class Part:
 
     Attributes
     ----------
-    group : Group
-    ridge : float
     rivals : tuple of (Group, float)
         Each group that could stand in its place and its weight, itself included.
     share : float
@@ -114,13 +112,10 @@ def free_form(
 
     Parameters
     ----------
-    problem : Problem
-    scale : Scale
     bare : Fit
         Frames and the effects that are named beyond doubt.
     precision : array, shape (K,)
         Prior precision of those effects' coordinates.
-    beliefs : Beliefs
     wandering : bool
         Look for what changes as the recording goes on, and ask no more of it than to predict
         short stretches from their neighbours.

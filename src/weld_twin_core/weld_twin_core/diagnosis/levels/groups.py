@@ -83,19 +83,7 @@ class Group:
 
 
 def all_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
-    """
-    Return the groups that these data can show at all.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-
-    """
+    """Return the groups that these data can show at all."""
     features = problem.features(model)
     out = []
     for at, on, curves in _curved(features, model):
@@ -109,16 +97,7 @@ def all_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
 
 
 def wandering_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
-    """
-    Return groups of what a joint loses by its direction, more and less as time goes on.
-
-    Parameters
-    ----------
-    problem : Problem
-    model : Model
-    scale : Scale
-
-    """
+    """Return groups of what a joint loses by its direction, more and less as time goes on."""
     features = problem.features(model)
     if problem.at_rest:
         return []
@@ -148,8 +127,6 @@ def spanned(
 
     Parameters
     ----------
-    problem : Problem
-    scale : Scale
     at, on : str
         Place and dependence.
     curves : tuple of Effect
@@ -258,7 +235,6 @@ def smooth_field(problem: Problem, k: int, maker: Features) -> Array:
 
     Parameters
     ----------
-    problem : Problem
     k : int
         Which recording, counted from 0.
     maker : Features

@@ -62,13 +62,11 @@ def placed(
     ----------
     found : Search
         The effects found, before curves take their place.
-    verdict : Verdict
     rival : Curved or None
         The free-form explanation that can be carried; what stays beside it stays here too.
     missed : Missed
         What the formulas miss. Joints that noise comes from are places, too, where no group finds
         any.
-    beliefs : Beliefs
 
     """
     if verdict.status != 'unknown':
@@ -144,11 +142,8 @@ def arm_first(found: Search, form: FreeForm, rows: int, beliefs: Beliefs) -> Fre
 
     Parameters
     ----------
-    found : Search
-    form : FreeForm
     rows : int
         Rows that the two are compared on.
-    beliefs : Beliefs
 
     """
     fields = [part for part in form.parts if part.group.at == 'instrument']

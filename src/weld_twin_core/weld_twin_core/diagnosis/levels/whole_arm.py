@@ -39,17 +39,7 @@ NEAR = 1e-3
 
 
 def whole_arm_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
-    """
-    Return the groups of causes that act at several joints at once, and loops of each joint.
-
-    Parameters
-    ----------
-    problem : Problem
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-
-    """
+    """Return the groups of causes that act at several joints at once, and loops of each joint."""
     features = problem.features(model)
     out = [
         spanned(

@@ -44,12 +44,6 @@ def held_out_shrink(
     ----------
     found : Search
         The fitted effects and the noise they leave.
-    unseen : Unseen
-        What models with more or fewer effects predict on stretches left out.
-    holdout : sequence of Recording
-        Recordings that were not fitted; none, and stretches take their turn.
-    beliefs : Beliefs
-        The numbers that decide.
 
     """
     model = found.final.model
@@ -90,8 +84,6 @@ def left_on(found: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> fl
     ----------
     found : Search
         Its final model is judged.
-    holdout : sequence of Recording
-    beliefs : Beliefs
 
     """
     return float(np.sqrt(_on_bags(found, holdout, beliefs.other_setup)[1].mean()))
@@ -112,8 +104,6 @@ def reached_by_chance(
         Its final model is judged.
     unseen : Unseen
         Of this model.
-    holdout : sequence of Recording
-    beliefs : Beliefs
 
     """
     if not holdout:

@@ -42,7 +42,6 @@ class Structure:
         Share of the squared error on unseen stretches that they take away.
     sure : float
         The gain over its standard error between stretches.
-    depends_on : tuple of str
 
     """
 
@@ -53,19 +52,7 @@ class Structure:
 
 
 def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
-    """
-    Return what generic columns add to a model on stretches not used for fitting.
-
-    Parameters
-    ----------
-    unseen : Unseen
-        What models with more or fewer effects predict on stretches left out.
-    model : Model
-        What is believed so far; everything is taken about it.
-    beliefs : Beliefs
-        The numbers that decide.
-
-    """
+    """Return what generic columns add to a model on stretches not used for fitting."""
     base = unseen.base(range(len(model.found)))
     found = [
         (base.gain(columns), name)

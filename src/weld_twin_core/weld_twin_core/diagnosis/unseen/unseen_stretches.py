@@ -56,7 +56,6 @@ class Unseen:
 
     Attributes
     ----------
-    problem, scale : Problem, Scale
     labels : array, shape (rows,)
         Stretch of every row.
     columns : Design
@@ -90,12 +89,6 @@ class Unseen:
 
         Parameters
         ----------
-        problem : Problem
-            The recordings to explain, and the frames that are fitted along.
-        scale : Scale
-            The noise that residuals are measured in, and the weight of every sample.
-        fit : Fit
-            The fitted model with its columns.
         precision : array, shape (K,)
             Prior precision of the fit coordinates, one over variance.
 

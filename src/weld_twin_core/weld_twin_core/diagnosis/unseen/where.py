@@ -48,8 +48,6 @@ def locate(found: Search, final: Unseen, causes: Sequence[Cause] = ()) -> Where:
     ----------
     found : Search
         Its baseline is the model before any effect was found.
-    final : Unseen
-        Of the final model.
     causes : sequence of Cause
         Of the answer, if there are any: joints and regimes are then theirs, so that they say what
         the answer says, also where a cause sits at no joint or its place is not certain.

@@ -32,7 +32,7 @@ from weld_twin_msgs_py.messages.topics import AUDIT, DEVIATION, MEASURED_POSE
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.controller import Controller
 
-from ..compensator import NOTHING
+from . import NOTHING
 from .drawn_cells import (
     HOMES,
     INSIDE,

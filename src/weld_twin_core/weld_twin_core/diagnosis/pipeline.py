@@ -13,8 +13,7 @@ from ..recording import Recording
 from .advice import Limits
 from .algebra.noise_floor import noise_floor
 from .algebra.problem import frames_named
-from .answer.answer import answer
-from .answer.refusal import refusal
+from .answer.answer import answer, refusal
 from .beliefs import Beliefs
 from .calibration.calibrated import stated
 from .frames.changes import families_named, settled_between
@@ -38,7 +37,7 @@ from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
 from .unseen.leftover_structure import structure
 from .unseen.unseen_stretches import Unseen
 from .verdict.decision import LIKELIER, decide
-from .verdict.gathered_evidence import gathered
+from .verdict.evidence import gathered
 
 Progress = Callable[[str], None]
 

@@ -20,8 +20,8 @@ import numpy as np
 from ...arm.channels import Shift
 from ...arrays import Array
 from ...twin.features import Features
+from .definite import Index
 from .problem import Problem, Scale
-from .unit_scale import Index
 
 Rows = slice | Index
 """Some rows: a slice, or their numbers."""

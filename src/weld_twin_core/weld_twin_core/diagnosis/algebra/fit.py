@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ...arrays import Array
+from .definite import unit_diagonal
 from .designed import designed
 from .independent_rows import measured_axes, robust_spread
 from .prior import effect_precision, frame_prior
 from .problem import Model, Problem, Scale
-from .unit_scale import unit_diagonal
 
 DAMPING, DAMPED = 1e-9, 1e6
 """Least and greatest damping of a step, in units of the columns: from Gauss-Newton to none."""

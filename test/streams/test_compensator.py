@@ -324,10 +324,38 @@ def test_a_model_exchanged_meanwhile_counts_from_the_next_goal_on(planner):
 
 def test_deviations_that_the_model_does_not_leave_withdraw_it(planner):
     deviation = planner.cell.publisher(DEVIATION)
-    for k in range(20):
-        deviation.publish(planner.cell.messages.vector3(k, np.array([3e-4, 0.0, 0.0])))
+
+    def deviate():
+        for k in range(20):
+            deviation.publish(planner.cell.messages.vector3(k, np.array([3e-4, 0.0, 0.0])))
+
+    planner.to(HOME + 1.0)  # where nothing was recorded, nothing was promised
+    deviate()
+    planner.to(HOME)
+    assert 'does not hold' not in planner.process.log
+    deviate()
     planner.cell.wait(lambda: 'does not hold' in planner.process.log, 'the notice')
     planner.refused(planner.goal(sway()), 'does not hold any more')
+    planner.cell.node.destroy_publisher(deviation)
+
+
+def test_a_tracker_that_was_lost_must_bear_the_model_out_again(planner):
+    deviation = planner.cell.publisher(DEVIATION)
+
+    def deviate(count):
+        for k in range(count):
+            deviation.publish(planner.cell.messages.vector3(k, np.array([1e-5, 0.0, 0.0])))
+        seen(planner.cell, 0.3)
+
+    deviate(5)
+    seen(planner.cell, 2.2)
+    planner.refused(planner.goal(sway()), 'the tracker is lost')
+    deviate(19)
+    planner.refused(planner.goal(sway()), '19 of the 20 measurements')
+    deviate(1)
+    handle, line = planner.send(planner.goal(sway()))
+    assert handle.accepted, line
+    planner.result(handle)
     planner.cell.node.destroy_publisher(deviation)
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Say what changed on a cell, since when, and when a trend reaches its limit.
+"""Say what changed, since when, and where it leads.
 
 A change is told where it is more than chance: one false alarm in a year of weekly looks.
 """
@@ -11,21 +11,23 @@ import argparse
 import json
 from collections.abc import Sequence
 
-from . import add_database, opened
+from weld_twin_nodes.cli.parsing import Adder
+
+from .database_options import add_database, opened
+
+EXAMPLE = 'weld-twin history changed --cell line3 --since 2026-03-31'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('--cell', required=True, metavar='NAME')
-    parser.add_argument('--since', metavar='DATE', help='only what changed after it')
-    parser.add_argument(
-        '--limit',
-        action='append',
-        default=[],
-        metavar='EFFECT=VALUE',
-        help='largest value allowed of an effect, SI units, such as backlash=0.0017; may be repeated',
+    add = Adder(parser)
+    add('--cell', 'NAME', 'whose history it is', required=True)
+    add('--since', 'DATE', 'only what changed after it')
+    text = (
+        'largest value allowed of an effect, SI units, such as backlash=0.0017; may be given again'
     )
-    parser.add_argument('--json', action='store_true', help='print JSON instead of sentences')
+    add('--limit', 'EFFECT=VALUE', text, many=True)
+    add('--json', 'print JSON instead of sentences')
     add_database(parser)
 
 

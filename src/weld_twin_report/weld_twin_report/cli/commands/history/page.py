@@ -1,23 +1,25 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Write a page that ranks the cells of a database, and a page for each cell with its control charts."""
+"""Write a page that ranks cells, and one for each cell."""
 
 from __future__ import annotations
 
 import argparse
 
 from weld_twin_nodes.cli.options import add_output, output
+from weld_twin_nodes.cli.parsing import Adder
 
-from ..history_jobs import opened
+from .database_options import opened
 
 INDEX = 'index.html'
+
+EXAMPLE = 'weld-twin history page --db plant.db --out plant'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument(
-        '--db', required=True, metavar='URL', help='an SQLite file, or postgresql+psycopg://...'
-    )
+    text = 'an SQLite file, or postgresql+psycopg://...'
+    Adder(parser)('--db', 'URL', text, required=True)
     add_output(parser, 'directory for the pages')
 
 

@@ -1,13 +1,15 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Show the diagnoses of a cell in the order of time, or which cells there are."""
+"""Show the diagnoses of a cell, or which cells there are."""
 
 from __future__ import annotations
 
 import argparse
 from typing import TYPE_CHECKING
 
-from . import add_database, opened
+from weld_twin_nodes.cli.parsing import Adder
+
+from .database_options import add_database, opened
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -18,10 +20,12 @@ if TYPE_CHECKING:
 WIDTH = 100
 """Columns of the table, whatever the terminal has."""
 
+EXAMPLE = 'weld-twin history show --cell line3'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('--cell', metavar='NAME', help='left out: list the cells')
+    Adder(parser)('--cell', 'NAME', 'left out: list the cells')
     add_database(parser)
 
 

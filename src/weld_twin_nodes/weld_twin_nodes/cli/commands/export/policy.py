@@ -10,24 +10,21 @@ from __future__ import annotations
 
 import argparse
 
-from ..options import add_file_output, output_file
+from ...options import add_file_output, output_file
+from ...parsing import Adder
 
-EXAMPLE = 'weld-twin policy --namespace left --remap joint_states:=/cell/states --out left.xml'
+EXAMPLE = (
+    'weld-twin export policy --namespace left --remap joint_states:=/cell/states --out left.xml'
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('--namespace', default='', help='namespace of the nodes')
-    parser.add_argument(
-        '--remap',
-        action='append',
-        default=[],
-        metavar='FROM:=TO',
-        help='a name the nodes have and the one they get; may be repeated',
-    )
-    parser.add_argument(
-        '--nodes', nargs='+', default=[], metavar='NODE', help='nodes it is for (default: all)'
-    )
+    add = Adder(parser)
+    add('--namespace', 'NS', 'namespace of the nodes', default='')
+    text = 'a name the nodes have and the one they get; may be given again'
+    add('--remap', 'FROM:=TO', text, many=True)
+    add('--nodes', 'NODE', 'nodes it is for (default: all)', nargs='+', default=[])
     add_file_output(parser, 'file to write (default: print it)')
 
 
@@ -36,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.files.whole_files import write_text
 
-    from ...live.policy import policy
+    from ....live.policy import policy
 
     remaps = {}
     for text in args.remap:

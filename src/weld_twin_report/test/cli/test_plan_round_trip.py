@@ -56,7 +56,7 @@ def robot_file(path, kind):
 @pytest.mark.parametrize('kind', NAMES)
 def test_a_table_to_fill_in_comes_back_as_the_postures_planned(weld_twin, tmp_path, kind):
     file, out = robot_file(tmp_path / 'made.yaml', kind), tmp_path / 'plan'
-    plan = ('plan-measurement', '--robot', file, '--tolerance', 0.5, '--postures', 24)
+    plan = ('investigate', '--robot', file, '--tolerance', 0.5, '--postures', 24)
     result = weld_twin(*plan, '--out', out)
     assert result.code == 0, result.err
     robot = load_robot(file)
@@ -79,7 +79,7 @@ def test_a_table_to_fill_in_comes_back_as_the_postures_planned(weld_twin, tmp_pa
 
 def test_no_program_is_written_for_an_axis_that_its_language_would_turn(weld_twin, tmp_path):
     file = robot_file(tmp_path / 'made.yaml', 'a track')
-    plan = ('plan-measurement', '--robot', file, '--tolerance', 0.5, '--postures', 24)
+    plan = ('investigate', '--robot', file, '--tolerance', 0.5, '--postures', 24)
     result = weld_twin(*plan, '--controller', 'rapid', '--out', tmp_path / 'plan')
     assert result.code == 2 and "'rail' of robot 'made' slides" in result.err
     assert not (tmp_path / 'plan').exists()
@@ -94,5 +94,5 @@ def test_no_program_is_written_for_an_axis_that_its_language_would_turn(weld_twi
     ],
 )
 def test_a_number_of_postures_that_makes_no_plan_is_refused(weld_twin, words, told):
-    result = weld_twin('plan-measurement', '--robot', 'ur5', '--tolerance', 0.3, *words)
+    result = weld_twin('investigate', '--robot', 'ur5', '--tolerance', 0.3, *words)
     assert result.code == 2 and told in result.err and len(result.err.splitlines()) == 1

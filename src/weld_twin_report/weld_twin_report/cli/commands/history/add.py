@@ -1,32 +1,30 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Add diagnoses to the history of a cell; what is in it already is left as it is."""
+"""Add diagnoses to the history of a cell."""
 
 from __future__ import annotations
 
 import argparse
 from typing import TYPE_CHECKING
 
-from . import add_database, opened
+from weld_twin_nodes.cli.parsing import Adder
+
+from .database_options import add_database, opened
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
 
+EXAMPLE = 'weld-twin history add found --cell line3 --at 2026-03-31'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument(
-        'diagnoses',
-        metavar='DIAGNOSIS',
-        nargs='+',
-        help='diagnosis.json, or the directory that diagnose wrote; or what verify wrote',
-    )
-    parser.add_argument('--cell', required=True, metavar='NAME', help='whose history it is')
-    parser.add_argument(
-        '--at',
-        metavar='DATE',
-        help='when it was recorded, such as 2026-03-31; left out, the stamps of the recording tell',
-    )
+    add = Adder(parser)
+    text = 'diagnosis.json, or the directory that diagnose wrote; or what verify wrote'
+    add('diagnoses', 'DIAGNOSIS', text, nargs='+')
+    add('--cell', 'NAME', 'whose history it is', required=True)
+    text = 'when it was recorded, such as 2026-03-31; left out, the stamps of the recording tell'
+    add('--at', 'DATE', text)
     add_database(parser)
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Make a bag of what is whole of one whose recording was cut short, or that is damaged.
+"""Make a bag of what is whole of a damaged one.
 
 BAG is what the recorder was told to write. The original stays as it is; delete it when you have
 looked at the new one.
@@ -10,15 +10,19 @@ from __future__ import annotations
 
 import argparse
 
+from ...parsing import Adder
+
+EXAMPLE = 'weld-twin bag recover my_recording'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('bag', metavar='BAG', help='bag, its .unfinished directory, or a file')
-    parser.add_argument(
+    add = Adder(parser)
+    add('bag', 'BAG', 'bag, its .unfinished directory, or a file')
+    add(
         '--out',
-        metavar='BAG2',
-        help='bag to write; it must not exist yet (default: the name that the recording should '
-        'have, or BAG_recovered)',
+        'BAG2',
+        'bag to write (default: the name the recording should have, or BAG_recovered)',
     )
 
 

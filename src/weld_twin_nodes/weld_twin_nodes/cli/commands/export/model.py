@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Write the model of a diagnosis in a form that other software loads."""
+"""Write the model of a diagnosis as other software loads it."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..options import add_file_output, add_robot, given_urdf, output_file, robot_of
+from ...options import add_file_output, add_robot, given_urdf, output_file, robot_of
+from ...parsing import Adder
 
+EXAMPLE = 'weld-twin export model found/diagnosis.json --robot ur5 --format offsets'
 _FORMATS = ('yaml', 'urdf', 'offsets', 'effects', 'left-over')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('model', metavar='MODEL', help='diagnosis.json')
+    add = Adder(parser)
+    add('model', 'MODEL', 'diagnosis.json')
     add_robot(parser)
-    parser.add_argument(
-        '--format',
-        choices=_FORMATS,
-        default='yaml',
-        help='yaml, urdf: the corrected robot; offsets: a CSV with a row for each joint; effects: '
-        'all effects, for the nominal robot; left-over: the effects that a corrected robot '
-        'cannot hold (default: yaml)',
+    text = (
+        'yaml, urdf: the corrected robot; offsets: a CSV, a row a joint; effects: all, for the '
+        'nominal robot; left-over: those that a corrected robot cannot hold (default: yaml)'
     )
+    add('--format', text, choices=_FORMATS, default='yaml')
     add_file_output(parser, 'file to write (default: print it)')
 
 
@@ -36,8 +36,8 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_msgs_py.files.diagnosis_model import read_model
     from weld_twin_msgs_py.files.posterior_entry import read_posterior
 
-    from ...offline.exports import FORMATS, write_given_urdf
-    from ...offline.where_it_holds import where_it_holds
+    from ....offline.exports import FORMATS, write_given_urdf
+    from ....offline.where_it_holds import where_it_holds
 
     robot = robot_of(args)
     model, posterior = read_model(robot, args.model), read_posterior(robot, args.model)

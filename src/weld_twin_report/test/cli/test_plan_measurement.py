@@ -14,7 +14,7 @@ from weld_twin_core.arm import catalog
 from weld_twin_msgs_py.files.joint_file import read_joint_motion
 
 ROBOT = catalog.load('kuka_kr6_r900')
-WORDS = ('plan-measurement', '--robot', 'kuka_kr6_r900', '--tolerance', 0.3)
+WORDS = ('investigate', '--robot', 'kuka_kr6_r900', '--tolerance', 0.3)
 
 
 def test_it_writes_stations_a_table_and_a_program_of_the_same_postures(weld_twin, tmp_path):

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Diagnose the recordings of a list, and write the results to a database.
+"""Diagnose the recordings of a list into a database.
 
 LIST is a table of text with commas and a first line of names: cell, recording and robot, and where
 they are needed at, align, effects_known, base_link, tip_link, contacts and apply. Paths are relative
@@ -17,8 +17,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from weld_twin_nodes.cli.options import add_pool
+from weld_twin_nodes.cli.parsing import Adder
 
-from ..history_jobs import opened
+from .database_options import opened
 
 if TYPE_CHECKING:
     from weld_twin_nodes.offline.task_pool import Pool
@@ -30,26 +31,20 @@ TROUBLED = 1
 GIGABYTE = 1_000_000_000
 """Bytes."""
 
+EXAMPLE = 'weld-twin history run examples/files/cells.csv --db plant.db'
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('list', metavar='LIST', help='table of recordings')
-    parser.add_argument(
-        '--db', required=True, metavar='URL', help='an SQLite file, or postgresql+psycopg://...'
-    )
+    add = Adder(parser)
+    add('list', 'LIST', 'table of recordings')
+    add('--db', 'URL', 'an SQLite file, or postgresql+psycopg://...', required=True)
     add_pool(parser)
-    parser.add_argument(
-        '--keep', metavar='DIR', help='also keep the page and the model of every recording there'
-    )
-    parser.add_argument(
-        '--again', action='store_true', help='run once more what a limit or a crash has ended'
-    )
-    parser.add_argument(
-        '--memory', type=float, default=6.0, metavar='GB', help='of each (default: 6)'
-    )
-    parser.add_argument(
-        '--minutes', type=float, default=10.0, metavar='N', help='of each (default: 10)'
-    )
+    text = 'also keep the page and the model of every recording there'
+    add('--keep', 'DIR', text)
+    add('--again', 'run once more what a limit or a crash has ended')
+    add('--memory', 'GB', 'of each (default: {default})', type=float, default=6.0, rare=True)
+    add('--minutes', 'N', 'of each (default: {default})', type=float, default=10.0, rare=True)
 
 
 def run(args: argparse.Namespace) -> int:

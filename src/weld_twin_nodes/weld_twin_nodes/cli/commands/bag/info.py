@@ -8,23 +8,28 @@ import argparse
 from collections.abc import Mapping
 from typing import Any
 
-from ..options import add_topics, topics_of
+from ...options import add_topics, topics_of
+from ...parsing import Adder
+
+EXAMPLE = 'weld-twin bag info bags/elbow_play'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    what = parser.add_mutually_exclusive_group(required=True)
-    what.add_argument('bag', nargs='?', metavar='BAG', help='rosbag2 directory, .mcap or .db3')
-    what.add_argument(
-        '--robots', action='store_true', help='list the bundled robots and your own instead'
-    )
+    add = Adder(parser)
+    add('bag', 'BAG', 'rosbag2 directory, .mcap or .db3', nargs='?')
+    add('--robots', 'list the bundled robots and your own instead')
     add_topics(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Print a table of topics, then what a diagnosis can do with them."""
+    from weld_twin_core.errors import DataError
+
     if args.robots:
         return _print_robots()
+    if args.bag is None:
+        raise DataError('give a BAG, or --robots')
     from rich.console import Console
     from rich.table import Table
 
@@ -81,7 +86,7 @@ def _effect(entry: Mapping[str, Any]) -> str:
     """Return an entry of an effects file in words, with its units where the effect is known."""
     from weld_twin_core.effects import REGISTRY
 
-    from ...wording.words import cause
+    from ....wording.words import cause
 
     kind = REGISTRY.get(entry['effect'])
     units = {} if kind is None else {p.name: p.unit.strip('-') for p in kind.parameters}

@@ -1,17 +1,20 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Print the JSON Schema of a file that people write, for editors: robot, effects, seam, artefact."""
+"""The JSON Schema of a robot, effects, seam or artefact file."""
 
 from __future__ import annotations
 
 import argparse
 
-from ..options import add_file_output, output_file
+from ...options import add_file_output, output_file
+from ...parsing import Adder
+
+EXAMPLE = 'weld-twin export schema robot --out robot.schema.json'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('kind', metavar='KIND', help='robot, effects, seam or artefact')
+    Adder(parser)('kind', 'KIND', 'robot, effects, seam or artefact')
     add_file_output(parser, 'file to write (default: print it)')
 
 

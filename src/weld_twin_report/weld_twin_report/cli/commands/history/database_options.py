@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The jobs of `weld-twin history`, one file each."""
+"""The option that names the database of the history, and the database."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
+
+from weld_twin_nodes.cli.parsing import Adder
 
 if TYPE_CHECKING:
     from weld_twin_report.history import Database
@@ -17,13 +19,10 @@ DATABASE = 'weld_twin_history.db'
 
 def add_database(parser: argparse.ArgumentParser) -> None:
     """Add the option that names the database."""
-    parser.add_argument(
-        '--db',
-        default=DATABASE,
-        metavar='URL',
-        help='database: an SQLite file, or a URL such as postgresql+psycopg://user@host/name '
-        f'(default: {DATABASE})',
+    text = (
+        'an SQLite file, or a URL such as postgresql+psycopg://user@host/name (default: {default})'
     )
+    Adder(parser)('--db', 'URL', text, default=DATABASE)
 
 
 @contextmanager

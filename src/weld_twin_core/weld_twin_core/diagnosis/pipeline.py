@@ -37,7 +37,7 @@ from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
 from .unseen.leftover_structure import structure
 from .unseen.unseen_stretches import Unseen
 from .verdict.decision import LIKELIER, decide
-from .verdict.evidence import gathered
+from .verdict.gathered_evidence import gathered
 
 Progress = Callable[[str], None]
 

@@ -44,7 +44,8 @@ from ..soundness.efforts import compared
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
 from ..verdict.decision import Verdict
-from ..verdict.evidence import Evidence, Left
+from ..verdict.evidence import Evidence
+from ..verdict.left import Left
 from .contact_spreads import contact_spreads
 from .named_effects import named_effects
 from .share_intervals import with_intervals

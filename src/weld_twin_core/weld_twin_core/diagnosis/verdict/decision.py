@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 from ..beliefs import Beliefs
 from ..posterior.table import named_together
 from ..result import Family, Site
-from .evidence import Evidence, Left
+from .evidence import Evidence
+from .left import Left
 
 FIELD = 'instrument'
 """A free field over the workspace speaks against every formula: it is what each of them bends to."""

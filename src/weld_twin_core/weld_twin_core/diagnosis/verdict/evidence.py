@@ -1,27 +1,14 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a verdict is drawn from, as plain values: gathered from fits and unseen stretches, and judged."""
+"""What a verdict is drawn from, as plain values."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from ...arm.robot import Robot
-from ...effects.effect import Effect
-from ...effects.plausible import beyond
-from ..algebra.noise_floor import NoiseFloor
-from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
-from ..hypotheses.search import Search
-from ..many.weighed_families import WeighedFamily, weighed_families
-from ..result import Shrink, Site
+from ..many.weighed_families import WeighedFamily
 from ..unseen.leftover_structure import Structure
-from ..unseen.unseen_stretches import Unseen
-
-TINY = 1e-18
-"""Least squared gap [m^2] divided by: a nanometre, far below any instrument."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,124 +66,3 @@ class Evidence:
     chance: float = 1.0
     believed: tuple[float, ...] = ()
     missed: tuple[tuple[str, str], ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Left:
-    """Evidence, and the numbers from which on what it leaves is more than noise."""
-
-    evidence: Evidence
-    beliefs: Beliefs
-
-    @property
-    def structured(self) -> bool:
-        """Return whether generic columns find something beyond doubt."""
-        gain, sure = self.evidence.structure.gain, self.evidence.structure.sure
-        usual = gain > self.beliefs.structure_gain and sure > self.beliefs.structure_sure
-        blatant = gain > self.beliefs.blatant_gain and sure > self.beliefs.blatant_sure
-        return usual or blatant
-
-    @property
-    def high(self) -> bool:
-        """Return whether what remains rises above a floor that was measured apart."""
-        told = self.evidence
-        return told.independent and told.after > self.beliefs.above * told.floor
-
-    @property
-    def wide(self) -> bool:
-        """Return whether what remains is far wider than a floor that only the fit shows."""
-        told = self.evidence
-        return not told.independent and told.after > self.beliefs.far_above * told.floor
-
-    @property
-    def above_noise(self) -> bool:
-        """Return whether what remains is more than noise."""
-        return self.structured or self.high
-
-    @property
-    def share(self) -> float:
-        """Return the share of the squared gap above noise that is not explained."""
-        told = self.evidence
-        found = told.structure.gain * told.after**2 if self.structured else 0.0
-        over = told.after**2 - told.floor**2 if self.high else 0.0
-        if self.wide:
-            # Such a floor may be too low by that factor; what is beyond is left all the same.
-            over = told.after**2 - (self.beliefs.far_above * told.floor) ** 2
-        return float(np.clip(max(found, over) / self._excess, 0.0, 1.0))
-
-    @property
-    def explained(self) -> float:
-        """Return the share of the squared gap above noise that the model takes off unseen data."""
-        told = self.evidence
-        return float(np.clip((told.gap**2 - told.after**2) / self._excess, 0.0, 1.0))
-
-    @property
-    def _excess(self) -> float:
-        told = self.evidence
-        least = self.beliefs.least_excess * told.floor**2
-        return max(told.gap**2 - told.floor**2, least, TINY)
-
-
-def gathered(
-    found: Search,
-    unseen: Unseen,
-    leftover: Structure,
-    shrink: Shrink,
-    floor: NoiseFloor,
-    beliefs: Beliefs,
-    least: float | None = None,
-    chance: float = 1.0,
-) -> Evidence:
-    """
-    Return the evidence for a verdict.
-
-    Parameters
-    ----------
-    leftover : Structure
-        What generic columns still find beside it.
-    shrink : Shrink
-        On held-out recordings or on stretches taking their turn.
-    least : float or None
-        As `borne_out` gives it.
-    chance : float
-        As `reached_by_chance` gives it.
-
-    """
-    robot = found.final.model.robot
-    return Evidence(
-        slots=found.slots,
-        structure=leftover,
-        gap=shrink.rms_before_m,
-        after=shrink.rms_after_m,
-        floor=floor.rms_m,
-        fitted=unseen.rms(unseen.whole),
-        independent=floor.independent,
-        parts=_parts(unseen),
-        refused=tuple(_refused(robot, e) for e in found.refused if beyond(robot, e)),
-        lacking=tuple(_lacking(e) for e in found.refused if not beyond(robot, e)),
-        families=weighed_families(found, unseen, beliefs) if found.dense else None,
-        least=least,
-        chance=chance,
-    )
-
-
-def _parts(unseen: Unseen) -> tuple[float, ...]:
-    """Return the squared contribution of every effect over the square of their sum."""
-    parts = unseen.targets[1:]
-    total = parts.sum(axis=0)
-    return tuple(float(p @ p) / max(float(total @ total), 1e-300) for p in parts)
-
-
-def _refused(robot: Robot, effect: Effect) -> str:
-    """Return an effect that no machine has, with the values that say so."""
-    units = {parameter.name: parameter.unit for parameter in effect.parameters}
-    values = ', '.join(
-        f'{name} {value:.3g} {units[name]} (the limit of machines is {limit:.3g})'
-        for name, value, limit in beyond(robot, effect)
-    )
-    return f'{Site(effect.name, effect.site)} with {values}'
-
-
-def _lacking(effect: Effect) -> str:
-    """Return an effect that was taken out of the library."""
-    return f'{Site(effect.name, effect.site)}, which was taken out of the library'

@@ -18,9 +18,8 @@ import numpy as np
 
 from ...arrays import Array
 from .atoms import rows_of
-from .definite import inverted, well_conditioned
+from .definite import inverted, unit_diagonal, well_conditioned
 from .designed import Design
-from .unit_scale import unit_diagonal
 
 BLOCKS = 24
 """Stretches whose scores are held apart: enough to tell a variance to a third."""

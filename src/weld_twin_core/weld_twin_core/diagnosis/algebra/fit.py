@@ -7,18 +7,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ...arrays import Array
+from .definite import unit_diagonal
 from .designed import designed
 from .independent_rows import measured_axes, robust_spread
 from .prior import effect_precision, frame_prior
 from .problem import Model, Problem, Scale
-from .unit_scale import unit_diagonal
 
 DAMPING, DAMPED = 1e-9, 1e6
 """Least and greatest damping of a step, in units of the columns: from Gauss-Newton to none."""
@@ -139,38 +139,12 @@ def fit(
 
     """
     prior = effect_precision(model) if precision is None else precision
-    here = descended(_Point.at(problem, model, scale, prior), iterations, tolerance)
+    here = _descended(_Point.at(problem, model, scale, prior), iterations, tolerance)
     return Fit(here.model, here.residual, coordinates(here.model))
 
 
-class Point(Protocol):
-    """A place on the way of a fit: what it costs, which way is down, and the place a step away."""
-
-    @property
-    def cost(self) -> float:
-        """Return what is to become small."""
-
-    @property
-    def normal_equations(self) -> tuple[Array, Array]:
-        """Return normal matrix (P, P) and right-hand side (P,) of a step, the priors included."""
-
-    def stepped(self: P, step: Array) -> P:
-        """Return the place a step, shape (P,), away."""
-
-
-P = TypeVar('P', bound=Point)
-
-
-def descended(start: P, iterations: int, tolerance: float) -> P:
-    """
-    Return the place that Levenberg and Marquardt lead to.
-
-    Parameters
-    ----------
-    tolerance : float
-        Stops when the cost falls by less than this share.
-
-    """
+def _descended(start: _Point, iterations: int, tolerance: float) -> _Point:
+    """Return the place that Levenberg and Marquardt lead to."""
     here, damping = start, DAMPING
     for _ in range(iterations):
         there = None

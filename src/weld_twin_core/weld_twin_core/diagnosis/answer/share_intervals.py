@@ -26,7 +26,7 @@ from ..levels.causes import LISTED, covering
 from ..result import Cause, Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
-from .standard_errors import covariance, idealised
+from .named_effects import covariance, idealised
 
 DRAWS = 1000
 """Enough for the ends of an interval to be good to a few per cent of its width."""

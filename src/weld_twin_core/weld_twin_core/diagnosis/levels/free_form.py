@@ -14,9 +14,8 @@ from ..algebra.fit import Fit, design
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..unseen.folds import ways_to_divide
-from .groups import Group, all_groups, wandering_groups
+from .groups import Group, all_groups, wandering_groups, whole_arm_groups
 from .sparse_groups import choosing, chosen, rival_weights, worth
-from .whole_arm import whole_arm_groups
 
 STANDS_OUT, NAMED = 0.5, 3
 """Weight from which one place is named alone, and how many are named where none has it."""

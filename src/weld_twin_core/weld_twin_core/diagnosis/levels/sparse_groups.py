@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
-from ..algebra.unit_scale import Index
+from ..algebra.definite import Index
 from ..beliefs import Beliefs
 from ..unseen.folds import steadiness
 from .groups import Group

@@ -24,12 +24,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
 from ..algebra.atoms import Rows, rows_of
-from ..algebra.definite import Triangle, inverses
+from ..algebra.definite import Index, Triangle, inverses, unit_diagonal
 from ..algebra.designed import Design, designed
 from ..algebra.fit import Fit, trusted
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.unit_scale import Index, unit_diagonal
 from .folds import STRETCHES, Gain, gain, ways_to_divide
 
 DAMPING = 1e-11

@@ -125,6 +125,12 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
     if 'tool' in problem.align:
         model = model.retooled(step[at : at + 6])
         at += 6
+    shared = []
+    for k, (_, own) in enumerate(problem.common):
+        now = model.common[k] if model.common else np.zeros(own.mean.size)
+        shared.append(now + step[at : at + now.size])
+        at += now.size
+    model = replace(model, common=tuple(shared))
     effects = []
     for effect in (*(change.effect for change in model.changes), *model.found):
         now = effect.coordinates()
@@ -326,8 +332,9 @@ def robust_scale(
     told = problem.told_weights
     residuals = [part * np.sqrt(own) for part, own in zip(residuals, told, strict=True)]
     lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
-    position = np.concatenate([measured_axes(r[:3]).ravel() for r in residuals])
-    turn = np.concatenate([r[3:].ravel() for r in residuals])
+    sure = problem.as_sure(residuals)
+    position = np.concatenate([measured_axes(rows).ravel() for rows, _ in sure])
+    turn = np.concatenate([rows.ravel() for _, rows in sure])
     sigma = robust_spread(position) / lost
     sigma_turn = robust_spread(turn) / lost if turn.size else 1.0
     if least is not None:
@@ -335,10 +342,10 @@ def robust_scale(
     sigma = max(sigma, 1e-9)
     sigma_turn = max(sigma_turn, LEAST_TURN * sigma)
     weights = []
-    for part, own in zip(residuals, told, strict=True):
-        off = np.sqrt((part[:3] ** 2).sum(axis=0) / 3.0) / sigma
-        if part.shape[0] > 3:
-            off = np.maximum(off, np.sqrt((part[3:] ** 2).sum(axis=0) / 3.0) / sigma_turn)
+    for (shifts, turns), own in zip(sure, told, strict=True):
+        off = np.sqrt((shifts**2).sum(axis=0) / max(len(shifts), 3)) / sigma
+        if turns.size:
+            off = np.maximum(off, np.sqrt((turns**2).sum(axis=0) / 3.0) / sigma_turn)
         weights.append(own * np.minimum(1.0, (HUBER / np.maximum(off, 1e-12)) ** 2))
     return Scale(sigma, sigma_turn, tuple(weights))
 

@@ -95,6 +95,9 @@ class Model:
         How it was undone, as plain values to be made again; see `soundness.mending`.
     alone : Alone or None
         What its robot file does by itself; None where that is not known.
+    common : tuple of array
+        Errors that all samples of an instrument share, one array for every recording that has
+        any; nothing before they are fitted.
 
     """
 
@@ -107,6 +110,7 @@ class Model:
     given: tuple[int, ...] = ()
     mends: tuple[Mapping[str, Any], ...] = ()
     alone: Alone | None = None
+    common: tuple[Array, ...] = ()
 
     def twin(self, k: int) -> Twin:
         """Return the twin of recording k."""

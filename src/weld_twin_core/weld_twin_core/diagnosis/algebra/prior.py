@@ -35,9 +35,15 @@ def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
     Return the prior precision of the frame columns, and how far the frames are off, (F,) each.
 
     In the order of `Problem.frame_columns`; nothing is believed of frames without an anchor.
-    What may differ between recordings is believed to be as large as in a machine.
+    Errors that samples share come in standard deviations. What may differ between recordings is
+    believed to be as large as in a machine.
     """
     precision, off = _anchored(problem, model)
+    shared = [common.mean for _, common in problem.common]
+    held = model.common or [np.zeros(mean.size) for mean in shared]
+    beside = [at - mean for at, mean in zip(held, shared, strict=True)]
+    precision = np.concatenate([precision, *(np.ones(mean.size) for mean in shared)])
+    off = np.concatenate([off, *beside])
     spread = [spreads(model.robot, change.effect) for change in model.changes]
     now = [change.effect.coordinates() for change in model.changes]
     own = np.concatenate([np.zeros(0), *spread]) ** -2.0 if spread else np.zeros(0)
@@ -49,7 +55,8 @@ def _anchored(problem: Problem, model: Model) -> tuple[Array, Array]:
     pairs: list[tuple[Array, Array, bool]] = []
     anchor = problem.anchor
     if anchor is None:
-        return np.zeros(problem.frame_count), np.zeros(problem.frame_count)
+        count = problem.frame_count - sum(common.mean.size for _, common in problem.common)
+        return np.zeros(count), np.zeros(count)
     if 'base' in problem.align:
         first = [group[0] for group in problem.stands]
         pairs += [(model.bases[k], anchor.bases[k], True) for k in first]

@@ -17,6 +17,7 @@ from ...arrays import Array
 from ...contacts import Unknowns, places, unknowns
 from ...effects.effect import Effect
 from ...errors import DataError, ModelError
+from ...pose_noise import Common
 from ...recording import Measurements, Recording
 from ...twin.features import Features, Remembered
 from .independent_rows import by_sample
@@ -166,7 +167,28 @@ class Problem:
     @property
     def frame_count(self) -> int:
         """Return the number of coordinates of the frames that are fitted along."""
-        return 6 * (('base' in self.align) * len(self.stands) + ('tool' in self.align))
+        frames = ('base' in self.align) * len(self.stands) + ('tool' in self.align)
+        return 6 * frames + sum(common.mean.size for _, common in self.common)
+
+    @cached_property
+    def common(self) -> list[tuple[int, Common]]:
+        """Return the recordings whose samples share errors of their instrument, and these."""
+        each = enumerate(_measured(r).common for r in self.recordings)
+        return [(k, common) for k, common in each if common is not None]
+
+    def of_frames(self) -> Problem:
+        """Return the problem with nothing fitted along but base and tool."""
+        if not self.common:
+            return replace(self, changes=())
+        pairs = ((r, _measured(r)) for r in self.recordings)
+        bare = tuple(r.with_measured(replace(m, common=None)) for r, m in pairs)
+        return replace(self, recordings=bare, changes=())
+
+    @cached_property
+    def roots(self) -> list[Array | None]:
+        """Return what makes independent rows of each recording's poses; None of those not told."""
+        told = (_measured(r).noise for r in self.recordings)
+        return [None if noise is None else noise.root for noise in told]
 
     def touching(self, model: Model) -> Problem:
         """Return the problem with its contacts as a model sees them; no contacts, no change."""
@@ -260,6 +282,8 @@ class Problem:
             if measured.rotation is not None:
                 parts.append(angle_between(measured.rotation, poses.rotation).T)
             out.append(np.concatenate(parts))
+        for (k, common), off in zip(self.common, model.common, strict=bool(model.common)):
+            out[k] = out[k] - np.einsum('mcz,z->cm', common.change, off)
         return out
 
     def features(self, model: Model) -> list[Features]:
@@ -301,6 +325,10 @@ class Problem:
             unit = np.full(part.shape[-2], 1.0 / scale.position)
             unit[3:] = 1.0 / scale.orientation
             turned = np.swapaxes(part, -1, -2)
+            root = self.roots[k]
+            if root is not None:
+                turned = (root @ turned[..., None])[..., 0]
+                unit[:] = 1.0 / scale.position
             scaled = np.empty(turned.shape)
             np.multiply(turned, np.sqrt(weight)[:, None] * unit, out=scaled)
             rows = scaled.reshape(*part.shape[:-2], weight.size * unit.size)
@@ -310,6 +338,22 @@ class Problem:
                 rows = rows - ((rows @ ways.T) * (1.0 - left)) @ ways
             out.append(rows)
         return out[0] if len(out) == 1 else np.concatenate(out, axis=-1)
+
+    def as_sure(self, parts: list[Array]) -> list[tuple[Array, Array]]:
+        """
+        Return residual-like parts as rows in metres and rows in radians, (k, M) each.
+
+        Where an instrument tells how sure its poses are, all rows are in metres, and as sure as
+        a usual coordinate.
+        """
+        out = []
+        for part, root in zip(parts, self.roots, strict=True):
+            if root is None:
+                out.append((part[:3], part[3:]))
+            else:
+                rows = np.einsum('mij,jm->im', root, part)
+                out.append((rows, rows[:0]))
+        return out
 
     def by_sample(self, values: Array) -> list[Array]:
         """Return what `whitened` has laid out in rows as one array per recording, (M, c, ...)."""
@@ -322,7 +366,8 @@ class Problem:
             names += [f'base {group[0]}.{j}' for group in self.stands for j in range(6)]
         if 'tool' in self.align:
             names += [f'tool.{j}' for j in range(6)]
-        parts = []
+        names += [f'common {k}.{j}' for k, own in self.common for j in range(own.mean.size)]
+        parts, shared = [], sum(own.mean.size for _, own in self.common)
         groups = [('base', group) for group in self.stands if 'base' in self.align]
         groups += [('tool', tuple(range(len(features))))] * ('tool' in self.align)
         rows, samples = self.rows, self.samples
@@ -331,6 +376,11 @@ class Problem:
             for p, (kind, group) in enumerate(groups):
                 for j in range(6 if k in group else 0):
                     block[6 * p + j] = self.seen(k, maker.column((kind, j)))
+            at = len(names) - shared
+            for other, own in self.common:
+                if other == k:
+                    block[at : at + own.mean.size] = own.change.transpose(2, 1, 0)
+                at += own.mean.size
             parts.append(np.concatenate([block, *self._change_columns(k, maker)]))
         sizes = [change.effect.coordinates().size for change in self.changes]
         names += [f'change {i}.{j}' for i, size in enumerate(sizes) for j in range(size)]

@@ -93,7 +93,7 @@ def positions_as(given: Given, factor: Array) -> Given:
             continue
         seen = measured(r)
         turn = None if np.prod(factor) < 0.0 else seen.rotation
-        out.append(r.with_measured(replace(seen, position=seen.position * factor, rotation=turn)))
+        out.append(r.with_measured(replace(seen, position=seen.position * factor, rotation=turn, noise=None, common=None)))
     return replace(given, recordings=tuple(out))
 
 
@@ -127,7 +127,7 @@ def turns_as(given: Given, way: str) -> Given:
             continue
         seen = measured(r)
         turn = None if seen.rotation is None else WAYS[way][1](seen.rotation)
-        out.append(r.with_measured(replace(seen, rotation=turn)))
+        out.append(r.with_measured(replace(seen, rotation=turn, noise=None, common=None)))
     return replace(given, recordings=tuple(out))
 
 

@@ -114,6 +114,10 @@ class Common:
         """Return that of some samples."""
         return replace(self, change=self.change[index])
 
+    def moved(self, change: Array) -> Common:
+        """Return them where errors became others, by matrices of shape (M, c, c)."""
+        return replace(self, change=change @ self.change)
+
 
 def inverse_error(position: Array, rotation: Array) -> Array:
     """

@@ -227,7 +227,7 @@ class Measurements:
         position = -(turn @ self.position[..., None])[..., 0]
         change = inverse_error(self.position, self.rotation)
         noise = None if self.noise is None else self.noise.moved(np.linalg.inv(change))
-        common = None if self.common is None else replace(self.common, change=change @ self.common.change)
+        common = None if self.common is None else self.common.moved(change)
         sigma = self.sigma if noise is None else noise.sigma
         return Measurements(self.t, position, turn, sigma, noise, common)
 

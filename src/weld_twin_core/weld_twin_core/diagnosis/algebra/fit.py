@@ -114,11 +114,11 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
     if 'tool' in problem.align:
         model = model.retooled(step[at : at + 6])
         at += 6
-    shared = []
-    for k, (_, own) in enumerate(problem.common):
-        now = model.common[k] if model.common else np.zeros(own.mean.size)
-        shared.append(now + step[at : at + now.size])
-        at += now.size
+    shared = [np.zeros(0) for _ in model.bases] if problem.common else list(model.common)
+    for k, own in problem.common:
+        size = own.mean.size
+        shared[k] = model.shared(k, size) + step[at : at + size]
+        at += size
     model = replace(model, common=tuple(shared))
     effects = []
     for effect in (*(change.effect for change in model.changes), *model.found):
@@ -316,7 +316,7 @@ def robust_scale(
     lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
     sure = problem.as_sure(residuals)
     position = np.concatenate([measured_axes(rows).ravel() for rows, _ in sure])
-    turn = np.concatenate([rows.ravel() for _, rows in sure])
+    turn = np.concatenate([part[3:].ravel() for part in residuals])
     sigma = robust_spread(position) / lost
     sigma_turn = robust_spread(turn) / lost if turn.size else 1.0
     if least is not None:

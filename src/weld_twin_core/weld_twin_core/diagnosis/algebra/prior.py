@@ -39,10 +39,8 @@ def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
     believed to be as large as in a machine.
     """
     precision, off = _anchored(problem, model)
-    shared = [common.mean for _, common in problem.common]
-    held = model.common or [np.zeros(mean.size) for mean in shared]
-    beside = [at - mean for at, mean in zip(held, shared, strict=True)]
-    precision = np.concatenate([precision, *(np.ones(mean.size) for mean in shared)])
+    beside = [model.shared(k, own.mean.size) - own.mean for k, own in problem.common]
+    precision = np.concatenate([precision, *(np.ones(part.size) for part in beside)])
     off = np.concatenate([off, *beside])
     spread = [spreads(model.robot, change.effect) for change in model.changes]
     now = [change.effect.coordinates() for change in model.changes]
@@ -55,8 +53,7 @@ def _anchored(problem: Problem, model: Model) -> tuple[Array, Array]:
     pairs: list[tuple[Array, Array, bool]] = []
     anchor = problem.anchor
     if anchor is None:
-        count = problem.frame_count - sum(common.mean.size for _, common in problem.common)
-        return np.zeros(count), np.zeros(count)
+        return np.zeros(problem.frame_count), np.zeros(problem.frame_count)
     if 'base' in problem.align:
         first = [group[0] for group in problem.stands]
         pairs += [(model.bases[k], anchor.bases[k], True) for k in first]

@@ -83,7 +83,7 @@ def held(found: Fit, problem: Problem, scale: Scale, precision: Array, given: Ro
         return found
     off, weight = _off(problem, found.model, given)
     back = np.linalg.lstsq(weight[:, None] * free.vectors, -weight * off, rcond=1e-9)[0]
-    count = found.information.shape[0] - len(free.names)
+    count = problem.shared_count + _between(found.model) + found.coordinates.size
     step = np.concatenate([free.vectors @ back, np.zeros(count)])
     model = stepped(problem, found.model, step)
     for _ in range(ROUNDS):
@@ -94,6 +94,11 @@ def held(found: Fit, problem: Problem, scale: Scale, precision: Array, given: Ro
     if residual @ residual > found.rss + most:
         return found
     return fit(problem, model, scale, precision if precision.size else None, iterations=0)
+
+
+def _between(model: Model) -> int:
+    """Return the number of coordinates of what differs between the recordings."""
+    return sum(change.effect.coordinates().size for change in model.changes)
 
 
 def _off(problem: Problem, model: Model, given: Robot) -> tuple[Array, Array]:

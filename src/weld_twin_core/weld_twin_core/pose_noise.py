@@ -7,10 +7,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .arm.rotation import skew
 from .arrays import Array, readonly
 
+ROUNDED = 1e-6
+"""Share by which numbers may differ that were meant to be the same: those of single precision."""
 TINY = 1e-12
 """Share of the largest variance, each in its own unit, below which one counts as none."""
 
@@ -67,6 +70,12 @@ class PoseNoise:
         root = (ways / np.sqrt(strength)[:, None, :]) @ np.swapaxes(ways, 1, 2)
         return cls(typical * root / size[:, None, :], typical, sigma)
 
+    @property
+    def covariance(self) -> Array:
+        """Return it as covariances, shape (M, c, c) [m^2, rad^2]."""
+        back = np.linalg.inv(self.root) * self.typical
+        return np.asarray(back @ np.swapaxes(back, 1, 2))
+
     def take(self, index: np.ndarray) -> PoseNoise:
         """Return that of some samples."""
         return replace(self, root=self.root[index], sigma=self.sigma[index])
@@ -117,6 +126,27 @@ class Common:
     def moved(self, change: Array) -> Common:
         """Return them where errors became others, by matrices of shape (M, c, c)."""
         return replace(self, change=change @ self.change)
+
+
+def alike(covariance: Array) -> bool:
+    """
+    Return whether covariances, shape (M, 6, 6), are all one, and the same in every direction.
+
+    Such a one tells nothing that measurements do not tell themselves; mostly somebody typed it in.
+    """
+    first = covariance[0]
+    plain = np.diag(np.repeat(first.diagonal()[[0, 3]], 3))
+    same = np.allclose(covariance, first, ROUNDED, 0.0)
+    return bool(same and np.allclose(first, plain, ROUNDED, 0.0))
+
+
+def positive(covariance: Array) -> NDArray[np.bool_]:
+    """Return which of covariances, shape (M, c, c), are finite and positive definite, (M,)."""
+    size = np.sqrt(np.maximum(np.einsum('mii->mi', covariance), 0.0))
+    good = np.isfinite(covariance).all(axis=(1, 2)) & (size > 0.0).all(axis=1)
+    unit = covariance[good] / (size[good][:, :, None] * size[good][:, None, :])
+    good[good] = np.linalg.eigvalsh(0.5 * (unit + np.swapaxes(unit, 1, 2)))[:, 0] > 0.0
+    return good
 
 
 def inverse_error(position: Array, rotation: Array) -> Array:

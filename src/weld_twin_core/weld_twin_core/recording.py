@@ -204,7 +204,9 @@ class Measurements:
             object.__setattr__(self, 'sigma', sigma)
         rows = 3 if self.rotation is None else 6
         if self.noise is not None and self.noise.root.shape != (t.size, rows, rows):
-            raise DataError(f'noise of the measurements must have {rows} rows for each of {t.size}')
+            raise DataError(
+                f'noise of the measurements must have {rows} rows for each of {t.size}'
+            )
         if self.common is not None and self.common.change.shape[:2] != (t.size, rows):
             raise DataError(f'common errors must have {rows} rows for each of {t.size} samples')
 

@@ -63,7 +63,7 @@ def bodies(seen: Sightings) -> Bodies:
     Raises
     ------
     DataError
-        No image shows enough of a target, or a camera or a target has nothing that joins it with the others.
+        No image shows enough of a target, or nothing joins a camera or a target with the others.
 
     """
     views = _views(seen)

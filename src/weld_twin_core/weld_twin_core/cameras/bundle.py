@@ -123,7 +123,9 @@ class _State:
         tool = self.tool[seen.image]
         # A camera of the world sees the tool's target: forth by the tool's pose; else back.
         forth = np.array([c.mount == 'world' for c in seen.cameras])[seen.camera]
-        corner = np.stack([self.points[t][p] for t, p in zip(seen.target, seen.point, strict=True)])
+        corner = np.stack(
+            [self.points[t][p] for t, p in zip(seen.target, seen.point, strict=True)]
+        )
         own = _times(target[:, :3, :3], corner)
         at = own + target[:, :3, 3]
         turn = np.where(forth[:, None, None], tool[:, :3, :3], _swap(tool[:, :3, :3]))

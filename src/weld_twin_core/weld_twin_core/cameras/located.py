@@ -83,7 +83,9 @@ def _of_plane(own: Array, flat: Array) -> list[Array]:
     h = (np.linalg.svd(rows / size)[2][-1] / size).reshape(3, 3)
     h = h / (0.5 * (np.linalg.norm(h[:, 0]) + np.linalg.norm(h[:, 1])))
     h = h * np.sign(h[2, 2])
-    pose = transform(_nearest(np.stack([h[:, 0], h[:, 1], np.cross(h[:, 0], h[:, 1])], 1)), h[:, 2])
+    pose = transform(
+        _nearest(np.stack([h[:, 0], h[:, 1], np.cross(h[:, 0], h[:, 1])], 1)), h[:, 2]
+    )
     sight = pose[:3, 3] / np.linalg.norm(pose[:3, 3])
     normal = pose[:3, 2]
     # The same outline, leant the other way: turned by twice the lean about the axis across it.

@@ -148,7 +148,7 @@ class Sightings:
             if self.cameras[c].mount == self.targets[t].mount:
                 raise DataError(
                     f'camera {self.cameras[c].name!r} and target {self.targets[t].name!r} are '
-                    f"both on the {self.cameras[c].mount}: what one sees of the other tells "
+                    f'both on the {self.cameras[c].mount}: what one sees of the other tells '
                     'nothing of the arm; say where each is fastened'
                 )
 
@@ -190,7 +190,9 @@ def described(entry: Mapping[str, Any]) -> tuple[tuple[Camera, ...], tuple[Targe
             for name, c in entry['cameras'].items()
         )
         targets = tuple(
-            Target(str(name), tuple(t['points']), list(t['points'].values()), t['mount'], t['sigma'])
+            Target(
+                str(name), tuple(t['points']), list(t['points'].values()), t['mount'], t['sigma']
+            )
             for name, t in entry['targets'].items()
         )
     except (KeyError, TypeError, AttributeError) as error:

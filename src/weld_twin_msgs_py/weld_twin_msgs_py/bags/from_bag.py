@@ -181,23 +181,25 @@ def _read(
     bag: BagReader, names: TopicNames, roles: Mapping[Role, str], robot: Robot
 ) -> tuple[dict[Role, Stream], Intake]:
     """Return the columns of a bag: read by the thousand where all is as usual, else one by one."""
-    streams, intake = _empty(names, roles, robot)
+    kinds = {role: bag.topics[topic][0] for role, topic in roles.items()}
+    streams, intake = _empty(names, roles, kinds, robot)
     one_each = {topic: role for role, topic in roles.items()}
     whole = not any(split_topic(getattr(names, role.value))[1] for role in roles)
     usual = whole and len(one_each) == len(roles)
     if not (usual and fill_regular(bag, one_each, streams, intake)):
-        streams, intake = _empty(names, roles, robot)
+        streams, intake = _empty(names, roles, kinds, robot)
         _fill(bag, names, streams, intake, robot)
     return streams, intake
 
 
 def _empty(
-    names: TopicNames, roles: Mapping[Role, str], robot: Robot
+    names: TopicNames, roles: Mapping[Role, str], kinds: Mapping[Role, str], robot: Robot
 ) -> tuple[dict[Role, Stream], Intake]:
     joint_names = names_called(robot, names.joint_prefix, dict(names.joint_map))
     intake = Intake(robot, limits=False, joint_names=joint_names, efforts=names.use_effort)
     width = partial(Intake.width, robot=robot, efforts=names.use_effort)
-    return {role: Stream(topic, width(role)) for role, topic in roles.items()}, intake
+    each = {r: Stream(topic, width(r, kind=kinds[r])) for r, topic in roles.items()}
+    return each, intake
 
 
 def _fill(

@@ -105,7 +105,8 @@ def write_recording(
     if twin is not None:
         parts.append(entries.poses(TWIN_POSE.name, recording.joints.t, *twin))
     if twin is not None and covariance is not None:
-        parts.append(entries.sure_poses(recording.joints.t, *twin, covariance))
+        topic = TWIN_COVARIANCE.name
+        parts.append(entries.sure_poses(topic, recording.joints.t, *twin, covariance))
     if deviation is not None and recording.measured is not None and len(deviation):
         parts.append(entries.vectors(DEVIATION.name, recording.measured.t, deviation))
     with BagWriter(path, storage=storage, provenance=made, beside=beside) as bag:
@@ -164,6 +165,10 @@ class _Entries:
         position, rotation, sigma = measured.position, measured.rotation, measured.sigma
         if not measured.t.size:
             return
+        if rotation is not None and measured.noise is not None:
+            known = measured.noise.covariance
+            yield self.sure_poses(MEASURED_POSE.name, measured.t, position, rotation, known)
+            return
         if rotation is not None:
             yield self.poses(MEASURED_POSE.name, measured.t, position, rotation)
         else:
@@ -189,7 +194,7 @@ class _Entries:
         return self._alike(topic, t, first, _pose_rows(position, rotation))
 
     def sure_poses(
-        self, t: Array, position: Array, rotation: Array, covariance: Array
+        self, topic: str, t: Array, position: Array, rotation: Array, covariance: Array
     ) -> Iterator[_Entry]:
         """Return poses with covariance, shapes (K, 3), (K, 3, 3) and (K, 6, 6)."""
         first = partial(
@@ -199,7 +204,7 @@ class _Entries:
             covariance=covariance[0],
         )
         rows = np.hstack([_pose_rows(position, rotation), covariance.reshape(-1, 36)])
-        return self._alike(TWIN_COVARIANCE.name, t, first, rows)
+        return self._alike(topic, t, first, rows)
 
     def vectors(self, topic: str, t: Array, vectors: Array) -> Iterator[_Entry]:
         """Return vectors, shape (K, 3)."""

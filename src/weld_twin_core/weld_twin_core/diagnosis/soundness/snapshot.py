@@ -75,7 +75,9 @@ class Snapshot:
         """Return the snapshot with other measured rotations, or none."""
         pairs = zip(self.recordings, turns, strict=True)
         seen = [(r, measured(r), turn) for r, turn in pairs]
-        out = [r.with_measured(Measurements(m.t, m.position, turn, m.sigma)) for r, m, turn in seen]
+        out = [
+            r.with_measured(Measurements(m.t, m.position, turn, m.sigma)) for r, m, turn in seen
+        ]
         return replace(self, recordings=tuple(out))
 
     @cached_property

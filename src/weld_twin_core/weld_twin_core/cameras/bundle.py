@@ -19,7 +19,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -27,14 +26,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arm.rotation import angle_between, rotation_matrix, skew
+from ..arm.rotation import rotation_matrix, skew
 from ..arrays import Array
 from ..errors import DataError
 from ..pose_noise import Common, PoseNoise
-from ..recording import Measurements
+from ..recording import Measurements, Recording
 from .bodies import Bodies, bodies
 from .lens import UNKNOWNS, Lens
-from .sightings import Sightings
+from .sightings import Fitted, Sightings
 
 FOCAL, CENTRE = 3e-3, 3e-3
 """Spread of focal length and of the centre of the image, in shares of the focal length: what
@@ -55,15 +54,15 @@ SETTLED = 1e-6
 """Share by which the cost must still fall."""
 DAMPED = 1e8
 """Damping of a step, in units of its columns, at which the search ends."""
-ARM_SHIFT, ARM_TURN = 3e-3, 5e-3
-"""Spread [m, rad] of a real tool about where an arm's model has it: arms out of the box have 1 to 3
-mm, and with it 1 m away their joints' errors are some mrad."""
-REWEIGHTED = 4
-"""Times that pixels are weighed anew; the first goes without the arm, whose frames it finds."""
+REWEIGHTED = 3
+"""Times that pixels are weighed anew; the last changes no pose by a tenth of its noise."""
 TOGETHER = 64
 """Stamps that are taken at once: enough to share a step, few enough for the memory."""
 SINGULAR = 1e9
 """Condition from which on images tell no pose."""
+BEYOND = 1.1
+"""Of the size of an image, from where on a pixel is outside: where the size is not told it follows
+from the centre, which is off by some per cent."""
 SHOWN = 1.0
 """Deviations by which an unknown of one deviation must move all poses together to be kept."""
 
@@ -227,26 +226,17 @@ class _Point:
     state: _State
     weight: Array
     rows: tuple[Array, Array, Array]
-    arm: Arm | None
 
     @classmethod
-    def at(cls, state: _State, weight: Array, arm: Arm | None) -> _Point:
+    def at(cls, state: _State, weight: Array) -> _Point:
         """Return the state with what it makes of every sighting."""
-        return cls(state, weight, state.rows(), arm)
-
-    @cached_property
-    def away(self) -> Array:
-        """Return how far the tool is from where the arm has it, (M, 6), in spreads."""
-        if self.arm is None:
-            return np.zeros((0, 6))
-        return self.arm.away(self.state.tool)
+        return cls(state, weight, state.rows())
 
     @property
     def cost(self) -> float:
         """Return the weighted squares and what priors add."""
         left = self.weight[:, None] * self.rows[0]
-        both = (self.state.unknowns**2).sum() + (self.away**2).sum()
-        return float((left**2).sum() + both)
+        return float((left**2).sum() + (self.state.unknowns**2).sum())
 
     @cached_property
     def reduced(self) -> _Taken:
@@ -277,8 +267,6 @@ class _Point:
     def stepped(self, damping: float) -> _Point:
         """Return the place a damped step away."""
         own = self.reduced
-        if self.arm is not None:
-            own = self.arm.believed(own, self.away)
         held = own.normal + np.diag(1.0 + damping * np.diag(own.normal))
         step = np.linalg.solve(held, own.rest - self.state.unknowns)
         square = _swap(own.roots) @ own.roots
@@ -286,7 +274,7 @@ class _Point:
         square = square + damping * each[:, :, None] * np.eye(6)
         right = _times(_swap(own.roots), own.right - own.shared @ step)
         tool = np.linalg.solve(square, right[..., None])[..., 0]
-        return _Point.at(self.state.moved(step, tool), self.weight, self.arm)
+        return _Point.at(self.state.moved(step, tool), self.weight)
 
 
 def _slots(image: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -298,62 +286,13 @@ def _slots(image: NDArray[np.intp]) -> NDArray[np.intp]:
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class Arm:
-    """
-    Where an arm has the tool, about: enough to tell how large all is that small targets leave open.
-
-    Attributes
-    ----------
-    poses : array, shape (M, 4, 4)
-        The first body on the tool in the first on the world, as the arm's model has it.
-
-    """
-
-    poses: Array
-
-    def away(self, tool: Array) -> Array:
-        """Return how far tools (M, 4, 4) are from there, (M, 6), in spreads."""
-        turn = angle_between(tool[:, :3, :3], self.poses[:, :3, :3])
-        return np.hstack([(tool[:, :3, 3] - self.poses[:, :3, 3]) / ARM_SHIFT, turn / ARM_TURN])
-
-    def believed(self, own: _Taken, away: Array) -> _Taken:
-        """Return rows with what the arm tells beside, its poses taken out again."""
-        held = np.broadcast_to(
-            np.diag(np.repeat([1.0 / ARM_SHIFT, 1.0 / ARM_TURN], 3)), own.roots.shape
-        )
-        none = np.zeros((*own.shared.shape[:2], own.shared.shape[2]))
-        q, roots = np.linalg.qr(np.concatenate([own.roots, held], axis=1))
-        both = np.concatenate(
-            [
-                np.concatenate([own.shared, own.right[..., None]], axis=2),
-                np.concatenate([none, -away[..., None]], axis=2),
-            ],
-            axis=1,
-        )
-        taken = _swap(q) @ both
-        left = (both - q @ taken).reshape(-1, both.shape[2])
-        normal = left.T @ left
-        return _Taken(
-            roots,
-            taken[..., -1],
-            taken[..., :-1],
-            own.normal + normal[:-1, :-1],
-            own.rest + normal[:-1, -1],
-        )
-
-
-def adjusted(seen: Sightings, arm: Callable[[Measurements], Array] | None = None) -> Adjusted:
+def adjusted(seen: Sightings) -> Adjusted:
     """
     Return the poses that images tell.
 
     Parameters
     ----------
     seen : Sightings
-    arm : callable, optional
-        Gives the poses (M, 4, 4) that an arm's model has for measured ones, frames fitted. It is
-        believed within `ARM_SHIFT` while a place is looked for where everything is nearly straight;
-        what is told of the poses has nothing of it.
 
     Raises
     ------
@@ -374,14 +313,77 @@ def adjusted(seen: Sightings, arm: Callable[[Measurements], Array] | None = None
     )
     state = replace(state, unknowns=np.zeros(state.sizes.size))
     told = np.ones(len(seen.image)) if seen.sigma is None else 1.0 / seen.sigma
-    for k in range(REWEIGHTED):
-        near = None
-        if arm is not None and k:
-            near = Arm(arm(Measurements(seen.t, state.tool[:, :3, 3], state.tool[:, :3, :3])))
+    for _ in range(REWEIGHTED):
         weight, _ = _weights(state, told)
-        state = _descended(_Point.at(state, weight, near)).state
+        state = _descended(_Point.at(state, weight)).state
     weight, noise = _weights(state, told)
-    return _told(_Point.at(state, weight, None), noise)
+    return _told(_Point.at(state, weight), noise)
+
+
+def seen_by(recording: Recording, seen: Sightings) -> Recording:
+    """
+    Return a recording with the poses that images tell, and what the images say of the lenses.
+
+    Parameters
+    ----------
+    recording : Recording
+    seen : Sightings
+
+    Raises
+    ------
+    DataError
+        Images show too little of targets, or cameras and targets do not hang together.
+
+    """
+    seen, said = _upright(seen)
+    found = adjusted(seen)
+    images, poses = len(seen.t), found.measured.t.size
+    notes = [
+        *said,
+        f'{poses} of {images} images tell a pose; points are found within {found.pixel:.2f} px',
+    ]
+    for camera, lens in zip(seen.cameras, found.lenses, strict=True):
+        longer = 100.0 * (lens.focal / camera.lens.focal - 1.0).mean()
+        notes.append(f'camera {camera.name!r}: the images have the focal length {longer:+.2f} %')
+    return replace(
+        recording,
+        images=replace(seen, fitted=Fitted(found.pixel, found.off)),
+        measured=found.measured,
+        notes=(*recording.notes, *notes),
+    )
+
+
+def _upright(seen: Sightings) -> tuple[Sightings, list[str]]:
+    """
+    Return sightings with lenses turned as the images are stored, and what is to be said of it.
+
+    A camera held upright is often calibrated on images that a viewer has turned. Pixels then lie
+    outside of the image that the intrinsics are of, and inside after a quarter turn.
+    """
+    turned = [c for c in range(len(seen.cameras)) if _lies(seen, c)]
+    if not turned:
+        return seen, []
+    tried = []
+    for clockwise in (True, False):
+        cameras = list(seen.cameras)
+        for c in turned:
+            lens = cameras[c].lens.turned(cameras[c].image, clockwise=clockwise)
+            cameras[c] = replace(cameras[c], lens=lens, size=None)
+        trial = replace(seen, cameras=tuple(cameras))
+        tried.append((adjusted(trial).pixel, trial))
+    best = min(tried, key=lambda one: one[0])[1]
+    names = ', '.join(repr(seen.cameras[c].name) for c in turned)
+    return best, [
+        f'the pixels of camera {names} lie beyond the image of its intrinsics, and within it after '
+        'a quarter turn: the intrinsics are taken as those of images that were turned'
+    ]
+
+
+def _lies(seen: Sightings, c: int) -> bool:
+    """Return whether the images of a camera are stored a quarter turn from its intrinsics."""
+    most = seen.pixel[seen.camera == c].max(axis=0, initial=0.0)
+    size = seen.cameras[c].image
+    return bool((most > BEYOND * size).any() and (most <= BEYOND * size[::-1]).all())
 
 
 def _weights(state: _State, told: Array) -> tuple[Array, float]:

@@ -128,6 +128,28 @@ class Lens:
                 break
         return flat
 
+    def turned(self, size: Array, *, clockwise: bool) -> Lens:
+        """
+        Return the lens for images that were stored a quarter turn on.
+
+        Parameters
+        ----------
+        size : array, shape (2,) [px]
+            Width and height of the image that it was calibrated with.
+        clockwise : bool
+            Which way the stored image has to be turned to become that one.
+
+        """
+        bent = self.distortion.copy()
+        (wide, high), (x, y) = size, self.centre
+        if clockwise:  # u = y, v = width - x
+            bent[2:4] = -bent[3], bent[2]
+            centre = np.array([y, wide - x])
+        else:  # u = height - y, v = x
+            bent[2:4] = bent[3], -bent[2]
+            centre = np.array([high - y, x])
+        return replace(self, focal=self.focal[::-1].copy(), centre=centre, distortion=bent)
+
     def moved(self, step: Array) -> Lens:
         """Return the lens after a step of its unknowns, shape (9,)."""
         bent = self.distortion.copy()

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,21 +33,30 @@ class Camera:
         As it was calibrated; the diagnosis takes how far that may be off into account.
     mount : str
         'world' or 'tool'.
+    size : tuple of int [px], optional
+        Width and height of the image that the lens was calibrated with.
 
     """
 
     name: str
     lens: Lens
     mount: str = 'world'
+    size: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         _mounted(f'camera {self.name!r}', self.mount)
+
+    @property
+    def image(self) -> Array:
+        """Return width and height [px]; where they were not told, the centre is in the middle."""
+        return 2.0 * self.lens.centre if self.size is None else np.array(self.size, dtype=float)
 
     def as_mapping(self) -> dict[str, Any]:
         """Return plain values."""
         lens = self.lens
         own = {name: getattr(lens, name).tolist() for name in ('focal', 'centre', 'distortion')}
-        return {'mount': self.mount, **own}
+        size = {} if self.size is None else {'size': list(self.size)}
+        return {'mount': self.mount, **own, **size}
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +112,23 @@ def _mounted(what: str, mount: str) -> None:
         raise DataError(f"{what} is mounted on {mount!r}; a mount is 'world' or 'tool'")
 
 
+class Fitted(NamedTuple):
+    """
+    What images say of themselves.
+
+    Attributes
+    ----------
+    pixel : float [px]
+        Noise of a pixel's coordinate.
+    off : array, shape (C, 9)
+        How far each lens is from the given one, in spreads between calibrations of one lens.
+
+    """
+
+    pixel: float
+    off: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Sightings:
     """
@@ -119,6 +145,8 @@ class Sightings:
     pixel : array, shape (N, 2) [px]
     sigma : array, shape (N,) [px], optional
         Standard deviation of each coordinate, where the detector tells it.
+    fitted : Fitted, optional
+        What was found of lenses when poses were made of them.
 
     Raises
     ------
@@ -136,6 +164,7 @@ class Sightings:
     point: NDArray[np.intp]
     pixel: Array
     sigma: Array | None = None
+    fitted: Fitted | None = None
 
     def __post_init__(self) -> None:
         count = len(self.image)
@@ -186,7 +215,12 @@ def described(entry: Mapping[str, Any]) -> tuple[tuple[Camera, ...], tuple[Targe
     """
     try:
         cameras = tuple(
-            Camera(str(name), Lens(c['focal'], c['centre'], c['distortion']), c['mount'])
+            Camera(
+                str(name),
+                Lens(c['focal'], c['centre'], c['distortion']),
+                c['mount'],
+                tuple(c['size']) if 'size' in c else None,
+            )
             for name, c in entry['cameras'].items()
         )
         targets = tuple(

@@ -30,6 +30,7 @@ from ..messages.topics import (
 from .columns import LEFT_OUT, Stream
 from .contacts import marks, touching
 from .ends import Ends, never_recorded, uneven_ends
+from .images import images, looking
 from .needed import POSE_TYPES, no_joints, no_measurements, other_names
 from .reader import BagReader
 from .regular import fill_regular
@@ -91,7 +92,8 @@ def read_recording(
         points = bag.topics.get(_topic(names, Role.POINT), ('', 0))[1]
         made = bag.provenance
         touched = marks(bag, names)
-        measured = touched or {Role.POSE, Role.POINT} & set(roles)
+        seen = [] if touched else images(bag, names)
+        measured = touched or seen or {Role.POSE, Role.POINT} & set(roles)
         if needs_measurements and not measured:
             raise DataError(f"bag '{path}': {no_measurements(names, bag.topics)}")
     if streams[Role.JOINTS].messages == intake.joints.others:
@@ -112,7 +114,9 @@ def read_recording(
     )
     if touched:
         return touching(whole, touched, made)
-    if names.measured_inverse and whole.measured is not None:
+    if seen:
+        whole = looking(whole, seen, names, made)
+    elif names.measured_inverse and whole.measured is not None:
         whole = whole.with_measured(whole.measured.inverted())
     return _with_what_is_missing(whole, made, _ends(names, samples))
 

@@ -17,6 +17,7 @@ from weld_twin_core import __version__
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.arrays import Array
+from weld_twin_core.cameras import Sightings
 from weld_twin_core.contacts import Contacts
 from weld_twin_core.recording import Measurements, Recording
 
@@ -28,6 +29,7 @@ from ..messages.topics import (
     ACTUAL_JOINT_STATES,
     CONTACT,
     DEVIATION,
+    IMAGE_POINTS,
     JOINT_STATES,
     MEASURED_POINT,
     MEASURED_POSE,
@@ -38,6 +40,7 @@ from ..messages.topics import (
     TWIN_POSE,
 )
 from ..messages.typestore import TYPES
+from .images import rows_of
 from .writer import BagWriter
 
 _Entry = tuple[int, str, str, bytes]
@@ -98,6 +101,8 @@ def write_recording(
     }
     if recording.contacts is not None:
         made['artefact'] = recording.contacts.artefact.as_mapping()
+    if recording.images is not None:
+        made['seen'] = recording.images.as_mapping()
     entries = _Entries(recording)
     parts = [*entries.inputs(robot)]
     if actual is not None:
@@ -131,7 +136,9 @@ class _Entries:
         effort = self.recording.effort
         told = None if effort is None else effort.at(motion.t)
         yield self.joints(JOINT_STATES.name, robot, motion.q, motion.qd, told)
-        if measured is not None:
+        if self.recording.images is not None:
+            yield self.images(self.recording.images)
+        elif measured is not None:
             yield from self.measured(measured)
         if self.recording.contacts is not None:
             yield self.contacts(self.recording.contacts)
@@ -187,6 +194,13 @@ class _Entries:
         for k, ns in enumerate(self._stamps(self.recording.joints.t).tolist()):
             message = self.make.contact(ns, contacts.labels[k], value[k], sigma[k])
             yield ns, CONTACT.name, message.__msgtype__, _serialised(message)
+
+    def images(self, seen: Sightings) -> Iterator[_Entry]:
+        """Return what cameras saw, of which the poses are made again when it is read."""
+        for stamp, camera, rows in rows_of(seen):
+            ns = int(self._stamps(np.array([stamp]))[0])
+            message = self.make.image_points(ns, camera, rows)
+            yield ns, IMAGE_POINTS.name, message.__msgtype__, _serialised(message)
 
     def poses(self, topic: str, t: Array, position: Array, rotation: Array) -> Iterator[_Entry]:
         """Return poses, shapes (K, 3) and (K, 3, 3)."""

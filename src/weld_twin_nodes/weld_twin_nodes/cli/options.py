@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.cameras import Camera, Target
     from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.messages.topics import TopicNames
     from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
@@ -129,6 +130,45 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
         help='springs of joints take JointState.effort [N m] for their load, in the place of the '
         "model's statics; a model that was learned so has it read without this",
     )
+    add_cameras(group)
+
+
+def add_cameras(group: argparse._ActionsContainer) -> None:
+    """Add the options that describe cameras and what they look at."""
+    group.add_argument(
+        '--camera',
+        action='append',
+        default=[],
+        metavar='NAME=FILE',
+        help='camera_info of a camera, with mount: tool or world; once for each',
+    )
+    group.add_argument(
+        '--target',
+        action='append',
+        default=[],
+        metavar='NAME=FILE',
+        help='points of a target in its own frame [m], with mount: tool or world; once for each',
+    )
+
+
+def cameras_of(args: argparse.Namespace) -> tuple[tuple[Camera, ...], tuple[Target, ...]]:
+    """Return the cameras and targets that the options describe."""
+    from weld_twin_msgs_py.tables import read_camera, read_target
+
+    cameras = tuple(read_camera(*_named(text, '--camera')) for text in args.camera)
+    # What a camera on the tool looks at stands still, where nothing else is said.
+    mounts = {camera.mount for camera in cameras}
+    other = 'world' if mounts == {'tool'} else 'tool'
+    return cameras, tuple(read_target(*_named(text, '--target'), other) for text in args.target)
+
+
+def _named(text: str, option: str) -> tuple[str, str]:
+    from weld_twin_core.errors import DataError
+
+    name, mark, path = text.partition('=')
+    if not (name and mark and path):
+        raise DataError(f"{option} takes NAME=FILE, got '{text}'")
+    return name, path
 
 
 def topics_of(args: argparse.Namespace) -> TopicNames:
@@ -148,8 +188,11 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
             raise DataError(f"--joint-map takes JOINT=NAME, got '{text}'")
         pairs.append((joint, name))
     names = replace(TopicNames.within(args.namespace), **named)
+    cameras, targets = cameras_of(args)
     return replace(
         names,
+        cameras=cameras,
+        targets=targets,
         joint_prefix=args.joint_prefix,
         joint_map=tuple(pairs),
         measured_inverse=args.measured_inverse,

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of joint angles and measured positions, poses or contacts into a bag.
+"""Tables of joint angles and measured positions, poses, pixels or contacts into a bag.
 
 Delimiter, units and columns are read from the table where they are plain, and every guess is
 printed; an option settles what is not. Lists of columns are separated by commas.
@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from ..options import add_bag_output, add_robot, robot_of
+from ..options import add_bag_output, add_cameras, add_robot, cameras_of, robot_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -33,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='ARTEFACT.yaml',
         help='the table holds joint angles and what was touched; this file describes it',
     )
+    add_cameras(parser)
     parser.add_argument(
         '--measured',
         metavar='FILE',
@@ -151,8 +152,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _read(args: argparse.Namespace, robot: Robot, options: TableOptions) -> Table:
     """Return the recording of one file, or of a log and what was measured beside it."""
-    from weld_twin_msgs_py.tables import read_table, read_two_tables
+    from weld_twin_msgs_py.tables import read_pixels, read_table, read_two_tables
 
+    if args.camera or args.target:
+        return read_pixels(args.file, robot, *cameras_of(args), options)
     if args.measured is None:
         return read_table(args.file, robot, options)
     return read_two_tables(args.file, args.measured, robot, options, args.clock_offset)

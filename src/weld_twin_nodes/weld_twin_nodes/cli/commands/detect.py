@@ -1,0 +1,105 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Images of a board to a table of pixels, by OpenCV.
+
+The table goes to `weld-twin import` with --camera and --target. Joint angles go along with
+--joints: a table with a row for every image, in its order, or with a column 'image' that names it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..options import add_file_output, output_file
+
+SUFFIXES = ('.png', '.jpg', '.jpeg', '.tif', '.tiff', '.bmp', '.pgm')
+"""Images of a folder that are looked at."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    parser.add_argument('images', nargs='+', metavar='IMAGE', help='images, or a folder of them')
+    parser.add_argument(
+        '--board',
+        required=True,
+        metavar='FILE.yaml',
+        help='board: charuco or chessboard, squares: [columns, rows], square: side [m], and of a '
+        'charuco board marker: side [m] and dictionary',
+    )
+    parser.add_argument(
+        '--camera', default='camera', metavar='NAME', help='what the table calls the camera'
+    )
+    parser.add_argument('--joints', metavar='FILE.csv', help='joint angles of every image')
+    add_file_output(parser, 'table to write', required=True)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the table, and say in how many images the board was found."""
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.files.csv_text import csv_text
+    from weld_twin_msgs_py.tables.camera_files import read_board
+
+    from ...offline.board_detection import detector
+
+    find = detector(read_board(args.board))
+    paths = _paths(args.images)
+    header, beside = _joints(args.joints, paths)
+    rows, found = list[tuple[str, ...]](), 0
+    for path, own in zip(paths, beside, strict=True):
+        labels, where = find(path)
+        found += bool(labels)
+        for label, (u, v) in zip(labels, where.tolist(), strict=True):
+            rows.append((path.name, args.camera, label, f'{u:.4f}', f'{v:.4f}', *own))
+    if not rows:
+        raise DataError(
+            f'no image of {len(paths)} shows the board; check squares and dictionary in '
+            f"'{args.board}'"
+        )
+    columns = ('image', 'camera', 'point', 'u [px]', 'v [px]', *header)
+    with output_file(args) as out:
+        out.write_text(csv_text(columns, rows), encoding='utf-8')
+    print(f'{args.out}: the board is in {found} of {len(paths)} images, {len(rows)} points')
+    return 0
+
+
+def _paths(given: list[str]) -> list[Path]:
+    """Return the images, those of folders by name."""
+    from weld_twin_core.errors import DataError
+
+    out = list[Path]()
+    for text in given:
+        path = Path(text)
+        if path.is_dir():
+            out += sorted(one for one in path.iterdir() if one.suffix.lower() in SUFFIXES)
+        elif path.is_file():
+            out.append(path)
+        else:
+            raise DataError(f"there is no image or folder '{path}'")
+    if not out:
+        raise DataError(f"there is no image in '{given[0]}'")
+    return out
+
+
+def _joints(file: str | None, paths: list[Path]) -> tuple[list[str], list[list[str]]]:
+    """Return the columns beside the pixels, and their cells for every image."""
+    if file is None:
+        return [], [[] for _ in paths]
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.tables.cells import read_cells
+
+    cells = read_cells(file, None, None)
+    if 'image' not in cells.header:
+        if len(cells.rows) != len(paths):
+            raise DataError(
+                f"table '{file}' has {len(cells.rows)} rows for {len(paths)} images; name the "
+                "images in a column 'image'"
+            )
+        return cells.header, cells.rows
+    at = cells.header.index('image')
+    rows = {Path(row[at]).stem: row[:at] + row[at + 1 :] for row in cells.rows}
+    for path in paths:
+        if path.stem not in rows:
+            raise DataError(f"table '{file}' has no row of image '{path.name}'")
+    header = cells.header[:at] + cells.header[at + 1 :]
+    return header, [rows[path.stem] for path in paths]

@@ -351,7 +351,7 @@ class Recording:
     effort_holds : bool
         The effort is what holds the load, as ROS means it; else it is the load itself.
     images : Sightings, optional
-        What cameras saw, of which the measurements were made; see `cameras.bundle`.
+        What cameras saw, of which the measurements were made; see `bundle`.
 
     Raises
     ------

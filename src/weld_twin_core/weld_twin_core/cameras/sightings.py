@@ -75,6 +75,8 @@ class Target:
         'world' or 'tool'.
     sigma : float [m]
         Uncertainty of every coordinate.
+    facing : bool
+        Whether its third axis points away from whoever sees it, as that of boards of OpenCV does.
 
     Raises
     ------
@@ -88,6 +90,7 @@ class Target:
     points: Array
     mount: str = 'tool'
     sigma: float = PLACED
+    facing: bool = False
 
     def __post_init__(self) -> None:
         _mounted(f'target {self.name!r}', self.mount)
@@ -104,7 +107,8 @@ class Target:
     def as_mapping(self) -> dict[str, Any]:
         """Return plain values."""
         points = dict(zip(self.labels, self.points.tolist(), strict=True))
-        return {'mount': self.mount, 'sigma': self.sigma, 'points': points}
+        own = {'mount': self.mount, 'sigma': self.sigma, 'facing': self.facing}
+        return {**own, 'points': points}
 
 
 def _mounted(what: str, mount: str) -> None:
@@ -225,7 +229,12 @@ def described(entry: Mapping[str, Any]) -> tuple[tuple[Camera, ...], tuple[Targe
         )
         targets = tuple(
             Target(
-                str(name), tuple(t['points']), list(t['points'].values()), t['mount'], t['sigma']
+                str(name),
+                tuple(t['points']),
+                np.array([*t['points'].values()], dtype=float),
+                t['mount'],
+                t['sigma'],
+                t['facing'],
             )
             for name, t in entry['targets'].items()
         )

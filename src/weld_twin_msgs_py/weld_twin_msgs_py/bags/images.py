@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.bundle import seen_by
 from weld_twin_core.cameras import Camera, Sightings, Target, described
-from weld_twin_core.cameras.bundle import seen_by
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 

@@ -94,7 +94,8 @@ def read_target(name: str, path: Path | str, mount: str | None = None) -> Target
     try:
         points = _points(entry)
         sigma, own = float(entry.get('sigma', PLACED)), str(entry.get('mount', mount or 'tool'))
-        return Target(name, tuple(points), np.array([*points.values()], dtype=float), own, sigma)
+        places = np.array([*points.values()], dtype=float)
+        return Target(name, tuple(points), places, own, sigma, facing='board' in entry)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise DataError(
             f"target file '{path}' cannot be understood: {_missing(error)}; it needs points, or "

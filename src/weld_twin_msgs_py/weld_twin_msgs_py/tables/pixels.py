@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.bundle import seen_by
 from weld_twin_core.cameras import Camera, Sightings, Target
-from weld_twin_core.cameras.bundle import seen_by
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 

@@ -207,3 +207,18 @@ def test_pixels_of_two_cameras_name_the_joint_whose_zero_is_off(tmp_path, weld_t
     assert named == [('joint_offset', 'axis_3')]
     assert found['verdict']['effects'][0]['parameters']['offset'] == pytest.approx(2e-3, abs=2e-4)
     assert (tmp_path / 'out' / 'report.html').is_file()
+
+
+def test_mistakes_with_cameras_are_named(tmp_path, weld_twin):
+    zeros = np.array([0.0, 0.0, 1e-3, 0.0, 0.0, 0.0])
+    for kind, mistake in (
+        ('target_scale', {'side': 0.98 * 0.025}),
+        ('target_mirrored', {'mirrored': True}),
+        ('cameras_swapped', {'names': {'left': 'right', 'right': 'left'}}),
+    ):
+        folder = tmp_path / kind
+        folder.mkdir()
+        robot = cell(folder, zeros=zeros, count=25, **mistake)
+        _, found = diagnosed(folder, robot, weld_twin)
+        assert found['status'] == 'unsound'
+        assert [entry['kind'] for entry in found['unsound']] == [kind]

@@ -26,14 +26,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arm.rotation import rotation_matrix, skew
-from ..arrays import Array
-from ..errors import DataError
-from ..pose_noise import Common, PoseNoise
-from ..recording import Measurements, Recording
-from .bodies import Bodies, bodies
-from .lens import UNKNOWNS, Lens
-from .sightings import Fitted, Sightings
+from .arm.rotation import rotation_matrix, skew
+from .arrays import Array
+from .cameras.bodies import Bodies, bodies
+from .cameras.lens import UNKNOWNS, Lens
+from .cameras.sightings import Fitted, Sightings
+from .errors import DataError
+from .pose_noise import Common, PoseNoise
+from .recording import Measurements, Recording
 
 FOCAL, CENTRE = 3e-3, 3e-3
 """Spread of focal length and of the centre of the image, in shares of the focal length: what

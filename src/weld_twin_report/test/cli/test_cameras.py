@@ -220,5 +220,5 @@ def test_mistakes_with_cameras_are_named(tmp_path, weld_twin):
         folder.mkdir()
         robot = cell(folder, zeros=zeros, count=25, **mistake)
         _, found = diagnosed(folder, robot, weld_twin)
-        assert found['status'] == 'unsound'
+        assert found['verdict']['status'] == 'unsound'
         assert [entry['kind'] for entry in found['unsound']] == [kind]

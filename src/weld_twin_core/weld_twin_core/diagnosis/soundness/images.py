@@ -19,9 +19,19 @@ from ...arrays import Array
 from ...bundle import adjusted
 from ...cameras import Sightings
 from ...cameras.located import located
+from ...cameras.sightings import Fitted
 from ...errors import DataError
 from .evidence import Case, Finding, Mistake
-from .limits import BEHIND, IMAGE_FAR, IMAGE_UNDONE, LENS_FAR, TARGET_EXPLAINS, TARGET_SCALE
+from .limits import (
+    BEHIND,
+    IMAGE_ALIKE,
+    IMAGE_FAR,
+    IMAGE_UNDONE,
+    LENS_DOUBT,
+    LENS_FAR,
+    TARGET_EXPLAINS,
+    TARGET_SCALE,
+)
 from .snapshot import measured
 
 LOOKED = 20
@@ -58,18 +68,17 @@ def _by_themselves(seen: Sightings) -> Iterator[Finding]:
             )
             return
     far = float(np.abs(fitted.off).max())
-    if fitted.pixel < IMAGE_FAR and far < LENS_FAR:
+    if fitted.pixel < IMAGE_FAR and far < LENS_DOUBT:
         return
     for kind, at, words, remedy, trial in _trials(seen):
         try:
             then = adjusted(trial)
         except DataError:
             continue
-        nearer = float(np.abs(then.off).max()) < LENS_FAR
-        if then.pixel < IMAGE_UNDONE * fitted.pixel and (nearer or far < LENS_FAR):
+        if _undone(fitted, Fitted(then.pixel, then.off)):
             sentence = (
                 f'{words}; undone, points are found within {then.pixel:.2f} px instead of '
-                f'{fitted.pixel:.2f} px.'
+                f'{fitted.pixel:.2f} px, and lenses are as they were calibrated.'
             )
             yield _mistake(kind, at, sentence, remedy)
             return
@@ -82,6 +91,16 @@ def _by_themselves(seen: Sightings) -> Iterator[Finding]:
             f'are off by {far:.0f} times what calibrations of one lens differ by.',
             CALIBRATE,
         )
+
+
+def _undone(before: Fitted, then: Fitted) -> bool:
+    """Return whether images agree much better with what they were said to be."""
+    if float(np.abs(then.off).max()) > LENS_DOUBT:
+        return False
+    nearer = float((before.off**2).sum() - (then.off**2).sum())
+    return then.pixel < IMAGE_UNDONE * before.pixel or (
+        then.pixel < IMAGE_ALIKE * before.pixel and nearer > LENS_DOUBT**2
+    )
 
 
 def _trials(seen: Sightings) -> Iterator[tuple[str, str, str, str, Sightings]]:

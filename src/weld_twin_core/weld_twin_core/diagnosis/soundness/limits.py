@@ -218,6 +218,10 @@ Corners of boards are found within 0.05 to 0.5 px, circles of markers within 1 p
 """
 IMAGE_UNDONE = 0.5
 """Share of that noise that undoing a mistake of cameras or targets may leave."""
+IMAGE_ALIKE = 1.1
+"""Share of that noise that is as good as it was: lenses that follow leave as much."""
+LENS_DOUBT = 4.0
+"""How far a lens may be from its calibration, in the spreads below, before it is looked into."""
 LENS_FAR = 8.0
 """
 How far a lens may be from its calibration, in spreads between calibrations of one lens.

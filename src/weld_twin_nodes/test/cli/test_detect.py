@@ -39,7 +39,10 @@ def test_a_board_in_images_becomes_a_table_of_pixels(tmp_path, weld_twin):
     (tmp_path / 'images').mkdir()
     (tmp_path / 'board.yaml').write_text(BOARD)
     truth = {}
-    for name, turn, depth in (('a.png', [0.3, -0.2, 0.1], 0.4), ('b.png', [-0.25, 0.35, 0.8], 0.5)):
+    for name, turn, depth in (
+        ('a.png', [0.3, -0.2, 0.1], 0.4),
+        ('b.png', [-0.25, 0.35, 0.8], 0.5),
+    ):
         matrix = Rotation.from_rotvec(turn).as_matrix()
         shift = np.array([0.0, 0.0, depth]) - matrix @ [0.105, 0.075, 0.0]
         truth[name] = places(matrix, shift)
@@ -58,7 +61,10 @@ def test_a_board_in_images_becomes_a_table_of_pixels(tmp_path, weld_twin):
     ).out
     assert 'the board is in 2 of 2 images' in said
     rows = list(csv.DictReader(out.open()))
-    assert {row['image']: row['joint_1 [rad]'] for row in rows} == {'a.png': '-0.25', 'b.png': '0.5'}
+    assert {row['image']: row['joint_1 [rad]'] for row in rows} == {
+        'a.png': '-0.25',
+        'b.png': '0.5',
+    }
     assert len(rows) > 40
     for row in rows:
         seen = [float(row['u [px]']), float(row['v [px]'])]

@@ -38,7 +38,6 @@ class Change(NamedTuple):
     ----------
     recording : int
         Counted from 0; never 0.
-    effect : Effect
 
     """
 
@@ -81,7 +80,6 @@ class Model:
 
     Attributes
     ----------
-    robot : Robot
     bases : tuple of array, shape (4, 4)
     known, found : tuple of Effect
         Effects given by the user, and those this diagnosis put in.

@@ -443,9 +443,6 @@ class Problem:
 
         Parameters
         ----------
-        features : list of Features
-            One per recording; see `Problem.features`.
-        effect : Effect
         atoms : bool
             Its linear features; else the derivatives by its fit coordinates.
 

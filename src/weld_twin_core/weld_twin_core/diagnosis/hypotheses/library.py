@@ -34,7 +34,6 @@ class Library:
         All columns, whitened, in the order of their numbers.
     systems : SeedSystems
         The normal matrix of every seed.
-    units : tuple of Unit
     absent : dict
         Why a family is not considered, by name.
 
@@ -78,21 +77,7 @@ def candidate_kinds(exclude: Sequence[str], align: frozenset[str]) -> list[type[
 
 
 def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] = ()) -> Library:
-    """
-    Return the library at a model: one set of columns that all hypotheses share.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-    exclude : sequence of str
-        Families taken out of the library.
-
-    """
+    """Return the library at a model: one set of columns that all hypotheses share."""
     features = problem.features(model)
     pulls = _pulls(problem, model, scale)
     shelf = _Shelf(problem, scale, features, pulls, dict.fromkeys(exclude, EXCLUDED))
@@ -211,7 +196,6 @@ def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
 
     Parameters
     ----------
-    robot : Robot
     view : View
         The samples that reach them.
     on : collection of str

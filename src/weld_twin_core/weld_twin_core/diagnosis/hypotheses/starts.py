@@ -31,7 +31,6 @@ class Profile(NamedTuple):
 
     Attributes
     ----------
-    effects : list of Effect
     gains : array, shape (D,)
         Fall of the whitened sum of squares, frames and the other effects fitted anew.
 
@@ -46,17 +45,6 @@ def started(problem: Problem, model: Model, scale: Scale, effect: Effect) -> Eff
     Return the instance of an effect from which to fit it beside those a model has.
 
     The effect itself where its kind has no need of a search.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-    effect : Effect
-
     """
     if not searched(effect):
         return effect
@@ -84,12 +72,6 @@ def profile(
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
     k : int
         Which of the found effects, counted from 0.
 
@@ -124,9 +106,6 @@ class _Looker:
 
     Attributes
     ----------
-    problem : Problem
-    scale : Scale
-    features : list of Features
     residual : array, shape (rows,)
         With frames and effects in the model fitted.
     basis : array, shape (rows, P)
@@ -142,19 +121,7 @@ class _Looker:
 
     @classmethod
     def of(cls, problem: Problem, model: Model, scale: Scale) -> _Looker:
-        """
-        Take the residual and its columns at a model.
-
-        Parameters
-        ----------
-        problem : Problem
-            The recordings to explain, and the frames that are fitted along.
-        model : Model
-            What is believed so far; everything is taken about it.
-        scale : Scale
-            The noise that residuals are measured in, and the weight of every sample.
-
-        """
+        """Take the residual and its columns at a model."""
         basis = span_of(design(problem, model, scale)[0]).T
         residual = problem.whitened(problem.residuals(model), scale)
         residual = residual - basis @ (basis.T @ residual)

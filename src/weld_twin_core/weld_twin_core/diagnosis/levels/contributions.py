@@ -25,7 +25,6 @@ def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | No
     ----------
     unseen : Unseen
         Of the model that the causes stand for.
-    causes : sequence of Cause
 
     """
     if not any(cause.members for cause in causes):

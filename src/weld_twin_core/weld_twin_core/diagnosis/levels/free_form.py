@@ -14,9 +14,8 @@ from ..algebra.fit import Fit, design
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..unseen.folds import ways_to_divide
-from .groups import Group, all_groups, wandering_groups
+from .groups import Group, all_groups, wandering_groups, whole_arm_groups
 from .sparse_groups import choosing, chosen, rival_weights, worth
-from .whole_arm import whole_arm_groups
 
 STANDS_OUT, NAMED = 0.5, 3
 """Weight from which one place is named alone, and how many are named where none has it."""
@@ -29,8 +28,6 @@ class Part:
 
     Attributes
     ----------
-    group : Group
-    ridge : float
     rivals : tuple of (Group, float)
         Each group that could stand in its place and its weight, itself included.
     share : float
@@ -114,13 +111,10 @@ def free_form(
 
     Parameters
     ----------
-    problem : Problem
-    scale : Scale
     bare : Fit
         Frames and the effects that are named beyond doubt.
     precision : array, shape (K,)
         Prior precision of those effects' coordinates.
-    beliefs : Beliefs
     wandering : bool
         Look for what changes as the recording goes on, and ask no more of it than to predict
         short stretches from their neighbours.

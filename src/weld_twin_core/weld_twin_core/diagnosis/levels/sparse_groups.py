@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
-from ..algebra.unit_scale import Index
+from ..algebra.definite import Index
 from ..beliefs import Beliefs
 from ..unseen.folds import steadiness
 from .groups import Group
@@ -153,7 +153,6 @@ class Choosing:
 
     Attributes
     ----------
-    groups : list of Group
     fixed : array of int
         Columns of nuisance frames and named effects, always fitted.
     places : list of array of int
@@ -314,15 +313,7 @@ class Worth(NamedTuple):
 
 
 def worth(work: Choosing, members: list[Member]) -> Worth:
-    """
-    Return what the groups chosen are worth on unseen folds.
-
-    Parameters
-    ----------
-    work : Choosing
-    members : list of Member
-
-    """
+    """Return what the groups chosen are worth on unseen folds."""
     none, now = work.errors([]), work.errors(members)
     gain = max(_worst_gain(none, now), 0.0)
     steady = min(steadiness(a, b) for a, b in zip(none, now, strict=True))
@@ -351,8 +342,6 @@ def rival_weights(
         The groups chosen.
     k : int
         Which of them is held against the others.
-    beliefs : Beliefs
-        The numbers that decide.
 
     """
     rest = members[:k] + members[k + 1 :]

@@ -24,12 +24,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
 from ..algebra.atoms import Rows, rows_of
-from ..algebra.definite import Triangle, inverses
+from ..algebra.definite import Index, Triangle, inverses, unit_diagonal
 from ..algebra.designed import Design, designed
 from ..algebra.fit import Fit, trusted
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.unit_scale import Index, unit_diagonal
 from .folds import STRETCHES, Gain, gain, ways_to_divide
 
 DAMPING = 1e-11
@@ -56,7 +55,6 @@ class Unseen:
 
     Attributes
     ----------
-    problem, scale : Problem, Scale
     labels : array, shape (rows,)
         Stretch of every row.
     columns : Design
@@ -90,12 +88,6 @@ class Unseen:
 
         Parameters
         ----------
-        problem : Problem
-            The recordings to explain, and the frames that are fitted along.
-        scale : Scale
-            The noise that residuals are measured in, and the weight of every sample.
-        fit : Fit
-            The fitted model with its columns.
         precision : array, shape (K,)
             Prior precision of the fit coordinates, one over variance.
 

@@ -1,9 +1,9 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Images of a board to a table of pixels, by OpenCV.
+"""Find a board in images: a table of pixels for weld-twin import.
 
-The table goes to `weld-twin import` with --camera and --target. Joint angles go along with
---joints: a table with a row for every image, in its order, or with a column 'image' that names it.
+OpenCV finds the corners. The table goes to weld-twin import with --camera and --target. --joints
+has a row for every image, in their order, or a column 'image' that names it.
 """
 
 from __future__ import annotations
@@ -12,25 +12,23 @@ import argparse
 from pathlib import Path
 
 from ..options import add_file_output, output_file
+from ..parsing import Adder
 
+EXAMPLE = 'weld-twin detect images --board board.yaml --joints joints.csv --out pixels.csv'
 SUFFIXES = ('.png', '.jpg', '.jpeg', '.tif', '.tiff', '.bmp', '.pgm')
 """Images of a folder that are looked at."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('images', nargs='+', metavar='IMAGE', help='images, or a folder of them')
-    parser.add_argument(
-        '--board',
-        required=True,
-        metavar='FILE.yaml',
-        help='board: charuco or chessboard, squares: [columns, rows], square: side [m], and of a '
-        'charuco board marker: side [m] and dictionary',
+    add = Adder(parser)
+    add('images', 'IMAGE', 'images, or a folder of them', nargs='+')
+    text = (
+        'charuco or chessboard: kind, squares, their side, and markers, as docs/cameras.md has it'
     )
-    parser.add_argument(
-        '--camera', default='camera', metavar='NAME', help='what the table calls the camera'
-    )
-    parser.add_argument('--joints', metavar='FILE.csv', help='joint angles of every image')
+    add('--board', 'FILE.yaml', text, required=True)
+    add('--camera', 'NAME', 'what the table calls the camera', default='camera')
+    add('--joints', 'FILE.csv', 'joint angles of every image')
     add_file_output(parser, 'table to write', required=True)
 
 

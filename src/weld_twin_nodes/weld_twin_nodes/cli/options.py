@@ -107,9 +107,9 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
     add_cameras(parser)
 
 
-def add_cameras(parser: argparse.ArgumentParser, *, rare: bool = True) -> None:
+def add_cameras(parser: argparse.ArgumentParser) -> None:
     """Add the options that describe cameras and what they look at."""
-    add = Adder(parser, 'cameras', rare=rare)
+    add = Adder(parser, 'cameras', rare=True)
     text = 'camera_info of a camera, with mount: tool or world; once for each'
     add('--camera', 'NAME=FILE', text, many=True)
     text = 'points of a target or numbers of a board [m], with mount: tool or world'

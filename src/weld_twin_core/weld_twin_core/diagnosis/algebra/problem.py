@@ -184,11 +184,15 @@ class Problem:
 
     def of_frames(self) -> Problem:
         """Return the problem with nothing fitted along but base and tool."""
+        return replace(self.not_shared(), changes=())
+
+    def not_shared(self) -> Problem:
+        """Return the problem without errors that samples of an instrument share."""
         if not self.common:
-            return replace(self, changes=())
+            return self
         pairs = ((r, _measured(r)) for r in self.recordings)
         bare = tuple(r.with_measured(replace(m, common=None)) for r, m in pairs)
-        return replace(self, recordings=bare, changes=())
+        return replace(self, recordings=bare)
 
     @cached_property
     def roots(self) -> list[Array | None]:

@@ -21,7 +21,7 @@ from ...cameras import Sightings
 from ...cameras.located import located
 from ...cameras.sightings import Fitted
 from ...errors import DataError
-from .evidence import Case, Finding, Mistake
+from .evidence import Case, Finding, mistake
 from .limits import (
     BEHIND,
     IMAGE_ALIKE,
@@ -209,4 +209,4 @@ def _too_large(case: Case, kind: str, share: float) -> Finding:
 
 
 def _mistake(kind: str, at: str, sentence: str, remedy: str) -> Finding:
-    return Finding.of(Mistake(kind, (at,), sentence, remedy, None))
+    return mistake(sentence, kind, (at,), remedy)

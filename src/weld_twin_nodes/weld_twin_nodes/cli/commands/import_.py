@@ -3,7 +3,8 @@
 """Make a bag of a table of what was measured, seen or touched.
 
 Delimiter, units and columns are read from the table where they are plain, and every guess is
-printed; an option settles what is not. Lists of columns are separated by commas.
+printed; an option settles what is not. Lists of columns are separated by commas. For pixels of
+cameras give --camera and --target; weld-twin detect makes a table of images.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add('--clock-offset', 'S', text, type=float, default=0.0, rare=True)
     add('--table', 'CSV', 'also write every deviation from the twin', rare=True)
     add('--picture', 'PNG', 'also draw the deviations', rare=True)
-    add_cameras(parser, rare=False)
+    add_cameras(parser)
     _add_units(parser)
     _add_reading(parser)
     _add_counting(parser)

@@ -24,11 +24,13 @@ INTERRUPTED = 130
 NODES, REPORT = 'weld_twin_nodes.cli.commands', 'weld_twin_report.cli.commands'
 COMMANDS = {
     **dict.fromkeys(('diagnose', 'investigate', 'correct', 'verify'), REPORT),
-    **dict.fromkeys(('simulate', 'import', 'bag', 'export'), NODES),
+    **dict.fromkeys(('simulate', 'detect', 'import', 'bag', 'export'), NODES),
     **dict.fromkeys(('history', 'iso9283', 'sensitivity', 'serve', 'demo'), REPORT),
     'lab': 'weld_twin_lab.cli',
 }
 """Commands in the order of the help, and where each lies: a file, or a folder with a file a job."""
+BEFORE = ('detect',)
+"""Commands that make what another takes; the help of that one tells of them."""
 BRINGS = {'weld_twin_report': 'writes pages', 'weld_twin_lab': 'is a proof'}
 """What the commands of a package do, for somebody who has not installed it."""
 OLD = {
@@ -145,7 +147,7 @@ def parser_of(words: Sequence[str] = ()) -> Parser:
         parser.error(
             f"'{typed}' {BRINGS[package]}; it needs the package {package}, which is not installed"
         )
-    for name in [chosen] if package else COMMANDS:
+    for name in [chosen] if package else [name for name in COMMANDS if name not in BEFORE]:
         if _installed(COMMANDS[name].partition('.')[0]):
             _add(subparsers, name, chosen)
     return parser

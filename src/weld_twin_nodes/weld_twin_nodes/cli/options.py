@@ -16,6 +16,7 @@ from .parsing import Adder, Parser, short_help
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.cameras import Camera, Target
     from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.messages.topics import TopicNames
     from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
@@ -29,6 +30,7 @@ PARTS = {
 TOPIC_OPTIONS = ('joint', 'pose', 'point', 'wrench', 'temperature')
 TOPICS = (
     *('namespace', 'joint_prefix', 'joint_map', 'measured_inverse', 'use_effort'),
+    *('camera', 'target'),
     *(f'{name}_topic' for name in TOPIC_OPTIONS),
 )
 """Attributes of the options of `add_topics`."""
@@ -102,6 +104,36 @@ def add_topics(parser: argparse.ArgumentParser) -> None:
     add('--measured-inverse', text)
     text = "springs of joints take JointState.effort [N m] for their load, not the model's statics"
     add('--use-effort', text)
+    add_cameras(parser)
+
+
+def add_cameras(parser: argparse.ArgumentParser) -> None:
+    """Add the options that describe cameras and what they look at."""
+    add = Adder(parser, 'cameras', rare=True)
+    text = 'camera_info of a camera, with mount: tool or world; once for each'
+    add('--camera', 'NAME=FILE', text, many=True)
+    text = 'points of a target or numbers of a board [m], with mount: tool or world'
+    add('--target', 'NAME=FILE', text, many=True)
+
+
+def cameras_of(args: argparse.Namespace) -> tuple[tuple[Camera, ...], tuple[Target, ...]]:
+    """Return the cameras and targets that the options describe."""
+    from weld_twin_msgs_py.tables import read_camera, read_target
+
+    cameras = tuple(read_camera(*_named(text, '--camera')) for text in args.camera)
+    # What a camera on the tool looks at stands still, where nothing else is said.
+    mounts = {camera.mount for camera in cameras}
+    other = 'world' if mounts == {'tool'} else 'tool'
+    return cameras, tuple(read_target(*_named(text, '--target'), other) for text in args.target)
+
+
+def _named(text: str, option: str) -> tuple[str, str]:
+    from weld_twin_core.errors import DataError
+
+    name, mark, path = text.partition('=')
+    if not (name and mark and path):
+        raise DataError(f"{option} takes NAME=FILE, got '{text}'")
+    return name, path
 
 
 def topics_of(args: argparse.Namespace) -> TopicNames:
@@ -121,8 +153,11 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
             raise DataError(f"--joint-map takes JOINT=NAME, got '{text}'")
         pairs.append((joint, name))
     names = replace(TopicNames.within(args.namespace), **named)
+    cameras, targets = cameras_of(args)
     return replace(
         names,
+        cameras=cameras,
+        targets=targets,
         joint_prefix=args.joint_prefix,
         joint_map=tuple(pairs),
         measured_inverse=args.measured_inverse,

@@ -93,6 +93,9 @@ class Model:
         How it was undone, as plain values to be made again; see `soundness.mending`.
     alone : Alone or None
         What its robot file does by itself; None where that is not known.
+    common : tuple of array
+        Errors that all samples of an instrument share, one array for every recording, empty where
+        it has none; nothing before they are fitted.
 
     """
 
@@ -105,6 +108,7 @@ class Model:
     given: tuple[int, ...] = ()
     mends: tuple[Mapping[str, Any], ...] = ()
     alone: Alone | None = None
+    common: tuple[Array, ...] = ()
 
     def twin(self, k: int) -> Twin:
         """Return the twin of recording k."""
@@ -126,6 +130,10 @@ class Model:
         """Return the model with the tool moved by (xyz, rotvec)."""
         tool = _moved(self.robot.T_flange_tool, step, left=False)
         return replace(self, robot=self.robot.with_frames(tool=tool))
+
+    def shared(self, k: int, count: int) -> Array:
+        """Return the errors that all samples of recording k share, shape (count,)."""
+        return self.common[k] if self.common else np.zeros(count)
 
     def without(self, k: int) -> Model:
         """Return the model without found effect k."""

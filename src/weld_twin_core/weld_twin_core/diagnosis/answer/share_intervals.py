@@ -188,10 +188,5 @@ def _fitted_parts(problem: Problem, scale: Scale, fit: Fit) -> Array:
 
 def _positions(problem: Problem, scale: Scale, rows: Array) -> Array:
     """Return the position part of whitened rows in every trusted sample, (3 samples,) [m]."""
-    parts = zip(problem.by_sample(rows), scale.weights, trusted(scale.weights), strict=True)
-    return np.concatenate(
-        [
-            (part[good, :3] * (scale.position / np.sqrt(weight[good]))[:, None]).ravel()
-            for part, weight, good in parts
-        ]
-    )
+    parts = zip(problem.measured_rows(rows, scale), trusted(scale.weights), strict=True)
+    return np.concatenate([part[good, :3].ravel() for part, good in parts])

@@ -94,11 +94,8 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
 
 def _pulls(problem: Problem, model: Model, scale: Scale) -> list[Array]:
     """Return how strongly what is left pulls at the tool of every recording, (3 or 6, M) each."""
-    residuals = problem.residuals(model)
-    for residual, weights in zip(residuals, scale.weights, strict=True):
-        residual[:3] *= weights / scale.position**2
-        residual[3:] *= weights / scale.orientation**2
-    return [problem.pulled(k, residual) for k, residual in enumerate(residuals)]
+    known = (problem.informed(k, r, scale) for k, r in enumerate(problem.residuals(model)))
+    return [problem.pulled(k, rows) for k, rows in enumerate(known)]
 
 
 def _applicable(kind: type[Effect], joint: str | None, features: list[Features]) -> str | None:

@@ -157,10 +157,8 @@ class _Looker:
 
     def _white(self, maker: Features, joint: int, k: int) -> Array:
         """Return what one joint does in recording k, whitened, shape (M, c)."""
-        unit = np.full(self.problem.rows[k], 1.0 / self.scale.position)
-        unit[3:] = 1.0 / self.scale.orientation
-        column = self.problem.seen(k, maker.column(('q', joint))).T
-        return np.asarray(column * unit * np.sqrt(self.scale.weights[k])[:, None])
+        column = self.problem.seen(k, maker.column(('q', joint)))
+        return self.problem.in_noise(k, column, self.scale)
 
 
 def _same(one: list[Effect], other: list[Effect]) -> bool:

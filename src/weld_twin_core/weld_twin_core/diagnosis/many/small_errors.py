@@ -115,7 +115,8 @@ def _apart_from_frames(
     where the joint moves.
     """
     scale = problem.unit_scale()
-    frames = problem.whitened(problem.frame_columns(features)[0], scale)
+    # What an instrument's samples share is known within its spread, and takes no place for free.
+    frames = problem.whitened(problem.not_shared().frame_columns(features)[0], scale)
     out, span = [], span_of(frames)
     for effect in effects:
         own = problem.whitened(problem.effect_columns(features, effect, atoms=False), scale)

@@ -76,10 +76,8 @@ class Waves:
         columns, masses, waves = [], [], []
         normal = np.zeros((orders.size, 2, 2))
         for r, maker in enumerate(features):
-            unit = np.full((problem.rows[r], 1), scale.position**-2)
-            unit[3:] = scale.orientation**-2
             column = problem.seen(r, maker.column(('q', joint)))
-            mass = column * unit * scale.weights[r]
+            mass = problem.informed(r, column, scale)
             angle = orders[:, None] * maker.view.q[:, joint]
             sine, cosine = np.sin(angle), np.cos(angle)
             weight = (column * mass).sum(axis=0)

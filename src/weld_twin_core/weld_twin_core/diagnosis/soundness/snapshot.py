@@ -17,7 +17,7 @@ from ...effects.joint_offset import JointOffset
 from ...effects.link_length import LinkLength
 from ...effects.link_offset import LinkOffset
 from ...effects.link_twist import LinkTwist
-from ...recording import JointMotion, Recording
+from ...recording import JointMotion, Measurements, Recording
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale
 from ..frames.alignment import initial_frames, refined, rough_frames, tracks
@@ -76,7 +76,10 @@ class Snapshot:
     def with_turns(self, turns: list[Array | None]) -> Snapshot:
         """Return the snapshot with other measured rotations, or none."""
         pairs = zip(self.recordings, turns, strict=True)
-        out = [r.with_measured(replace(measured(r), rotation=turn)) for r, turn in pairs]
+        seen = [(r, measured(r), turn) for r, turn in pairs]
+        out = [
+            r.with_measured(Measurements(m.t, m.position, turn, m.sigma)) for r, m, turn in seen
+        ]
         return replace(self, recordings=tuple(out))
 
     @cached_property

@@ -1,9 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Make a bag of a table of what was measured or touched.
+"""Make a bag of a table of what was measured, seen or touched.
 
 Delimiter, units and columns are read from the table where they are plain, and every guess is
-printed; an option settles what is not. Lists of columns are separated by commas.
+printed; an option settles what is not. Lists of columns are separated by commas. For pixels of
+cameras give --camera and --target; weld-twin detect makes a table of images.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from ..options import add_bag_output, add_robot, robot_of
+from ..options import add_bag_output, add_cameras, add_robot, cameras_of, robot_of
 from ..parsing import Adder
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add('--clock-offset', 'S', text, type=float, default=0.0, rare=True)
     add('--table', 'CSV', 'also write every deviation from the twin', rare=True)
     add('--picture', 'PNG', 'also draw the deviations', rare=True)
+    add_cameras(parser)
     _add_units(parser)
     _add_reading(parser)
     _add_counting(parser)
@@ -123,8 +125,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _read(args: argparse.Namespace, robot: Robot, options: TableOptions) -> Table:
     """Return the recording of one file, or of a log and what was measured beside it."""
-    from weld_twin_msgs_py.tables import read_table, read_two_tables
+    from weld_twin_msgs_py.tables import read_pixels, read_table, read_two_tables
 
+    if args.camera or args.target:
+        return read_pixels(args.file, robot, *cameras_of(args), options)
     if args.measured is None:
         return read_table(args.file, robot, options)
     return read_two_tables(args.file, args.measured, robot, options, args.clock_offset)

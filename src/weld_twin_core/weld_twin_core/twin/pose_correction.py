@@ -37,8 +37,8 @@ OPEN = 1e-9
 SIDES = np.repeat((1e-3, 2e-3), 3)
 """Distances [m, rad] to either side over which a slope is taken: what bends there is below 1e-9."""
 TRUSTED = np.array([5e-10, *[2e-8] * 12])
-"""Error [m, rad] of a pose, and of those beside it, whose next step need not be looked at: it leaves some
-thousandths, rounding of the pose and some millionths of a slope."""
+"""Error [m, rad] of a pose, and of those beside it, whose next step need not be looked at: it leaves
+some thousandths, rounding of the pose and some millionths of a slope."""
 EXACT = 2e-10
 """Largest error [m] that what is told between two looks should have."""
 REACH = (2e-5, 5e-4, 1e-2)

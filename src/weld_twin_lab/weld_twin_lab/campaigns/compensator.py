@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
 
+from .compensating import NOTHING
 from .latency import pose_table
 
 if TYPE_CHECKING:
@@ -38,8 +39,6 @@ HELD = (0.88, 0.95)
 """Share of the goals whose error must stay within the bound that was told."""
 SLOWER = 1.5
 """Times the latency of a relay that copies which poses may take."""
-NOTHING = 'nothing'
-"""The change that is none."""
 POSES = 500.0
 """Poses a second in the race."""
 

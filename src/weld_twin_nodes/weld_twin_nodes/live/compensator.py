@@ -168,6 +168,7 @@ class Compensator(ManagedNode):
         self._intake = Intake(self.robot, joint_names=self.joint_names, mend=True)
         self._arm = ArmState()
         self._around: tuple[Any, float | None] = (None, None)
+        self._streamed = self._around
         self._model: LoadedModel | None = None
         self._active = False
         self._told, self._looked_at, self._outdated = '', -np.inf, ''
@@ -329,6 +330,8 @@ class Compensator(ManagedNode):
     def _look(self) -> None:
         """Look at the model file, and tell that the model is withdrawn, or is not any more."""
         self._listened = self._correction.get_subscription_count() > 0
+        if self._stream is not None and self._around is not self._streamed:
+            self._stream.renew(self._pose_correction())
         if self._model is not None:
             self._outdated = self._model.outdated(self.setting('max_model_age'))
         why = self._withdrawn() if self._active else ''
@@ -361,8 +364,13 @@ class Compensator(ManagedNode):
 
     # Poses -----------------------------------------------------------------------------------
 
+    def _pose_correction(self) -> PoseCorrection:
+        """Return what corrects poses under the present load and temperature."""
+        self._streamed = self._around
+        return PoseCorrection(self._present(), self.robot.T_flange_tool)
+
     def _renew_stream(self) -> None:
-        correction = PoseCorrection(self._present(), self.robot.T_flange_tool)
+        correction = self._pose_correction()
         for name in correction.left_out:
             self.remark(f'{name} is not corrected in poses, which do not tell what comes next')
         self._stream = PoseStream(

@@ -73,6 +73,8 @@ def unit_inverse(columns: Design, ridge: Array) -> tuple[Array, Array]:
     normal = columns.normal()
     normal[np.diag_indices_from(normal)] += ridge
     scaled, size = unit_diagonal(normal)
+    if not size.size:
+        return scaled, size  # LAPACK complains of a matrix of no columns.
     if well_conditioned(scaled, SINGULAR):
         return inverted(scaled), size
     return np.asarray(np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True)), size

@@ -23,7 +23,7 @@ from rclpy.action import ActionClient
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.twin.goal_correction import GoalLimits, Refusal, corrected_goal
+from weld_twin_core.twin.goal_correction import GoalLimits, Refusal, Start, corrected_goal
 from weld_twin_core.twin.goal_motion import Goal, course, fine_times
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.files.yaml_file import yaml_text
@@ -32,7 +32,7 @@ from weld_twin_msgs_py.messages.topics import AUDIT, DEVIATION, MEASURED_POSE
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.controller import Controller
 
-from ..compensator import NOTHING
+from . import NOTHING
 from .drawn_cells import (
     HOMES,
     INSIDE,
@@ -187,16 +187,16 @@ class CellTrial:
     def judged(self, drawn: DrawnGoal, after: str) -> dict[str, Any]:
         """Return what became of a goal, run as it is and through the compensator."""
         goal = drawn.goal
-        beyond = goal.q[0] - 0.05 * np.sign(goal.q[min(3, len(goal.q) - 1)] - goal.q[0])
+        came = np.sign(goal.q[min(3, len(goal.q) - 1)] - goal.q[0])
         offs = []
         taken, line = True, dict[str, Any]()
         for through in (False, True):
-            self.to(beyond)
+            self.to(goal.q[0] - 0.05 * came)
             self.to(goal.q[0])
             taken, line = self.run(goal, through=through)
             if taken:
                 offs.append(self.off(goal, line.get('waits_s', 0.0)))
-        best = self._best(goal)
+        best = self._best(goal, Start(goal.q[0], False, came))
         return {
             'robot': self.name,
             'after': after,
@@ -211,10 +211,10 @@ class CellTrial:
             'largest_m': line.get('largest_m'),
         }
 
-    def _best(self, goal: Goal) -> float:
+    def _best(self, goal: Goal, start: Start) -> float:
         """Return what would be left with the true causes [m]."""
         true = ProgramModel(self.robot, true_effects(self.robot, self.causes))
-        found = corrected_goal(true, goal, GoalLimits(acceleration=20.0))
+        found = corrected_goal(true, goal, GoalLimits(acceleration=20.0), start)
         return np.inf if isinstance(found, Refusal) else found.after
 
     # Changes ---------------------------------------------------------------------------------

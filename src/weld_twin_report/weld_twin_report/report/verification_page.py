@@ -15,7 +15,7 @@ from weld_twin_nodes.wording.words import CAUSES, cause, listed
 
 from .charts import Axis, Line, chart
 from .footing import inputs_section
-from .html import Html, document, section, table, tag
+from .html import Html, document, figures, main, section, table, tag
 
 _STATES = {
     'gone': 'went away',
@@ -89,14 +89,11 @@ def verification_page(found: Verification, robot: str, inputs: Sequence[InputFil
 
     """
     title = f'{found.program} · {robot}' if found.program else robot
-    body = tag(
-        'main',
-        tag(
-            'header',
-            tag('p', 'After the correction', class_='kind'),
-            tag('p', title, class_='subject'),
-        ),
-        tag('section', tag('h1', headline(found)), _figures(found), id_='verdict'),
+    body = main(
+        ('After the correction', ''),
+        title,
+        headline(found),
+        _figures(found),
         *(tag('p', note, class_='warn') for note in found.notes),
         _causes(found),
         _drawn(found),
@@ -117,14 +114,7 @@ def _figures(found: Verification) -> Html:
         ('Measured', millimetres(found.measured_m), noise),
         ('Kept', 'yes' if found.kept else 'no', f'{found.samples} measurements'),
     )
-    return tag(
-        'dl',
-        *(
-            tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
-            for name, value, note in cells
-        ),
-        class_='figures',
-    )
+    return figures(cells)
 
 
 def _causes(found: Verification) -> Html | None:

@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +19,9 @@ from weld_twin_core.diagnosis.predicting.planned import SPREAD, clear_postures, 
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.posterior import largest_sigma
 from weld_twin_core.twin.twin import Twin
-from weld_twin_msgs_py.files.whole_files import write_text
-from weld_twin_nodes.offline.output_directory import write_owned
 
 from ..blind.simulator import require_simulator
+from ..parts import Parts, Tell, write_results
 from ..plant.plant import run
 from ..plant.plant_recording import Command
 from ..plant.tracker import Tracker
@@ -115,7 +113,7 @@ def _measured(
     return Recording('plan', JointMotion(t, q, static=True), Measurements(t, seen.position))
 
 
-def planned(count: int, out: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+def planned(count: int, out: Path, tell: Tell) -> dict[str, Any]:
     """
     Return how plans compare with what came of them.
 
@@ -129,15 +127,11 @@ def planned(count: int, out: Path, tell: Callable[[str], None]) -> dict[str, Any
 
     """
     require_simulator()
-    (out / PARTS).mkdir(parents=True, exist_ok=True)
-    entries = []
+    part, entries = Parts(out / PARTS), []
     for seed in range(count):
-        path = out / PARTS / f'plan_{seed:03d}.json'
-        if not path.is_file():
-            write_text(path, json.dumps(carried_out(seed), indent=1) + '\n')
-        entries.append(json.loads(path.read_text()))
+        entries.append(part(f'plan_{seed:03d}', partial(carried_out, seed)))
         tell(' '.join(f'{key} {value}' for key, value in entries[-1].items()))
-    write_owned(out / RESULTS, json.dumps(entries, indent=1) + '\n')
+    write_results(out / RESULTS, entries)
     ratio = [e['kept_sigma_m'] / e['promised_sigma_m'] for e in entries]
     return {
         'plans': len(entries),

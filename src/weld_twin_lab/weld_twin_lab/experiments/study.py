@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,6 +15,7 @@ from weld_twin_nodes.offline.output_directory import write_owned
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from ..blind.deck import lots
+from ..parts import write_results
 from .goals import page, summary
 
 RESULTS, TABLE, PARTS = 'investigate.json', 'investigate.md', 'parts'
@@ -81,7 +81,7 @@ def study(
         'cases': cases,
     }
     out.mkdir(parents=True, exist_ok=True)
-    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
+    write_results(out / RESULTS, result)
     write_owned(out / TABLE, page(result))
     return result
 

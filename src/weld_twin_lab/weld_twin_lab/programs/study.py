@@ -4,18 +4,17 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from weld_twin_core import __version__
 from weld_twin_msgs_py.files import markdown
-from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_nodes.offline.output_directory import write_owned
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
+from ..parts import Parts, Tell, write_results
 from . import correction_table, urdf_table
 from .broken import fuzz
 from .cells import CELLS
@@ -27,7 +26,6 @@ URDF_ARMS, URDF_TABLE = 'urdf_arms.json', 'urdf_arms.md'
 SCHEMA = 'weld_twin/programs/1'
 MADE = Path('test/programs/made')
 """Programs as users have them, from the top of the source tree; left out where there are none."""
-Tell = Callable[[str], None]
 
 
 def study(
@@ -52,20 +50,20 @@ def study(
         Told what is being done.
 
     """
-    (out / PARTS).mkdir(parents=True, exist_ok=True)
+    part = Parts(out / PARTS, tell)
     trips, fuzzed = [], []
     for language in CELLS:
         trip = partial(round_trips, language, drawn)
-        trips.append(_kept(out, f'round_trips_{language}', trip, tell))
+        trips.append(part(f'round_trips_{language}', trip))
         trial = partial(fuzz, language, broken, _whole(language, made))
-        fuzzed.append(_kept(out, f'fuzz_{language}', trial, tell))
+        fuzzed.append(part(f'fuzz_{language}', trial))
     result = {
         'schema': SCHEMA,
         'version': __version__,
         'round_trips': trips,
         'fuzz': fuzzed,
     }
-    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
+    write_results(out / RESULTS, result)
     write_owned(out / TABLE, summary(result))
     return result
 
@@ -105,7 +103,7 @@ def corrections(
         'cases': cases,
     }
     out.mkdir(parents=True, exist_ok=True)
-    write_owned(out / CORRECTIONS, json.dumps(result, indent=1) + '\n')
+    write_results(out / CORRECTIONS, result)
     write_owned(out / CORRECTIONS_TABLE, correction_table.page(result))
     return result
 
@@ -137,8 +135,8 @@ def urdf_arms(out: Path, seed: int, arms: int, runner: Runner, engine: str) -> d
         'cases': cases,
     }
     out.mkdir(parents=True, exist_ok=True)
-    write_text(out / URDF_ARMS, json.dumps(result, indent=1) + '\n', overwrite=True)
-    write_text(out / URDF_TABLE, urdf_table.page(result), overwrite=True)
+    write_results(out / URDF_ARMS, result)
+    write_owned(out / URDF_TABLE, urdf_table.page(result))
     return result
 
 
@@ -191,15 +189,6 @@ def _whole(language: str, made: Path) -> list[list[str]]:
         files = [path, *([path.with_suffix('.dat')] if language == 'krl' else [])]
         out.append([file.read_bytes().decode('latin-1') for file in files])
     return out
-
-
-def _kept(out: Path, name: str, make: Callable[[], dict[str, Any]], tell: Tell) -> dict[str, Any]:
-    path = out / PARTS / f'{name}.json'
-    if not path.exists():
-        tell(name)
-        write_text(path, json.dumps(make(), indent=1) + '\n')
-    entry: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-    return entry
 
 
 def summary(result: dict[str, Any]) -> str:

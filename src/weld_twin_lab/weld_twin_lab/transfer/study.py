@@ -4,16 +4,15 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from weld_twin_core import __version__
-from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_nodes.offline.output_directory import write_owned
 
+from ..parts import Parts, Tell, refuse_foreign, write_results
 from ..real_robots.data import tables
 from .goals import Measure, measures
 from .judging import judge
@@ -25,7 +24,6 @@ RESULTS, TABLE, PARTS = 'transfer.json', 'transfer.md', 'splits'
 SCHEMA = 'weld_twin/transfer/1'
 HOME = {'ur5': 0, 'ur10': 1}
 """Rows before this one are left out: the UR10's first is its home pose, far from the rest."""
-Tell = Callable[[str], None]
 
 
 def study(
@@ -51,14 +49,14 @@ def study(
         Data are missing, or ``out`` holds something else.
 
     """
-    _refuse_foreign(out)
-    (out / PARTS).mkdir(parents=True, exist_ok=True)
+    refuse_foreign(out, RESULTS, TABLE, PARTS)
+    part = Parts(out / PARTS, tell)
     entries = []
     for split in _all(ur5, ur10):
         if only in split.name:
-            entries.append(_kept(out, split.name, lambda s=split: judge(s), tell))  # type: ignore[misc]
+            entries.append(part(split.name, partial(judge, split)))
     if only in 'servo_axis':
-        entries.append(_kept(out, 'servo_axis', lambda: judge_axis(emps), tell))
+        entries.append(part('servo_axis', partial(judge_axis, emps)))
     found = measures(entries)
     result = {
         'schema': SCHEMA,
@@ -67,7 +65,7 @@ def study(
         'splits': entries,
     }
     write_owned(out / TABLE, page(entries, found))
-    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
+    write_results(out / RESULTS, result)
     return result
 
 
@@ -81,24 +79,3 @@ def page(entries: Sequence[dict[str, Any]], found: Sequence[Measure]) -> str:
 def _all(ur5: Path, ur10: Path) -> Iterator[Split]:
     for robot, directory in (('ur5', ur5), ('ur10', ur10)):
         yield from splits(robot, tables(robot, directory)[0].recording, HOME[robot])
-
-
-def _kept(out: Path, name: str, work: Callable[[], dict[str, Any]], tell: Tell) -> dict[str, Any]:
-    """Return the result of one split, from its file where there is one."""
-    path = out / PARTS / f'{name}.json'
-    if path.is_file():
-        kept: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-        return kept
-    tell(name)
-    entry = work()
-    write_text(path, json.dumps(entry, indent=1) + '\n', overwrite=True)
-    return entry
-
-
-def _refuse_foreign(out: Path) -> None:
-    """Refuse a directory that holds something else."""
-    if not out.exists():
-        return
-    ours = out.is_dir() and all(p.name in (RESULTS, TABLE, PARTS) for p in out.iterdir())
-    if not ours:
-        raise DataError(f"'{out}' holds something else already; choose another place")

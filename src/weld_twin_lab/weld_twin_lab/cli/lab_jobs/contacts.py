@@ -47,6 +47,7 @@ def run(args: argparse.Namespace) -> int:
     from ...contacts.data import ARMS
     from ...contacts.splits import study
     from ...contacts.table import summary, table
+    from ...parts import write_results
 
     def tell(text: str) -> None:
         print(text, file=sys.stderr, flush=True)
@@ -57,19 +58,19 @@ def run(args: argparse.Namespace) -> int:
             raise DataError(f'--arms: there is no arm {name!r}; they are {", ".join(ARMS)}')
     out = Path(args.out)
     entries = study(Path(args.data), arms, out / 'splits', tell)
-    write_owned(out / 'contacts.json', json.dumps(summary(entries), indent=1) + '\n')
+    write_results(out / 'contacts.json', summary(entries))
     write_owned(out / 'contacts.md', table(entries))
     print(table(entries), end='')
     if args.sealed:
         from ...contacts.sealed import sealed
 
         score = sealed(args.sealed, out / 'sealed', tell)
-        write_owned(out / 'sealed.json', json.dumps(score, indent=1) + '\n')
+        write_results(out / 'sealed.json', score)
         print(', '.join(f'{key} {value}' for key, value in score.items()))
     if args.postures:
         from ...contacts.postures import postures
 
         needed = postures(args.postures, out / 'postures', tell)
-        write_owned(out / 'postures.json', json.dumps(needed, indent=1) + '\n')
+        write_results(out / 'postures.json', needed)
         print(json.dumps(needed))
     return 0

@@ -31,13 +31,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Judge what is not judged yet, write and print the table."""
-    import json
-
     from weld_twin_core.errors import DataError
     from weld_twin_nodes.offline.output_directory import write_owned
     from weld_twin_nodes.offline.task_pool import Task
 
     from ...blind.diagnosing import engine_digest
+    from ...parts import write_results
     from ...real_arms.rows import plans
     from ...real_arms.study import judged, summary, table
 
@@ -50,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         entries = list(runner.run(tasks))
     told = table(entries)
     result = {'summary': summary(entries), 'rows': entries}
-    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
+    write_results(out / RESULTS, result)
     write_owned(out / PAGE, told)
     print(told, end='')
     return 0

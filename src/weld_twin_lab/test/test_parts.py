@@ -1,0 +1,36 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A study that was stopped goes on where it stopped, and takes no folder of somebody else."""
+
+import pytest
+
+from weld_twin_core.errors import DataError
+from weld_twin_lab.parts import Parts, refuse_foreign
+
+
+def test_a_study_that_was_stopped_makes_only_what_is_missing(tmp_path):
+    made = []
+
+    def make(name):
+        made.append(name)
+        if made == ['a', 'b']:
+            raise KeyboardInterrupt
+        return {'name': name}
+
+    def study():
+        part = Parts(tmp_path / 'parts')
+        return [part(name, lambda name=name: make(name)) for name in 'abc']
+
+    with pytest.raises(KeyboardInterrupt):
+        study()
+    assert [entry['name'] for entry in study()] == ['a', 'b', 'c']
+    assert made == ['a', 'b', 'b', 'c']
+
+
+def test_a_folder_with_something_else_in_it_is_refused(tmp_path):
+    refuse_foreign(tmp_path / 'not there yet', 'parts')
+    (tmp_path / 'parts').mkdir()
+    refuse_foreign(tmp_path, 'parts')
+    (tmp_path / 'thesis.tex').touch()
+    with pytest.raises(DataError, match='something else'):
+        refuse_foreign(tmp_path, 'parts')

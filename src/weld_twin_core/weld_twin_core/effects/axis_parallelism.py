@@ -18,6 +18,8 @@ class AxisParallelism(ChannelError):
     dbeta: Value = 0.0
 
     name = 'axis_parallelism'
+    title = 'axis parallelism error'
+    entered = 'model'
     everywhere = True
     depends_on = 'constant'
     of = 'link'

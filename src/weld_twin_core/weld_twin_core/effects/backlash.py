@@ -48,6 +48,9 @@ class Backlash(MemoryEffect):
     form: str = 'play'
 
     name = 'backlash'
+    title = 'backlash'
+    entered = "the joint's gear"
+    changes_in_use = True
     demand = 2
     depends_on = 'direction'
     of = 'joint'

@@ -18,6 +18,8 @@ class BasePose(FrameError):
     rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'base_pose'
+    title = 'base pose error'
+    entered = 'base'
     depends_on = 'constant'
     place = 'base'
     channel = 'base'

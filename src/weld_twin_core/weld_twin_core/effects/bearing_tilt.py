@@ -50,6 +50,8 @@ class BearingTilt(Effect):
     second: Value = ()
 
     name = 'bearing_tilt'
+    title = 'axis wobble'
+    entered = 'program'
     depends_on = 'angle'
     of = 'joint'
     stage = Stage.LINK

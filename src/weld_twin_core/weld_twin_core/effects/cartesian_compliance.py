@@ -24,6 +24,8 @@ class CartesianCompliance(Effect):
     compliance: Value = (0.0, 0.0, 0.0)
 
     name = 'cartesian_compliance'
+    title = 'compliance at the tool'
+    entered = 'stiffness and of the force at the tool'
     depends_on = 'load'
     place = 'tool'
     of = 'robot'

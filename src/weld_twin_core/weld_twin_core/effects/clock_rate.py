@@ -22,6 +22,8 @@ class ClockRate(Effect):
     rate: Value = 0.0
 
     name = 'clock_rate'
+    title = 'clock that runs fast or slow'
+    entered = 'its clocks'
     depends_on = 'time'
     place = 'clock'
     of = 'robot'

@@ -18,6 +18,8 @@ class Drift(Effect):
     xyz_rate: Value = (0.0, 0.0, 0.0)
 
     name = 'drift'
+    title = 'drift of the frame'
+    entered = 'what the frame stands on, or of the temperature'
     depends_on = 'time'
     place = 'base'
     of = 'robot'

@@ -56,6 +56,9 @@ class Friction(MemoryEffect):
     release: float = 0.3
 
     name = 'friction'
+    title = 'friction'
+    entered = "the joint's gear, bearings and grease"
+    changes_in_use = True
     depends_on = 'direction'
     of = 'joint'
     stage = Stage.PLAY

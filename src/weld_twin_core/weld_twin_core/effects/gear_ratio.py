@@ -19,6 +19,8 @@ class GearRatio(Effect):
     scale: Value = 0.0
 
     name = 'gear_ratio'
+    title = 'gear ratio error'
+    entered = 'ratio'
     everywhere = True
     by_motion = True
     demand = 2

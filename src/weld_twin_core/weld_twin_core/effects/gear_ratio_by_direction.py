@@ -47,6 +47,8 @@ class GearRatioByDirection(MemoryEffect):
     travel: Value = 1e-4
 
     name = 'gear_ratio_by_direction'
+    title = 'gear ratio that differs by direction'
+    entered = "the joint's gear"
     depends_on = 'direction'
     of = 'joint'
     stage = Stage.PLAY

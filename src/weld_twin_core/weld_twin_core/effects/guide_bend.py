@@ -26,6 +26,8 @@ class GuideBend(GuideError):
     curvature: Value = (0.0, 0.0)
 
     name = 'guide_bend'
+    title = 'bent guide'
+    entered = 'program'
     stage = Stage.POSE
     parameters = (Parameter('curvature', '1/m', size=2, typical=2e-4),)
 

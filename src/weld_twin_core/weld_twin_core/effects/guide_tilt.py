@@ -26,6 +26,8 @@ class GuideTilt(GuideError):
     rate: Value = (0.0, 0.0, 0.0)
 
     name = 'guide_tilt'
+    title = 'tilting carriage'
+    entered = 'program'
     stage = Stage.POSE
     parameters = (Parameter('rate', 'rad/m', size=3, typical=2e-4),)
 

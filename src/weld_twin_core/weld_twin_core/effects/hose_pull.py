@@ -41,6 +41,8 @@ class HosePull(Effect):
     stiffness: Value = 0.0
 
     name = 'hose_pull'
+    title = 'pull of the hose package'
+    entered = 'program'
     depends_on = 'load'
     place = 'load'
     of = 'robot'

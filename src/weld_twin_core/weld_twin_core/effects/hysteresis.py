@@ -49,6 +49,9 @@ class Hysteresis(MemoryEffect):
     travel: Value = 0.03
 
     name = 'hysteresis'
+    title = 'hysteresis'
+    entered = "the joint's gear"
+    changes_in_use = True
     depends_on = 'direction'
     of = 'joint'
     stage = Stage.PLAY

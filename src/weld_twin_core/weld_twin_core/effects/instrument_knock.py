@@ -21,6 +21,8 @@ class InstrumentKnock(SuddenFrame):
     time: float = 0.0
 
     name = 'instrument_knock'
+    title = 'knocked instrument or base'
+    entered = 'the instrument or the base was knocked'
     place = 'instrument'
     of_setup = True
     channel = 'base'

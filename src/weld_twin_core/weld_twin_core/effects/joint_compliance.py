@@ -39,6 +39,9 @@ class JointCompliance(Effect):
     statics: str = 'equilibrium'
 
     name = 'joint_compliance'
+    title = 'compliance'
+    entered = 'program'
+    changes_in_use = True
     everywhere = True
     by_motion = True
     depends_on = 'load'

@@ -26,6 +26,8 @@ class JointCoupling(Effect):
     ratio: Value = 0.0
 
     name = 'joint_coupling'
+    title = 'coupling'
+    entered = 'ratio'
     by_motion = True
     demand = 2
     depends_on = 'angle'

@@ -18,6 +18,9 @@ class JointOffset(ChannelError):
     offset: Value = 0.0
 
     name = 'joint_offset'
+    title = 'zero offset'
+    entered = 'zero'
+    changes_in_use = True
     everywhere = True
     set_at_controller = True
     depends_on = 'constant'

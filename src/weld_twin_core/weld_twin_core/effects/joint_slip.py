@@ -22,6 +22,8 @@ class JointSlip(SuddenChannel):
     time: float = 0.0
 
     name = 'joint_slip'
+    title = 'slip'
+    entered = 'zero'
     of = 'joint'
     stage = Stage.JOINT
     channel = 'q'

@@ -18,6 +18,9 @@ class LinkLength(ChannelError):
     da: Value = 0.0
 
     name = 'link_length'
+    title = 'link length error'
+    entered = 'model'
+    changes_in_use = True
     everywhere = True
     depends_on = 'constant'
     of = 'link'

@@ -18,6 +18,8 @@ class LinkOffset(ChannelError):
     dd: Value = 0.0
 
     name = 'link_offset'
+    title = 'link offset error'
+    entered = 'model'
     everywhere = True
     depends_on = 'constant'
     of = 'link'

@@ -18,6 +18,8 @@ class LinkTwist(ChannelError):
     dalpha: Value = 0.0
 
     name = 'link_twist'
+    title = 'link twist error'
+    entered = 'model'
     everywhere = True
     depends_on = 'constant'
     of = 'link'

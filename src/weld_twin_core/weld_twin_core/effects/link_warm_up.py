@@ -42,6 +42,8 @@ class LinkWarmUp(Effect):
     follows: Sequence[float] | None = None
 
     name = 'link_warm_up'
+    title = 'warm-up of the link'
+    entered = 'warming up'
     depends_on = 'time'
     of = 'link'
     stage = Stage.LINK

@@ -40,6 +40,8 @@ class LoadedPlay(Effect):
     torque: float = 1.0
 
     name = 'loaded_play'
+    title = 'play under load'
+    entered = "the joint's gear"
     depends_on = 'load'
     of = 'joint'
     stage = Stage.LINK

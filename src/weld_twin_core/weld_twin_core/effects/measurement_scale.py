@@ -18,6 +18,8 @@ class MeasurementScale(Effect):
     scale: Value = 0.0
 
     name = 'measurement_scale'
+    title = 'scale error of the instrument'
+    entered = 'the scale of the instrument'
     depends_on = 'place'
     place = 'instrument'
     of = 'robot'

@@ -25,6 +25,9 @@ class Payload(Effect):
     com: Value = (0.0, 0.0, 0.0)
 
     name = 'payload'
+    title = 'wrong payload'
+    entered = 'load'
+    changes_in_use = True
     depends_on = 'load'
     place = 'load'
     of = 'robot'

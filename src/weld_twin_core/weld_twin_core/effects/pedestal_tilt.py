@@ -38,6 +38,8 @@ class PedestalTilt(Effect):
     compliance: Value = (0.0, 0.0)
 
     name = 'pedestal_tilt'
+    title = 'leaning pedestal'
+    entered = 'program'
     depends_on = 'load'
     place = 'base'
     of = 'robot'

@@ -36,6 +36,8 @@ class Quantization(Effect):
     step: Value = 0.0
 
     name = 'quantization'
+    title = 'encoder resolution'
+    entered = 'the encoder'
     by_motion = True
     depends_on = 'angle'
     of = 'joint'

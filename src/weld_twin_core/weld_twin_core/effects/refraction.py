@@ -54,6 +54,8 @@ class Refraction(Effect):
     instrument: Sequence[float] | None = None
 
     name = 'refraction'
+    title = 'bent line of sight'
+    entered = 'warm air bent the line of sight'
     depends_on = 'place'
     place = 'instrument'
     of = 'robot'

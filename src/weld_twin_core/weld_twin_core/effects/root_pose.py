@@ -22,6 +22,8 @@ class RootPose(FrameError):
     rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'root_pose'
+    title = 'root error of the positioner'
+    entered = 'root'
     depends_on = 'constant'
     place = 'base'
     channel = 'root'

@@ -53,6 +53,8 @@ class ServoLag(MemoryEffect):
     damping: float | None = None
 
     name = 'servo_lag'
+    title = 'servo lag'
+    entered = "the drive's gains and feed-forward"
     depends_on = 'speed'
     of = 'joint'
     stage = Stage.SERVO

@@ -32,6 +32,8 @@ class SetupSettling(Effect):
     start: float = 0.0
 
     name = 'setup_settling'
+    title = 'settling set-up'
+    entered = 'how the set-up is held'
     depends_on = 'time'
     place = 'base'
     of = 'robot'

@@ -33,6 +33,8 @@ class SetupStep(Effect):
     time: float = 0.0
 
     name = 'setup_step'
+    title = 'moved set-up'
+    entered = 'base'
     depends_on = 'time'
     place = 'base'
     of = 'robot'

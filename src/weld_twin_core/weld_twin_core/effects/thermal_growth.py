@@ -35,6 +35,8 @@ class ThermalGrowth(Effect):
     warmup: Sequence[float] | None = None
 
     name = 'thermal_growth'
+    title = 'thermal growth'
+    entered = 'warming up, or of the temperature in the cell'
     demand = 1
     depends_on = 'temperature'
     of = 'links'

@@ -18,6 +18,8 @@ class TimeDelay(Effect):
     delay: Value = 0.0
 
     name = 'time_delay'
+    title = 'clock delay'
+    entered = 'its clocks'
     everywhere = True
     depends_on = 'speed'
     place = 'clock'

@@ -18,6 +18,9 @@ class ToolPose(FrameError):
     rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'tool_pose'
+    title = 'tool pose error'
+    entered = 'tool'
+    changes_in_use = True
     depends_on = 'constant'
     place = 'tool'
     channel = 'tool'

@@ -21,6 +21,8 @@ class ToolSlip(SuddenFrame):
     time: float = 0.0
 
     name = 'tool_slip'
+    title = 'slipped tool or reflector'
+    entered = 'tool'
     place = 'tool'
     of_setup = True
     channel = 'tool'

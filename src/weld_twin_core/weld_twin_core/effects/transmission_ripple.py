@@ -47,6 +47,8 @@ class TransmissionRipple(Effect):
     phase: Value = 0.0
 
     name = 'transmission_ripple'
+    title = 'transmission ripple'
+    entered = 'program'
     everywhere = True
     by_motion = True
     demand = 1

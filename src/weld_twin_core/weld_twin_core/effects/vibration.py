@@ -41,6 +41,8 @@ class Vibration(MemoryEffect):
     gain: Value = 0.0
 
     name = 'vibration'
+    title = 'vibration'
+    entered = 'how the motion is planned, and of stiffness'
     depends_on = 'acceleration'
     of = 'joint'
     stage = Stage.SERVO

@@ -34,6 +34,8 @@ class Wear(Effect):
     slowing: Value = 0.0
 
     name = 'wear'
+    title = 'tool wear'
+    entered = 'tool'
     depends_on = 'time'
     place = 'tool'
     of = 'robot'

@@ -30,7 +30,7 @@ from weld_twin_nodes.wording.quantities import (
 )
 from weld_twin_nodes.wording.verdict import verdict
 from weld_twin_nodes.wording.words import (
-    CAUSES,
+    called,
     cause,
     found_name,
     listed,
@@ -248,7 +248,7 @@ class Answer:
     @property
     def nothing_changed(self) -> str:
         """Return that nothing was seen to change, of what."""
-        names = listed([CAUSES.get(name, name) for name in self.diagnosis.may_change], 'or')
+        names = listed([called(name) for name in self.diagnosis.may_change], 'or')
         return f'No {names} was seen to change between the recordings.'
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_nodes.offline.verifying import Left, Promise, Verification
 from weld_twin_nodes.wording.quantities import millimetres
-from weld_twin_nodes.wording.words import CAUSES, cause, listed
+from weld_twin_nodes.wording.words import called, cause, listed
 
 from .charts import Axis, Line, chart
 from .footing import inputs_section
@@ -70,7 +70,7 @@ def _name(left: Left) -> str:
     if len(left.sites) == 1:
         return cause(left.sites[0].effect, left.sites[0].joint)
     kind = left.sites[0].effect
-    return f'{CAUSES.get(kind, kind)} of {listed([str(site.joint) for site in left.sites])}'
+    return f'{called(kind)} of {listed([str(site.joint) for site in left.sites])}'
 
 
 def _share(left: Left) -> str:

@@ -34,6 +34,7 @@ from .base_leans import base_leans
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import turn
 
 
 @register
@@ -170,6 +171,14 @@ class BearingTilt(Effect):
         if joint is not None and view.robot.prismatic[view.robot.index(joint)]:
             return 'a joint that slides has no bearing that turns with it'
         return super().applicable(view, joint)
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        lean = float(np.linalg.norm(np.asarray(self.lean)))
+        return (
+            f'Look at the bearing of {self.site}: its axis leans by {turn(lean)} once per turn; '
+            'compensate the poses until it is replaced.'
+        )
 
 
 def _axes(view: View, i: int) -> list[dict[Channel, float]]:

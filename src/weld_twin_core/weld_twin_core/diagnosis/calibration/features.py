@@ -21,7 +21,6 @@ from ..posterior.table import Row, dependence_of
 from ..result import Cause
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.evidence import Evidence
-from ..verdict.left import Left
 
 Numbers = dict[str, float]
 FAR = 1e3
@@ -73,31 +72,26 @@ def of_situation(
             'gap': log(evidence.gap / floor),
             'left': log(evidence.after / floor),
             'left elsewhere': log(elsewhere / max(evidence.fitted * evidence.chance, 1e-12)),
-            'left unexplained': Left(evidence, found.work.beliefs).share,
             'structure': evidence.structure.gain,
             'structure, errors': evidence.structure.sure,
             'rows': log(found.effective(found.small)),
             'joints moving': float((travel > MOVES).mean()),
-            'causes': len(evidence.slots),
             'refused': len(evidence.refused),
             'lacking': len(evidence.lacking),
             'cancelling': log(sum(evidence.parts)) if evidence.parts else 0.0,
-            'waves hardly seen': len(evidence.glimpsed),
-            'floor measured': float(evidence.independent),
             'stations': float(found.problem.recordings[0].joints.static),
-            **_of_curves(unseen, rival, floor),
+            **_of_curves(unseen, rival),
         }
     )
 
 
-def _of_curves(unseen: Unseen, rival: Curved | None, floor: float) -> Numbers:
+def _of_curves(unseen: Unseen, rival: Curved | None) -> Numbers:
     """Return how curves without a name compare with the names."""
     if rival is None:
-        return dict.fromkeys(('curves', 'curves instead', 'curves, left', 'form'), 0.0)
+        return dict.fromkeys(('curves', 'curves instead', 'form'), 0.0)
     return {
         'curves': len(rival.form.parts),
         'curves instead': max(gain_of(unseen, rival.unseen)[0], -1.0),
-        'curves, left': log(rival.rms_m / floor),
         'form': rival.form.gain,
     }
 
@@ -123,7 +117,6 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
         {
             'weight': odds(row.mass),
             'evidence': log1(row.gap),
-            'margin': log1(min(row.margin, FAR)),
             'apart': log(min(row.apart, FAR)),
             'size': log(size),
             'wander': log(wandered),

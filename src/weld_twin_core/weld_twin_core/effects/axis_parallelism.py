@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from .constant import ChannelError
 from .registry import register
-from .view import Parameter, Stage, Value
+from .view import Parameter, Plausible, Stage, Value
 
 
 @register
@@ -26,4 +26,13 @@ class AxisParallelism(ChannelError):
     stage = Stage.LINK
     channel = 'beta'
     off = 'the axes are out of parallel by'
-    parameters = (Parameter('dbeta', 'rad', typical=5e-4),)
+    parameters = (
+        Parameter(
+            'dbeta',
+            'rad',
+            typical=5e-4,
+            range=Plausible.even(
+                2e-3, 2e-2, 'derived: a tilt of the same kind as link_twist, of the same size'
+            ),
+        ),
+    )

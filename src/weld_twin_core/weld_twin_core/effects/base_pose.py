@@ -10,9 +10,9 @@ from ..arm.controller_lookup import controller_frames
 from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix
 from ..arrays import Array
-from .constant import FrameError
+from .constant import FrameError, frame_parameters
 from .registry import register
-from .view import Value
+from .view import Plausible, Value
 from .wording import base_frame
 
 
@@ -31,6 +31,10 @@ class BasePose(FrameError):
     place = 'base'
     channel = 'base'
     fitted_with = 'base'
+    parameters = frame_parameters(
+        Plausible.even(5e-3, 0.5, 'derived: half a metre off is another place'),
+        Plausible.even(1e-2, 0.2, 'derived: ten degrees are seen by the eye'),
+    )
 
     def remedy(self, robot: Robot) -> str:
         """Return what to mend, in words; see `Hooks.remedy`."""

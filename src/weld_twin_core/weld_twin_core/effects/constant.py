@@ -12,8 +12,15 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
-from .view import Parameter, Stage, View, single
+from .view import Parameter, Plausible, Stage, View, single
 from .wording import metres, radians
+
+URS = (
+    'controller calibrations of a UR3 (github.com/MyRobotLab/pyrobotlab issue 145) and of a UR5 '
+    '(github.com/UniversalRobots/Universal_Robots_ROS_Driver issue 457): rows between axes that '
+    'are not parallel'
+)
+"""Where errors of links were read."""
 
 
 class ChannelError(Effect):
@@ -47,16 +54,20 @@ class ChannelError(Effect):
         return [single((self.channel, view.robot.index(str(self.site))), np.ones(()), view)]
 
 
+def frame_parameters(xyz: Plausible, rotvec: Plausible) -> tuple[Parameter, ...]:
+    """Return the parameters of an error of a frame, with how large each may be."""
+    return (
+        Parameter('xyz', 'm', size=3, typical=5e-4, range=xyz),
+        Parameter('rotvec', 'rad', size=3, typical=1e-3, range=rotvec),
+    )
+
+
 class FrameError(Effect):
     """A constant error of the base or tool frame: a displacement and a turn."""
 
     channel: ClassVar[str]
     of = 'robot'
     stage = Stage.LINK
-    parameters = (
-        Parameter('xyz', 'm', size=3, typical=5e-4),
-        Parameter('rotvec', 'rad', size=3, typical=1e-3),
-    )
 
     def displace(self, view: View) -> Shift:
         """Return xyz and rotvec on the six components of the frame."""

@@ -7,9 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..arm.robot import Robot
+from .constant import frame_parameters
 from .registry import register
 from .sudden import SuddenFrame
-from .view import Value
+from .view import Plausible, Value
 from .wording import base_frame
 
 
@@ -28,6 +29,10 @@ class InstrumentKnock(SuddenFrame):
     place = 'instrument'
     of_setup = True
     channel = 'base'
+    parameters = frame_parameters(
+        Plausible.even(5e-3, 0.1, 'derived: a knock'),
+        Plausible.even(5e-3, 0.1, 'derived: a knock'),
+    )
 
     def remedy(self, robot: Robot) -> str:
         """Return what to mend, in words; see `Hooks.remedy`."""

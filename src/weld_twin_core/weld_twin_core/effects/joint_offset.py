@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..arm.robot import Robot
 from .constant import ChannelError
 from .registry import register
-from .view import Parameter, Stage, Value
+from .view import Parameter, Plausible, Stage, Value
 from .wording import stands, to_mend
 
 
@@ -29,7 +29,21 @@ class JointOffset(ChannelError):
     of = 'joint'
     stage = Stage.JOINT
     channel = 'q'
-    parameters = (Parameter('offset', 'rad', typical=5e-4),)
+    parameters = (
+        Parameter(
+            'offset',
+            'rad',
+            typical=5e-4,
+            range=Plausible.even(
+                5e-3,
+                0.13,
+                'a mastering 16 degrees of the motor off is 0.2 degrees (3.5 mrad) of the joint; arms '
+                'mastered on wrong marks were 5 to 7 degrees off (industrialmonitordirect.com, KR16 '
+                'mastering deviation and KR3 mastering error)',
+            ),
+            sliding=Plausible.even(5e-3, 0.1, 'derived: a reference switch, by hand'),
+        ),
+    )
 
     def remedy(self, robot: Robot) -> str:
         """Return what to mend, in words; see `Hooks.remedy`."""

@@ -10,7 +10,7 @@ from ..arm.robot import Robot
 from .joint_offset import JointOffset
 from .registry import register
 from .sudden import SuddenChannel
-from .view import Parameter, Stage, Value
+from .view import Parameter, Plausible, Stage, Value
 from .wording import radians
 
 
@@ -29,7 +29,19 @@ class JointSlip(SuddenChannel):
     of = 'joint'
     stage = Stage.JOINT
     channel = 'q'
-    parameters = (Parameter('offset', 'rad', typical=5e-4),)
+    parameters = (
+        Parameter(
+            'offset',
+            'rad',
+            typical=5e-4,
+            range=Plausible.even(
+                5e-3,
+                0.13,
+                'derived: a tooth of a belt or the mark of a mastering; see joint_offset',
+            ),
+            sliding=Plausible.even(5e-3, 0.1, 'derived: a tooth of a belt or a rack'),
+        ),
+    )
 
     def lasting(self) -> JointOffset:
         """Return the offset that the joint keeps."""

@@ -4,9 +4,9 @@
 
 from dataclasses import dataclass
 
-from .constant import ChannelError
+from .constant import URS, ChannelError
 from .registry import register
-from .view import Parameter, Stage, Value
+from .view import Parameter, Plausible, Stage, Value
 
 
 @register
@@ -26,4 +26,15 @@ class LinkLength(ChannelError):
     of = 'link'
     stage = Stage.LINK
     channel = 'a'
-    parameters = (Parameter('da', 'm', typical=2e-4),)
+    parameters = (
+        Parameter(
+            'da',
+            'm',
+            typical=2e-4,
+            range=Plausible.even(
+                5e-4,
+                1e-2,
+                f'{URS}: 0.02 to 0.28 mm; range derived: beyond a centimetre it is another arm',
+            ),
+        ),
+    )

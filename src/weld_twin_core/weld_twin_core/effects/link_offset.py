@@ -4,9 +4,9 @@
 
 from dataclasses import dataclass
 
-from .constant import ChannelError
+from .constant import URS, ChannelError
 from .registry import register
-from .view import Parameter, Stage, Value
+from .view import Parameter, Plausible, Stage, Value
 
 
 @register
@@ -25,4 +25,15 @@ class LinkOffset(ChannelError):
     of = 'link'
     stage = Stage.LINK
     channel = 'd'
-    parameters = (Parameter('dd', 'm', typical=2e-4),)
+    parameters = (
+        Parameter(
+            'dd',
+            'm',
+            typical=2e-4,
+            range=Plausible.even(
+                5e-4,
+                1e-2,
+                f'{URS}: 0.09 to 0.32 mm; range derived: beyond a centimetre it is another arm',
+            ),
+        ),
+    )

@@ -4,9 +4,9 @@
 
 from dataclasses import dataclass
 
-from .constant import ChannelError
+from .constant import URS, ChannelError
 from .registry import register
-from .view import Parameter, Stage, Value
+from .view import Parameter, Plausible, Stage, Value
 
 
 @register
@@ -26,4 +26,11 @@ class LinkTwist(ChannelError):
     stage = Stage.LINK
     channel = 'alpha'
     off = 'the axes are twisted by'
-    parameters = (Parameter('dalpha', 'rad', typical=5e-4),)
+    parameters = (
+        Parameter(
+            'dalpha',
+            'rad',
+            typical=5e-4,
+            range=Plausible.even(2e-3, 2e-2, f'{URS}: 0.4 to 3.9 mrad'),
+        ),
+    )

@@ -7,9 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..arm.robot import Robot
+from .constant import frame_parameters
 from .registry import register
 from .sudden import SuddenFrame
-from .view import Value
+from .view import Plausible, Value
 from .wording import frame
 
 
@@ -28,6 +29,10 @@ class ToolSlip(SuddenFrame):
     place = 'tool'
     of_setup = True
     channel = 'tool'
+    parameters = frame_parameters(
+        Plausible.even(5e-3, 0.05, 'derived: a holder or a nest that gave way'),
+        Plausible.even(2e-2, 0.4, 'derived: a holder that gave way'),
+    )
 
     def remedy(self, robot: Robot) -> str:
         """Return what to mend, in words; see `Hooks.remedy`."""

@@ -93,11 +93,11 @@ def test_marginals_of_a_row_are_sums_over_who_shares_it():
     assert row.dependences() == pytest.approx(
         {'constant': 0.5, 'angle': 0.3, 'direction': 0.18, 'time': 0.02}
     )
-    assert (row.gap, row.apart) == (9.0, 5.0)
+    assert (row.gap, row.margin, row.apart) == (9.0, 7.0, 5.0)
     sure = (replace(slot[0], probability=0.9), *(replace(r, probability=0.03) for r in slot[1:]))
     (row,) = table_of((sure,), wt.diagnosis.Beliefs())
     assert row.listed == (zero,)
-    assert row.apart == 1.0
+    assert (row.margin, row.apart) == (1.0, 1.0)
 
 
 @pytest.fixture(scope='module')

@@ -21,6 +21,7 @@ from ..posterior.table import Row, dependence_of
 from ..result import Cause
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.evidence import Evidence
+from ..verdict.left import Left
 
 Numbers = dict[str, float]
 FAR = 1e3
@@ -72,10 +73,12 @@ def of_situation(
             'gap': log(evidence.gap / floor),
             'left': log(evidence.after / floor),
             'left elsewhere': log(elsewhere / max(evidence.fitted * evidence.chance, 1e-12)),
+            'left unexplained': Left(evidence, found.work.beliefs).share,
             'structure': evidence.structure.gain,
             'structure, errors': evidence.structure.sure,
             'rows': log(found.effective(found.small)),
             'joints moving': float((travel > MOVES).mean()),
+            'causes': len(evidence.slots),
             'refused': len(evidence.refused),
             'lacking': len(evidence.lacking),
             'cancelling': log(sum(evidence.parts)) if evidence.parts else 0.0,
@@ -117,6 +120,7 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
         {
             'weight': odds(row.mass),
             'evidence': log1(row.gap),
+            'margin': log1(min(row.margin, FAR)),
             'apart': log(min(row.apart, FAR)),
             'size': log(size),
             'wander': log(wandered),

@@ -64,6 +64,11 @@ class Row:
         return self.leader.nats
 
     @property
+    def margin(self) -> float:
+        """Return by how much the leader is ahead of the best that is not named [nats]; inf of none."""
+        return min((self.leader.nats - rival.nats for rival in self.others), default=float('inf'))
+
+    @property
     def apart(self) -> float:
         """
         Return how far the nearest that is not named leaves another residual, RMS [noise]; inf of none.

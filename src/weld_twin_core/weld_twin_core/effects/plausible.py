@@ -3,9 +3,10 @@
 """
 What a machine can have: a spread and a range for every parameter of every effect.
 
-Each effect's file says it with its parameters; here it is asked of a robot. The spread (``sd``) is that of a Gaussian about zero, the prior of every fit; what lies outside
-the range is never named as a cause. ``source`` says where the figures come from: a publication
-that was read, or, where none was found, an argument that starts with 'derived'; those are wide.
+Each effect's file says it with its parameters; here it is asked of a robot. The spread (``sd``)
+is that of a Gaussian about zero, the prior of every fit; what lies outside the range is never
+named as a cause. ``source`` says where the figures come from: a publication that was read, or,
+where none was found, an argument that starts with 'derived'; those are wide.
 docs/plausible.md lists them. A robot may narrow them: key ``plausible`` of a robot file.
 """
 

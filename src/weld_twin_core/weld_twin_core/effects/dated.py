@@ -17,9 +17,9 @@ import numpy as np
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
+from .constant import ChannelError, FrameError, frame_parameters
 from .effect import Effect
-from .frame_errors import FrameError, frame_parameters
-from .geometry import ChannelError, JointOffset
+from .geometry import JointOffset
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import base_frame, frame, radians

@@ -5,47 +5,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
-from ..arm.channels import Channel, Shift
 from ..arm.controller_lookup import controller_frames
 from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix
 from ..arrays import Array
-from .effect import Effect
+from .constant import FrameError, frame_parameters
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View, single
+from .view import Plausible, Value
 from .wording import base_frame, frame
-
-
-def frame_parameters(xyz: Plausible, rotvec: Plausible) -> tuple[Parameter, ...]:
-    """Return the parameters of an error of a frame, with how large each may be."""
-    return (
-        Parameter('xyz', 'm', size=3, typical=5e-4, range=xyz),
-        Parameter('rotvec', 'rad', size=3, typical=1e-3, range=rotvec),
-    )
-
-
-class FrameError(Effect):
-    """A constant error of the base or tool frame: a displacement and a turn."""
-
-    channel: ClassVar[str]
-    of = 'robot'
-    stage = Stage.LINK
-
-    def displace(self, view: View) -> Shift:
-        """Return xyz and rotvec on the six components of the frame."""
-        out: dict[Channel, Array] = {}
-        for k in range(3):
-            out |= single((self.channel, k), self.number('xyz', k), view)
-            out |= single((self.channel, k + 3), self.number('rotvec', k), view)
-        return out
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return one for each component."""
-        return [single((self.channel, k), np.ones(()), view) for k in range(6)]
 
 
 @register

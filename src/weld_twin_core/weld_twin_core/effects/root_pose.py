@@ -12,7 +12,7 @@ from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix
 from ..arrays import Array
 from ..errors import ModelError
-from .frame_errors import FrameError, frame_parameters
+from .constant import FrameError, frame_parameters
 from .registry import register
 from .view import Plausible, Value, View
 from .wording import frame

@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects import REGISTRY
+from ...effects.constant import ChannelError, FrameError
 from ...effects.effect import Effect
-from ...effects.frame_errors import FrameError
-from ...effects.geometry import ChannelError
 from ...effects.setup_motion import of_the_robot
 from ...twin.corrected import corrected
 from ...twin.features import joints_of

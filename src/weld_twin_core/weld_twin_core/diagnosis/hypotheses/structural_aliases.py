@@ -6,10 +6,10 @@ Constant errors that no motion tells apart, whatever the data: they follow from 
 The offset of the first link lifts the tool exactly as a higher base does. Such a pair is told as
 a set even where one of the two was taken out of the library, the simplest member first.
 
-Effects of one joint that come out by the same thing, such as play and friction by the direction,
-are alike in all but their curve. Where one of them is found and another was taken out that fits as
-well, no data can vouch for the name alone, and they are a set too. Where the other fits clearly
-better, what was found stands in for a cause that the library lacks.
+Families that were taken out are still held against what is found, in its place: a hose may do on
+these motions what a load does. Where one of them fits as well, no data can vouch for the name
+alone, and they are a set too. Where it fits clearly better, what was found stands in for a cause
+that the library lacks. None of them is ever named alone.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ from ..algebra.alias import outside, share_outside, span_of
 from ..algebra.fit import Fit, fit
 from ..beliefs import Beliefs
 from ..result import Site
-from .rivals import Rival, nats_in_place, weighed
+from .library import build
+from .rivals import Rival, contenders, nats_in_place, weighed
 from .search import Search, refitted
-from .selection import fitted_with, implausible
+from .selection import Workspace, fitted_with, implausible
 from .still_joints import hardly_moves, moved_most
 
 POSTURES = 40
@@ -44,8 +45,8 @@ SAME = 1e-6
 SAME_AT_REST = 0.04
 """The same of what is done by a joint at rest: as far as that may travel [rad], a wave that comes once
 per turn departs from a constant."""
-MOST_SEEDS = 3
-"""Instances of an excluded kind that are fitted at most; between them lie sizes ten times apart."""
+MOST_EXCLUDED = 3
+"""Excluded families that are fitted in a place at most: three that fit as well leave no name alone."""
 FEW = 2
 """Instances of a kind that are tried on a joint at rest: what leaks in from either side; of waves
 one does, as all stand still."""
@@ -55,7 +56,7 @@ SEED = 7
 
 def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beliefs) -> Search:
     """
-    Return what was found, each constant error with the excluded ones that are the same error.
+    Return what was found, each with the excluded families that may be the same error.
 
     Parameters
     ----------
@@ -66,51 +67,69 @@ def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beli
 
     """
     slots, better = [], list(found.refused)
-    for k, slot in enumerate(found.slots):
-        if k < len(found.small.model.found):
-            slot, clearly = _extended(found, k, slot, exclude, beliefs)
-            better += clearly
-        slots.append(slot)
+    named = found.slots[: len(found.small.model.found)]
+    outside = _outside(found, exclude) if named else None
+    for k, slot in enumerate(named):
+        more, clearly = _also(found, k, slot, exclude, outside)
+        slots.append(weighed([*slot, *more], beliefs.temperature) if more else slot)
+        better += clearly
+    slots += found.slots[len(named) :]
     aliased = replace(found, slots=tuple(slots), refused=tuple(better))
     return _settable_first(aliased, frozenset(exclude))
 
 
-def _extended(
-    found: Search, k: int, slot: tuple[Rival, ...], exclude: Sequence[str], beliefs: Beliefs
-) -> tuple[tuple[Rival, ...], list[Effect]]:
+def _outside(found: Search, exclude: Sequence[str]) -> Workspace | None:
+    """Return the workspace with a library of what was taken out, or None where that is nothing."""
+    if not exclude:
+        return None
+    work = found.work
+    others = [name for name in REGISTRY if name not in exclude]
+    return replace(work, library=build(work.problem, found.small.model, work.scale, others))
+
+
+def _also(
+    found: Search,
+    k: int,
+    slot: tuple[Rival, ...],
+    exclude: Sequence[str],
+    outside: Workspace | None,
+) -> tuple[list[Rival], list[Effect]]:
     """
-    Return a slot with what may be the same error, each fitted in its place.
+    Return what may be the same error as what is in a slot, each fitted in its place.
 
     None of these counts for more than what was found. What was taken out and fits clearly better is
     no member of the slot, but returned beside it.
     """
-    work, features = found.work, found.work.problem.features(found.small.model)
-    taken = {Site(e.name, e.site) for e in found.small.model.found} | {r.site for r in slot}
+    work, beliefs, now = found.work, found.work.beliefs, found.small
+    features = work.problem.features(now.model)
+    taken = {Site(e.name, e.site) for e in now.model.found} | {r.site for r in slot}
     constants = [
         rival.site
         for rival in slot
         if rival.probability >= beliefs.listed and _constant(REGISTRY[rival.site.effect])
     ]
     seeds = [
-        *_kin(features, found.small.model.found[k], exclude),
         *_same_anywhere(found, constants, exclude),
         *_constants_here(found, features, constants),
     ]
     seeds = [seed for seed in seeds if Site(seed.name, seed.site) not in taken]
-    if not seeds:
-        return slot, []
-    rest = fit(work.problem, found.small.model.without(k), work.scale, None, 4)
-    count, most = found.effective(found.small), max(rival.nats for rival in slot)
+    if not seeds and outside is None:
+        return [], []
+    rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
+    count, most = found.effective(now), max(rival.nats for rival in slot)
+    alike = [_in_place(found, features, rest, slot, seed, count) for seed in seeds]
+    if outside is not None:
+        _, tried = contenders(outside, rest, count, now.model.found, MOST_EXCLUDED)
+        alike += [
+            Rival(Site(*c.unit.site), nats_in_place(rest, own, count, c), own) for c, own in tried
+        ]
     more, clearly = list[Rival](), list[Effect]()
-    for one in _best_of_each(
-        _in_place(found, features, rest, slot, seed, count) for seed in seeds
-    ):
-        curved = one.site.effect in exclude and not _constant(REGISTRY[one.site.effect])
-        if curved and one.nats > most + beliefs.enter_nats:
+    for one in _best_of_each(alike):
+        if one.site.effect in exclude and one.nats > most + beliefs.enter_nats:
             clearly.append(one.fit.model.found[-1])
         elif not implausible(one.fit.model):
             more.append(replace(one, nats=min(one.nats, most)))
-    return weighed([*slot, *more], beliefs.temperature), clearly
+    return more, clearly
 
 
 def _in_place(
@@ -177,18 +196,6 @@ def _led_by(slot: tuple[Rival, ...], site: Site, small: Fit) -> tuple[Rival, ...
     rest = [rival for rival in slot if rival.site != site]
     whole = sum(rival.probability for rival in (first, *rest))
     return tuple(replace(r, probability=r.probability / whole) for r in (first, *rest))
-
-
-def _kin(features: list[Features], effect: Effect, exclude: Sequence[str]) -> Iterator[Effect]:
-    """Yield instances of excluded kinds that differ from an effect of a joint by their curve alone."""
-    if effect.of != 'joint' or _constant(type(effect)):
-        return
-    maker = features[moved_most(features, effect.site)]
-    for kind in _causes(exclude):
-        like = (kind.of, kind.place, kind.depends_on)
-        alike = kind is not type(effect) and like == ('joint', effect.place, effect.depends_on)
-        if alike and kind.applicable(maker.view, effect.site) is None:
-            yield from maker.seeds(kind, effect.site)[0][:MOST_SEEDS]
 
 
 def _causes(names: Sequence[str]) -> list[type[Effect]]:

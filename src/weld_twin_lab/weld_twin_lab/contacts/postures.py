@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,7 +27,7 @@ from weld_twin_core.diagnosis.hypotheses.library import plain_causes
 from weld_twin_core.recording import Recording
 
 from ..blind.simulator import require_simulator
-from ..parts import Parts, Tell
+from ..study import Parts
 from .sealed import ARMS
 from .touching import postures_at, touching
 
@@ -160,7 +159,7 @@ def _proposed(
         yield len(q) // len(SPOTS), cell.touched(q, labels, rng)
 
 
-def postures(count: int, out: Path, tell: Tell) -> dict[str, Any]:
+def postures(count: int, part: Parts) -> dict[str, Any]:
     """
     Return which share of the reachable shrink so many postures a place give, in the mean.
 
@@ -168,14 +167,11 @@ def postures(count: int, out: Path, tell: Tell) -> dict[str, Any]:
     ----------
     count : int
         Arms.
-    out : Path
-        Keeps a file per arm; those that are there are not made again.
-    tell : callable
-        Told of every arm.
+    part : Parts
+        Keeps every arm.
 
     """
     require_simulator()
-    part = Parts(out, tell)
     cases = [part(f'arm_{seed:03d}', partial(case, seed)) for seed in range(count)]
     score: dict[str, Any] = {'arms': len(cases)}
     for how in ('random_m', 'proposed_m'):

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from weld_twin_core.recording import Recording
 
 from ..blind.cause_sizes import draw, scaled, site
 from ..blind.simulator import require_simulator
-from ..parts import Parts, Tell
+from ..study import Parts
 from .touching import postures_at, touching
 
 ARMS = ('ur5', 'ur10', 'kuka_iiwa14', 'franka_panda')
@@ -126,21 +125,18 @@ def _shown(robot: Robot, recording: Recording) -> float:
     return float(np.sqrt((away**2).mean() / 3.0))
 
 
-def sealed(count: int, out: Path, tell: Tell) -> dict[str, Any]:
+def sealed(count: int, part: Parts) -> dict[str, Any]:
     """
     Return how many of some sealed cases were named.
 
     Parameters
     ----------
     count : int
-    out : Path
-        Keeps a file per case; those that are there are not made again.
-    tell : callable
-        Told of every case.
+    part : Parts
+        Keeps every case.
 
     """
     require_simulator()
-    part = Parts(out, tell)
     cases = [part(f'case_{seed:04d}', partial(case, seed)) for seed in range(count)]
     seen = [c for c in cases if c['seen'] and c['slacks'] >= SIZE[0]]
     hidden = [c for c in cases if not c['seen']]

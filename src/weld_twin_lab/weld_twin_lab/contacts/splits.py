@@ -20,7 +20,7 @@ from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.frames.alignment import refined
 from weld_twin_core.recording import Recording
 
-from ..parts import Parts, Tell
+from ..study import Parts
 from .data import places_of, robot_of, touches
 
 MOSTLY = 0.5
@@ -126,7 +126,7 @@ def flagged(found: Diagnosis, data: Path, arm: str, judged: Sequence[str]) -> li
     return out
 
 
-def study(data: Path, arms: Sequence[str], out: Path, tell: Tell) -> list[dict[str, Any]]:
+def entries_of(data: Path, arms: Sequence[str], part: Parts) -> list[dict[str, Any]]:
     """
     Return every split of some arms: each place left out, and each place alone.
 
@@ -134,13 +134,11 @@ def study(data: Path, arms: Sequence[str], out: Path, tell: Tell) -> list[dict[s
     ----------
     data : Path
     arms : sequence of str
-    out : Path
-        Keeps a file per split; those that are there are not computed again.
-    tell : callable
-        Told of every split.
+    part : Parts
+        Keeps every split.
 
     """
-    part, found = Parts(out, tell), []
+    found = []
     for arm in arms:
         every = places_of(data, arm)
         for place in every:

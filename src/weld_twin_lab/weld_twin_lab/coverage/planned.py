@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,10 +21,10 @@ from weld_twin_core.twin.posterior import largest_sigma
 from weld_twin_core.twin.twin import Twin
 
 from ..blind.simulator import require_simulator
-from ..parts import Parts, Tell, write_results
 from ..plant.plant import run
 from ..plant.plant_recording import Command
 from ..plant.tracker import Tracker
+from ..study import Parts, Tell
 
 ARMS = ('ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb1600')
 COUNTS = (16, 24, 40)
@@ -33,7 +33,6 @@ NOISE = 3e-5
 """Of every measured coordinate [m]."""
 TOLERANCE = 2e-4
 """Of the tool [m]; plans are asked how probably it is kept."""
-RESULTS, PARTS = 'plans.json', 'parts'
 UNSEEN = 60
 """Other postures of the region, at which the corrected arm is judged."""
 FRAMES = [
@@ -113,25 +112,29 @@ def _measured(
     return Recording('plan', JointMotion(t, q, static=True), Measurements(t, seen.position))
 
 
-def planned(count: int, out: Path, tell: Tell) -> dict[str, Any]:
+def planned(count: int, part: Parts, tell: Tell) -> list[dict[str, Any]]:
     """
-    Return how plans compare with what came of them.
+    Return what so many plans promised, and what came of them.
 
     Parameters
     ----------
     count : int
-    out : Path
-        Gets plans.json, and keeps a file per plan; those that are there are not made again.
+    part : Parts
+        Keeps every plan.
     tell : callable
-        Told of every plan.
+        Told what came of every plan.
 
     """
     require_simulator()
-    part, entries = Parts(out / PARTS), []
+    entries = []
     for seed in range(count):
         entries.append(part(f'plan_{seed:03d}', partial(carried_out, seed)))
         tell(' '.join(f'{key} {value}' for key, value in entries[-1].items()))
-    write_results(out / RESULTS, entries)
+    return entries
+
+
+def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Return how plans compare with what came of them."""
     ratio = [e['kept_sigma_m'] / e['promised_sigma_m'] for e in entries]
     return {
         'plans': len(entries),

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_core import __version__
 from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis, diagnose
@@ -19,64 +18,44 @@ from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.robots import load_robot
-from weld_twin_nodes.offline.output_directory import write_owned
 
 from ..blind import layout
 from ..blind.diagnosing import diagnosis_of
-from ..parts import Parts, Tell, refuse_foreign, write_results
-from ..real_robots.data import tables
 from ..real_robots.unseen_stations import ALIGN
-from ..transfer.splits import TUNED_ON, Split, splits
+from ..study import Parts
+from ..transfer.splits import TUNED_ON, Split, all_splits
 from .held import held
-from .table import page
 
-RESULTS, TABLE, PARTS = 'coverage.json', 'coverage.md', 'parts'
-SCHEMA = 'weld_twin/coverage/1'
-HOME = {'ur5': 0, 'ur10': 1}
-"""Rows before this one are left out: the UR10's first is its home pose, far from the rest."""
+NAME, PARTS = 'coverage', 'parts'
 UR5_NOISE = 2e-5
 """A GTS3800 is good to 15 um + 6 um/m, a metre or two away [m]."""
 
 
-def study(
-    ur5: Path, ur10: Path, out: Path, cases: Path | None = None, tell: Tell = lambda text: None
-) -> dict[str, Any]:
+def entries_of(ur5: Path, ur10: Path, cases: Path | None, part: Parts) -> list[dict[str, Any]]:
     """
-    Try the regions of all splits, and of sealed cases where there are any, and write the results.
-
-    Each recording's result is kept as soon as it is there; a run that was stopped goes on.
+    Return what the regions of all splits hold, and of sealed cases where there are any.
 
     Parameters
     ----------
     ur5, ur10 : Path
         Directories with the published tables.
-    out : Path
-        Keeps a file per recording.
-    cases : Path, optional
-        Directory with ``cases`` and ``truths`` as ``weld-twin blind make`` writes them.
-    tell : callable
-        Told what is being done.
+    cases : Path or None
+        Directory with ``cases`` and ``truths`` as ``weld-twin lab blind make`` writes them.
+    part : Parts
+        Keeps every recording's result.
 
     Raises
     ------
     DataError
-        Data are missing or cannot be read, or ``out`` holds something else.
+        Data are missing or cannot be read.
 
     """
-    refuse_foreign(out, RESULTS, TABLE, PARTS)
-    part = Parts(out / PARTS, tell)
-    entries = []
-    for robot, directory in (('ur5', ur5), ('ur10', ur10)):
-        for split in splits(robot, tables(robot, directory)[0].recording, HOME[robot]):
-            entries.append(part(split.name, partial(_of_split, split)))
+    entries = [part(split.name, partial(_of_split, split)) for split in all_splits(ur5, ur10)]
     if cases is not None:
         for name in _names(cases / 'cases'):
             pair = (cases / 'cases' / name, cases / 'truths' / name)
             entries.append(part(name, partial(of_case, *pair)))
-    result = {'schema': SCHEMA, 'version': __version__, 'entries': entries}
-    write_owned(out / TABLE, page(entries))
-    write_results(out / RESULTS, result)
-    return result
+    return entries
 
 
 def _of_split(split: Split) -> dict[str, Any]:

@@ -9,135 +9,57 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from weld_twin_core import __version__
 from weld_twin_msgs_py.files import markdown
-from weld_twin_nodes.offline.output_directory import write_owned
-from weld_twin_nodes.offline.task_pool import Runner, Task
+from weld_twin_nodes.offline.task_pool import Task
 
-from ..parts import Parts, Tell, write_results
-from . import correction_table, urdf_table
+from ..study import Parts, head
 from .broken import fuzz
 from .cells import CELLS
 from .round_trips import round_trips
 
-RESULTS, TABLE, PARTS = 'programs.json', 'programs.md', 'parts'
-CORRECTIONS, CORRECTIONS_TABLE = 'corrections.json', 'corrections.md'
-URDF_ARMS, URDF_TABLE = 'urdf_arms.json', 'urdf_arms.md'
-SCHEMA = 'weld_twin/programs/1'
-MADE = Path('test/programs/made')
-"""Programs as users have them, from the top of the source tree; left out where there are none."""
+PARTS = 'parts'
 
 
-def study(
-    out: Path,
-    drawn: int,
-    broken: int,
-    made: Path = MADE,
-    tell: Tell = lambda text: None,
-) -> dict[str, Any]:
+def read(drawn: int, broken: int, made: Path, part: Parts) -> dict[str, Any]:
     """
-    Try every language that was not tried yet, and write the results.
+    Return how every language is read.
 
     Parameters
     ----------
-    out : Path
-        Keeps a file for every part; a run that was interrupted goes on from there.
     drawn, broken : int
         Programs of each language.
     made : Path
         Folder of programs as users have them.
-    tell : callable
-        Told what is being done.
+    part : Parts
+        Keeps every language.
 
     """
-    part = Parts(out / PARTS, tell)
     trips, fuzzed = [], []
     for language in CELLS:
         trip = partial(round_trips, language, drawn)
         trips.append(part(f'round_trips_{language}', trip))
         trial = partial(fuzz, language, broken, _whole(language, made))
         fuzzed.append(part(f'fuzz_{language}', trial))
-    result = {
-        'schema': SCHEMA,
-        'version': __version__,
-        'round_trips': trips,
-        'fuzz': fuzzed,
-    }
-    write_results(out / RESULTS, result)
-    write_owned(out / TABLE, summary(result))
-    return result
+    return head('programs/1', round_trips=trips, fuzz=fuzzed)
 
 
-def corrections(
-    out: Path, seed: int, seams: int, runner: Runner, engine: str, languages: Sequence[str]
-) -> dict[str, Any]:
-    """
-    Correct sealed seams, let the plant run them, and write the results.
-
-    Parameters
-    ----------
-    out : Path
-    seed : int
-        Decides the seams.
-    seams : int
-        Of each language.
-    runner : Runner
-        Keeps what came of every seam; a run that was interrupted goes on from there.
-    engine : str
-        Tells the results of one version of the core from those of another.
-    languages : sequence of str
-
-    """
-    tasks = [
+def seams(seed: int, count: int, engine: str) -> list[Task]:
+    """Return the correction of so many sealed seams of each language, language by language."""
+    return [
         Task(corrected, (language, seed, k, engine), f'{language} {k}')
-        for k in range(seams)
-        for language in languages
+        for language in CELLS
+        for k in range(count)
     ]
-    cases = sorted(runner.run(tasks), key=lambda case: list(CELLS).index(case['language']))
-    result = {
-        'schema': SCHEMA,
-        'version': __version__,
-        'engine': engine,
-        'seed': seed,
-        'totals': correction_table.totals(cases),
-        'cases': cases,
-    }
-    out.mkdir(parents=True, exist_ok=True)
-    write_results(out / CORRECTIONS, result)
-    write_owned(out / CORRECTIONS_TABLE, correction_table.page(result))
-    return result
 
 
-def urdf_arms(out: Path, seed: int, arms: int, runner: Runner, engine: str) -> dict[str, Any]:
-    """
-    Take arms that are given as URDFs all the way, and write the results.
+def urdf_arms(seed: int, count: int, engine: str) -> list[Task]:
+    """Return the ways of so many arms that are given as URDFs."""
+    return [Task(of_urdf, (seed, k, engine), f'arm {k}') for k in range(count)]
 
-    Parameters
-    ----------
-    out : Path
-    seed : int
-        Decides the arms.
-    arms : int
-    runner : Runner
-        Keeps what came of every arm; a run that was interrupted goes on from there.
-    engine : str
-        Tells the results of one version of the core from those of another.
 
-    """
-    tasks = [Task(of_urdf, (seed, k, engine), f'arm {k}') for k in range(arms)]
-    cases = runner.run(tasks)
-    result = {
-        'schema': SCHEMA,
-        'version': __version__,
-        'engine': engine,
-        'seed': seed,
-        'totals': urdf_table.totals(cases),
-        'cases': cases,
-    }
-    out.mkdir(parents=True, exist_ok=True)
-    write_results(out / URDF_ARMS, result)
-    write_owned(out / URDF_TABLE, urdf_table.page(result))
-    return result
+def head_of(seed: int, engine: str, totals: Any, cases: Sequence[Any]) -> dict[str, Any]:
+    """Return the results of sealed cases."""
+    return head('programs/1', engine=engine, seed=seed, totals=totals, cases=cases)
 
 
 def of_urdf(seed: int, number: int, engine: str) -> dict[str, Any]:

@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A study that was stopped goes on where it stopped, and takes no folder of somebody else."""
 
+from argparse import Namespace
+
 import pytest
 
 from weld_twin_core.errors import DataError
-from weld_twin_lab.parts import Parts, refuse_foreign
+from weld_twin_lab.study import Parts, Study
 
 
 def test_a_study_that_was_stopped_makes_only_what_is_missing(tmp_path):
@@ -28,9 +30,10 @@ def test_a_study_that_was_stopped_makes_only_what_is_missing(tmp_path):
 
 
 def test_a_folder_with_something_else_in_it_is_refused(tmp_path):
-    refuse_foreign(tmp_path / 'not there yet', 'parts')
+    Study(Namespace(out=tmp_path / 'not there yet')).refuse_foreign('parts')
+    ours = Study(Namespace(out=tmp_path))
     (tmp_path / 'parts').mkdir()
-    refuse_foreign(tmp_path, 'parts')
+    ours.refuse_foreign('parts')
     (tmp_path / 'thesis.tex').touch()
     with pytest.raises(DataError, match='something else'):
-        refuse_foreign(tmp_path, 'parts')
+        ours.refuse_foreign('parts')

@@ -17,12 +17,11 @@ BRANDS = {
 }
 """By the start of a robot's name, as the bundled models and most URDFs have it."""
 _PROGRAM = (
-    'The controller has no field for it: correct the points of the program (weld-twin '
-    'correct-program).'
+    'The controller has no field for it: correct the points of the program (weld-twin correct).'
 )
 UNNAMED = (
     'No field before the cause is known; so long, correct the points of the program (weld-twin '
-    'correct-program).'
+    'correct).'
 )
 """Of a curve: a joint that is off alike everywhere need not be so for its zero."""
 _PLACES = {
@@ -78,7 +77,7 @@ _BY_MODEL = ('ur',)
 """Makers whose controllers keep an error of a zero in their model: the readings stay as they are."""
 _RATIO = (
     'Where the controller has a field for ratios of gears; else correct the points of the program '
-    '(weld-twin correct-program).'
+    '(weld-twin correct).'
 )
 _ANYWHERE = {
     'zero': 'As the zero of this axis, by mastering it anew: new reading = old reading {far}, with '
@@ -88,7 +87,7 @@ _ANYWHERE = {
     'tool': 'As the tool centre point',
     'load': 'As the payload',
     'model': 'In the kinematic model, where the controller has one that can be edited; else correct '
-    'the points of the program (weld-twin correct-program)',
+    'the points of the program (weld-twin correct)',
 }
 """What takes a correction at any controller, by the kind of the error."""
 _CHECK = (

@@ -21,6 +21,6 @@ add_arguments = options(security.add_arguments, out='JSON file to write', of='FI
 
 def run(args: argparse.Namespace) -> int:
     """Run the campaign of this name."""
-    from ..campaign import run as run_campaign
+    from .campaign import run as run_campaign
 
     return run_campaign(argparse.Namespace(**vars(args), campaign=CAMPAIGN))

@@ -14,7 +14,7 @@ import os
 from weld_twin_nodes.cli.options import add_output, output
 from weld_twin_nodes.offline.environment import THREADS
 
-from ..study import Study, option, options, study
+from ...study import Study, option, options, study
 
 ONE_THREAD = {
     **dict.fromkeys(THREADS, '1'),
@@ -35,7 +35,7 @@ def run(study: Study) -> None:
     """Run the benchmark; print results as they come."""
     os.environ.update(ONE_THREAD)
 
-    from ..benchmark.all_races import FULL, QUICK, benchmark
+    from ...benchmark.all_races import FULL, QUICK, benchmark
 
     sizes = QUICK if study.args.quick else FULL
     with output(study.args, 'benchmark.json') as folder:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from weld_twin_nodes.cli.options import add_output, output
 
-from ..study import REQUIRED, Study, option, options, study
+from ...study import REQUIRED, Study, option, options, study
 
 add_arguments = options(
     option('--ur5', REQUIRED, 'DIR', 'holds grid.csv, random.csv'),
@@ -25,7 +25,7 @@ add_arguments = options(
 @study
 def run(study: Study) -> None:
     """Diagnose, judge, write, and print one line for each split."""
-    from ..real_robots.arm_study import RESULTS, judged_arms
+    from ...real_robots.arm_study import RESULTS, judged_arms
 
     with output(study.args, RESULTS) as place:
         robots = judged_arms(Path(study.args.ur5), Path(study.args.ur10), place, study.tell)

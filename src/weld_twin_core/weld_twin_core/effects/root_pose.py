@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..arm.robot import Robot
-from ..errors import ModelError
 from .constant import FrameError
 from .registry import register
 from .view import Value, View
@@ -25,45 +24,7 @@ class RootPose(FrameError):
     depends_on = 'constant'
     place = 'base'
     channel = 'root'
-
-    def check(self, robot: Robot) -> None:
-        """
-        Refuse an effect this robot cannot have.
-
-        Parameters
-        ----------
-        robot : Robot
-
-        Raises
-        ------
-        ModelError
-            As of every effect, or no positioner is there.
-
-        """
-        super().check(robot)
-        if not robot.behind:
-            raise ModelError(
-                f'{self.name} is of a positioner, and robot {robot.name!r} has none; use base_pose'
-            )
-
-    @classmethod
-    def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: the robot may have no such thing.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on.
-
-        """
-        return (
-            super().applicable(view, joint)
-            if cls.fits(view.robot, joint)
-            else 'there is no positioner'
-        )
+    lacking = 'is of a positioner, and robot {robot!r} has none; use base_pose'
 
     @classmethod
     def fits(cls, robot: Robot, joint: str | None) -> bool:

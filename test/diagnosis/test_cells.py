@@ -133,12 +133,14 @@ def test_a_spring_of_the_tilt_is_told_and_the_urdf_is_given_back(tmp_path, robot
     assert off == pytest.approx(1.5e-3, rel=0.1)
 
 
-def test_programs_refuse_a_positioner_in_one_sentence(tmp_path, robot_file, capfd):
+def test_programs_without_external_axes_refuse_a_positioner_in_one_sentence(
+    tmp_path, robot_file, capfd
+):
     (tmp_path / 'p.script').write_text('def p():\nend\n', encoding='utf-8')
     words = ('correct-program', tmp_path / 'p.script', '--robot', robot_file)
     assert commanded(*words, '--out', tmp_path / 'o') == 2
     said = capfd.readouterr().err
-    assert said.startswith('weld-twin: a corrected program is not there yet for a workpiece that')
+    assert said.startswith('weld-twin: external axes of urscript are not known here')
     assert '(turn, tilt)' in said
     assert said.count('\n') == 1
     assert not (tmp_path / 'o').exists()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from ..arm.robot import Robot
 from .constant import FrameError
 from .registry import register
-from .view import Value, View
+from .view import Value
 
 
 @register

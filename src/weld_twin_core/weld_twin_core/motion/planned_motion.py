@@ -245,7 +245,9 @@ class _JointLine:
 def _along(told: Array, length: float) -> Callable[..., Array]:
     """Return positions and, of order 1, their slopes at arc lengths, without overshoot between."""
     if len(told) == 1:
-        return lambda s, order=0: np.broadcast_to(told[0] * (order == 0), (*s.shape, told.shape[1]))
+        return lambda s, order=0: np.broadcast_to(
+            told[0] * (order == 0), (*s.shape, told.shape[1])
+        )
     return PchipInterpolator(np.linspace(0.0, length, len(told)), told)
 
 

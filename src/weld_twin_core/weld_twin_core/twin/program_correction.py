@@ -392,7 +392,7 @@ def _collect(
                 arm = model.arm(move.tool)
                 jacobian = chain_jacobian(arm, frames(arm, motion.q[at]))
                 step = np.zeros(arm.n)  # external axes go where they went
-                own = slice(program.external, None)
+                own = slice(moved.external, None)
                 step[own] = least_step(jacobian[:, own], gap[at], SINGULAR)
             else:
                 step = _own(moved.place(use), use, point, gap[at])

@@ -20,7 +20,9 @@ from .newton import polish
 
 def rest(robot: Robot) -> Array:
     """Return where a positioner stands of which nothing is told: at zero, or nearest, (behind,)."""
-    return np.clip(np.zeros(robot.behind), *(v[: robot.behind] for v in (robot.lower, robot.upper)))
+    return np.clip(
+        np.zeros(robot.behind), *(v[: robot.behind] for v in (robot.lower, robot.upper))
+    )
 
 
 @dataclass(frozen=True, eq=False)

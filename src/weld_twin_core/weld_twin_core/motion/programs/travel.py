@@ -200,9 +200,7 @@ def _on_the_way(carried: CarriedArm, poses: Array, q: Array, told: Array) -> Arr
     return found
 
 
-def _joint_move(
-    carried: CarriedArm, course: _Course, move: Move, q: Array | None
-) -> _Reached:
+def _joint_move(carried: CarriedArm, course: _Course, move: Move, q: Array | None) -> _Reached:
     """Return the samples of a joint move; where it comes from may not be known."""
     assert move.end is not None
     arm, place = carried.robot, course.program.place(move.end)

@@ -146,7 +146,8 @@ def _write(args: argparse.Namespace, robot: Robot, plan: Planned) -> None:
             _write_program(args, context, folder)
     print(f'stations: {Path(args.out) / STATIONS}')
     print(f'table to fill in: {Path(args.out) / TABLE}')
-    if not np.array_equal(context.controller.mix, np.eye(robot.n)):
+    counted = np.array_equal(context.controller.mix, np.eye(robot.n))
+    if not counted and not context.controller.external:
         print('J3 counts from the ground there: import the table with --coupled 3+2')
 
 

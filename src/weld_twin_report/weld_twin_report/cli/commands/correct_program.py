@@ -62,7 +62,6 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_msgs_py.programs.source import read_source
 
     robot = robot_of(args)
-    robot.refuse_positioner('a corrected program')
     language = language_of(read_source(args.program), args.program, args.controller)
     context = context_of(args, robot, language)
     program = read_program(args.program, context, language)

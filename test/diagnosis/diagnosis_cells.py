@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis.algebra.fit import design
+from weld_twin_core.diagnosis.algebra.prior import effect_precision, frame_prior
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
@@ -135,3 +137,14 @@ def shaken(rotation, sigma, rng):
 
 def known_scale(problem, position=SIGMA, orientation=SIGMA_TURN):
     return Scale(position, orientation, tuple(np.ones(m) for m in problem.samples))
+
+
+def errors_of(problem, model, scale, precision=None):
+    """Return the standard errors of the effects' coordinates, by an orthogonal method."""
+    columns, _ = design(problem, model, scale)
+    own = effect_precision(model) if precision is None else precision
+    ridge = np.concatenate([frame_prior(problem, model)[0], own])
+    rows = np.concatenate([columns, np.diag(np.sqrt(ridge))], axis=1)
+    size = np.maximum(np.linalg.norm(rows, axis=1), 1e-300)
+    inverse = np.linalg.pinv((rows / size[:, None]).T, rcond=1e-6)
+    return (np.linalg.norm(inverse, axis=1) / size)[len(size) - own.size :]

@@ -15,7 +15,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.result import NAMING
-from weld_twin_core.diagnosis.unseen.regions import posture_regions
+from weld_twin_core.diagnosis.unseen.folds import posture_regions
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 ARM = 'kuka_kr6_r900'

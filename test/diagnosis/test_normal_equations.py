@@ -1,11 +1,12 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Normal equations against least squares on the matrices themselves."""
+"""What some columns can do in the place of others, against least squares on the matrices."""
 
 import numpy as np
 import pytest
 
-from weld_twin_core.diagnosis.algebra.gram import Gram
+from weld_twin_core.diagnosis.algebra.alias import outside, share_outside, span_of
+from weld_twin_core.diagnosis.algebra.unit_scale import unit_diagonal
 
 COUNT, ROWS = 7, 60
 
@@ -18,79 +19,52 @@ def system():
     return columns, rng.normal(size=ROWS)
 
 
-def least_squares(columns, target, ridge=None):
-    """Return coefficients and residual by an orthogonal method, never by normal equations."""
-    a, b = columns.T, target
-    if ridge is not None:
-        a = np.concatenate([a, np.diag(np.sqrt(ridge))])
-        b = np.concatenate([b, np.zeros(len(ridge))])
-    x = np.linalg.lstsq(a, b, rcond=None)[0]
-    return x, target - columns.T @ x
+def left(columns, target):
+    """Return what a least-squares fit of columns leaves of a row, by an orthogonal method."""
+    return target - columns.T @ np.linalg.lstsq(columns.T, target, rcond=None)[0]
 
 
-def projected(columns, index):
-    """Return the part of every column that some of them do not span."""
-    q, _ = np.linalg.qr(columns[index].T)
-    return columns - (columns @ q) @ q.T
-
-
-def test_coefficients_are_those_of_least_squares(system):
+def test_what_lies_outside_is_what_least_squares_leaves(system):
     columns, y = system
-    index = np.array([0, 2, 5])
-    expected, _ = least_squares(columns[index], y)
-    np.testing.assert_allclose(Gram.of(columns, y).solve(index), expected, rtol=1e-8)
-
-
-def test_a_prior_precision_is_a_ridge_on_its_own_column(system):
-    columns, y = system
-    index, ridge = np.array([1, 3, 6]), np.array([1e-4, 50.0, 0.0])
-    expected, _ = least_squares(columns[index], y, ridge)
-    np.testing.assert_allclose(Gram.of(columns, y).solve(index, ridge), expected, rtol=1e-8)
-
-
-def test_the_gain_is_the_fall_of_the_sum_of_squares(system):
-    columns, y = system
-    index = np.array([0, 4, 6])
-    _, left = least_squares(columns[index], y)
-    assert Gram.of(columns, y).gain(index) == pytest.approx(y @ y - left @ left, rel=1e-9)
-
-
-def test_no_columns_gain_nothing(system):
-    assert Gram.of(*system).gain(np.array([], dtype=int)) == 0.0
-
-
-def test_columns_taken_out_leave_what_they_do_not_span(system):
-    columns, y = system
-    out, rest = np.array([1, 4]), np.array([0, 2, 3, 5, 6])
-    less = Gram.of(columns, y).without(out)
-    free, (_, left) = projected(columns, out), least_squares(columns[out], y)
-    size = np.sqrt(np.outer((columns[rest] ** 2).sum(axis=1), (columns[rest] ** 2).sum(axis=1)))
-    np.testing.assert_allclose(
-        less.normal[np.ix_(rest, rest)] / size, free[rest] @ free[rest].T / size, atol=1e-10
-    )
-    np.testing.assert_allclose(less.right[rest], free[rest] @ y, rtol=1e-8)
-    assert less.rss == pytest.approx(left @ left, rel=1e-10)
-    assert not less.normal[out].any() and not less.right[out].any()
+    span = span_of(columns[[1, 4]])
+    np.testing.assert_allclose(outside(y, span), left(columns[[1, 4]], y), rtol=1e-8)
+    rest = columns[[0, 2, 3, 5, 6]]
+    expected = np.array([left(columns[[1, 4]], row) for row in rest])
+    size = np.linalg.norm(rest, axis=1)[:, None]
+    np.testing.assert_allclose(outside(rest, span) / size, expected / size, atol=1e-10)
+    share = np.linalg.norm(expected, axis=1) / size[:, 0]
+    np.testing.assert_allclose(share_outside(rest, span), share, rtol=1e-8)
 
 
 def test_fitting_after_a_projection_is_fitting_all_at_once(system):
     columns, y = system
-    out, index = np.array([1, 4]), np.array([0, 6])
-    together, _ = least_squares(columns[np.concatenate([out, index])], y)
-    less = Gram.of(columns, y).without(out)
-    np.testing.assert_allclose(less.solve(index), together[2:], rtol=1e-7)
+    out, index = [1, 4], [0, 6]
+    together = np.linalg.lstsq(columns[[*out, *index]].T, y, rcond=None)[0]
+    span = span_of(columns[out])
+    alone = np.linalg.lstsq(outside(columns[index], span).T, outside(y, span), rcond=None)[0]
+    np.testing.assert_allclose(alone, together[2:], rtol=1e-7)
 
 
-def test_a_column_spanned_by_those_taken_out_is_no_longer_live(system):
+def test_a_column_that_others_can_do_has_no_share_outside(system):
+    columns, _ = system
+    mixed = 2.0 * columns[1] - 300.0 * columns[0]
+    share = share_outside(np.stack([mixed, columns[3]]), span_of(columns[:2]))
+    assert share[0] < 1e-12 and share[1] > 0.5
+
+
+def test_columns_that_repeat_or_vanish_span_no_more(system):
     columns, y = system
-    columns = np.concatenate([columns, [2.0 * columns[1] - 300.0 * columns[0]]])
-    less = Gram.of(columns, y).without(np.array([0, 1]))
-    np.testing.assert_array_equal(less.live(np.array([0, 3, COUNT])), [3])
+    twice = np.concatenate([columns[:2], 3.0 * columns[:1], np.zeros((1, ROWS))])
+    assert span_of(twice).shape == (2, ROWS)
+    np.testing.assert_allclose(outside(y, span_of(twice)), left(columns[:2], y), rtol=1e-8)
+    assert span_of(np.zeros((3, ROWS))).shape == (0, ROWS)
 
 
-def test_two_equal_columns_share_one_coefficient_without_failing(system):
+def test_equations_at_unit_scale_have_the_same_solution(system):
     columns, y = system
-    columns = np.concatenate([columns, columns[:1]])
-    alone, _ = least_squares(columns[:1], y)
-    both = Gram.of(columns, y).solve(np.array([0, COUNT]))
-    np.testing.assert_allclose(both.sum(), alone[0], rtol=1e-6)
+    scaled, size = unit_diagonal(columns @ columns.T)
+    np.testing.assert_allclose(np.diag(scaled), 1.0)
+    expected = np.linalg.lstsq(columns.T, y, rcond=None)[0]
+    np.testing.assert_allclose(
+        np.linalg.solve(scaled, columns @ y / size) / size, expected, rtol=1e-7
+    )

@@ -19,7 +19,6 @@ from weld_twin_core.diagnosis.unseen.leftover_structure import Structure, struct
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.diagnosis.verdict.decision import decide
 from weld_twin_core.diagnosis.verdict.evidence import Evidence
-from weld_twin_core.diagnosis.verdict.partial_waves import glimpsed
 from weld_twin_core.recording import Measurements
 
 PLAY, OFFSET = Site('backlash', 'elbow_joint'), Site('joint_offset', 'wrist_1_joint')
@@ -71,15 +70,6 @@ def test_a_structure_that_a_few_stretches_hold_counts_when_it_is_large():
     verdict = decide(Evidence((), step, 6e-5, 6e-5, 3.5e-5, 6e-5, False, ()))
     assert verdict.status == 'unknown'
     assert 'time' in verdict.reasons[0]
-
-
-@pytest.mark.parametrize(('order', 'told'), [(1.0, ('elbow_joint',)), (40.0, ())])
-def test_periods_seen_are_counted_over_all_recordings(order, told):
-    problem, model = tiny(static=False)
-    ripple = effect(
-        'transmission_ripple', joint='elbow_joint', amplitude=1e-4, order=order, phase=0.0
-    )
-    assert glimpsed(problem, model.with_found((ripple,)), Beliefs()) == told
 
 
 def test_an_effect_smaller_than_what_remains_is_told_beside_it():

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole engine on recordings of the independent plant, whose flaws are known."""
 
+import gc
+
 import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, recorded, shaken, sites, solved
@@ -9,6 +11,7 @@ from diagnosis_cells import SIGMA, recorded, shaken, sites, solved
 from weld_twin_core import JointMotion, Measurements, Recording, Twin, default_seam, plan
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis.algebra.fit import Fit
 from weld_twin_core.effects import BearingTilt, JointOffset, ServoLag
 
 SINGLE = {
@@ -193,3 +196,17 @@ def test_what_stands_in_for_two_causes_gives_way_once_one_of_them_is_found():
         ('servo_lag', 'joint_a2'), ('joint_offset', 'joint_a5')
     }  # fmt: skip
     assert answer.shrink.rms_after_m == pytest.approx(np.sqrt(3.0) * 3e-5, rel=0.1)
+
+
+def test_a_diagnosis_that_is_over_holds_no_memory():
+    def fits():
+        gc.collect()
+        return sum(isinstance(one, Fit) for one in gc.get_objects())
+
+    arm = load('ur5')
+    before = fits()
+    true = [{'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 2e-3}]
+    answer = diagnose([recorded(arm, true, 3)], arm)
+    assert answer.effects
+    del answer
+    assert fits() <= before

@@ -6,8 +6,8 @@ import pytest
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.advice import actions
-from weld_twin_core.diagnosis.advice.readable import number
 from weld_twin_core.effects import REGISTRY, effects_from_list
+from weld_twin_core.effects.wording import number
 
 
 def said(robot, **entry):

@@ -9,7 +9,7 @@ import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie, places, spreads
-from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.algebra.fit import design, fit
 from weld_twin_core.diagnosis.algebra.problem import Scale
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
@@ -123,8 +123,11 @@ def test_four_point_tool_calibration_is_a_special_case_with_its_uncertainty():
     np.testing.assert_allclose(aligned_fit.model.robot.T_flange_tool[:3, 3], tip, atol=1e-6)
 
     near = robot.with_frames(tool=tool)
-    _, told = fitted(recording, near, [wt.effects.ToolPose(xyz=np.zeros(3), rotvec=np.zeros(3))])
-    np.testing.assert_allclose(np.sqrt(np.diag(told.covariance()))[:3], deviation, rtol=1e-3)
+    free = [wt.effects.ToolPose(xyz=np.zeros(3), rotvec=np.zeros(3))]
+    problem, told = fitted(recording, near, free)
+    scale = Scale(SIGMA, 1.0, tuple(np.ones(m) for m in problem.samples))
+    inverse = np.linalg.pinv(design(problem, told.model, scale)[0].T)
+    np.testing.assert_allclose(np.linalg.norm(inverse, axis=1)[:3], deviation, rtol=1e-3)
 
 
 def test_a_known_distance_between_two_sockets_gives_the_scale():

@@ -21,8 +21,7 @@ from weld_twin_core.diagnosis.levels.sparse_groups import (
     chosen,
     worth,
 )
-from weld_twin_core.diagnosis.unseen.regions import posture_regions
-from weld_twin_core.diagnosis.unseen.unseen_stretches import steadiness
+from weld_twin_core.diagnosis.unseen.folds import posture_regions, steadiness
 from weld_twin_core.diagnosis.verdict.decision import Verdict
 from weld_twin_core.effects.curve import basis
 from weld_twin_core.effects.joint_curve import JointCurve

@@ -7,7 +7,7 @@ import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.problem import Problem
-from weld_twin_core.diagnosis.unseen.regions import posture_regions
+from weld_twin_core.diagnosis.unseen.folds import posture_regions
 from weld_twin_core.effects import REGISTRY, Backlash, GearRatio, LinkLength
 
 ROBOT = wt.load('abb_irb120')

@@ -162,9 +162,6 @@ class Beliefs:
     dependence_sure: float = _unseen(2.0)
     """The same in standard errors between stretches."""
 
-    periods: float = _unseen(0.8)
-    """Periods of its finest wave that a joint must pass through for a wave to be told as one."""
-
     other_setup: float = _unseen(5.0)
     """Times by which a held-out recording must fit better with a frame of its own to stem from
     another set-up. A judgement."""
@@ -213,10 +210,6 @@ class Beliefs:
 
     blatant_sure: float = _verdict(1.5)
     """and its standard errors, which are then large as well. Moved: nothing changes."""
-
-    cancel: float = _verdict(5.0)
-    """Effects whose squares sum to this many times the square of their sum cancel each other.
-    Moved: nothing changes."""
 
     far_above: float = _verdict(1.7)
     """What remains over the floor, RMS, from which the answer is 'unknown' where nothing was found

@@ -33,10 +33,9 @@ from .predicting.alone import alone
 from .result import Diagnosis, Shrink
 from .soundness import Examined, Given, examine, refuse_reused
 from .soundness.efforts import with_sign
-from .unseen.carrying import carrying
+from .unseen.elsewhere import borne_out
 from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
 from .unseen.leftover_structure import structure
-from .unseen.parted_elsewhere import parted_elsewhere
 from .unseen.unseen_stretches import Unseen
 from .verdict.decision import LIKELIER, decide
 from .verdict.gathered_evidence import gathered
@@ -182,13 +181,12 @@ def _told(
     if examined.posed is None:
         return refusal(examined)
     holdout = examined.mended(holdout)
-    found = carrying(found, holdout, exclude, beliefs)
+    found, least = borne_out(found, holdout, exclude, beliefs)
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     leftover = structure(unseen, found.final.model, beliefs)
     progress('looked for what is left')
     floor = noise_floor(found.problem, found.problem.residuals(found.final.model))
     shrink = held_out_shrink(found, unseen, holdout, beliefs)
-    found, least = parted_elsewhere(found, holdout, beliefs)
     chance = reached_by_chance(found, unseen, holdout, beliefs)
     evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, least, chance)
     rival = curved(found, beliefs)

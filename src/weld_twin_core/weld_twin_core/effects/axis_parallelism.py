@@ -23,4 +23,5 @@ class AxisParallelism(ChannelError):
     of = 'link'
     stage = Stage.LINK
     channel = 'beta'
+    off = 'the axes are out of parallel by'
     parameters = (Parameter('dbeta', 'rad', typical=5e-4),)

@@ -159,6 +159,19 @@ class Backlash(MemoryEffect):
         """Return the gap whose width is the coefficient, never negative."""
         return Backlash(self.joint, max(float(coefficients[0]), 0.0), self.form)
 
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        play = self.travelled(robot, self.plain('width'))
+        if self.form == 'coast':
+            return (
+                f'Approach stations with {self.site} always from one side, or preload its gear: '
+                f'where it stops it coasts across {play} of play and rests ahead of its command.'
+            )
+        return (
+            f'Service the gear of {self.site}: it has {play} of play; '
+            'until then approach seams from one side.'
+        )
+
 
 def _reversals(q: Array, state: Any) -> tuple[Array, Any]:
     """Return 1.0 where the direction differs from that of the last motion, and what to carry."""

@@ -4,9 +4,16 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..arm.controller_lookup import controller_frames
+from ..arm.robot import Robot
+from ..arm.rotation import rotation_matrix
+from ..arrays import Array
 from .constant import FrameError
 from .registry import register
 from .view import Value
+from .wording import base_frame
 
 
 @register
@@ -22,3 +29,18 @@ class BasePose(FrameError):
     place = 'base'
     channel = 'base'
     fitted_with = 'base'
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        moved = base_frame(_of_the_origin(self.vector(), robot))
+        return (
+            f'Correct the base frame by {moved}. If it was right when it was measured, the arm has '
+            'moved: check the bolts of its foot.'
+        )
+
+
+def _of_the_origin(step: Array, robot: Robot) -> Array:
+    """Return the move of the base of the rows, (6,) [m, rad], as one of the controller's base."""
+    lever = robot.T_world_base[:3, :3] @ controller_frames(robot).base[:3, 3]
+    swing = rotation_matrix(step[3:]) @ lever - lever
+    return np.concatenate([step[:3] + swing, step[3:]])

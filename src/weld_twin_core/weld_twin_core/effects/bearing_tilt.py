@@ -35,6 +35,7 @@ from .carriage import summed
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import turn
 
 
 @register
@@ -154,6 +155,14 @@ class BearingTilt(Effect):
     def fits(cls, robot: Robot, joint: str | None) -> bool:
         """Return whether the joint turns."""
         return joint is not None and not robot.prismatic[robot.index(joint)]
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        lean = float(np.linalg.norm(np.asarray(self.lean)))
+        return (
+            f'Look at the bearing of {self.site}: its axis leans by {turn(lean)} once per turn; '
+            'compensate the poses until it is replaced.'
+        )
 
 
 def _axes(view: View, i: int) -> list[dict[Channel, float]]:

@@ -10,10 +10,12 @@ import numpy as np
 
 from ..arm.channels import Shift
 from ..arm.dynamics import wrench_rotation
+from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 
 @register
@@ -55,3 +57,9 @@ class CartesianCompliance(Effect):
         """Return the force along each axis."""
         forces = self._axis_forces(view)
         return [{('pose', j): force[..., j] for j in range(3)} for force in forces]
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        values = np.asarray(self.compliance) * 1e5
+        each = ', '.join(number(float(v)) for v in values)
+        return f'Compensate the yielding of the tool: ({each}) mm per 100 N along its x, y, z.'

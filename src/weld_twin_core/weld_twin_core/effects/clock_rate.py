@@ -5,9 +5,11 @@
 from dataclasses import dataclass
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import size
 
 
 @register
@@ -39,3 +41,12 @@ class ClockRate(Effect):
         """Return minus the joint velocity times the time that the measurement's clock shows."""
         shown = view.elapsed / (1.0 - self.number('rate'))
         return [{('q', i): -view.qd[..., i] * shown for i in range(view.robot.n)}]
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        ppm = self.plain('rate') * 1e6
+        way = 'fast' if ppm > 0.0 else 'slow'
+        return (
+            f'Synchronise the clocks of both computers all the time: that of the measurements runs '
+            f'{size(abs(ppm))} ppm {way}, {size(abs(ppm) * 3.6e-3)} s in an hour.'
+        )

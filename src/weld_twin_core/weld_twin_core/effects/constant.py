@@ -9,15 +9,33 @@ from typing import ClassVar
 import numpy as np
 
 from ..arm.channels import Channel, Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .view import Parameter, Stage, View, single
+from .wording import metres, radians
 
 
 class ChannelError(Effect):
     """A constant error of one channel of one joint or row; the parameter displaces it."""
 
     channel: ClassVar[str]
+    off: ClassVar[str] = 'it is off by'
+    """How a robot file is wrong that lacks it."""
+
+    def remedy(self, robot: Robot) -> str:
+        """Return which number of the robot file to mend; see `Hooks.remedy`."""
+        error = self.plain(self.parameters[0].name)
+        now = float(getattr(robot, self.channel)[robot.index(str(self.site))])
+        if self.channel in ('a', 'd'):
+            old, new = f'{now * 1e3:.3f} mm', f'{(now + error) * 1e3:.3f} mm'
+        else:
+            old, new = f'{np.degrees(now):.4f} deg', f'{np.degrees(now + error):.4f} deg'
+        by = metres(error) if self.channel in ('a', 'd') else radians(error)
+        return (
+            f'Enter {self.channel} = {new} for {self.site} in the kinematic model in place of '
+            f'{old}: {self.off} {by}.'
+        )
 
     def displace(self, view: View) -> Shift:
         """Return the parameter on the channel."""

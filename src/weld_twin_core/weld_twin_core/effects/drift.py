@@ -4,10 +4,14 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 
 @register
@@ -33,3 +37,12 @@ class Drift(Effect):
     def gradient(self, view: View) -> list[Shift | None]:
         """Return elapsed time along each axis."""
         return [{('pose', k): view.elapsed} for k in range(3)]
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        rate = np.asarray(self.xyz_rate) * 3.6e6
+        each = ', '.join(number(float(v)) for v in rate)
+        return (
+            f'Find what creeps (fixture, tripod, pedestal): ({each}) mm per hour along x, y, z; '
+            'measure a fixed point now and then.'
+        )

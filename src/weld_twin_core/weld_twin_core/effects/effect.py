@@ -22,6 +22,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .hooks import Hooks
 from .view import Parameter, Stage, Value, View
+from .wording import travel
 
 __all__ = ['Effect', 'MemoryEffect', 'Parameter', 'Stage', 'Value', 'View']
 
@@ -115,6 +116,20 @@ class Effect(Hooks, ABC):
         """Return whether it displaces a joint that slides: m where its parameters say rad."""
         at = self.site if self.of == 'joint' else None
         return at in robot.joint_names and bool(robot.prismatic[robot.index(str(at))])
+
+    def travelled(self, robot: Robot, value: float) -> str:
+        """Return how far its joint moves, in mm where that slides, in degrees where it turns."""
+        return travel(value, sliding=self.on_slide(robot))
+
+    def remedy(self, robot: Robot) -> str:
+        """Return the parameters to put into the model, as they are; see `Hooks.remedy`."""
+        sizes = ', '.join(
+            f'{p.name} {np.array2string(np.asarray(getattr(self, p.name)), precision=4)} '
+            f'{self.unit(p, robot)}'
+            for p in self.parameters
+        )
+        where = f' of {self.site}' if self.site else ''
+        return f'Put {self.name}{where} into the model: {sizes}.'
 
     def unit(self, parameter: Parameter, robot: Robot | None = None) -> str:
         """

@@ -88,3 +88,10 @@ class FrameCurve(Effect):
         """Return how much the value at each knot counts, for every axis."""
         weights = basis(self.knots, QUANTITIES[self.over](view, 0))
         return [{(self.frame, axis): row} for axis in range(6) for row in weights]
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Look at the {self.at}: it moves over the {self.on} in a way that no known effect '
+            'gives.'
+        )

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, MemoryEffect
@@ -174,3 +175,10 @@ class Friction(MemoryEffect):
             uneven = float(coefficients[1]) / windup if windup > 0.0 else 0.0
             asymmetry = float(np.clip(uneven, -UNEVEN, UNEVEN)) or A_LITTLE
         return Friction(self.joint, windup, asymmetry, self.travel, self.release)
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Give the controller of {self.site} feed-forward against friction, and see to its '
+            f'lubrication: in motion it trails by {self.travelled(robot, self.plain("windup"))}.'
+        )

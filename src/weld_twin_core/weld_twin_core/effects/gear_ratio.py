@@ -5,9 +5,11 @@
 from dataclasses import dataclass
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View, single
+from .wording import number
 
 
 @register
@@ -40,3 +42,18 @@ class GearRatio(Effect):
     def slope(self, view: View) -> Shift:
         """Return the scale."""
         return single(('q', view.robot.index(self.joint)), self.number('scale'), view)
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        scale = self.plain('scale')
+        if self.on_slide(robot):
+            return (
+                f'Enter the feed of {self.site} (mm of travel per turn of the motor) times '
+                f'{1.0 + scale:.6f}: it goes {number(scale * 1e3)} mm further on every metre than it '
+                'reads.'
+            )
+        return (
+            f'Enter the gear ratio of {self.site} times {1.0 + scale:.6f} where it is turns of the '
+            'joint per turn of the motor, divided by it where it is turns of the motor per turn of '
+            f'the joint: it turns {number(scale * 100.0)} % of its angle further than it reads.'
+        )

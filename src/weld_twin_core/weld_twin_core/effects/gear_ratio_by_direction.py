@@ -19,11 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import last_true, play
 from .effect import Effect, MemoryEffect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import size
 
 TRAVELS = (3e-5, 3e-4)
 """Travels [rad] that a search starts from: a longer one is a loop, `hysteresis`."""
@@ -130,3 +132,13 @@ class GearRatioByDirection(MemoryEffect):
             left = one - alike @ np.linalg.lstsq(alike, one, rcond=None)[0]
             if float(np.sqrt((left**2).mean())) > SHOWN * unit:
                 yield made
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        difference = self.plain('difference')
+        more, less = ('up', 'down') if difference > 0.0 else ('down', 'up')
+        return (
+            f'Compensate the gear of {self.site} by direction, or approach seams from one side: on '
+            f'the way {more} it turns {size(difference * 100.0)} % of its angle further than on the '
+            f'way {less}.'
+        )

@@ -11,10 +11,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from .carriage import GuideError, carriage_axes, carried, summed
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import size
 
 
 @register
@@ -43,3 +47,11 @@ class GuideBend(GuideError):
         x, y, _ = carriage_axes(view, i)
         bow = 0.5 * view.joint(i) ** 2
         return [carried(view, i, bow * axis, None) for axis in (x, y)]
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        x, y = np.asarray(self.curvature) * 0.125e3
+        return (
+            f'Align the guide of {self.site}: over a metre it is bent by {size(float(x))} mm along x '
+            f'and {size(float(y))} mm along y of its row; until then compensate the motion.'
+        )

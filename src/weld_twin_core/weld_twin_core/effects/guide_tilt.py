@@ -11,10 +11,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from .carriage import GuideError, carriage_axes, carried, summed
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 
 @register
@@ -42,3 +46,11 @@ class GuideTilt(GuideError):
         i = view.robot.index(self.joint)
         axes = carriage_axes(view, i)
         return [carried(view, i, None, view.joint(i) * axis) for axis in axes]
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        each = ', '.join(number(float(np.degrees(v))) for v in np.asarray(self.rate))
+        return (
+            f'Level the guide of {self.site}: its carriage turns by ({each}) deg about x, y, z of '
+            'its row on every metre; until then compensate the motion.'
+        )

@@ -78,8 +78,8 @@ class Hooks(Parametric, ABC):
     everywhere: ClassVar[bool] = False
     """Whether a prediction allows for it on every joint, or clock, where it was not found."""
     waves: ClassVar[Waves | None] = None
-    """Set by an effect that is a sum of waves in its joint's angle; it also gives `orders` and
-    `with_orders`."""
+    """Set by an effect that is a sum of waves in its joint's angle; it also gives `orders`,
+    `with_orders` and `lines`."""
 
     bends: ClassVar[bool] = False
     """Whether it stands for waves of a joint that travels too little for them; then gives
@@ -289,6 +289,11 @@ class Hooks(Parametric, ABC):
         """Return the orders of the waves that this instance is a sum of, in cycles per turn."""
         return np.zeros(0)
 
+    @classmethod
+    def lines(cls, joint: str, orders: Array) -> list[Any]:
+        """Return an instance of a single wave of no size for each order, shape (K,) [1/rev]."""
+        return []
+
     def with_orders(self: H, orders: Array) -> H:
         """Return its waves of these orders and no others, shape (K,); new ones of no size yet."""
         return self
@@ -298,6 +303,20 @@ class Hooks(Parametric, ABC):
     def causes(self) -> int:
         """Return how many separate causes this instance stands for."""
         return max(1, self.orders().size)
+
+    # The advice ---------------------------------------------------------------------------------
+
+    @abstractmethod
+    def remedy(self, robot: Robot) -> str:
+        """
+        Return what to mend where it was found, as one sentence with its size.
+
+        Parameters
+        ----------
+        robot : Robot
+            The nominal model: what is entered in the controller now.
+
+        """
 
     # The prediction -----------------------------------------------------------------------------
 

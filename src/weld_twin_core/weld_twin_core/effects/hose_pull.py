@@ -25,11 +25,13 @@ import numpy as np
 
 from ..arm.channels import Shift
 from ..arm.dynamics import point_force_torque, wrench_rotation
+from ..arm.robot import Robot
 from ..arm.vectors import components, pad
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 
 @register
@@ -63,6 +65,15 @@ class HosePull(Effect):
     def gradient(self, view: View) -> list[Shift | None]:
         """Return d torque by each component of the force, and by the stiffness."""
         return [{('tau', i): part[i] for i in range(view.robot.n)} for part in _torques(view)]
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        x, y, z = (float(part) for part in np.asarray(self.force))
+        return (
+            f'Lead the hose package so that it hangs free: it pulls the flange by ({number(x)}, '
+            f'{number(y)}, {number(z)}) N along x, y, z of the base, less '
+            f'{number(self.plain("stiffness"))} N for every metre away from it.'
+        )
 
 
 def _torques(view: View) -> list[Array]:

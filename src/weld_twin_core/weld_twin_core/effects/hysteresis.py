@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, MemoryEffect
@@ -144,3 +145,12 @@ class Hysteresis(MemoryEffect):
         travels = unit * np.geomspace(SHORTEST, LONGEST, 10)
         z = Hysteresis(self.joint, 1.0, travels)._loop(view.joint(i), None)[0]
         return [Hysteresis(self.joint, 1.0, float(travel)) for travel in travels], -z
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Compensate the lost motion of {self.site}, or approach seams from one side: it trails '
+            f'by {self.travelled(robot, self.plain("amplitude"))} once it has moved '
+            f'{self.travelled(robot, 3.0 * self.plain("travel"))} one way; see to its gear if that '
+            'grows.'
+        )

@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..arm.robot import Robot
 from .registry import register
 from .sudden import SuddenFrame
 from .view import Value
+from .wording import base_frame
 
 
 @register
@@ -24,3 +26,10 @@ class InstrumentKnock(SuddenFrame):
     place = 'instrument'
     of_setup = True
     channel = 'base'
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Fasten the instrument and the base: one moved by {base_frame(self.vector()[:6])} at '
+            f't = {self.plain("time"):.4g}; measure what came before and after apart.'
+        )

@@ -23,6 +23,7 @@ from ..errors import DataError, ModelError
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import metres, radians, size
 
 LOAD_OF_EFFORT = {'effort': -1.0, 'effort_reversed': 1.0}
 """Load torque for each N m of measured effort: against it where it holds the load."""
@@ -124,3 +125,18 @@ class JointCompliance(Effect):
             yield cls(str(joint))
         else:
             yield cls(str(joint), statics='effort' if view.effort_holds else 'effort_reversed')
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        compliance = self.plain('compliance')
+        slides = self.on_slide(robot)
+        stiffness = (
+            f'a stiffness of {size(1e-3 / compliance)} kN{"/m" if slides else " m/rad"}'
+            if compliance > 0.0
+            else 'which no spring does'
+        )
+        return (
+            f'Compensate the yielding of {self.site} under load: '
+            f'{metres(compliance * 1e2) if slides else radians(compliance * 1e2)} under '
+            f'100 N{"" if slides else " m"}, {stiffness}.'
+        )

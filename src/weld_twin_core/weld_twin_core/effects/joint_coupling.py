@@ -14,6 +14,7 @@ from ..errors import ModelError
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 
 @register
@@ -77,3 +78,12 @@ class JointCoupling(Effect):
         for k in (i - 1, i + 1):
             if 0 <= k < view.robot.n:
                 yield cls(str(joint), view.robot.joint_names[k], 0.0)
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        source = self.source
+        ratio = self.plain('ratio')
+        return (
+            f'Enter a coupling of {source} into {self.site}: {number(90.0 * ratio)} deg for every 90 '
+            'deg.'
+        )

@@ -110,3 +110,10 @@ class JointCurve(Effect):
         rise = basis_slope(self.knots, view.joint(index))
         values = np.asarray(self.values, dtype=np.float64)
         return {self._site(view): np.tensordot(values, rise, axes=(-1, 0))}
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Look at {self.site}: it is off by a curve over the {self.on} that no known effect '
+            'gives.'
+        )

@@ -4,9 +4,11 @@
 
 from dataclasses import dataclass
 
+from ..arm.robot import Robot
 from .constant import ChannelError
 from .registry import register
 from .view import Parameter, Stage, Value
+from .wording import stands, to_mend
 
 
 @register
@@ -25,3 +27,9 @@ class JointOffset(ChannelError):
     stage = Stage.JOINT
     channel = 'q'
     parameters = (Parameter('offset', 'rad', typical=5e-4),)
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        joint, offset = str(self.site), self.plain('offset')
+        sliding = bool(robot.prismatic[robot.index(joint)])
+        return f'{stands(joint, offset, sliding=sliding)} {to_mend(offset, sliding=sliding)}'

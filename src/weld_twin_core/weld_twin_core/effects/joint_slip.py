@@ -6,10 +6,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..arm.robot import Robot
 from .joint_offset import JointOffset
 from .registry import register
 from .sudden import SuddenChannel
 from .view import Parameter, Stage, Value
+from .wording import radians
 
 
 @register
@@ -30,3 +32,13 @@ class JointSlip(SuddenChannel):
     def lasting(self) -> JointOffset:
         """Return the offset that the joint keeps."""
         return JointOffset(self.joint, self.offset)
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        at = robot.index(str(self.site))
+        size = self.plain('offset')
+        far = f'{size * 1e3:+.3g} mm' if robot.prismatic[at] else radians(size)
+        return (
+            f'See to the belt, coupling and encoder of {self.site}: it slipped by {far} at '
+            f't = {self.plain("time"):.4g}; then master it again.'
+        )

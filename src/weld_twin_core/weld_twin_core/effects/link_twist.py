@@ -23,4 +23,5 @@ class LinkTwist(ChannelError):
     of = 'link'
     stage = Stage.LINK
     channel = 'alpha'
+    off = 'the axes are twisted by'
     parameters = (Parameter('dalpha', 'rad', typical=5e-4),)

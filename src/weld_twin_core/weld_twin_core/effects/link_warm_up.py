@@ -22,6 +22,7 @@ from ..errors import DataError, ModelError
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 CONSTANTS = (0.15, 0.6, 2.5)
 """Time constants that a search starts from, in lengths of the recording: beyond, it is a ramp."""
@@ -153,6 +154,14 @@ class LinkWarmUp(Effect):
             yield cls(str(joint), 0.0, share * span)
         if view.temperature is not None and (rise := float(np.ptp(view.temperature))) > WARMER:
             yield cls(str(joint), 0.0, span, (float(np.min(view.temperature)), rise))
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        grown = self.plain('strain') * 1e3
+        return (
+            f'Warm {self.site} up before welding, or compensate its link while it warms: it grows by '
+            f'{number(grown)} mm per m.'
+        )
 
 
 def _is_pair(follows: Sequence[float]) -> bool:

@@ -108,6 +108,13 @@ class LoadedPlay(Effect):
         if held > 0.0 and not _changes(torque, held):
             yield cls(str(joint), 0.0, held)
 
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Service or preload the gear of {self.site}: its load lays it on one flank or the other '
+            f'of {self.travelled(robot, self.plain("width"))} of play.'
+        )
+
 
 def _changes(torque: Array, held: float) -> bool:
     """Return whether a load, shape (N,), moves a gear from its flank that friction holds so far."""

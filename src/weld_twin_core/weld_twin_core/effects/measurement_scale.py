@@ -5,9 +5,11 @@
 from dataclasses import dataclass
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 
 @register
@@ -34,3 +36,10 @@ class MeasurementScale(Effect):
         """Return the position."""
         position = view.frames.position
         return [{('pose', k): position[..., k] for k in range(3)}]
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            'Have the instrument calibrated, or correct for air temperature: lengths read '
+            f'{number(self.plain("scale") * 1e3)} mm per m too long.'
+        )

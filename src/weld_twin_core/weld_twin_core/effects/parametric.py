@@ -124,6 +124,10 @@ class Parametric:
             at += count
         return replace(self, **values)
 
+    def plain(self, name: str) -> float:
+        """Return a parameter that is one plain number."""
+        return float(np.asarray(getattr(self, name)))
+
     def number(self, name: str, k: int | None = None) -> Array:
         """Return one component ready to broadcast with samples: scalar, or shape (D, 1)."""
         value = np.asarray(getattr(self, name), dtype=np.float64)

@@ -10,10 +10,12 @@ import numpy as np
 
 from ..arm.channels import Shift
 from ..arm.dynamics import payload_slope, payload_torque
+from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 
 @register
@@ -57,6 +59,17 @@ class Payload(Effect):
             lever = payload_torque(robot, chain, 1.0, np.eye(3)[k]) - origin
             out.append(_on_joints(self.number('mass') * lever))
         return out
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        extra = self.plain('mass')
+        com = np.asarray(self.com) * 1e3
+        where = ', '.join(number(float(v)) for v in com)
+        return (
+            f'Enter a payload of {robot.payload_mass + extra:.2f} kg in place of '
+            f'{robot.payload_mass:.2f} kg; the {number(extra)} kg lie at ({where}) mm in the tool '
+            'frame.'
+        )
 
 
 def _on_joints(torque: Array) -> Shift:

@@ -19,12 +19,14 @@ import numpy as np
 
 from ..arm.channels import Channel, Shift
 from ..arm.dynamics import base_moment, wrench_rotation
+from ..arm.robot import Robot
 from ..arm.vectors import components, dot, pad
 from ..arrays import Array
 from .base_leans import base_leans
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 CHANGED = 0.2
 """Share of the largest moment by which it must change: with less, a lean is a base pose."""
@@ -79,6 +81,15 @@ class PedestalTilt(Effect):
         if change <= CHANGED * np.linalg.norm(moment, axis=0).max(initial=0.0):
             return 'the moment on the pedestal hardly changes'
         return None
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        x, y = np.asarray(self.compliance) * 1e2
+        return (
+            'Stiffen the pedestal or its anchors: under 100 N m it leans by '
+            f'{number(float(np.degrees(x)))} deg about x of the base and by '
+            f'{number(float(np.degrees(y)))} deg about y; until then compensate the motion.'
+        )
 
 
 def _moments(view: View) -> tuple[Array, Array]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
@@ -130,6 +131,13 @@ class Quantization(Effect):
     def from_atoms(self, coefficients: Array) -> Quantization:
         """Return the same staircase: its height and step are one parameter."""
         return self
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Read {self.site} with a finer encoder or more digits: it is rounded to '
+            f'{self.travelled(robot, self.plain("step"))}.'
+        )
 
 
 def _parabola(power: Array, k: int) -> float:

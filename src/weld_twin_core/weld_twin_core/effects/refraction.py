@@ -30,6 +30,7 @@ from ..errors import ModelError
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 BEND = 7.86e-4 * 101.325 / 293.15**2
 """By how much the refractive index of air falls [1/K], 9.27e-7 at 20 degC and 101.325 kPa:
@@ -115,3 +116,11 @@ class Refraction(Effect):
                 'where an instrument stands'
             )
         return super().applicable(view, joint)
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        each = ', '.join(number(float(v)) for v in np.asarray(self.warming))
+        return (
+            'Stir the air along the line of sight, shield it from heat or stand the instrument '
+            f'nearer: the air warms by ({each}) K/m along x, y, z and bends it.'
+        )

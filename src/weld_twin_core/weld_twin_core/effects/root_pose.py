@@ -6,10 +6,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..arm.robot import Robot
+from ..arm.rotation import rotation_matrix
+from ..arrays import Array
 from .constant import FrameError
 from .registry import register
 from .view import Value
+from .wording import frame
 
 
 @register
@@ -30,3 +35,27 @@ class RootPose(FrameError):
     def fits(cls, robot: Robot, joint: str | None) -> bool:
         """Return whether there is a positioner."""
         return robot.behind > 0
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        rows = robot.T_base_foot
+        step = (self.vector().reshape(2, 3) @ rows[:3, :3]).ravel()
+        now = np.asarray(np.linalg.inv(robot.T_root_base @ rows))
+        new = np.eye(4)
+        new[:3, :3] = rotation_matrix(step[3:]) @ now[:3, :3]
+        new[:3, 3] = now[:3, 3] + step[:3]
+        moved = frame(step, 'of the base', 'of the positioner')
+        return (
+            f'Correct the root frame of the positioner by {moved}: in the base of the robot it '
+            f'stands at {_placed(new)} in place of {_placed(now)}.'
+        )
+
+
+def _placed(pose: Array) -> str:
+    """Return a frame as controllers take it: mm, and turns about fixed x, y and z in degrees."""
+    place = ', '.join(f'{value * 1e3:.3f}' for value in pose[:3, 3])
+    yaw = np.arctan2(pose[1, 0], pose[0, 0])
+    pitch = np.arctan2(-pose[2, 0], np.hypot(pose[0, 0], pose[1, 0]))
+    roll = np.arctan2(pose[2, 1], pose[2, 2])
+    angles = ', '.join(f'{np.degrees(value):.4f}' for value in (roll, pitch, yaw))
+    return f'x, y, z = ({place}) mm, turned by ({angles}) deg about them'

@@ -26,6 +26,7 @@ from .associative_scan import linear
 from .effect import MemoryEffect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import size
 
 DAMPINGS = (0.3, 0.4, 0.55, 0.75)
 """Dampings of loops that a search starts from; a stiffer one is hardly told from first order."""
@@ -200,3 +201,10 @@ class ServoLag(MemoryEffect):
     def from_atoms(self, coefficients: Array) -> ServoLag:
         """Return the lag whose time constant is the coefficient, never negative."""
         return ServoLag(self.joint, max(float(coefficients[0]), 0.0), self.damping)
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Give the controller of {self.site} more feed-forward, or record measured in place of '
+            f'commanded joints: it lags by {size(self.plain("time_constant") * 1e3)} ms.'
+        )

@@ -15,10 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arm.channels import Channel, Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View, single
+from .wording import base_frame
 
 
 @register
@@ -82,3 +84,10 @@ class SetupSettling(Effect):
         if span > 0.0:
             for share in (0.05, 0.12, 0.25, 0.5):
                 yield cls(time_constant=share * span, start=float(view.t[0]))
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Let the set-up settle before measuring: it started {base_frame(self.vector()[:6])} from '
+            'where it ended.'
+        )

@@ -14,10 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arm.channels import Channel, Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View, single
+from .wording import base_frame
 
 TIMES = 40
 """Times that a search tries, evenly over the recording."""
@@ -80,3 +82,10 @@ class SetupStep(Effect):
         for k in np.unique(index):
             if k > 0:
                 yield cls(time=float(0.5 * (view.t[k - 1] + view.t[k])))
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Fasten the set-up: it moved by {base_frame(-self.vector()[:6])} at '
+            f'{self.plain("time"):.4g} s; measure what came before and after apart.'
+        )

@@ -17,6 +17,7 @@ from ..errors import DataError, ModelError
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 
 @register
@@ -102,6 +103,14 @@ class ThermalGrowth(Effect):
         """Return length times temperature rise."""
         rise = self.rise(view)
         return [{channel: length * rise for channel, length in self._lengths(view)}]
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        links = self.links or ('all links',)
+        return (
+            'Warm the arm up before welding, or compensate '
+            f'{number(self.plain("coefficient") * 1e3)} mm per m and K for {", ".join(links)}.'
+        )
 
 
 def _is_curve(warmup: Sequence[float]) -> bool:

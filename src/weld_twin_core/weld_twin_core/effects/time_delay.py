@@ -5,9 +5,11 @@
 from dataclasses import dataclass
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View, single
+from .wording import size
 
 
 @register
@@ -34,3 +36,12 @@ class TimeDelay(Effect):
     def gradient(self, view: View) -> list[Shift | None]:
         """Return minus the joint velocity on every joint."""
         return [{('q', i): -view.qd[..., i] for i in range(view.robot.n)}]
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        delay = self.plain('delay')
+        order = 'late' if delay > 0.0 else 'early'
+        return (
+            f'Fix the clock: the measurements are stamped {size(delay * 1e3)} ms {order} against the '
+            'joint states; synchronise both computers or subtract the delay.'
+        )

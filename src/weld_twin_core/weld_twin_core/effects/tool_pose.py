@@ -4,9 +4,14 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..arm.controller_lookup import controller_frames
+from ..arm.robot import Robot
 from .constant import FrameError
 from .registry import register
 from .view import Value
+from .wording import frame
 
 
 @register
@@ -22,3 +27,10 @@ class ToolPose(FrameError):
     place = 'tool'
     channel = 'tool'
     fitted_with = 'tool'
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        flange = controller_frames(robot).flange[:3, :3]
+        step = np.concatenate([flange.T @ self.vector()[:3], self.vector()[3:]])
+        moved = frame(step, 'of the flange', 'of the tool')
+        return f'Correct the tool centre point by {moved}; a bent torch looks like this too.'

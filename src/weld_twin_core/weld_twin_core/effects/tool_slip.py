@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..arm.robot import Robot
 from .registry import register
 from .sudden import SuddenFrame
 from .view import Value
+from .wording import frame
 
 
 @register
@@ -24,3 +26,11 @@ class ToolSlip(SuddenFrame):
     place = 'tool'
     of_setup = True
     channel = 'tool'
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Fasten the tool or the reflector: it moved by '
+            f'{frame(self.vector()[:6], "of the flange", "of the tool")} at '
+            f't = {self.plain("time"):.4g}; measure its centre point again.'
+        )

@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect
 from .hooks import Waves, highest_order
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import size
 
 MAX_ORDER = 100
 """Highest order a search considers: one per tooth of a 100:1 strain-wave gear."""
@@ -127,7 +129,7 @@ class TransmissionRipple(Effect):
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """
-        Yield one instance per integer order that the joint's range of motion can tell.
+        Return one instance per integer order that the joint's range of motion can tell.
 
         Parameters
         ----------
@@ -141,13 +143,17 @@ class TransmissionRipple(Effect):
 
         """
         told = highest_order(view.joint(view.robot.index(str(joint))))
-        for order in range(1, min(MAX_ORDER, int(told)) + 1):
-            yield cls(str(joint), 0.0, float(order), 0.0)
+        return cls.lines(str(joint), np.arange(1.0, min(MAX_ORDER, int(told)) + 1.0))
+
+    @classmethod
+    def lines(cls, joint: str, orders: Array) -> list[TransmissionRipple]:
+        """Return an instance of no size for each order, shape (K,) [1/rev]."""
+        return [cls(joint, 0.0, float(order), 0.0) for order in orders]
 
     @classmethod
     def small(cls, view: View, joint: str | None, most: int) -> list[TransmissionRipple]:
         """
-        Return one ripple of all orders that the measurements can hold apart.
+        Return one ripple of all orders up to the highest that the measurements can hold apart.
 
         Parameters
         ----------
@@ -156,11 +162,10 @@ class TransmissionRipple(Effect):
         joint : str or None
             The joint it sits on.
         most : int
-            How many numbers the measurements can hold apart.
+            How many orders.
 
         """
-        told = int(highest_order(view.joint(view.robot.index(str(joint)))))
-        orders = np.arange(1.0, min(MAX_ORDER, most, told) + 1.0)
+        orders = np.arange(1.0, min(MAX_ORDER, most) + 1.0)
         zero = np.zeros(orders.size)
         return [cls(str(joint), zero, orders, zero)] if orders.size else []
 
@@ -243,6 +248,24 @@ class TransmissionRipple(Effect):
     def coordinate_scales(self) -> Array:
         """Return the typical amplitude for every coefficient."""
         return np.full(2 * np.size(self.order), self.parameters[0].typical)
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        amplitude = np.atleast_1d(np.asarray(self.amplitude))
+        order = np.atleast_1d(np.asarray(self.order))
+        strongest = np.argsort(-np.abs(amplitude))[:3]
+        slides = self.on_slide(robot)
+        waves = ', '.join(
+            f'{size(amplitude[k] * 1e3, 2)} mm every {2e3 * np.pi / order[k]:.3g} mm'
+            if slides
+            else f'{size(np.degrees(amplitude[k]), 2)} deg at {order[k]:g} per turn'
+            for k in strongest
+        )
+        more = f' and {amplitude.size - 3} smaller orders' if amplitude.size > 3 else ''
+        return (
+            f'Compensate the ripple of {self.site} by table ({waves}{more}); inspect its gear and '
+            'encoder if it grows.'
+        )
 
 
 def _sum(waves: Iterable[Array]) -> Array:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import linear
 from .effect import Effect, MemoryEffect
@@ -172,6 +173,14 @@ class Vibration(MemoryEffect):
     def from_atoms(self, coefficients: Array) -> Vibration:
         """Return the mode whose gain is the in-phase coefficient."""
         return Vibration(self.joint, self.frequency, self.damping, float(coefficients[0]))
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        return (
+            f'Limit the jerk of {self.site}, or shape its motion for '
+            f'{self.plain("frequency"):.3g} Hz (damping {self.plain("damping"):.2g}); look '
+            'for a loose mount.'
+        )
 
 
 def _ringing(decay: Array, damped: Array, kick: Array) -> Array:

@@ -13,10 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arm.channels import Shift
+from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Stage, Value, View
+from .wording import number
 
 SLOWED = (0.0, 0.5)
 """Slowing that a search starts from, over the length of the recording: none, and a rate that falls
@@ -82,6 +84,14 @@ class Wear(Effect):
         span = max(float(np.max(view.elapsed, initial=0.0)), 1.0)
         for slowed in SLOWED:
             yield cls(0.0, slowed / span)
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        hour = self.plain('rate') * 3.6e6
+        return (
+            f'Renew or measure the tip of the tool: along its axis it draws back by {number(hour)} mm '
+            'per hour.'
+        )
 
 
 def _slowed(x: Array) -> tuple[Array, Array]:

@@ -246,7 +246,7 @@ def controller_of(
 
 
 def _counting(arm: Robot, robot: Robot, language: str, origin: Array, notes: list[str]) -> Array:
-    """Return joints of the model from those shown, (n, n); note it, and lift the origin to where it is."""
+    """Return joints of the model from those shown, (n, n); note it, and lift the origin there."""
     mix = np.eye(robot.n)
     begin, maker = AT_SECOND_AXIS.get(language, ('none', ''))
     if bundled_name(arm).startswith(begin):

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.diagnosis.advice.zeros import TURNED_ROUND, stands, to_mend
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.soundness.mending import reading_map, turned_joints
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.setup_motion import of_the_robot
+from weld_twin_core.effects.wording import TURNED_ROUND, stands, to_mend
 from weld_twin_core.twin.corrected import corrected, joint_offsets
 from weld_twin_msgs_py.files.csv_text import csv_text
 from weld_twin_msgs_py.files.whole_files import write_text

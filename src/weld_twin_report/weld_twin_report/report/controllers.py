@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.diagnosis.advice.zeros import further
 from weld_twin_core.effects.effect import Effect
+from weld_twin_core.effects.wording import further
 
 BRANDS = {
     'abb': 'ABB',

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from weld_twin_core.diagnosis.advice import actions
-from weld_twin_core.diagnosis.advice.experiment import ELSE, way
 from weld_twin_core.diagnosis.result import Diagnosis, Site
+from weld_twin_core.effects.apart import ELSE, way
 from weld_twin_core.metrics.conformity import PASS, Rule
 from weld_twin_nodes.wording.leading import in_order
 from weld_twin_nodes.wording.mending import left_without, look_at, warning

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -19,11 +20,19 @@ import numpy as np
 from ...arm.channels import Shift
 from ...arrays import Array
 from ...twin.features import Features
-from .gram import Index
 from .problem import Problem, Scale
+from .unit_scale import Index
 
 Rows = slice | Index
 """Some rows: a slice, or their numbers."""
+
+
+def rows_of(labels: Array) -> list[Rows]:
+    """Return the rows of every label, a slice each where they lie together."""
+    if (np.diff(labels) >= 0).all():
+        bounds = np.searchsorted(labels, np.arange(int(labels[-1]) + 2))
+        return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
+    return [np.flatnonzero(labels == k) for k in range(int(labels.max()) + 1)]
 
 
 class Columns(Protocol):

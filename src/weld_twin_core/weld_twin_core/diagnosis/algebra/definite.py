@@ -17,7 +17,7 @@ from scipy.linalg.blas import dsymm, dsymv
 from scipy.linalg.lapack import dpocon, dpotrf, dpotri, dpotrs, dtrtri
 
 from ...arrays import Array
-from .gram import Index
+from .unit_scale import Index
 
 SAFE = 100.0
 """The condition is an estimate, good to some factor: so much is left between."""

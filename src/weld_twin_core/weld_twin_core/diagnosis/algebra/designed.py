@@ -19,8 +19,8 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.features import Features
 from .atoms import Amounts, Columns, MovedJoint, Rows, Whole, amounts, gathered, moved_joint
-from .gram import Index
 from .problem import Model, Problem, Scale
+from .unit_scale import Index
 
 MANY = 32
 """Coordinates of one effect from which on they are kept apart from what its joint does to the

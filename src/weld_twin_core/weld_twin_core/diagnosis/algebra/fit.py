@@ -5,20 +5,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ...arrays import Array
-from .designed import Design, designed
-from .gram import unit_diagonal
+from .designed import designed
 from .independent_rows import measured_axes, robust_spread
 from .prior import effect_precision, frame_prior
 from .problem import Model, Problem, Scale
+from .unit_scale import unit_diagonal
 
 DAMPING, DAMPED = 1e-9, 1e6
 """Least and greatest damping of a step, in units of the columns: from Gauss-Newton to none."""
@@ -54,34 +54,23 @@ class Fit:
     model : Model
     residual : array, shape (rows,)
         Whitened residual at the solution.
-    information : array, shape (P, P)
-        Normal matrix of frames and effect coordinates, prior included.
-    names : list of str
-        Frame columns first, then 'k.j' for coordinate j of found effect k.
     coordinates : array, shape (K,)
         Fit coordinates of all found effects.
+    prepared : list
+        What was last prepared of it for unseen stretches, as several steps ask for the same. It
+        lies here, and goes with the fit: it holds the fit itself.
 
     """
 
     model: Model
     residual: Array
-    information: Array
-    names: list[str]
     coordinates: Array
+    prepared: list[Any] = field(default_factory=list, init=False, repr=False)
 
     @property
     def rss(self) -> float:
         """Return the whitened sum of squares."""
         return float(self.residual @ self.residual)
-
-    def covariance(self, inflation: float = 1.0) -> Array:
-        """Return the covariance of the effect coordinates, shape (K, K)."""
-        count = self.coordinates.size
-        if count == 0:
-            return np.zeros((0, 0))
-        scaled, size = unit_diagonal(self.information)
-        inverse = np.linalg.pinv(scaled, rcond=1e-12, hermitian=True) / np.outer(size, size)
-        return np.asarray(inflation * inverse[-count:, -count:])
 
 
 def design(problem: Problem, model: Model, scale: Scale) -> tuple[Array, list[str]]:
@@ -169,9 +158,7 @@ def fit(
     """
     prior = effect_precision(model) if precision is None else precision
     here = descended(_Point.at(problem, model, scale, prior), iterations, tolerance)
-    information, _ = here.normal_equations
-    names = here.columns[1]
-    return Fit(here.model, here.residual, information, names, coordinates(here.model))
+    return Fit(here.model, here.residual, coordinates(here.model))
 
 
 class Point(Protocol):
@@ -259,14 +246,9 @@ class _Point:
         return cls(problem, scale, prior, model, residual, ridge, x, cost)
 
     @cached_property
-    def columns(self) -> tuple[Design, list[str]]:
-        """Return the whitened columns and their names."""
-        return designed(self.problem, self.model, self.scale)
-
-    @cached_property
     def normal_equations(self) -> tuple[Array, Array]:
         """Return normal matrix and right-hand side of a step, the priors included."""
-        columns, _ = self.columns
+        columns, _ = designed(self.problem, self.model, self.scale)
         right = columns.times(self.residual) - self.ridge * self.x
         normal = columns.normal()
         normal[np.diag_indices_from(normal)] += self.ridge

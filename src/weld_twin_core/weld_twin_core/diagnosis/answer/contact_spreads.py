@@ -9,6 +9,7 @@ import numpy as np
 from ...arrays import Array
 from ...contacts import Length, lengths, spreads
 from ...effects.plausible import spreads as spreads_of
+from ..algebra.alias import outside, span_of
 from ..algebra.problem import Model, Problem
 from ..hypotheses.library import plain_causes
 from ..hypotheses.search import Search
@@ -65,12 +66,11 @@ def not_seen(found: Search) -> tuple[str, ...]:
     problem, model, scale = found.problem, found.final.model, found.scale
     features = problem.features(model)
     frames = problem.whitened(problem.frame_columns(features)[0], scale)
-    basis = np.linalg.qr(frames.T)[0] if frames.shape[0] else np.zeros((frames.shape[1], 0))
-    hidden: dict[str, list[str]] = {}
+    span, hidden = span_of(frames), dict[str, list[str]]()
     for effect in plain_causes(model.robot, features[0].view, ('constant',)):
         rows = problem.whitened(problem.effect_columns(features, effect), scale)
-        rows = rows - (rows @ basis) @ basis.T
-        size = np.linalg.norm(rows, axis=1) * spreads_of(model.robot, effect)
+        left = np.linalg.norm(outside(rows, span), axis=1)
+        size = left * spreads_of(model.robot, effect)
         if size.max(initial=0.0) < 1.0:
             hidden.setdefault(effect.name.replace('_', ' '), []).append(str(effect.site))
     listed = [f'{name} of {", ".join(sites)}' for name, sites in hidden.items()]
@@ -108,7 +108,7 @@ def _of(problem: Problem, model: Model) -> tuple[dict[str, Array], list[Length]]
 
 def _held_out(unseen: Unseen) -> dict[str, Array]:
     """Return distances from every contact as predicted where it was not fitted."""
-    parts = unseen.problem.by_sample(unseen.predict(range(len(unseen.parts))))
+    parts = unseen.problem.by_sample(unseen.whole)
     out: dict[str, Array] = {}
     for recording, part, weight in zip(
         unseen.problem.recordings, parts, unseen.scale.weights, strict=True

@@ -78,8 +78,8 @@ def _held(cause: Cause, tries: Array) -> Cause:
 def _tries(found: Search, unseen: Unseen, floor: float) -> Array:
     """Return draws of the share of every effect, (DRAWS, K)."""
     rng = np.random.default_rng(SEED)
-    before = float(unseen.squares(unseen.predict([])).mean())
-    after = float(unseen.squares(unseen.predict(range(len(unseen.parts)))).mean())
+    before = float(unseen.squares(unseen.bare).mean())
+    after = float(unseen.squares(unseen.whole).mean())
     noise = min(floor**2, after)
     moved = _coordinates(rng, found, (after - noise) / max(after, 1e-300))
     parted = _parted(_along(unseen, moved))

@@ -3,19 +3,13 @@
 """
 Standard errors of what was found.
 
-The largest of what four reasons give: the noise, as if rows were independent; scores that hang
-together within a stretch, or differ between stretches because the model is not quite the arm [1]_;
-other optima that fit nearly as well; and formulas that are idealised.
-
-References
-----------
-.. [1] H. White, "Maximum likelihood estimation of misspecified models", Econometrica 50, 1982.
+The largest of what three reasons give: the covariance of `algebra.spread`; other optima that fit
+nearly as well; and formulas that are idealised.
 
 """
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -23,20 +17,14 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.definite import inverted, well_conditioned
+from ..algebra import spread
 from ..algebra.designed import Design, designed
 from ..algebra.fit import coordinates
-from ..algebra.gram import unit_diagonal
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
+from ..algebra.spread import BLOCKS
 from ..hypotheses.starts import profile
 
-BLOCKS = 24
-"""Stretches whose scores are held apart: enough to tell a variance to a third."""
-SINGULAR = 1e-12
-"""Share of the largest eigenvalue below which a direction is one that columns repeat."""
-TINY = 1e-300
-"""Keeps a division by the variance of a coordinate that nothing moves finite."""
 UNSEEN = 1e-2
 """A coordinate a thousand times its typical size must move some row by this much noise."""
 
@@ -78,9 +66,6 @@ def covariance(
     """
     Return the covariance of all fit coordinates, shape (K, K); NaN for those that have none.
 
-    As wide as the noise makes it or as scores that differ between stretches do, each coordinate by
-    the larger; they hang together as their columns do.
-
     Parameters
     ----------
     problem, model, scale, precision, share
@@ -94,30 +79,11 @@ def covariance(
     live &= _visible(columns, model)
     columns = columns.chosen(np.flatnonzero(live))
     ridge = np.concatenate([frame_prior(problem, model)[0], prior])[live]
-    normal = columns.normal()
-    normal[np.diag_indices_from(normal)] += ridge
-    inverse, size = _inverse(normal)
     residual = problem.whitened(problem.residuals(model), scale)
-    cuts = np.flatnonzero(np.diff(problem.block_labels(BLOCKS))) + 1
-    bounds = [0, *cuts.tolist(), residual.size]
-    stretches = [slice(a, b) for a, b in pairwise(bounds)]
-    each = [columns.within(s).times(residual[s]) / size for s in stretches]
-    scores = inverse @ np.stack(each, axis=1)
-    blocks = max(len(stretches), 2)
-    together = (scores**2).sum(axis=1) * blocks / (blocks - 1)
-    own = np.diag(inverse)
-    wider = np.sqrt(np.maximum(own / share, together) / np.maximum(own, TINY)) / size
     out = np.full((live.size, live.size), np.nan)
-    out[np.ix_(live, live)] = inverse * np.outer(wider, wider)
+    labels = problem.block_labels(BLOCKS)
+    out[np.ix_(live, live)] = spread.covariance(columns, ridge, residual, labels, share)
     return out[live.size - count :, live.size - count :]
-
-
-def _inverse(normal: Array) -> tuple[Array, Array]:
-    """Return the inverse of a normal matrix with ones on its diagonal, and its columns' norms."""
-    scaled, size = unit_diagonal(normal)
-    if well_conditioned(scaled, SINGULAR):
-        return inverted(scaled), size
-    return np.asarray(np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True)), size
 
 
 def _free(model: Model) -> NDArray[np.bool_]:

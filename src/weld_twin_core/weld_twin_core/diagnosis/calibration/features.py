@@ -82,22 +82,19 @@ def of_situation(
             'refused': len(evidence.refused),
             'lacking': len(evidence.lacking),
             'cancelling': log(sum(evidence.parts)) if evidence.parts else 0.0,
-            'waves hardly seen': len(evidence.glimpsed),
-            'floor measured': float(evidence.independent),
             'stations': float(found.problem.recordings[0].joints.static),
-            **_of_curves(unseen, rival, floor),
+            **_of_curves(unseen, rival),
         }
     )
 
 
-def _of_curves(unseen: Unseen, rival: Curved | None, floor: float) -> Numbers:
+def _of_curves(unseen: Unseen, rival: Curved | None) -> Numbers:
     """Return how curves without a name compare with the names."""
     if rival is None:
-        return dict.fromkeys(('curves', 'curves instead', 'curves, left', 'form'), 0.0)
+        return dict.fromkeys(('curves', 'curves instead', 'form'), 0.0)
     return {
         'curves': len(rival.form.parts),
         'curves instead': max(gain_of(unseen, rival.unseen)[0], -1.0),
-        'curves, left': log(rival.rms_m / floor),
         'form': rival.form.gain,
     }
 

@@ -50,75 +50,40 @@ def initial_frames(problem: Problem, model: Model) -> Model:
     Frames that are near already stay as they are, and so does what the data cannot tell. Only
     frames in ``problem.align`` move; the tool moves when moving the base is not enough.
     """
-    few = problem.thinned(MOST_ROWS)
-    tracks = [_track(few, model, k) for k in range(len(few.recordings))]
-    best = attempted(tracks, model, problem.align)
-    return model if best is None else refined(few, best)
-
-
-def attempted(tracks: list[Track], model: Model, align: frozenset[str]) -> Model | None:
-    """
-    Return the model with frames that are near, not yet refined; None where they are already.
-
-    Parameters
-    ----------
-    tracks : list of Track
-        One for every recording.
-    model : Model
-    align : frozenset of str
-        Frames that may move.
-
-    """
-    if not align or _gap(tracks, model) < NEAR:
-        return None
+    few, align = problem.thinned(MOST_ROWS), problem.align
+    own = tracks(few, model)
+    if not align or _gap(own, model) < NEAR:
+        return model
     best = model
     for attempt in _attempts(align):
-        found = attempt(tracks, model)
-        if _gap(tracks, found) < _gap(tracks, best):
+        found = attempt(own, model)
+        if _gap(own, found) < _gap(own, best):
             best = found
-        if _gap(tracks, best) < NEAR:
+        if _gap(own, best) < NEAR:
             break
-    return best
+    return refined(few, best)
 
 
-def rough_frames(problem: Problem, model: Model, *, thorough: bool = False) -> Model:
-    """
-    Return the model with base and tool frames in closed form, both free.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    thorough : bool
-        Use more measurements and more rounds.
-
-    """
-    tracks = [_track(problem, model, k) for k in range(len(problem.recordings))]
-    return _base_and_tool(tracks, model, REACHES if thorough else ())
-
-
-def rough_together(
+def rough_frames(
     trials: Sequence[tuple[list[Track], Model]], *, thorough: bool = False
 ) -> list[Model]:
     """
-    Return the same of many trials at once: tracks of as many samples, all turned or none.
+    Return models with base and tool frames in closed form, both free, of several trials at once.
 
     Parameters
     ----------
     trials : sequence of list of Track, and Model
-        One track for every recording.
+        One track for every recording; all trials have as many samples, all are turned or none.
     thorough : bool
-        As for `rough_frames`.
+        Start from more tools.
 
     """
     reaches = REACHES if thorough else ()
     out: list[Model] = []
     for first in range(0, len(trials), TOGETHER):
         some = trials[first : first + TOGETHER]
-        tracks = [Track.side_by_side(each) for each in zip(*(own for own, _ in some), strict=True)]
-        out += _bases_and_tools(tracks, [model for _, model in some], reaches)
+        side = [Track.side_by_side(each) for each in zip(*(own for own, _ in some), strict=True)]
+        out += _bases_and_tools(side, [model for _, model in some], reaches)
     return out
 
 
@@ -135,6 +100,11 @@ def _attempts(align: frozenset[str]) -> list[Callable[[list[Track], Model], Mode
     if 'base' not in align:
         return [_tool_only]
     return [_base_only, _base_and_tool] if 'tool' in align else [_base_only]
+
+
+def tracks(problem: Problem, model: Model) -> list[Track]:
+    """Return what every recording says of its frames; see `Track`."""
+    return [_track(problem, model, k) for k in range(len(problem.recordings))]
 
 
 def _track(problem: Problem, model: Model, k: int) -> Track:
@@ -203,11 +173,8 @@ def _tool_vector(
 # Both ------------------------------------------------------------------------------------------
 
 
-def _base_and_tool(
-    tracks: list[Track], model: Model, reaches: tuple[float, ...] = REACHES
-) -> Model:
-    one = [Track.side_by_side([track]) for track in tracks]
-    return _bases_and_tools(one, [model], reaches)[0]
+def _base_and_tool(tracks: list[Track], model: Model) -> Model:
+    return rough_frames([(tracks, model)], thorough=True)[0]
 
 
 def _bases_and_tools(

@@ -23,15 +23,15 @@ from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...errors import ModelError
 from ...twin.features import joints_of
+from ..algebra.designed import Design, designed
 from ..algebra.fit import coordinates, design, fit, robust_fit, robust_scale
 from ..algebra.independent_rows import effective_share
 from ..algebra.prior import effect_precision, frame_offset, frame_prior
 from ..algebra.problem import Change, Model, Problem, Scale
+from ..algebra.spread import BLOCKS, covariance, unit_inverse
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 
-BLOCKS = 24
-"""Stretches whose scores are held apart: enough to tell a variance to a third."""
 ROWS = 9000
 """Rows on which changes are chosen."""
 SURE = 3.0
@@ -287,65 +287,48 @@ def told(
         What may differ. Frames that were fitted for each recording are compared here.
 
     """
-    covariance = _covariance(problem, model, scale, precision)
+    whole = _covariance(problem, model, scale, precision)
     parts = _places(problem, model)
     out = [
-        Told(change, covariance[np.ix_(part, part)])
+        Told(change, whole[np.ix_(part, part)])
         for change, part in zip(model.changes, parts, strict=True)
     ]
     for kind in (REGISTRY[name] for name in families):
         if kind.fitted_with == 'base' and 'base' in problem.align:
-            out += _bases(kind, problem, model, covariance)
+            out += _bases(kind, problem, model, whole)
     found = sorted(out, key=lambda each: each.change.recording)
     return tuple(each for each in found if each.sure)
 
 
-def _bases(kind: type[Effect], problem: Problem, model: Model, covariance: Array) -> list[Told]:
+def _bases(kind: type[Effect], problem: Problem, model: Model, whole: Array) -> list[Told]:
     """Return how every base differs from the first."""
     out = []
     first, *others = (group[0] for group in problem.stands)
     for i, k in enumerate(others, 1):
         step = frame_offset(model.bases[k], model.bases[first], left=True)
-        mix = np.zeros((6, covariance.shape[0]))
+        mix = np.zeros((6, whole.shape[0]))
         mix[:, :6], mix[:, 6 * i : 6 * i + 6] = -np.eye(6), np.eye(6)
         effect = kind().with_coordinates(step)
         own = problem.given[k] if problem.given else k
-        out.append(Told(Change(own, effect), mix @ covariance @ mix.T))
+        out.append(Told(Change(own, effect), mix @ whole @ mix.T))
     return out
 
 
 def _covariance(problem: Problem, model: Model, scale: Scale, precision: Array) -> Array:
-    """
-    Return the covariance of all columns, shape (P, P).
-
-    The larger of that of the noise, and of what stretches of time say apart from each other.
-    """
-    unit, inverse, size = _inverse(problem, model, scale, precision)
+    """Return the covariance of all columns, shape (P, P)."""
+    columns, ridge = _columns(problem, model, scale, precision)
     residual = problem.whitened(problem.residuals(model), scale)
     share = effective_share(residual, problem.rows, problem.samples)
-    labels = problem.block_labels(BLOCKS)
-    stretches = [np.flatnonzero(labels == b) for b in np.unique(labels)]
-    scores = inverse @ np.stack([unit[:, s] @ residual[s] for s in stretches], axis=1)
-    blocks = max(len(stretches), 2)
-    spread = (scores**2).sum(axis=1) * blocks / (blocks - 1)
-    noise = np.maximum(np.diag(inverse), 1e-300) / share
-    # Correlations are those of the noise, sizes the larger of both.
-    wider = np.sqrt(np.maximum(1.0, spread / noise) / share)
-    return np.asarray(inverse * np.outer(wider, wider) / np.outer(size, size))
+    return covariance(columns, ridge, residual, problem.block_labels(BLOCKS), share)
 
 
-def _inverse(
+def _columns(
     problem: Problem, model: Model, scale: Scale, precision: Array
-) -> tuple[Array, Array, Array]:
-    """Return all columns at unit size, their inverse normal matrix, and their sizes."""
-    columns, _ = design(problem, model, scale)
+) -> tuple[Design, Array]:
+    """Return all columns and their prior precision."""
+    columns, _ = designed(problem, model, scale)
     prior = precision if precision.size else np.zeros(coordinates(model).size)
-    ridge = np.concatenate([frame_prior(problem, model)[0], prior])
-    size = np.sqrt((columns**2).sum(axis=1) + ridge)
-    size[size == 0.0] = 1.0
-    unit = columns / size[:, None]
-    normal = unit @ unit.T + np.diag(ridge / size**2)
-    return unit, np.linalg.pinv(normal, rcond=1e-12, hermitian=True), size
+    return columns, np.concatenate([frame_prior(problem, model)[0], prior])
 
 
 def untold(problem: Problem, model: Model, families: Sequence[str]) -> list[str]:
@@ -366,7 +349,7 @@ def untold(problem: Problem, model: Model, families: Sequence[str]) -> list[str]
     scale = robust_scale(thin, thin.residuals(model))
     every = replace(thin, changes=candidates)
     free = replace(model, changes=candidates)
-    _, inverse, size = _inverse(every, free, scale, effect_precision(model))
+    inverse, size = unit_inverse(*_columns(every, free, scale, effect_precision(model)))
     left = np.sqrt(np.diag(inverse)) / size
     out: dict[str, None] = {}
     for change, part in zip(candidates, _places(every, free), strict=True):

@@ -18,7 +18,7 @@ from ...twin.features import Features, joints_of
 from ..algebra.atoms import Amounts, Columns, MovedJoint, Whole, amounts, gathered, moved_joint
 from ..algebra.problem import Model, Problem, Scale
 from .seed_systems import SeedSystems, Unit
-from .still_joints import REASON, hardly_moves, moved_most
+from .still_joints import REASON, hardly_moves, moved_most, orders_told
 
 EXCLUDED = 'excluded by the user'
 
@@ -145,12 +145,20 @@ class _Shelf:
         if reason is not None:
             self.absent[kind.name] = reason
             return
-        k = moved_most(self.features, joint)
-        found, trials = self.features[k].seeds(kind, joint, self.pulls[k])
+        found, trials = self._seeds(kind, joint)
         seeds = [seed for seed in found if not hardly_moves(self.features, seed)]
         if len(seeds) < len(found):
             self._leave_out(kind.name, str(joint))
         self._place(kind.name, joint, seeds, trials)
+
+    def _seeds(self, kind: type[Effect], joint: str | None) -> tuple[list[Effect], float]:
+        """Return the instances that are looked for, and among how many they were chosen."""
+        if kind.waves is not None and joint is not None:
+            most = min(kind.waves.dense, orders_told(self.features, joint))
+            lines = kind.lines(joint, np.arange(1.0, most + 1.0))
+            return lines, float(len(lines))
+        k = moved_most(self.features, joint)
+        return self.features[k].seeds(kind, joint, self.pulls[k])
 
     def _leave_out(self, family: str, joint: str) -> None:
         """Tell that a joint, too, hardly moves."""

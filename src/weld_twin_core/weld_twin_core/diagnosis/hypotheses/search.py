@@ -68,8 +68,6 @@ class Search:
         Whether many small errors were fitted together.
     refused : tuple of Effect
         What would explain the rest best, but no machine has.
-    ruled_out : frozenset of Site
-        What is alike on the recordings fitted, and fails on held-out ones.
     many : Search or None
         All kinds fitted together, where that predicts about as well as the few do.
 
@@ -87,7 +85,6 @@ class Search:
     crowded: bool = False
     dense: bool = False
     refused: tuple[Effect, ...] = ()
-    ruled_out: frozenset[Site] = frozenset()
     many: Search | None = None
 
     @property

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.gram import EMPTY, FLAT, Index, unit_diagonal
+from ..algebra.unit_scale import EMPTY, FLAT, Index, unit_diagonal
 
 SINGULAR = 1e-11
 """Added to the diagonal of ones, so that columns that repeat others do no harm; far above

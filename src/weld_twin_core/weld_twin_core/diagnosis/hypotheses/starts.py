@@ -13,6 +13,7 @@ from ...arrays import Array
 from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features
 from ...twin.resampling import Picker
+from ..algebra.alias import span_of
 from ..algebra.fit import design
 from ..algebra.problem import Model, Problem, Scale
 from .still_joints import moved_most
@@ -154,9 +155,7 @@ class _Looker:
             The noise that residuals are measured in, and the weight of every sample.
 
         """
-        columns = design(problem, model, scale)[0]
-        size = np.linalg.norm(columns, axis=1)
-        basis, _ = np.linalg.qr((columns[size > 0.0] / size[size > 0.0, None]).T)
+        basis = span_of(design(problem, model, scale)[0]).T
         residual = problem.whitened(problem.residuals(model), scale)
         residual = residual - basis @ (basis.T @ residual)
         return cls(problem, scale, problem.features(model), residual, basis)

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How far joints move: what depends on the motion of one at rest cannot be told from a constant."""
+"""How far joints move, and what that can show of them: of one at rest nothing but a constant."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...effects.effect import Effect
+from ...effects.hooks import highest_order
 from ...recording import Recording
 from ...twin.features import Features
 
@@ -49,6 +50,12 @@ def narrow(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:
     travel = np.max([high for _, high in ends], axis=0) - np.min([low for low, _ in ends], axis=0)
     wide = np.minimum(WIDE, MOST_OF_IT * (robot.upper - robot.lower))
     return tuple(np.array(robot.joint_names)[travel < wide].tolist())
+
+
+def orders_told(features: Sequence[Features], joint: str) -> int:
+    """Return the highest order of a wave in a joint's angle that all recordings together can tell."""
+    i = features[0].twin.robot.index(joint)
+    return int(highest_order(np.concatenate([maker.view.joint(i) for maker in features])))
 
 
 def moved_most(features: Sequence[Features], joint: str | None) -> int:

@@ -6,15 +6,15 @@ Constant errors that no motion tells apart, whatever the data: they follow from 
 The offset of the first link lifts the tool exactly as a higher base does. Such a pair is told as
 a set even where one of the two was taken out of the library, the simplest member first.
 
-Effects of one joint that come out by the same thing, such as play and friction by the direction,
-are alike in all but their curve. Where one of them is found and another was taken out that fits as
-well, no data can vouch for the name alone, and they are a set too. Where the other fits clearly
-better, what was found stands in for a cause that the library lacks.
+Families that were taken out are still held against what is found, in its place: a hose may do on
+these motions what a load does. Where one of them fits as well, no data can vouch for the name
+alone, and they are a set too. Where it fits clearly better, what was found stands in for a cause
+that the library lacks. None of them is ever named alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,12 +26,14 @@ from ...effects.registry import REGISTRY
 from ...recording import JointMotion, Recording
 from ...twin.features import Features, joints_of
 from ...twin.twin import Twin
+from ..algebra.alias import outside, share_outside, span_of
 from ..algebra.fit import Fit, fit
 from ..beliefs import Beliefs
 from ..result import Site
-from .rivals import Rival, nats_in_place, weighed
+from .library import build
+from .rivals import Rival, contenders, nats_in_place, weighed
 from .search import Search, refitted
-from .selection import fitted_with, implausible
+from .selection import Workspace, fitted_with, implausible
 from .still_joints import hardly_moves, moved_most
 
 POSTURES = 40
@@ -43,8 +45,8 @@ SAME = 1e-6
 SAME_AT_REST = 0.04
 """The same of what is done by a joint at rest: as far as that may travel [rad], a wave that comes once
 per turn departs from a constant."""
-MOST_SEEDS = 3
-"""Instances of an excluded kind that are fitted at most; between them lie sizes ten times apart."""
+MOST_EXCLUDED = 3
+"""Excluded families that are fitted in a place at most: three that fit as well leave no name alone."""
 FEW = 2
 """Instances of a kind that are tried on a joint at rest: what leaks in from either side; of waves
 one does, as all stand still."""
@@ -54,7 +56,7 @@ SEED = 7
 
 def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beliefs) -> Search:
     """
-    Return what was found, each constant error with the excluded ones that are the same error.
+    Return what was found, each with the excluded families that may be the same error.
 
     Parameters
     ----------
@@ -64,22 +66,84 @@ def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beli
     beliefs : Beliefs
 
     """
-    known = [name for name in exclude if name in REGISTRY and REGISTRY[name].cause]
-    kinds = [name for name in known if _constant(REGISTRY[name])]
     slots, better = [], list(found.refused)
-    for k, slot in enumerate(found.slots):
-        if k < len(found.small.model.found):
-            kin = _fitted_kin(found, k, _kin(found.small.model.found[k], known))
-            slot = _extended(found, k, slot, kinds, beliefs) if kinds else slot
-            slot = _with_constants(found, k, slot, beliefs)
-            most = max(rival.nats for rival in slot)
-            clearly = [rival for rival in kin if rival.nats > most + beliefs.enter_nats]
-            better += [rival.fit.model.found[-1] for rival in clearly]
-            alike = [replace(r, nats=min(r.nats, most)) for r in kin if r not in clearly]
-            slot = weighed([*slot, *alike], beliefs.temperature) if alike else slot
-        slots.append(slot)
+    named = found.slots[: len(found.small.model.found)]
+    outside = _outside(found, exclude) if named else None
+    for k, slot in enumerate(named):
+        more, clearly = _also(found, k, slot, exclude, outside)
+        slots.append(weighed([*slot, *more], beliefs.temperature) if more else slot)
+        better += clearly
+    slots += found.slots[len(named) :]
     aliased = replace(found, slots=tuple(slots), refused=tuple(better))
     return _settable_first(aliased, frozenset(exclude))
+
+
+def _outside(found: Search, exclude: Sequence[str]) -> Workspace | None:
+    """Return the workspace with a library of what was taken out, or None where that is nothing."""
+    if not exclude:
+        return None
+    work = found.work
+    others = [name for name in REGISTRY if name not in exclude]
+    return replace(work, library=build(work.problem, found.small.model, work.scale, others))
+
+
+def _also(
+    found: Search,
+    k: int,
+    slot: tuple[Rival, ...],
+    exclude: Sequence[str],
+    outside: Workspace | None,
+) -> tuple[list[Rival], list[Effect]]:
+    """
+    Return what may be the same error as what is in a slot, each fitted in its place.
+
+    None of these counts for more than what was found. What was taken out and fits clearly better is
+    no member of the slot, but returned beside it.
+    """
+    work, beliefs, now = found.work, found.work.beliefs, found.small
+    features = work.problem.features(now.model)
+    taken = {Site(e.name, e.site) for e in now.model.found} | {r.site for r in slot}
+    constants = [
+        rival.site
+        for rival in slot
+        if rival.probability >= beliefs.listed and _constant(REGISTRY[rival.site.effect])
+    ]
+    seeds = [
+        *_same_anywhere(found, constants, exclude),
+        *_constants_here(found, features, constants),
+    ]
+    seeds = [seed for seed in seeds if Site(seed.name, seed.site) not in taken]
+    if not seeds and outside is None:
+        return [], []
+    rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
+    count, most = found.effective(now), max(rival.nats for rival in slot)
+    alike = [_in_place(found, features, rest, slot, seed, count) for seed in seeds]
+    if outside is not None:
+        _, tried = contenders(outside, rest, count, now.model.found, MOST_EXCLUDED)
+        alike += [
+            Rival(Site(*c.unit.site), nats_in_place(rest, own, count, c), own) for c, own in tried
+        ]
+    more, clearly = list[Rival](), list[Effect]()
+    for one in _best_of_each(alike):
+        if one.site.effect in exclude and one.nats > most + beliefs.enter_nats:
+            clearly.append(one.fit.model.found[-1])
+        elif not implausible(one.fit.model):
+            more.append(replace(one, nats=min(one.nats, most)))
+    return more, clearly
+
+
+def _in_place(
+    found: Search,
+    features: list[Features],
+    rest: Fit,
+    slot: tuple[Rival, ...],
+    seed: Effect,
+    count: float,
+) -> Rival:
+    """Return an effect fitted in the place of a slot."""
+    own = fitted_with(found.work, rest.model, seed)
+    unused = _unused(found, features, slot, seed) if hardly_moves(features, seed) else 0
+    return Rival(Site(seed.name, seed.site), nats_in_place(rest, own, count, unused=unused), own)
 
 
 def _settable_first(found: Search, exclude: frozenset[str]) -> Search:
@@ -134,102 +198,37 @@ def _led_by(slot: tuple[Rival, ...], site: Site, small: Fit) -> tuple[Rival, ...
     return tuple(replace(r, probability=r.probability / whole) for r in (first, *rest))
 
 
-def _kin(effect: Effect, excluded: Sequence[str]) -> list[type[Effect]]:
-    """Return the excluded kinds that differ from an effect of a joint by their curve alone."""
-    if effect.of != 'joint' or _constant(type(effect)):
-        return []
-    kinds = [REGISTRY[name] for name in excluded]
-    return [
-        kind
-        for kind in kinds
-        if kind is not type(effect)
-        and (kind.of, kind.place, kind.depends_on) == ('joint', effect.place, effect.depends_on)
-    ]
-
-
-def _fitted_kin(found: Search, k: int, kin: Sequence[type[Effect]]) -> list[Rival]:
-    """Return excluded kin of found effect k, each fitted in its place."""
-    if not kin:
-        return []
-    effect, work = found.small.model.found[k], found.work
-    rest = fit(work.problem, found.small.model.without(k), work.scale, None, 4)
-    count, features = found.effective(found.small), work.problem.features(rest.model)
-    maker = features[moved_most(features, effect.site)]
-    out = []
-    for kind in kin:
-        if kind.applicable(maker.view, effect.site) is not None:
-            continue
-        seeds = maker.seeds(kind, effect.site)[0][:MOST_SEEDS]
-        tried = [fitted_with(work, rest.model, seed) for seed in seeds]
-        if tried:
-            best = min(tried, key=lambda one: one.rss)
-            nats = nats_in_place(rest, best, count)
-            out.append(Rival(Site(kind.name, effect.site), nats, best))
-    return out
+def _causes(names: Sequence[str]) -> list[type[Effect]]:
+    """Return the kinds that are a cause."""
+    return [REGISTRY[name] for name in names if name in REGISTRY and REGISTRY[name].cause]
 
 
 def _constant(kind: type[Effect]) -> bool:
     return kind.cause and kind.depends_on == 'constant'
 
 
-def _extended(
-    found: Search, k: int, slot: tuple[Rival, ...], kinds: Sequence[str], beliefs: Beliefs
-) -> tuple[Rival, ...]:
-    """Return a slot with the excluded errors that its constants are on any motion."""
-    work = found.work
-    constants = [
-        _of(rival.site)
-        for rival in slot
-        if rival.probability >= beliefs.listed and _constant(REGISTRY[rival.site.effect])
-    ]
-    if not constants:
-        return slot
-    taken = {(e.name, e.site) for e in found.small.model.found}
-    rest = fit(work.problem, found.small.model.without(k), work.scale, None, 4)
-    count = found.effective(found.small)
-    more = []
-    for other in _candidates(found.baseline.model.robot, kinds, work.problem.align):
-        if (other.name, other.site) in taken:
-            continue
-        if any(same_error(found.baseline.model.robot, own, other) for own in constants):
-            tried = fitted_with(work, rest.model, other)
-            nats = nats_in_place(rest, tried, count)
-            more.append(Rival(Site(other.name, other.site), nats, tried))
-    return weighed([*slot, *more], beliefs.temperature) if more else slot
+def _same_anywhere(
+    found: Search, constants: Sequence[Site], exclude: Sequence[str]
+) -> Iterator[Effect]:
+    """Yield the excluded errors that some constants are on any motion."""
+    robot, align = found.baseline.model.robot, found.work.problem.align
+    kinds = [kind.name for kind in _causes(exclude) if _constant(kind)]
+    for other in _candidates(robot, kinds, align) if constants else ():
+        if any(same_error(robot, _of(own), other) for own in constants):
+            yield other
 
 
-def _with_constants(
-    found: Search, k: int, slot: tuple[Rival, ...], beliefs: Beliefs
-) -> tuple[Rival, ...]:
-    """Return a slot with what is a constant of a joint on these motions, as its constants are."""
-    joints = [
-        rival.site.joint
-        for rival in slot
-        if rival.probability >= beliefs.listed and _constant(REGISTRY[rival.site.effect])
-    ]
-    work, listed = found.work, {rival.site for rival in slot}
-    features = work.problem.features(found.small.model)
-    seeds = [
-        seed
-        for joint in _with_next(found.baseline.model.robot, joints)
-        for kind in REGISTRY.values()
-        for view in (features[moved_most(features, joint)].view,)
-        if kind.cause and kind.of == 'joint' and kind.applicable(view, joint) is None
-        for seed in (*kind.constants(view, joint), *_at_rest(features, kind, joint))
-        if Site(kind.name, joint) not in listed
-    ]
-    if not seeds:
-        return slot
-    rest = fit(work.problem, found.small.model.without(k), work.scale, None, 4)
-    count, most = found.effective(found.small), max(rival.nats for rival in slot)
-    tried = [(seed, fitted_with(work, rest.model, seed)) for seed in seeds]
-    more = []
-    for seed, own in tried:
-        if not implausible(own.model):
-            unused = _unused(found, features, slot, seed) if hardly_moves(features, seed) else 0
-            nats = nats_in_place(rest, own, count, unused=unused)
-            more.append(Rival(Site(seed.name, seed.site), min(nats, most), own))
-    return weighed([*slot, *_best_of_each(more)], beliefs.temperature)
+def _constants_here(
+    found: Search, features: list[Features], constants: Sequence[Site]
+) -> Iterator[Effect]:
+    """Yield what is a constant of a joint on these motions, at the joints of some constants."""
+    joints = [site.joint for site in constants]
+    for joint in _with_next(found.baseline.model.robot, joints):
+        view = features[moved_most(features, joint)].view
+        for kind in REGISTRY.values():
+            if kind.cause and kind.of == 'joint' and kind.applicable(view, joint) is None:
+                yield from kind.constants(view, joint)
+                yield from _at_rest(features, kind, joint)
 
 
 def _unused(found: Search, features: list[Features], slot: Sequence[Rival], seed: Effect) -> int:
@@ -271,7 +270,7 @@ def _with_next(robot: Robot, joints: Sequence[str | None]) -> list[str]:
     return [robot.joint_names[k] for k in dict.fromkeys(both)]
 
 
-def _best_of_each(more: Sequence[Rival]) -> list[Rival]:
+def _best_of_each(more: Iterable[Rival]) -> list[Rival]:
     """Return the best rival of every site."""
     out: dict[Site, Rival] = {}
     for rival in sorted(more, key=lambda one: one.nats):
@@ -353,12 +352,10 @@ def always(robot: Robot, one: Effect, other: Effect, align: frozenset[str]) -> b
     a, b = _columns(robot, one), _columns(robot, other)
     frames = [_frame_columns(robot, name) for name in sorted(align)]
     if frames:
-        span = np.linalg.qr(np.concatenate(frames).T)[0]
-        whole = [np.linalg.norm(rows, axis=1) for rows in (a, b)]
-        a, b = (rows - (rows @ span) @ span.T for rows in (a, b))
-        pairs = zip((a, b), whole, strict=True)
-        if any((np.linalg.norm(rows, axis=1) < SAME * size).any() for rows, size in pairs):
+        span = span_of(np.concatenate(frames))
+        if min(share_outside(rows, span).min() for rows in (a, b)) < SAME:
             return False  # A frame is what they are.
+        a, b = (outside(rows, span) for rows in (a, b))
     return _inside(a, b) and _inside(b, a)
 
 
@@ -390,8 +387,4 @@ def _levered(columns: Array) -> Array:
 
 def _inside(rows: Array, span: Array, share: float = SAME) -> bool:
     """Return whether every row lies in the span of others, but for a share of it."""
-    size = np.linalg.norm(rows, axis=1)
-    if not (size > 0.0).all():
-        return False
-    left = rows.T - span.T @ np.linalg.lstsq(span.T, rows.T, rcond=None)[0]
-    return bool((np.linalg.norm(left, axis=0) < share * size).all())
+    return bool(rows.any(axis=1).all() and (share_outside(rows, span_of(span)) < share).all())

@@ -22,6 +22,7 @@ from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..posterior.table import Row
 from ..result import Cause, Shares, Site
+from ..unseen.folds import jackknife
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
@@ -91,8 +92,8 @@ def causes(
     curved = rival if rival is not None and rival.unseen is unseen else None
     claims, rest = _nameless(found, told, verdict, curved, placing, beliefs)
     squares = (
-        unseen.squares(unseen.predict([])),
-        unseen.squares(unseen.predict(range(len(unseen.parts)))),
+        unseen.squares(unseen.bare),
+        unseen.squares(unseen.whole),
     )
     parts = _contributions(unseen)
     labels = unseen.trusted_labels()
@@ -360,5 +361,4 @@ def _spread(
     if names.size < 3 or not claims:
         return np.full(len(claims), 0.5)
     tries = np.array([_shares(squares, parts, claims, labels != n) for n in names])
-    count = names.size
-    return np.asarray(np.sqrt((count - 1) / count * ((tries - tries.mean(axis=0)) ** 2).sum(0)))
+    return np.asarray(np.sqrt(jackknife(tries)))

@@ -35,8 +35,8 @@ def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | No
     others = tuple(k for k in range(len(fields)) if k not in named)
     groups = [cause.members for cause in causes] + [others] * bool(others)
     parts = np.array([fields[list(group)].sum(axis=0) for group in groups])
-    left = unseen.predict(range(len(fields)))
-    rest = unseen.predict([]) - left - parts.sum(axis=0)
+    left = unseen.whole
+    rest = unseen.bare - left - parts.sum(axis=0)
     sizes = (parts**2).mean(axis=1)
     parts += rest * (sizes / max(float(sizes.sum()), 1e-300))[:, None]
     split = [_metres(unseen, part) for part in (left, *parts)]

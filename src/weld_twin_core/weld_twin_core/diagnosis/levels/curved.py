@@ -15,8 +15,9 @@ from ..algebra.fit import fit, robust_fit, robust_scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Shrink, Site
+from ..unseen.folds import gain
 from ..unseen.held_out_shrink import held_out_shrink
-from ..unseen.unseen_stretches import Unseen, steadiness
+from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .free_form import FreeForm, free_form
 
@@ -49,7 +50,7 @@ class Curved:
     @property
     def rms_m(self) -> float:
         """Return what it leaves on unseen stretches, RMS [m]."""
-        return self.unseen.rms(self.unseen.predict(range(len(self.unseen.parts))))
+        return self.unseen.rms(self.unseen.whole)
 
 
 def curved(found: Search, beliefs: Beliefs) -> Curved | None:
@@ -136,14 +137,9 @@ def gain_of(named: Unseen, rival: Unseen) -> tuple[float, float]:
         The model held against the rival, and the rival, both whole.
 
     """
-    before = named.squares(named.predict(range(len(named.parts))))
-    after = rival.squares(rival.predict(range(len(rival.parts))))
-    gain = 1.0 - float(after.mean() / max(float(before.mean()), 1e-300))
-    labels, others = named.trusted_labels(), rival.trusted_labels()
-    names = np.intersect1d(labels, others)
-    one = np.array([before[labels == n].mean() for n in names])
-    two = np.array([after[others == n].mean() for n in names])
-    return gain, steadiness(one, two)
+    before, after = named.squares(named.whole), rival.squares(rival.whole)
+    told = gain(before, after, named.trusted_labels(), rival.trusted_labels())
+    return told.share, told.steady
 
 
 def carried(
@@ -191,7 +187,7 @@ def _worth(named: Unseen, rival: Curved, verdict: Verdict, beliefs: Beliefs) -> 
     Curves that hardly help beside names would put places under suspicion for nothing.
     """
     if verdict.sets:
-        gain, steady = gain_of(named, rival.unseen)
-        return gain >= beliefs.beaten_share and steady >= beliefs.beaten_steady
-    left = named.rms(named.predict(range(len(named.parts))))
+        share, steady = gain_of(named, rival.unseen)
+        return share >= beliefs.beaten_share and steady >= beliefs.beaten_steady
+    left = named.rms(named.whole)
     return rival.rms_m <= beliefs.curve_room * left

@@ -11,7 +11,7 @@ the name misses.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -25,8 +25,8 @@ from ...twin.resampling import Picker
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..unseen.regions import posture_regions
-from ..unseen.unseen_stretches import Taken, Unseen
+from ..unseen.folds import least_gain
+from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
 from .groups import LEAST, smooth_field, spanned
@@ -186,14 +186,13 @@ def beside_names(found: Search, unseen: Unseen) -> list[Beside]:
         return []
     features = problem.features(model)
     sizes = [unseen.rms(part) for part in unseen.targets[1:]]
-    whole = range(len(unseen.parts))
-    bases = [u.base(whole) for u in (unseen, unseen.by(posture_regions(problem)))]
+    bases = unseen.bases()
     out = []
     for at, on, columns in _forms(problem, unseen.scale, features, {e.at for e in model.found}):
         own = [s for e, s in zip(model.found, sizes, strict=True) if at in (e.at, 'instrument')]
-        told = worse_of([base.taken(columns) for base in bases])
+        told = least_gain([base.gain(columns) for base in bases])
         share = float(np.sqrt(max(told.fall, 0.0))) / max([*own, 1e-12])
-        out.append(Beside(at, on, told.gain, told.steady, share))
+        out.append(Beside(at, on, told.share, told.steady, share))
     return out
 
 
@@ -241,9 +240,3 @@ def _lost(problem: Problem, k: int, maker: Features, features: list[Features], i
         *(rest, np.abs(rest), speed, way * QUANTITIES['load'](view, i)),
     ]
     return np.asarray(problem.seen(k, maker.column(('q', i))) * np.array(shapes)[:, None, :])
-
-
-def worse_of(ways: Sequence[Taken]) -> Taken:
-    """Return the least that columns take off over the ways of leaving out, and the most left."""
-    gains, steadies, falls, left = zip(*ways, strict=True)
-    return Taken(min(gains), min(steadies), min(falls), max(left))

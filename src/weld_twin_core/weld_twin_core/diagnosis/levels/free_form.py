@@ -13,7 +13,7 @@ from ...effects.effect import Effect
 from ..algebra.fit import Fit, design
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
-from ..unseen.regions import posture_regions
+from ..unseen.folds import ways_to_divide
 from .groups import Group, all_groups, wandering_groups
 from .sparse_groups import choosing, chosen, rival_weights, worth
 from .whole_arm import whole_arm_groups
@@ -135,7 +135,7 @@ def free_form(
     groups = all_groups(problem, bare.model, scale)
     if whole_arm:
         groups += whole_arm_groups(problem, bare.model, scale)
-    ways = [problem.block_labels(STRETCHES), posture_regions(problem)]
+    ways = ways_to_divide(problem, STRETCHES)
     if wandering:
         groups += wandering_groups(problem, bare.model, scale)
         ways = [problem.block_labels(SHORT) % STRETCHES]

@@ -21,11 +21,11 @@ from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Site
-from ..unseen.regions import posture_regions
+from ..unseen.folds import least_gain
 from ..unseen.unseen_stretches import Base, Unseen
 from ..verdict.decision import Verdict
 from .curved import ROWS, Curved
-from .formulas import Missed, worse_of
+from .formulas import Missed
 from .free_form import FreeForm, Part, free_form
 from .groups import Group, all_groups, smooth_field, spanned
 from .scatter import Scatter
@@ -209,12 +209,10 @@ def _field(problem: Problem, bare: Fit, scale: Scale) -> Group:
 
 
 def _bases(problem: Problem, bare: Fit, scale: Scale) -> list[Base]:
-    unseen = Unseen.of(problem, scale, bare, np.zeros(bare.coordinates.size))
-    whole = range(len(unseen.parts))
-    return [one.base(whole) for one in (unseen, unseen.by(posture_regions(problem)))]
+    return Unseen.of(problem, scale, bare, np.zeros(bare.coordinates.size)).bases()
 
 
 def _gain(bases: Sequence[Base], groups: Sequence[Group]) -> float:
     """Return the share of the squared unseen error that groups take off together."""
     columns = np.concatenate([group.columns for group in groups])
-    return worse_of([base.taken(columns) for base in bases]).gain
+    return least_gain([base.gain(columns) for base in bases]).share

@@ -32,10 +32,9 @@ from ...effects.curve import QUANTITIES
 from ...twin.features import Features
 from ..algebra.independent_rows import measured_axes
 from ..hypotheses.search import Search
+from ..unseen.folds import STRETCHES, jackknife
 from ..unseen.unseen_stretches import Unseen
 
-STRETCHES = 8
-"""Stretches of time left out in turn for the standard errors."""
 LEAST = 80
 """Measurements of a recording from which on variances are told: ten for each stretch."""
 GROSS = 6.0
@@ -184,5 +183,4 @@ def _errors(normal: Array, right: Array) -> Array:
     tries = np.array(
         [_shared_out(whole - a, pulls - b) for a, b in zip(normal, right, strict=True)]
     )
-    spread = ((tries - tries.mean(axis=0)) ** 2).sum(axis=0)
-    return np.asarray(np.sqrt((len(tries) - 1) / len(tries) * spread))
+    return np.asarray(np.sqrt(jackknife(tries)))

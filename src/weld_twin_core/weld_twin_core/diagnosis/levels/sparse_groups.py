@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
-from ..algebra.gram import Index
+from ..algebra.unit_scale import Index
 from ..beliefs import Beliefs
-from ..unseen.unseen_stretches import steadiness
+from ..unseen.folds import steadiness
 from .groups import Group
 
 RIDGES = (1e-1, 1e1, 1e3)

@@ -19,13 +19,13 @@ from ...arm.robot import Robot
 from ...effects.effect import Effect, Stage
 from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
+from ..algebra.alias import outside, span_of
 from ..algebra.fit import design
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..unseen.regions import posture_regions
 from ..unseen.unseen_stretches import Unseen
-from .shrinkage import believed, groups, learned_precision, projected
+from .shrinkage import believed, groups, learned_precision
 from .small_errors import many_small
 
 BEAR = (10, 30, 100)
@@ -172,7 +172,7 @@ def _many(found: Search, best: Search, beliefs: Beliefs) -> bool:
 def _members(found: Search, beliefs: Beliefs) -> int:
     """Return how many effects move the tool by much of what all of them leave."""
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    least = beliefs.member * unseen.rms(unseen.base(range(len(unseen.parts))).residual)
+    least = beliefs.member * unseen.rms(unseen.whole)
     sizes = np.array([unseen.rms(part) for part in unseen.targets[1:]])
     return int((sizes > least).sum())
 
@@ -248,13 +248,7 @@ def _one_number(kind: type[Effect]) -> bool:
 def unseen_rms(found: Search) -> float:
     """Return the RMS [m] on stretches and on regions of posture left out, both together."""
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    everything = range(len(unseen.parts))
-    parts = [unseen]
-    # Regions would have places of contacts on both sides.
-    if not found.problem.untracked or found.problem.places < PLACES:
-        parts.append(unseen.by(posture_regions(found.problem)))
-    squares = [each.rms(each.base(everything).residual) ** 2 for each in parts]
-    return float(np.sqrt(np.mean(squares)))
+    return float(np.sqrt(np.mean([each.rms(each.whole) ** 2 for each in unseen.every_way()])))
 
 
 def members_beside(few: Search, many: Search, beliefs: Beliefs) -> int:
@@ -274,23 +268,23 @@ def members_beside(few: Search, many: Search, beliefs: Beliefs) -> int:
     others = tuple(effect for effect in many.final.model.found if effect.key not in have)
     if not others:
         return 0
-    own, _ = design(problem, model, scale)
+    span = span_of(design(problem, model, scale)[0])
     features = problem.features(model)
     each = [
-        problem.whitened(problem.effect_columns(features, effect, atoms=False), scale)
+        outside(
+            problem.whitened(problem.effect_columns(features, effect, atoms=False), scale), span
+        )
         for effect in others
     ]
-    columns = np.concatenate([own, *each])
-    residual = problem.whitened(problem.residuals(model), scale)
-    normal, right, rss = projected(
-        columns @ columns.T, columns @ residual, float(residual @ residual), len(own)
-    )
+    columns = np.concatenate(each)
+    residual = outside(problem.whitened(problem.residuals(model), scale), span)
+    normal, right = columns @ columns.T, columns @ residual
+    rss = float(residual @ residual)
     labels, scales = groups(others, beliefs)
     held = believed(model.with_found(others))
     ridge, _ = learned_precision(normal, right, rss, residual.size, labels, scales, held)
     mean = np.linalg.lstsq(normal + np.diag(ridge), right, rcond=1e-12)[0]
-    basis = np.linalg.lstsq(own.T, columns[len(own) :].T, rcond=1e-12)[0]
-    parts = mean[:, None] * (columns[len(own) :] - basis.T @ own)
-    least = beliefs.member * unseen.rms(unseen.base(range(len(unseen.parts))).residual)
+    parts = mean[:, None] * columns
+    least = beliefs.member * unseen.rms(unseen.whole)
     ends = np.cumsum([len(part) for part in each])[:-1]
     return sum(unseen.rms(part.sum(axis=0)) > least for part in np.split(parts, ends))

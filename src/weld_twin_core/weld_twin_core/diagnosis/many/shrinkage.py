@@ -218,7 +218,7 @@ def _learned(
     x = coordinates(model)
     target = _target(normal, right, float(residual @ residual), x)
     precision, freedom = learned_precision(
-        *projected(*target, frames),
+        *_projected(*target, frames),
         residual.size,
         labels,
         scales,
@@ -259,19 +259,8 @@ def _target(normal: Array, right: Array, rss: float, x: Array) -> tuple[Array, A
     return normal, right + shift, rss + float(2.0 * now @ right + now @ shift)
 
 
-def projected(normal: Array, right: Array, rss: float, frames: int) -> tuple[Array, Array, float]:
-    """
-    Return the normal equations with the leading columns projected out.
-
-    Parameters
-    ----------
-    normal : array, shape (P, P)
-    right : array, shape (P,)
-    rss : float
-    frames : int
-        How many lead.
-
-    """
+def _projected(normal: Array, right: Array, rss: float, frames: int) -> tuple[Array, Array, float]:
+    """Return the normal equations with the leading columns, so many, projected out."""
     if not frames:
         return normal, right, rss
     cross = normal[:frames, frames:]

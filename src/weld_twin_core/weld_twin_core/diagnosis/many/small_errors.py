@@ -20,20 +20,18 @@ from ...arrays import Array
 from ...effects import REGISTRY
 from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features, joints_of
+from ..algebra.alias import outside, share_outside, span_of
 from ..algebra.fit import Fit, robust_scale
-from ..algebra.gram import Gram
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.library import candidate_kinds
-from ..hypotheses.still_joints import hardly_moves, moved_most
+from ..hypotheses.still_joints import hardly_moves, moved_most, orders_told
 from .shrinkage import shrunk_fit, shrunk_step
 from .wave_lines import with_lines
 
 SEEN = 0.05
 """Part of an error's effect on the tool that fitted frames must leave of it: formulas are a few
 per cent off real arms, so that less than this says nothing of the error."""
-ALIKE = 1e-9
-"""Strength of a direction of the frames, as a share of the strongest, below which it is rounding."""
 
 
 def many_small(
@@ -94,6 +92,7 @@ def _everything(
     # All joints' pairs of coordinates together stay below half the rows.
     most = problem.size // (4 * model.robot.n)
     out: list[Effect] = []
+    small: Sequence[Effect]
     for kind in candidate_kinds(exclude, problem.align):
         if kind.stage in (Stage.SERVO, Stage.CLOCK) or not kind.common:
             out += [e for e in model.found if e.name == kind.name]
@@ -102,10 +101,13 @@ def _everything(
             view = features[moved_most(features, joint)].view
             if kind.applicable(view, joint) is not None:
                 continue
-            if kind.waves is not None and orders is not None:
-                small: Sequence[Effect] = kind.small(view, joint, orders)
+            if kind.waves is None:
+                small = _as_found(kind.small(view, joint, most), have)
+            elif orders is not None or _travel(view, joint) >= beliefs.wave_range:
+                told = orders_told(features, str(joint))
+                small = kind.small(view, joint, min(orders or most, told))
             else:
-                small = _small(kind, view, joint, most, beliefs, have)
+                small = []
             out += [effect for effect in small if not hardly_moves(features, effect)]
     out += _bends(features, exclude, {effect.site for effect in out if effect.orders().size})
     out = _apart_from_frames(problem, features, out)
@@ -124,15 +126,10 @@ def _apart_from_frames(
     """
     scale = problem.unit_scale()
     frames = problem.whitened(problem.frame_columns(features)[0], scale)
-    if not frames.size:
-        return effects
-    _, strength, span = np.linalg.svd(frames, full_matrices=False)
-    span = span[strength > ALIKE * strength[0]]
-    out = []
+    out, span = [], span_of(frames)
     for effect in effects:
         own = problem.whitened(problem.effect_columns(features, effect, atoms=False), scale)
-        left = np.linalg.norm(own - (own @ span.T) @ span, axis=1)
-        if (left > SEEN * np.linalg.norm(own, axis=1)).any():
+        if (share_outside(own, span) > SEEN).any():
             out.append(effect)
     return out
 
@@ -151,20 +148,14 @@ def _bends(
     return [effect for effect in out if effect is not None]
 
 
-def _small(
-    kind: type[Effect],
-    view: View,
-    joint: str | None,
-    most: int,
-    beliefs: Beliefs,
-    have: Mapping[tuple[str, ...], Effect],
-) -> list[Effect]:
-    """Return the instances of one kind on one joint, as found where the search has found them."""
-    if kind.waves is not None:
-        travel = float(np.ptp(view.joint(view.robot.index(str(joint)))))
-        return kind.small(view, joint, most) if travel >= beliefs.wave_range else []
-    each = {seed.key: seed for seed in reversed(kind.small(view, joint, most))}
+def _as_found(small: Sequence[Effect], have: Mapping[tuple[str, ...], Effect]) -> Sequence[Effect]:
+    """Return instances, each as the search has found it where it has."""
+    each = {seed.key: seed for seed in reversed(small)}
     return [have.get(key, seed) for key, seed in reversed(each.items())]
+
+
+def _travel(view: View, joint: str | None) -> float:
+    return float(np.ptp(view.joint(view.robot.index(str(joint)))))
 
 
 def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -> Model:
@@ -187,17 +178,16 @@ def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
     """
     for kind in [kind for kind in REGISTRY.values() if kind.of_setup and not kind.dated]:
         features = problem.features(model)
-        residual = problem.whitened(problem.residuals(model), scale)
-        frames = problem.whitened(problem.frame_columns(features)[0], scale)
+        span = span_of(problem.whitened(problem.frame_columns(features)[0], scale))
+        residual = outside(problem.whitened(problem.residuals(model), scale), span)
         best: tuple[float, Effect] | None = None
         for seed in features[moved_most(features, None)].seeds(kind, None)[0]:
             own = problem.whitened(problem.effect_columns(features, seed), scale)
-            gram = Gram.of(np.concatenate([frames, own]), residual)
-            index = np.arange(frames.shape[0], frames.shape[0] + own.shape[0])
-            gram = gram.without(np.arange(frames.shape[0]))
-            chi = gram.gain(index)
+            own = outside(own, span)
+            size = np.linalg.lstsq(own.T, residual, rcond=None)[0]
+            chi = float(residual @ (size @ own))
             if best is None or chi > best[0]:
-                best = (chi, seed.from_atoms(gram.solve(index)))
+                best = (chi, seed.from_atoms(size))
         if best is not None and best[0] > beliefs.setup_chi2:
             model = model.with_found((*model.found, best[1]))
     return model

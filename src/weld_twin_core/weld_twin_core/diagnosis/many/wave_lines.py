@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...effects.hooks import highest_order
 from ...twin.features import Features
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
+from ..hypotheses.still_joints import orders_told
 
 LINES = 40
 """Lines at the most; the weakest of so many is far below what decides anything."""
@@ -37,8 +37,6 @@ class Waves:
     normal : array, shape (O, 2, 2)
     apart : float
         Half the resolution in orders that the range of motion allows.
-    positions : array, shape (N,)
-        Of the joint, all recordings together.
 
     """
 
@@ -48,7 +46,6 @@ class Waves:
     waves: list[np.ndarray]
     normal: Array
     apart: float
-    positions: Array
 
     @classmethod
     def of(
@@ -102,8 +99,7 @@ class Waves:
             waves.append(np.concatenate([sine, cosine]).astype(np.float32))
         normal += 1e-9 * np.eye(2) * np.trace(normal[0])
         apart = float(np.ceil(np.pi / (high - low)))
-        positions = np.concatenate([maker.view.q[:, joint] for maker in features])
-        return cls(joint, columns, masses, waves, normal, apart, positions)
+        return cls(joint, columns, masses, waves, normal, apart)
 
     def peak(
         self, residual: list[Array], free: NDArray[np.bool_]
@@ -153,7 +149,7 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
         for i in range(model.robot.n)
     ]
     waves = {w.joint: w for w in each if w is not None}
-    free = {i: _free(model, w, orders) for i, w in waves.items()}
+    free = {i: _free(model, features, w, orders) for i, w in waves.items()}
     found = list(model.found)
     for _ in range(LINES if waves else 0):
         chi, i, k, step = max(
@@ -170,11 +166,14 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
     return model.with_found(tuple(found))
 
 
-def _free(model: Model, waves: Waves, orders: Array) -> NDArray[np.bool_]:
+def _free(
+    model: Model, features: list[Features], waves: Waves, orders: Array
+) -> NDArray[np.bool_]:
     """Return which orders no wave of the joint is too close to, shape (O,)."""
-    free: NDArray[np.bool_] = orders < highest_order(waves.positions)
+    joint = model.robot.joint_names[waves.joint]
+    free: NDArray[np.bool_] = orders <= orders_told(features, joint)
     for effect in model.found:
-        if effect.site == model.robot.joint_names[waves.joint]:
+        if effect.site == joint:
             for order in effect.orders():
                 free &= np.abs(orders - order) >= waves.apart
     return free

@@ -19,12 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ..algebra.problem import PLACES
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Site
-from ..unseen.regions import posture_regions
-from ..unseen.unseen_stretches import BLOCKS, Unseen
+from ..unseen.folds import STRETCHES
+from ..unseen.unseen_stretches import Unseen
 from .shrinkage import believed
 
 TINY = 1e-9
@@ -147,11 +146,7 @@ class _Case:
         model = found.final.model
         usual = believed(model)
         usual = np.where(usual > 0.0, usual, found.precision)
-        free = unseen.held(usual, found.final.coordinates)
-        views = [free]
-        # Regions would have places of contacts on both sides.
-        if not found.problem.untracked or found.problem.places < PLACES:
-            views.append(free.by(posture_regions(found.problem)))
+        views = unseen.held(usual, found.final.coordinates).every_way()
         parts, first = [], 0
         for view in views:
             parts.append(first + _neighbours(view))
@@ -196,7 +191,7 @@ class _Case:
 def _neighbours(view: Unseen) -> NDArray[np.intp]:
     """Return the part of every sample; of eight, two neighbours together tell more steadily."""
     names, parts = np.unique(view.trusted_labels(), return_inverse=True)
-    return np.asarray(parts // 2 if names.size >= BLOCKS else parts, dtype=np.intp)
+    return np.asarray(parts // 2 if names.size >= STRETCHES else parts, dtype=np.intp)
 
 
 def _chosen(case: _Case, members: Members, worth: float) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ from ..algebra.model import Alone
 from ..algebra.prior import effect_precision, frame_offset
 from ..algebra.problem import Model, Problem, Scale
 from ..result import Shrink
-from ..unseen.regions import posture_regions
+from ..unseen.folds import posture_regions
 
 ROWS = 900
 """Rows that the constants are fitted on: three hundred positions show frames and some zeros well, and

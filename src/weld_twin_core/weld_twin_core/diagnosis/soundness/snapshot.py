@@ -13,17 +13,14 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
+from ...effects.joint_offset import JointOffset
+from ...effects.link_length import LinkLength
+from ...effects.link_offset import LinkOffset
+from ...effects.link_twist import LinkTwist
 from ...recording import JointMotion, Recording
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale
-from ..frames.alignment import (
-    attempted,
-    initial_frames,
-    refined,
-    rough_frames,
-    rough_together,
-)
-from ..frames.in_turn import Track
+from ..frames.alignment import initial_frames, refined, rough_frames, tracks
 from .limits import (
     BEYOND,
     LARGE,
@@ -37,13 +34,14 @@ from .limits import (
     UNLIKE,
 )
 from .mending import Given, Mend, measured
-from .postures import KINDS, Postures
 
 __all__ = ['FRAMES', 'Arm', 'Snapshot', 'gap', 'measured', 'snapshot']
 
 SAMPLES = 60
 """Samples of a snapshot in all: enough for every error of an arm, few enough for fits at once."""
 FRAMES = frozenset({'base', 'tool'})
+KINDS = (JointOffset, LinkLength, LinkOffset, LinkTwist)
+"""Errors that a plausible arm has on every joint."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,14 +89,10 @@ class Snapshot:
 
         Whatever is shrunk to a point leaves no gap: that explains nothing.
         """
-        if self.postures is None:
-            twins = [
-                self.model.twin(k).poses(recording, measured(recording).t).position
-                for k, recording in enumerate(self.recordings)
-            ]
-        else:
-            reached = self.postures.at(self.model).reached.T
-            twins = [reached[part] for part in self.postures.parts]
+        twins = [
+            self.model.twin(k).poses(recording, measured(recording).t).position
+            for k, recording in enumerate(self.recordings)
+        ]
         return max(1.0, _spread(twins) / (UNLIKE * max(self.spread, 1e-12)))
 
     def shrunk(self, before: Snapshot) -> float:
@@ -117,14 +111,9 @@ class Snapshot:
         low, high = self.robot.lower - BEYOND, self.robot.upper + BEYOND
         return bool(((reads >= low) & (reads <= high)).all())
 
-    @cached_property
-    def postures(self) -> Postures | None:
-        """Return the stations for fits of all errors of an arm at once, where they can be so."""
-        return Postures.of(self.recordings, self.model)
-
     def gap(self, model: Model) -> float:
         """Return the median gap [m] that a model leaves."""
-        return gap(self.problem, model) if self.postures is None else self.postures.at(model).gap
+        return gap(self.problem, model)
 
     def rough(self, *, thorough: bool = False) -> Model:
         """Return the model after a quick fit of both frames; thorough: from many starts."""
@@ -136,24 +125,14 @@ class Snapshot:
 
     def refined(self, align: frozenset[str], start: Model) -> Model:
         """Return the model after a robust fit of some frames."""
-        problem = replace(self.problem, align=align)
-        if self.postures is None:
-            return refined(problem, start)
-        model = start.with_found(())
-        for _ in range(3):
-            scale = robust_scale(problem, self.postures.at(model).residuals)
-            model = self.postures.fitted(model, align, scale)
-        return model.with_found(start.found)
+        return refined(replace(self.problem, align=align), start)
 
     def aligned(self, align: frozenset[str]) -> Model:
         """Return the model with only these frames fitted."""
         if not align:
             return self.model
-        if self.postures is None:
-            problem = replace(self.problem, align=align)
-            return refined(problem, initial_frames(problem, self.model))
-        near = attempted(self.postures.tracks, self.model, align)
-        return self.refined(align, self.model if near is None else self.refined(align, near))
+        problem = replace(self.problem, align=align)
+        return refined(problem, initial_frames(problem, self.model))
 
     def gap_with(self, align: frozenset[str]) -> float:
         """Return the median gap [m] with only these frames fitted."""
@@ -180,12 +159,8 @@ class Snapshot:
 
     def _bent(self, trial: Model, precision: Array) -> Model:
         """Return the model after a robust fit of both frames and the errors that it has."""
-        if self.postures is None:
-            problem = self.problem
-            scale = robust_scale(problem, problem.residuals(trial), self.soft)
-            return fit(problem, trial, scale, precision, iterations=6).model
-        scale = robust_scale(self.problem, self.postures.at(trial).residuals, self.soft)
-        return self.postures.fitted(trial, FRAMES, scale, precision, iterations=6)
+        scale = robust_scale(self.problem, self.problem.residuals(trial), self.soft)
+        return fit(self.problem, trial, scale, precision, iterations=6).model
 
     @property
     def soft(self) -> Scale:
@@ -264,18 +239,12 @@ def rough_models(shots: Sequence[Snapshot], *, thorough: bool = False) -> list[M
         Whether the fit starts from many tools.
 
     """
-    shapes: dict[tuple[object, ...], list[tuple[Snapshot, list[Track]]]] = {}
+    shapes: dict[tuple[object, ...], list[Snapshot]] = {}
     for shot in shots:
-        own = shot.postures
-        if own is None:
-            model = rough_frames(shot.problem, shot.model, thorough=thorough)
-            shot._roughly[thorough] = model
-        else:
-            key = (shot.turned, *(part.stop for part in own.parts))
-            shapes.setdefault(key, []).append((shot, own.tracks))
+        shapes.setdefault((shot.turned, *shot.problem.samples), []).append(shot)
     for alike in shapes.values():
-        trials = [(tracks, shot.model) for shot, tracks in alike]
-        for (shot, _), model in zip(alike, rough_together(trials, thorough=thorough), strict=True):
+        trials = [(tracks(shot.problem, shot.model), shot.model) for shot in alike]
+        for shot, model in zip(alike, rough_frames(trials, thorough=thorough), strict=True):
             # Where orientations were measured there is one start.
             shot._roughly.update(dict.fromkeys((thorough, thorough or shot.turned), model))
     return [shot._roughly[thorough] for shot in shots]

@@ -19,7 +19,7 @@ from ..beliefs import Beliefs
 from ..frames.places import posed
 from ..hypotheses.search import Search
 from ..result import Shrink
-from .regions import posture_regions
+from .folds import jackknife, posture_regions
 from .unseen_stretches import Unseen
 
 LARGE = 300
@@ -54,7 +54,7 @@ def held_out_shrink(
     """
     model = found.final.model
     steps, alone = _waterfall(unseen, model)
-    first, last = unseen.predict([]), unseen.predict(range(len(model.found)))
+    first, last = unseen.bare, unseen.whole
     before, after = unseen.squares(first), unseen.squares(last)
     turned = (unseen.turn_rms(first), unseen.turn_rms(last))
     labels, source, elsewhere = unseen.trusted_labels(), 'blocked cross-validation', None
@@ -119,7 +119,7 @@ def reached_by_chance(
     if not holdout:
         return 1.0
     _, there, labels = _on_bags(found, holdout, beliefs.other_setup)
-    here = unseen.squares(unseen.predict(range(len(unseen.parts))))
+    here = unseen.squares(unseen.whole)
     pairs = ((there, labels), (here, unseen.trusted_labels()))
     return float(np.exp(STUDENT * np.sqrt(sum(map(_log_variance, *zip(*pairs, strict=True))))))
 
@@ -131,7 +131,7 @@ def _log_variance(squares: Array, labels: Array) -> float:
         # Of so many Gaussian readings in three coordinates each.
         return 1.0 / (6.0 * squares.size)
     logs = [0.5 * np.log(max(float(squares[labels != n].mean()), 1e-300)) for n in names]
-    return float((names.size - 1) * np.var(logs))
+    return float(jackknife(np.array(logs)))
 
 
 def _of_others(ratio: float, interval: tuple[float, float]) -> tuple[float, float]:
@@ -157,8 +157,7 @@ class Judged(NamedTuple):
 def by_posture(whole: Unseen) -> Judged:
     """Return the gap before and after on regions of posture that take their turn."""
     unseen = whole.by(posture_regions(whole.problem))
-    before = unseen.squares(unseen.predict([]))
-    after = unseen.squares(unseen.predict(range(len(unseen.parts))))
+    before, after = unseen.squares(unseen.bare), unseen.squares(unseen.whole)
     ratio, interval = ratio_interval(before, after, unseen.trusted_labels())
     return Judged((float(np.sqrt(before.mean())), float(np.sqrt(after.mean()))), ratio, interval)
 
@@ -301,8 +300,7 @@ def ratio_interval(
         keep = labels != name
         pair = (max(after[keep].mean(), 1e-300), max(before[keep].mean(), 1e-300))
         logs.append(0.5 * np.log(pair[0] / pair[1]))
-    k = names.size
-    variance = float((k - 1) / k * ((np.array(logs) - np.mean(logs)) ** 2).sum())
+    variance = float(jackknife(np.array(logs)))
     if elsewhere is not None:
         apart = np.log(max(elsewhere, 1e-300) / max(ratio, 1e-300))
         variance += min(abs(float(apart)), farthest) ** 2

@@ -68,14 +68,14 @@ def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
     """
     base = unseen.base(range(len(model.found)))
     found = [
-        (base.taken(columns), name)
+        (base.gain(columns), name)
         for name, columns in _generic(unseen.problem, model, unseen.scale)
     ]
-    found.sort(key=lambda item: -item[0].gain)
+    found.sort(key=lambda item: -item[0].share)
     best = found[0][0]
     least, certain = beliefs.dependence_gain, beliefs.dependence_sure
-    names = tuple(n for one, n in found[:TOLD] if one.gain > least and one.steady > certain)
-    return Structure(best.rms_m, best.gain, best.steady, names)
+    names = tuple(n for one, n in found[:TOLD] if one.share > least and one.steady > certain)
+    return Structure(best.rms_m, best.share, best.steady, names)
 
 
 def _generic(problem: Problem, model: Model, scale: Scale) -> Iterator[tuple[str, Array]]:

@@ -18,23 +18,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from itertools import pairwise
-from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
-from ..algebra.atoms import Rows
+from ..algebra.atoms import Rows, rows_of
 from ..algebra.definite import Triangle, inverses
 from ..algebra.designed import Design, designed
 from ..algebra.fit import Fit, trusted
-from ..algebra.gram import Index, unit_diagonal
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
+from ..algebra.unit_scale import Index, unit_diagonal
+from .folds import STRETCHES, Gain, gain, ways_to_divide
 
-BLOCKS = 8
-"""Stretches left out in turn: enough for a standard error, few enough that each tells much."""
 DAMPING = 1e-11
 """Of columns that repeat others, far below what a fit can tell."""
 ROUNDED = 1e-13
@@ -103,13 +100,14 @@ class Unseen:
             Prior precision of the fit coordinates, one over variance.
 
         """
-        if fit in _MADE:
-            given, made = _MADE[fit]
+        made: Unseen
+        for given, made in fit.prepared:
             same = made.problem is problem and made.scale is scale
             if same and np.array_equal(given, precision):
                 return made
-        _MADE[fit] = precision, _prepared(problem, scale, fit, precision)
-        return _MADE[fit][1]
+        made = _prepared(problem, scale, fit, precision)
+        fit.prepared[:] = [(precision, made)]
+        return made
 
     def by(self, labels: Array) -> Unseen:
         """Return the same with other parts left out in turn, told by a label of every row."""
@@ -136,6 +134,24 @@ class Unseen:
             precision=np.concatenate([self.precision[:frames], precision]),
             pull=np.concatenate([self.pull[:frames], precision * coordinates]),
         )
+
+    @cached_property
+    def bare(self) -> Array:
+        """Return the residual on every stretch without any effect, (rows,)."""
+        return self.predict([])
+
+    @cached_property
+    def whole(self) -> Array:
+        """Return the residual on every stretch with all effects, (rows,)."""
+        return self.predict(range(len(self.parts)))
+
+    def bases(self) -> list[Base]:
+        """Return all effects, ready for further columns, for each way to divide the data."""
+        return [each.base(range(len(self.parts))) for each in self.every_way()]
+
+    def every_way(self) -> list[Unseen]:
+        """Return the same for each way to divide the data, this one first."""
+        return [self, *(self.by(labels) for labels in ways_to_divide(self.problem)[1:])]
 
     def forget_other_parts(self) -> None:
         """Let go of what was worked out for other parts: with many columns it is a hundred MB."""
@@ -349,35 +365,6 @@ class Unseen:
         return [(part[g], w[g]) for (part, w), g in zip(parts, good, strict=True)]
 
 
-def steadiness(before: Array, after: Array) -> float:
-    """Return the mean fall over the folds in its standard errors."""
-    fall = before - after
-    error = float(fall.std(ddof=1) / np.sqrt(fall.size)) if fall.size > 1 else np.inf
-    return float(fall.mean() / max(error, 1e-300))
-
-
-class Taken(NamedTuple):
-    """
-    What columns take off the squared error on unseen stretches.
-
-    Attributes
-    ----------
-    gain : float
-        Share of it.
-    steady : float
-        The same in standard errors between stretches.
-    fall : float [m^2]
-    rms_m : float
-        What is left, RMS [m].
-
-    """
-
-    gain: float
-    steady: float
-    fall: float
-    rms_m: float
-
-
 @dataclass(frozen=True, eq=False)
 class Base:
     """A model fitted with each stretch left out in turn, ready to be given further columns."""
@@ -388,7 +375,7 @@ class Base:
     solvers: list[Solver]
     residual: Array
 
-    def taken(self, extra: Array) -> Taken:
+    def gain(self, extra: Array) -> Gain:
         """
         Return what further columns take off at the best of a few ridges.
 
@@ -398,17 +385,10 @@ class Base:
             Of unit mean square.
 
         """
-        labels, before = self.unseen.trusted_labels(), self.unseen.squares(self.residual)
-        stretches = [labels == name for name in np.unique(labels)]
-        one = np.array([before[here].mean() for here in stretches])
-        told = []
-        for residual in self.extended(extra, RIDGES):
-            after = self.unseen.squares(residual)
-            two = np.array([after[here].mean() for here in stretches])
-            left, fall = float(after.mean()), float(before.mean() - after.mean())
-            gain = fall / max(float(before.mean()), 1e-300)
-            told.append(Taken(gain, steadiness(one, two), fall, float(np.sqrt(left))))
-        return max(told, key=lambda taken: taken.gain)
+        unseen = self.unseen
+        labels, before = unseen.trusted_labels(), unseen.squares(self.residual)
+        tried = self.extended(extra, RIDGES)
+        return max(gain(before, unseen.squares(after), labels) for after in tried)
 
     def extended(self, extra: Array, ridges: Sequence[float]) -> list[Array]:
         """
@@ -449,10 +429,6 @@ class Base:
         return [part.chosen(self.index) for part in self.unseen._stretches]
 
 
-_MADE: WeakKeyDictionary[Fit, tuple[Array, Unseen]] = WeakKeyDictionary()
-"""What was prepared of every fit that somebody still holds: several steps ask for the same."""
-
-
 def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
     """Return the parts of a fitted model; see `Unseen.of`."""
     model = fit.model
@@ -469,7 +445,7 @@ def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Uns
     return Unseen(
         problem=problem,
         scale=scale,
-        labels=problem.block_labels(BLOCKS),
+        labels=problem.block_labels(STRETCHES),
         columns=columns,
         parts=tuple(slice(a, b) for a, b in pairwise(ends)),
         residual=fit.residual,
@@ -490,14 +466,6 @@ def _solved(factor: tuple[Array, bool], size: Array, right: Array) -> Array:
     """Return the solution of scaled normal equations, shape as the right-hand side (P, ...)."""
     unit = size if right.ndim == 1 else size[:, None]
     return np.asarray(cho_solve(factor, right / unit) / unit)
-
-
-def rows_of(labels: Array) -> list[Rows]:
-    """Return the rows of every label, a slice each where they lie together."""
-    if (np.diff(labels) >= 0).all():
-        bounds = np.searchsorted(labels, np.arange(int(labels[-1]) + 2))
-        return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
-    return [np.flatnonzero(labels == k) for k in range(int(labels.max()) + 1)]
 
 
 def _spread(normal: Array) -> Array:

@@ -98,8 +98,8 @@ def _of_causes(
 def _explained(final: Unseen, found: Model) -> tuple[dict[str, float], dict[str, float]]:
     """Return how much of the unseen squared gap the effects of every joint and regime explain."""
     everything = range(len(found.found))
-    total = final.squares(final.predict([])).mean()
-    after = final.squares(final.predict(everything)).mean()
+    total = final.squares(final.bare).mean()
+    after = final.squares(final.whole).mean()
 
     def fall(members: list[int]) -> float:
         if not members:

@@ -31,8 +31,6 @@ class Evidence:
         Whether the floor was measured apart from any model.
     parts : tuple of float
         Squared contribution of every effect over the square of their sum.
-    glimpsed : tuple of str
-        Joints of which a wave was seen over too little of a period.
     refused : tuple of str
         What would explain the rest best but no machine has, in words.
     lacking : tuple of str
@@ -61,7 +59,6 @@ class Evidence:
     fitted: float
     independent: bool
     parts: tuple[float, ...]
-    glimpsed: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
     lacking: tuple[str, ...] = ()
     families: tuple[WeighedFamily, ...] | None = None

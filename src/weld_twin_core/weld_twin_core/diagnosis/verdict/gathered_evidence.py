@@ -15,7 +15,6 @@ from ..result import Shrink, Site
 from ..unseen.leftover_structure import Structure
 from ..unseen.unseen_stretches import Unseen
 from .evidence import Evidence
-from .partial_waves import glimpsed
 
 
 def gathered(
@@ -43,23 +42,21 @@ def gathered(
     floor : NoiseFloor
     beliefs : Beliefs
     least : float or None
-        As `parted_elsewhere` gives it.
+        As `borne_out` gives it.
     chance : float
         As `reached_by_chance` gives it.
 
     """
     robot = found.final.model.robot
-    everything = range(len(found.final.model.found))
     return Evidence(
         slots=found.slots,
         structure=leftover,
         gap=shrink.rms_before_m,
         after=shrink.rms_after_m,
         floor=floor.rms_m,
-        fitted=unseen.rms(unseen.predict(everything)),
+        fitted=unseen.rms(unseen.whole),
         independent=floor.independent,
         parts=_parts(unseen),
-        glimpsed=glimpsed(found.problem, found.final.model, beliefs),
         refused=tuple(_refused(robot, e) for e in found.refused if beyond(robot, e)),
         lacking=tuple(_lacking(e) for e in found.refused if not beyond(robot, e)),
         families=weighed_families(found, unseen, beliefs) if found.dense else None,

@@ -1,12 +1,16 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers with the units people read: mm, degrees, ms."""
+"""
+Numbers with the units people read, and the phrases that sentences about effects share.
+
+Where a joint stands at a reading, and what its zero has to become, is said here and nowhere else.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Array
+from ..arrays import Array
 
 LEAST_MM = 0.005
 """Shift of a frame [mm] that is not told: no arm repeats that well."""
@@ -14,6 +18,12 @@ _FINE = 1e-3
 """Length [m] below which three decimals of mm are told: a controller takes no more."""
 LEAST_DEG = 0.0003
 """Turn of a frame [degrees] that is not told: a metre away it moves the tool by 0.005 mm."""
+
+TURNED_ROUND = (
+    'X is the recorded reading with its sign turned round: a controller that shows the joint as '
+    'it was recorded needs the opposite sign in all of this.'
+)
+"""What a person has to know of a joint whose readings were recorded with the other sign."""
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -75,3 +85,43 @@ def _axes(values: Array, least: float, words: str, places: int) -> str:
         if abs(value) >= least
     ]
     return ', '.join(parts)
+
+
+def base_frame(step: Array) -> str:
+    """Return a displacement [m] and a turn [rad] of the base, shape (6,); see `frame`."""
+    return frame(step, 'of the measuring frame', 'of the base')
+
+
+def further(offset: float, *, sliding: bool = False) -> str:
+    """
+    Return how much further than its reading a joint stands, to follow the reading in a sum.
+
+    Parameters
+    ----------
+    offset : float [rad or m]
+        The joint stands at reading + offset.
+    sliding : bool
+        Whether the joint slides; its offset is then in metres.
+
+    Returns
+    -------
+    str
+        Such as ``+ 0.0456 deg``: a sign, a blank, a number and its unit.
+
+    """
+    places, unit = (3, 'mm') if sliding else (4, 'deg')
+    shown = offset * 1e3 if sliding else float(np.degrees(offset))
+    return f'{"-" if shown < 0.0 else "+"} {abs(shown):.{places}f} {unit}'
+
+
+def stands(joint: str, offset: float, *, sliding: bool = False) -> str:
+    """Return where a joint stands at any reading, as a sentence; see `further`."""
+    return f'At reading X {joint} stands at X {further(offset, sliding=sliding)}.'
+
+
+def to_mend(offset: float, *, sliding: bool = False) -> str:
+    """Return what mends a zero, by the readings before and after; see `further`."""
+    return (
+        'To mend: set its zero anew so that, with the joint left where it is, the reading X '
+        f'becomes X {further(offset, sliding=sliding)}.'
+    )

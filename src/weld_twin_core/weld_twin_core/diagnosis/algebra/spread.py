@@ -1,0 +1,80 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How sure fitted coordinates are: covariances that hold where the model is not quite the arm.
+
+As wide as the noise makes them, or as scores do that hang together within a stretch of time or differ
+between stretches [1]_, each coordinate by the larger; they hang together as their columns do.
+
+References
+----------
+.. [1] H. White, "Maximum likelihood estimation of misspecified models", Econometrica 50, 1982.
+
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import Array
+from .atoms import rows_of
+from .definite import inverted, well_conditioned
+from .designed import Design
+from .unit_scale import unit_diagonal
+
+BLOCKS = 24
+"""Stretches whose scores are held apart: enough to tell a variance to a third."""
+SINGULAR = 1e-12
+"""Share of the largest eigenvalue below which a direction is one that columns repeat."""
+TINY = 1e-300
+"""Keeps a division by the variance of a coordinate that nothing moves finite."""
+
+
+def covariance(
+    columns: Design, ridge: Array, residual: Array, labels: Array, share: float
+) -> Array:
+    """
+    Return the covariance of all columns' coefficients, shape (P, P).
+
+    Parameters
+    ----------
+    columns : Design
+        P whitened columns.
+    ridge : array, shape (P,)
+        Prior precision.
+    residual : array, shape (rows,)
+        What the fit leaves, whitened.
+    labels : array of int, shape (rows,)
+        Stretch of every row, some `BLOCKS` in all.
+    share : float
+        Of the rows that count as independent.
+
+    """
+    inverse, size = unit_inverse(columns, ridge)
+    stretches = rows_of(np.unique(labels, return_inverse=True)[1])
+    each = [columns.within(rows).times(residual[rows]) / size for rows in stretches]
+    scores = inverse @ np.stack(each, axis=1)
+    blocks = max(len(each), 2)
+    together = (scores**2).sum(axis=1) * blocks / (blocks - 1)
+    own = np.diag(inverse)
+    wider = np.sqrt(np.maximum(own / share, together) / np.maximum(own, TINY)) / size
+    return np.asarray(inverse * np.outer(wider, wider))
+
+
+def unit_inverse(columns: Design, ridge: Array) -> tuple[Array, Array]:
+    """
+    Return the inverse of the normal matrix with ones on its diagonal, and the norms of its columns.
+
+    Parameters
+    ----------
+    columns : Design
+    ridge : array, shape (P,)
+        Prior precision.
+
+    """
+    normal = columns.normal()
+    normal[np.diag_indices_from(normal)] += ridge
+    scaled, size = unit_diagonal(normal)
+    if well_conditioned(scaled, SINGULAR):
+        return inverted(scaled), size
+    return np.asarray(np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True)), size

@@ -1,0 +1,166 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Parts of the data that take turns in being unseen, and what a model gains on them.
+
+Parts are stretches of time, as `Problem.block_labels` cuts them, and regions of posture: what carries
+over to the next minute need not carry over to where the arm has not been. Neighbouring samples err
+alike, so that it is parts that are counted wherever an error is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Array
+from ..algebra.problem import PLACES, Problem
+
+STRETCHES = 8
+"""Stretches left out in turn: enough for a standard error, few enough that each tells much."""
+MOST_IN_ONE = 0.5
+"""Share of a recording in one region from which on the others do not tell its base."""
+
+
+def ways_to_divide(problem: Problem, stretches: int = STRETCHES) -> list[Array]:
+    """
+    Return the part of every row, int, shape (rows,), for each way to divide the rows.
+
+    Stretches of time, then regions of posture; these not where places of contacts are the parts, as
+    a place would lie on both sides.
+
+    Parameters
+    ----------
+    problem : Problem
+    stretches : int
+        How many, about.
+
+    """
+    by_time = problem.block_labels(stretches)
+    if problem.untracked and problem.places >= PLACES:
+        return [by_time]
+    return [by_time, posture_regions(problem)]
+
+
+def posture_regions(problem: Problem, halvings: int = 3) -> Array:
+    """
+    Return the region of posture of every row, int, shape (rows,).
+
+    The measurements are halved at the median of the joint that spreads most among them, and the
+    halves again, so that every region holds as many and lies in one part of the joint space. Where
+    recordings have bases of their own, one that lies in one region for the most part is dealt out
+    over all of them: its base could not be told from the other regions.
+
+    Parameters
+    ----------
+    problem : Problem
+    halvings : int
+        2 to this power is the number of regions.
+
+    """
+    postures = np.concatenate(
+        [r.joints.at(r.measured.t)[0] for r in problem.recordings if r.measured is not None]
+    )
+    # Where a joint stands alike, what was measured decides: not which recording was given first.
+    seen = np.concatenate(
+        [r.measured.position.T for r in problem.recordings if r.measured is not None], axis=1
+    )
+    labels = np.zeros(postures.shape[0], dtype=int)
+    for _ in range(halvings):
+        after = labels * 2
+        for name in np.unique(labels):
+            here = np.flatnonzero(labels == name)
+            spread = np.ptp(postures[here], axis=0)
+            order = np.lexsort((*seen[:, here], postures[here, int(np.argmax(spread))]))
+            after[here[order[here.size // 2 :]]] += 1
+        labels = after
+    if problem.own_bases:
+        labels = _keeping_bases(labels, problem.samples)
+    rows, at = [], 0
+    for c, m in zip(problem.rows, problem.samples, strict=True):
+        rows.append(np.repeat(labels[at : at + m], c))
+        at += m
+    return np.concatenate(rows)
+
+
+def _keeping_bases(labels: Array, samples: Sequence[int]) -> Array:
+    """Return regions without a recording that lies in one of them for the most part."""
+    out, at, count = labels.copy(), 0, int(labels.max()) + 1
+    for m in samples:
+        own = labels[at : at + m]
+        if np.bincount(own).max() > MOST_IN_ONE * m:
+            out[at : at + m] = np.arange(m) * count // m
+        at += m
+    return np.asarray(out)
+
+
+class Gain(NamedTuple):
+    """
+    What one model takes off the squared error of another on unseen parts.
+
+    Attributes
+    ----------
+    share : float
+        Share of it.
+    steady : float
+        The same in standard errors between parts.
+    fall : float [m^2]
+    rms_m : float
+        What is left, RMS [m].
+
+    """
+
+    share: float
+    steady: float
+    fall: float
+    rms_m: float
+
+
+def gain(before: Array, after: Array, labels: Array, after_labels: Array | None = None) -> Gain:
+    """
+    Return what is gained.
+
+    Parameters
+    ----------
+    before, after : array, shape (samples,) [m^2]
+        Squared errors.
+    labels : array of int, shape (samples,)
+        Part of every sample.
+    after_labels : array of int, optional
+        The same of those after, where other samples are trusted.
+
+    """
+    others = labels if after_labels is None else after_labels
+    names = np.intersect1d(labels, others)
+    one = np.array([before[labels == n].mean() for n in names])
+    two = np.array([after[others == n].mean() for n in names])
+    was, left = float(before.mean()), float(after.mean())
+    return Gain((was - left) / max(was, 1e-300), steadiness(one, two), was - left, left**0.5)
+
+
+def least_gain(ways: Sequence[Gain]) -> Gain:
+    """Return the least that is gained over the ways to divide the data, and the most left."""
+    shares, steadies, falls, left = zip(*ways, strict=True)
+    return Gain(min(shares), min(steadies), min(falls), max(left))
+
+
+def steadiness(before: Array, after: Array) -> float:
+    """Return the mean fall over the parts in its standard errors."""
+    fall = before - after
+    error = float(fall.std(ddof=1) / np.sqrt(fall.size)) if fall.size > 1 else np.inf
+    return float(fall.mean() / max(error, 1e-300))
+
+
+def jackknife(tries: Array) -> Array:
+    """
+    Return the variance of a figure from what it is with each part left out in turn.
+
+    Parameters
+    ----------
+    tries : array, shape (parts, ...)
+
+    """
+    count = len(tries)
+    return np.asarray((count - 1) / count * ((tries - tries.mean(axis=0)) ** 2).sum(axis=0))

@@ -36,14 +36,34 @@ class RootPose(FrameError):
         """Return whether there is a positioner."""
         return robot.behind > 0
 
+    def stands(self, robot: Robot, base: Array) -> tuple[Array, Array]:
+        """
+        Return where the positioner's rows begin, as the robot file has it and as it is.
+
+        Parameters
+        ----------
+        robot : Robot
+        base : array, shape (4, 4) [m]
+            The base that it is told in, in the frame where the robot's own rows begin.
+
+        Returns
+        -------
+        array, array
+            ``T_base_root``, shape (4, 4) [m].
+
+        """
+        now, step = np.linalg.inv(robot.T_root_base), self.vector()
+        new = now.copy()
+        new[:3, :3] = rotation_matrix(step[3:]) @ now[:3, :3]
+        new[:3, 3] += step[:3]
+        there = np.linalg.inv(base)
+        return np.asarray(there @ now), np.asarray(there @ new)
+
     def remedy(self, robot: Robot) -> str:
         """Return what to mend, in words; see `Hooks.remedy`."""
         rows = robot.T_base_foot
         step = (self.vector().reshape(2, 3) @ rows[:3, :3]).ravel()
-        now = np.asarray(np.linalg.inv(robot.T_root_base @ rows))
-        new = np.eye(4)
-        new[:3, :3] = rotation_matrix(step[3:]) @ now[:3, :3]
-        new[:3, 3] = now[:3, 3] + step[:3]
+        now, new = self.stands(robot, rows)
         moved = frame(step, 'of the base', 'of the positioner')
         return (
             f'Correct the root frame of the positioner by {moved}: in the base of the robot it '

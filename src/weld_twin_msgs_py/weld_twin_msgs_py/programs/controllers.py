@@ -23,7 +23,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.inverse import CarriedArm
 
-from .external_axes import LABELS, ExternalAxis, external_axes, shown_order
+from .external_axes import LABELS, ExternalAxis, carrying, external_axes, shown_order
 
 AT_SECOND_AXIS = {'fanuc-ls': ('fanuc', 'FANUC'), 'inform': ('yaskawa', 'Yaskawa')}
 """Languages whose controllers have the origin there, with the names of bundled robots and maker."""
@@ -243,6 +243,27 @@ def controller_of(
         told.world is not None or len(axes) == robot.behind,
         robot.behind > 0,
     )
+
+
+def world_of(robot: Robot, language: str) -> Array:
+    """
+    Return the world of a controller as delivered, in the frame where a robot's rows begin, (4, 4) [m].
+
+    It is the arm's own base; of an arm on a track it is taken to be where the track begins.
+
+    Parameters
+    ----------
+    robot : Robot
+    language : str
+
+    """
+    count = carrying(robot)
+    if count > robot.behind:
+        return np.eye(4)
+    arm = CarriedArm(robot, count).arm
+    origin = np.array((robot.controller or controller_frames(arm)).base)
+    _counting(arm, robot, language, origin, [])
+    return origin
 
 
 def _counting(arm: Robot, robot: Robot, language: str, origin: Array, notes: list[str]) -> Array:

@@ -37,6 +37,7 @@ MISTAKES = (
     'stamps_in_bursts',
     'computed',
     'camera_inverted',
+    'wrong_fixture',
     'other',
 )
 """Kinds of mistakes in data and set-up; docs/unsound.md describes each."""

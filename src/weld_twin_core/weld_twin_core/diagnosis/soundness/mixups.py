@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from ...arm.robot import Robot
-from ...arm.rotation import rotation_vector
+from ...arm.rotation import quaternion_from_matrix, rotation_vector
 from ...arrays import Array
 from ...effects.base_pose import BasePose
 from ...effects.effect import Effect
@@ -21,6 +21,7 @@ from ...effects.link_length import LinkLength
 from ...effects.link_offset import LinkOffset
 from ...effects.link_twist import LinkTwist
 from ...effects.plausible import plausible
+from ...effects.root_pose import RootPose
 from ...effects.tool_pose import ToolPose
 from ..algebra.fit import fit, robust_scale
 from ..algebra.prior import effect_precision
@@ -184,6 +185,9 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
                 return ()
             framed = _framed(shot, model, frozenset(more - given), before, left)
             own = None if framed.kind == 'base_turned' else _within(shot, before, left, given)
+            if own and framed.kind == 'wrong_fixture' and own.at == shot.robot.joint_names[:1]:
+                # A fixture that is turned about the positioner's last axis is one with its zero.
+                own = replace(own, alike=(*own.alike, (framed.kind, framed.at)))
             return [Finding.of(own or framed)]
     return ()
 
@@ -215,12 +219,13 @@ def _plausible(robot: Robot, model: Model) -> bool:
 def _framed(
     shot: Snapshot, model: Model, more: frozenset[str], before: float, left: float
 ) -> Mistake:
-    turn = None
-    if more == {'base'}:
-        turn = _turned(shot.robot.T_world_base, model.bases[0])
     falls = f'the gap falls from {length(before)} to {length(left)}'
-    if turn is not None:
-        return _base(shot.robot, turn, falls)
+    if more == {'base'}:
+        if shot.robot.behind:
+            return _fixture(shot.robot, model.bases, falls)
+        turn = _turned(shot.robot.T_world_base, model.bases[0])
+        if turn is not None:
+            return _base(shot.robot, turn, falls)
     names = listed(sorted(more))
     return Mistake(
         'other',
@@ -260,6 +265,29 @@ def _base(robot: Robot, turn: Array, falls: str) -> Mistake:
         partial(base_turned, turn=turn),
         alike=alike,
     )
+
+
+def _fixture(robot: Robot, bases: Sequence[Array], falls: str) -> Mistake:
+    """Return the mistake that poses were measured in another frame of the workpiece than was given."""
+    seen = [np.asarray(np.linalg.inv(base)) for base in bases]
+    steps = [np.asarray(robot.T_world_base @ pose) for pose in seen]
+    far = [float(np.linalg.norm(step[:3, 3])) for step in steps]
+    k = int(np.argmax(far))
+    angle = np.degrees(np.linalg.norm(rotation_vector(steps[k][:3, :3])))
+    at = ', '.join(f'{value:.4f}' for value in seen[k][:3, 3])
+    turn = ', '.join(f'{value:.5f}' for value in quaternion_from_matrix(seen[k][:3, :3]))
+    which = f' of recording {k + 1}' if len(bases) > 1 else ''
+    words = (
+        f'The poses{which} were measured in the frame of another fixture than was given: on the '
+        f'positioner it lies {length(far[k])} from there, turned by {angle:.1f} degrees; with it, '
+        f'{falls}.'
+    )
+    remedy = (
+        "Give the frame of the fixture that was measured on (of a robot file 'tool' of the "
+        f'workpiece: xyz [{at}], quat_xyzw [{turn}]), or have it aligned (--align base)'
+    )
+    mend = partial(frames_fitted, frames=('base',))
+    return Mistake('wrong_fixture', ('base',), words, remedy, mend)
 
 
 def _turned(given: Array, fitted: Array) -> Array | None:
@@ -314,6 +342,13 @@ def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
         return ()
     worst = int(arm.strain.argmax())
     effect = arm.model.found[worst]
+    if isinstance(effect, RootPose):
+        words = (
+            'The positioner stands elsewhere beside the robot than it was given, farther than any '
+            f'root frame is off by. {effect.remedy(shot.robot)}'
+        )
+        remedy = 'Measure where it stands, or give the robot file of this cell'
+        return [Finding.of(Mistake('other', ('base',), words, remedy, None))]
     joint, value = str(effect.site), float(effect.vector()[0])
     if isinstance(effect, JointOffset):
         words = (
@@ -352,6 +387,7 @@ def other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Mistake, float] 
         kind() for frame, kind in (('base', BasePose), ('tool', ToolPose)) if frame not in align
     ]
     own = [*given, *_of_joints(shot, (JointOffset, LinkTwist))]
+    own += [RootPose()] if shot.robot.behind else []
     fitted = partial(_fitted, problem, start, shot.soft)
     without = fitted([*own, *_of_joints(shot, (JointCompliance,))])
     left = gap(problem, without)

@@ -245,25 +245,33 @@ def controller_of(
     )
 
 
-def world_of(robot: Robot, language: str) -> Array:
+def world_of(robot: Robot, language: str) -> tuple[Array, str]:
     """
-    Return the world of a controller as delivered, in the frame where a robot's rows begin, (4, 4) [m].
-
-    It is the arm's own base; of an arm on a track it is taken to be where the track begins.
+    Return the world of a controller as delivered: the arm's own base, or where its track begins.
 
     Parameters
     ----------
     robot : Robot
     language : str
 
+    Returns
+    -------
+    array, shape (4, 4) [m]
+        In the frame where the robot's own rows begin.
+    str
+        What it is taken to be.
+
     """
     count = carrying(robot)
     if count > robot.behind:
-        return np.eye(4)
+        return np.eye(4), 'where the track begins'
     arm = CarriedArm(robot, count).arm
-    origin = np.array((robot.controller or controller_frames(arm)).base)
-    _counting(arm, robot, language, origin, [])
-    return origin
+    frames = robot.controller or controller_frames(arm)
+    origin, notes = np.array(frames.base), list[str]()
+    _counting(arm, robot, language, origin, notes)
+    if origin[2, 3] != frames.base[2, 3]:
+        return origin, 'on axis 1 at the height of axis 2'
+    return origin, f'link {frames.base_link}' if frames.base_link else 'the base of the robot file'
 
 
 def _counting(arm: Robot, robot: Robot, language: str, origin: Array, notes: list[str]) -> Array:

@@ -475,7 +475,7 @@ def test_a_positioner_that_stands_elsewhere_is_told_as_its_controller_takes_it(b
     mine = base @ placed([0.0, 0.0, 0.1], Rotation.from_quat([1.0, 0.0, 0.0, 0.0]))
     moved = Rotation.from_rotvec(high.apply(error['rotvec']))
     real = placed(foot['xyz'] + high.apply(error['xyz']), moved * turn)
-    parts = re.split('Old value |; new value |\\. Where ', told)
+    parts = re.split('Old value |; new value |\\. The origin ', told)
     old, new = (frame_in(part, brand) for part in parts[1:3])
     np.testing.assert_allclose(old, np.linalg.inv(mine) @ placed(foot['xyz'], turn), atol=2e-6)
     np.testing.assert_allclose(new, np.linalg.inv(mine) @ real, atol=2e-6)

@@ -241,7 +241,8 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
 def _root(effect: RootPose, brand: str, robot: Robot) -> str:
     """Return old and new value of a positioner's root frame as its controller writes them."""
     form = _FRAMES[brand]
-    now, new = effect.stands(robot, world_of(robot, form.language))
+    world, begins = world_of(robot, form.language)
+    now, new = effect.stands(robot, world)
 
     def numbers(pose: Array) -> list[float]:
         return form.notation.numbers(pose, [0.0] * 3 + [1.0] + [0.0] * 3)
@@ -250,6 +251,7 @@ def _root(effect: RootPose, brand: str, robot: Robot) -> str:
     step = _rapid(by) if brand == 'abb' else form.words(by)
     return (
         f'Old value {form.words(numbers(now))}; new value {form.words(numbers(new))}. '
+        f'The origin of that world is taken to be {begins}. '
         'Where the old value there is another one, the controller has the root at another place of '
         f'the positioner: then the new value is {form.moved.format(by=step)}.'
     )

@@ -187,7 +187,7 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
             own = None if framed.kind == 'base_turned' else _within(shot, before, left, given)
             if own and framed.kind == 'wrong_fixture' and own.at == shot.robot.joint_names[:1]:
                 # A fixture that is turned about the positioner's last axis is one with its zero.
-                own = replace(own, alike=(*own.alike, (framed.kind, framed.at)))
+                own = own._replace(alike=(*own.alike, (framed.kind, framed.at)))
             return [Finding.of(own or framed)]
     return ()
 

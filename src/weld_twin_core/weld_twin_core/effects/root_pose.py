@@ -14,7 +14,7 @@ from ..arrays import Array
 from .constant import FrameError
 from .registry import register
 from .view import Value
-from .wording import frame
+from .wording import frame, placed
 
 
 @register
@@ -67,15 +67,5 @@ class RootPose(FrameError):
         moved = frame(step, 'of the base', 'of the positioner')
         return (
             f'Correct the root frame of the positioner by {moved}: in the base of the robot it '
-            f'stands at {_placed(new)} in place of {_placed(now)}.'
+            f'stands at {placed(new)} in place of {placed(now)}.'
         )
-
-
-def _placed(pose: Array) -> str:
-    """Return a frame as controllers take it: mm, and turns about fixed x, y and z in degrees."""
-    place = ', '.join(f'{value * 1e3:.3f}' for value in pose[:3, 3])
-    yaw = np.arctan2(pose[1, 0], pose[0, 0])
-    pitch = np.arctan2(-pose[2, 0], np.hypot(pose[0, 0], pose[1, 0]))
-    roll = np.arctan2(pose[2, 1], pose[2, 2])
-    angles = ', '.join(f'{np.degrees(value):.4f}' for value in (roll, pitch, yaw))
-    return f'x, y, z = ({place}) mm, turned by ({angles}) deg about them'

@@ -483,3 +483,17 @@ def test_a_positioner_that_stands_elsewhere_is_told_as_its_controller_takes_it(b
     step = frame_in(parts[3].split('new value is ')[1].split('old value')[0], brand)
     step[:3, 3] *= 1e-3 if brand == 'abb' else 1.0  # PoseMult is in mm
     np.testing.assert_allclose(step @ old @ other, new @ other, atol=4e-6)
+
+
+def test_a_frame_on_the_workpiece_is_told_where_it_is_on_the_positioner():
+    """Of a cell poses are measured there, and no bolt of the robot's foot is to blame."""
+    data = load('kuka_kr16_2').to_mapping() | {'name': 'cell'}
+    tool = {'xyz': [0.1, 0.05, 0.08], 'quat_xyzw': [0.0, 0.0, 0.6, 0.8]}
+    data['workpiece'] = {'joints': [{'name': 'turn'}], 'tool': tool}
+    turn, moved = Rotation.from_quat(tool['quat_xyzw']), np.array([0.012, -0.02, 0.004])
+    # What the measuring frame sees of the positioner is displaced by the error.
+    off = {'effect': 'base_pose', 'xyz': (-turn.inv().apply(moved)).tolist(), 'rotvec': [0.0] * 3}
+    told = effect_from_mapping(off).remedy(Robot.from_mapping(data))
+    assert 'at x, y, z = (112.000, 30.000, 84.000) mm' in told
+    assert 'in place of x, y, z = (100.000, 50.000, 80.000) mm' in told
+    assert 'fixture' in told and 'bolts' not in told

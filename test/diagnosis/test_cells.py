@@ -137,7 +137,7 @@ def test_programs_without_external_axes_refuse_a_positioner_in_one_sentence(
     tmp_path, robot_file, capfd
 ):
     (tmp_path / 'p.script').write_text('def p():\nend\n', encoding='utf-8')
-    words = ('correct-program', tmp_path / 'p.script', '--robot', robot_file)
+    words = ('correct', tmp_path / 'p.script', '--robot', robot_file)
     assert commanded(*words, '--out', tmp_path / 'o') == 2
     said = capfd.readouterr().err
     assert said.startswith('weld-twin: external axes of urscript are not known here')

@@ -11,9 +11,9 @@ import numpy as np
 from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix
 from ..arrays import Array
-from .constant import FrameError
+from .constant import FrameError, frame_parameters
 from .registry import register
-from .view import Value
+from .view import Plausible, Value
 from .wording import frame, placed
 
 
@@ -26,10 +26,16 @@ class RootPose(FrameError):
     rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'root_pose'
+    title = 'root error of the positioner'
+    entered = 'root'
     depends_on = 'constant'
     place = 'base'
     channel = 'root'
     lacking = 'is of a positioner, and robot {robot!r} has none; use base_pose'
+    parameters = frame_parameters(
+        Plausible.even(5e-3, 0.1, 'derived: a root that was measured by touch, or by hand'),
+        Plausible.even(5e-3, 0.1, 'derived: five millimetres on a metre'),
+    )
 
     @classmethod
     def fits(cls, robot: Robot, joint: str | None) -> bool:

@@ -229,7 +229,7 @@ def cell(tmp_path, arm):
 
 def corrected(cell, language, text, *more):
     (cell / NAMES[language]).write_text(text, encoding='utf-8')
-    words = ['correct-program', cell / NAMES[language], '--robot', cell / 'cell.yaml']
+    words = ['correct', cell / NAMES[language], '--robot', cell / 'cell.yaml']
     words += [
         '--model',
         cell / 'found.yaml',
@@ -374,7 +374,7 @@ def test_stations_are_written_under_the_names_that_the_controller_has(cell, lang
     names = ['turn', 'tilt', 'rail', *(f'joint_{k}' for k in range(1, 7))]
     stations |= {'joint_names': names, 'q': POSTURES.tolist()}
     (cell / 'stations.yaml').write_text(yaml.safe_dump(stations), encoding='utf-8')
-    words = ['export-program', cell / 'stations.yaml', '--robot', cell / 'cell.yaml']
+    words = ['export', 'program', cell / 'stations.yaml', '--robot', cell / 'cell.yaml']
     words += ['--controller', language, '--out', cell / NAMES[language]]
     ran = weld_twin(*words)
     assert ran.code == 2

@@ -58,6 +58,13 @@ class Plausible:
     low, high : float
         What lies outside is no property of a machine.
     source : str
+        A publication that was read, or an argument that starts with 'derived'.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> wt.effects.Plausible.even(2e-3, 2e-2, 'derived: ten times its spread').low
+    -0.02
 
     """
 

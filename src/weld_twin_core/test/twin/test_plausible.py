@@ -18,7 +18,8 @@ from weld_twin_core.effects import (
     effects_from_list,
     register,
 )
-from weld_twin_core.effects.plausible import TABLE, beyond, mass_range, plausible, ranges, spreads
+from weld_twin_core.effects.payload import mass_range
+from weld_twin_core.effects.plausible import TABLE, beyond, plausible, ranges, spreads
 from weld_twin_core.errors import ModelError
 
 UR5 = catalog.load('ur5')

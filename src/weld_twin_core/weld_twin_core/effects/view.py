@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
@@ -59,6 +60,8 @@ class Plausible:
         What lies outside is no property of a machine.
     source : str
         A publication that was read, or an argument that starts with 'derived'.
+    by_robot : callable, optional
+        Returns low and high on a robot, where they hang on it.
 
     Examples
     --------
@@ -72,6 +75,7 @@ class Plausible:
     low: float
     high: float
     source: str
+    by_robot: Callable[[Robot], tuple[float, float]] | None = None
 
     @property
     def derived(self) -> bool:

@@ -94,13 +94,12 @@ def _in_cells(
     tell: Callable[[str], None],
 ) -> None:
     """Try every arm that is not through yet; what the next one needs is learned meanwhile."""
-    from .compensating.drawn_cells import HOMES, right_and_wrong
-    from .compensating.trial import CHANGES, tried
+    from .compensating.drawn_cells import right_and_wrong
+    from .compensating.trial import tried
     from .keeping.result_file import write_result
 
     begun = time.monotonic()
-    through = {c['robot'] for c in known.changes if c['change'] == CHANGES[-1]}
-    names = [name for name in HOMES if name not in through]
+    names = unfinished(known, each)
     models = {name: beside.submit(right_and_wrong, name, args.seed) for name in names}
     for name in names:
         for said in tried(name, args.seed, each, models[name].result(), known):
@@ -108,6 +107,16 @@ def _in_cells(
             made = {**summary(*known, '', None), 'seed': args.seed, 'goals': known.rows}
             write_result(args.out, 'compensator', time.monotonic() - begun, made)
         tell(f'{name}: {_told([row for row in known.rows if row["robot"] == name])}')
+
+
+def unfinished(known: Known, each: int) -> list[str]:
+    """Return the arms that lack a change, or some of so many goals."""
+    from .compensating.drawn_cells import HOMES
+    from .compensating.trial import CHANGES
+
+    changed = {change['robot'] for change in known.changes if change['change'] == CHANGES[-1]}
+    calm = [row['robot'] for row in known.rows if not row['after']]
+    return [name for name in HOMES if name not in changed or calm.count(name) < each]
 
 
 def race(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any] | None:

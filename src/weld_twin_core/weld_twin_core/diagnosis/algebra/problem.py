@@ -333,7 +333,8 @@ class Problem:
         out = []
         taken = self.places_taken(scale)
         for k, part in enumerate(parts):
-            rows = self.in_noise(k, part, scale).reshape(*part.shape[:-2], -1)
+            rows = self.in_noise(k, part, scale)
+            rows = rows.reshape(*rows.shape[:-2], rows.shape[-2] * rows.shape[-1])  # of none, too
             own = taken[k] if taken else None
             if own is not None:
                 ways, left = own

@@ -135,15 +135,7 @@ def _scattering(one: Scatter) -> Part:
 
 
 def arm_first(found: Search, form: FreeForm) -> FreeForm:
-    """
-    Return a form whose field of the instrument is a set with the joints, where they are one.
-
-    Parameters
-    ----------
-    rows : int
-        Rows that the two are compared on.
-
-    """
+    """Return a form whose field of the instrument is a set with the joints, where they are one."""
     fields = [part for part in form.parts if part.group.at == 'instrument']
     if not fields or _tilt(found.problem, found.baseline.model) > TILT:
         return form

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -205,6 +205,9 @@ def write_plan(folder: Path, context: Context, language: str | None, plan: Plann
     t = plan.minutes[len(plan.q)] * 60.0 / len(plan.q) * np.arange(1.0, len(plan.q) + 1.0)
     motion = {'static': True, 'joint_names': robot.joint_names, 't': t, 'q': plan.q}
     write_joint_motion(folder / STATIONS, motion, 'Stations of a first measurement')
+    if context.controller.external:  # an import knows joints by the names of the robot file alone
+        plain = replace(context.controller, mix=np.eye(robot.n))
+        context, language = context._replace(controller=plain), None
     shown = context.degrees(4)
     units = np.where(robot.prismatic, 'mm', 'deg')
     labels = [

@@ -39,7 +39,7 @@ LARGEST = ('2mm', '1deg')
 """How far a point may be moved unless told: more is no inaccuracy of an arm, but a mistake."""
 OF_PROGRAMS = (
     *('controller', 'max_correction', 'start', 'temperature', 'setup', 'force', 'tool', 'base'),
-    'pulses_per_degree',
+    *('pulses_per_degree', 'external', 'on_positioner', 'world'),
 )
 BAGS = ('.mcap', '.db3')
 
@@ -118,7 +118,6 @@ def _corrected_program(args: argparse.Namespace) -> int:
     from weld_twin_msgs_py.programs.source import read_source
 
     robot = robot_of(args)
-    robot.refuse_positioner('a corrected program')
     language = language_of(read_source(args.what), args.what, args.controller)
     context = context_of(args, robot, language)
     program = read_program(args.what, context, language)

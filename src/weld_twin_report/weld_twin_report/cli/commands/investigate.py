@@ -144,7 +144,8 @@ def _write_plan(args: argparse.Namespace, robot: Robot, plan: Planned, seconds: 
         if args.controller:
             lines = _program(args, context, folder / STATIONS, out, 'measure', seconds)
     print('\n'.join([f'stations: {out / STATIONS}', f'table to fill in: {out / TABLE}', *lines]))
-    if not np.array_equal(context.controller.mix, np.eye(robot.n)):
+    counted = np.array_equal(context.controller.mix, np.eye(robot.n))
+    if not counted and not context.controller.external:
         print('J3 counts from the ground there: import the table with --coupled 3+2')
 
 

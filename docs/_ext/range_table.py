@@ -18,7 +18,7 @@ class Ranges(Directive):
 
     def run(self) -> list[nodes.Node]:
         """Return the table."""
-        return [page_table(HEADER, range_rows(sliding=self.arguments == ['sliding']), 'sentences')]
+        return [page_table(HEADER, range_rows(sliding=self.arguments == ['sliding']))]
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

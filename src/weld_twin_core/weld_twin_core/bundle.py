@@ -143,18 +143,7 @@ class _State:
             pixel[which], by_point[which], by_lens[which] = lens.derivatives(ahead[which])
         by_there = by_point @ back
         by_at = by_there @ turn
-        arm = there - tool[:, :3, 3]
-        of_tool = np.concatenate(
-            [
-                np.where(forth[:, None, None], by_there, -by_at),
-                np.where(
-                    forth[:, None, None],
-                    -by_there @ skew(arm),
-                    by_at @ skew(at - tool[:, :3, 3]),
-                ),
-            ],
-            axis=2,
-        )
+        of_tool = _of_tool(forth, by_there, by_at, there - tool[:, :3, 3], at - tool[:, :3, 3])
         of_eye = np.concatenate([-by_there, by_there @ skew(away)], axis=2)
         of_target = np.concatenate([by_at, -by_at @ skew(own)], axis=2)
         of_corner = by_at @ target[:, :3, :3]
@@ -441,6 +430,15 @@ def _told(point: _Point, noise: float) -> Adjusted:
     )
     off = state.unknowns[: UNKNOWNS * len(state.lenses)].reshape(-1, UNKNOWNS)
     return Adjusted(measured, state.lenses, off, noise)
+
+
+def _of_tool(
+    forth: NDArray[np.bool_], by_there: Array, by_at: Array, there: Array, at: Array
+) -> Array:
+    """Return the change with the tool, (N, 2, 6), of points forth by its pose or back by it."""
+    ahead = np.concatenate([by_there, -by_there @ skew(there)], axis=2)
+    back = np.concatenate([-by_at, by_at @ skew(at)], axis=2)
+    return np.where(forth[:, None, None], ahead, back)
 
 
 def _times(matrix: Array, vector: Array) -> Array:

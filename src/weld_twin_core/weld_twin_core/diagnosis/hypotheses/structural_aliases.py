@@ -136,9 +136,8 @@ def _also(
         more = [Rival(Site(*c.unit.site), nats_in_place(rest, f, count, c), f) for c, f in tried]
         alike += more
         # What is the same error on any motion is ahead by its fewer numbers alone.
-        always_alike = {Site(seed.name, seed.site) for seed in seeds}
-        parted = [rival for rival in more if rival.site not in always_alike]
-        best = max(parted, key=lambda rival: rival.nats, default=None)
+        same = {Site(seed.name, seed.site) for seed in seeds}
+        best = max((r for r in more if r.site not in same), key=lambda r: r.nats, default=None)
     return [
         replace(one, nats=min(one.nats, most))
         for one in _best_of_each(alike)

@@ -1,9 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Plan a first measurement: how many postures, which, and how sure one will be.
+"""Plan a measurement: how many postures, which, and how sure one will be.
 
-Before anybody measures: for the errors that arms of this kind usually have. With --out, the
-directory gets the stations, a table to fill in, and with --controller a robot program.
+Before anybody measures: for the errors that arms of this kind usually have. With --model: after a
+diagnosis, for what it left open, in a --region or in the whole reach. With --out, the directory gets
+the stations, a table to fill in, and with --controller a robot program.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from ..options import add_force, add_robot, output, robot_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.arrays import Array
     from weld_twin_msgs_py.programs import Context
 
     from ...offline.measurement_plan import Planned
@@ -65,6 +67,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='every joint turns so far to either side of the posture of a usual seam '
         '(default: 75)',
     )
+    add('--model', metavar='FILE', help='diagnosis.json: plan what to measure on top of it')
+    add(
+        '--region',
+        metavar='R',
+        help='where the tool is to be sure, with --model: a box X,Y,Z:X,Y,Z (corners in the base frame, '
+        'mm), a program, or a bag (default: the whole reach)',
+    )
     add('--controller', metavar='NAME', help=f'also write a program: {", ".join(SUFFIXES)}')
     add('--trigger', type=int, default=1, metavar='N', help='output that tells the instrument')
     add('--out', metavar='DIR', help='directory for the files')
@@ -74,11 +83,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print how many stations and how sure; write the files."""
-    from math import radians
-
     from weld_twin_core.errors import DataError
 
-    from ...offline.measurement_plan import SURE, planned
+    from ...offline.measurement_plan import SURE
 
     if args.controller is not None and args.controller not in SUFFIXES:
         known = ', '.join(SUFFIXES)
@@ -92,16 +99,10 @@ def run(args: argparse.Namespace) -> int:
     minutes = 1.0 if args.minutes is None else args.minutes
     if not (0.0 < args.seconds <= 3600.0 and 0.0 < minutes <= 10_000.0):
         raise DataError('--minutes and --seconds must be above zero')
+    if args.region and not args.model:
+        raise DataError('--region says where a fitted model is to be sure; give it with --model')
     robot = robot_of(args)
-    plan = planned(
-        robot,
-        args.tolerance * 1e-3,
-        args.minutes,
-        args.noise * 1e-3,
-        args.seconds,
-        radians(args.spread),
-        args.postures,
-    )
+    plan = _more(args, robot, minutes) if args.model else _first(args, robot)
     _print_table(plan, args.tolerance)
     if args.postures is not None and plan.within[-1] < SURE:
         print(
@@ -111,6 +112,78 @@ def run(args: argparse.Namespace) -> int:
     if args.out:
         _write(args, robot, plan)
     return 0
+
+
+def _first(args: argparse.Namespace, robot: Robot) -> Planned:
+    """Return the plan of a first measurement."""
+    from math import radians
+
+    from weld_twin_core.diagnosis.predicting.planned import plan_stations
+
+    from ...offline.measurement_plan import planned
+
+    given = (args.tolerance * 1e-3, args.noise * 1e-3, radians(args.spread))
+    return planned(
+        robot,
+        lambda count: plan_stations(robot, count, *given),
+        args.minutes,
+        args.seconds,
+        args.postures,
+    )
+
+
+def _more(args: argparse.Namespace, robot: Robot, minutes: float) -> Planned:
+    """Return the plan of what to measure on top of a diagnosis, and say how sure it is so far."""
+    from math import radians
+
+    from weld_twin_core.diagnosis.predicting.planned import Wanted, plan_more
+    from weld_twin_core.effects.setup_motion import of_the_robot
+    from weld_twin_core.errors import DataError
+    from weld_twin_core.twin.twin import Twin
+    from weld_twin_msgs_py.files.diagnosis_model import load_model
+    from weld_twin_msgs_py.files.posterior_entry import read_posterior
+
+    from ...offline.measurement_plan import planned
+    from ...offline.region import anywhere
+
+    posterior, fitted = read_posterior(robot, args.model), load_model(robot, args.model)
+    if posterior is None:
+        raise DataError(
+            f"the diagnosis '{args.model}' does not say how sure it is; diagnose again"
+        )
+    twin = Twin(fitted.robot, of_the_robot(fitted.effects))
+    postures = _in_region(args, robot) if args.region else anywhere(robot, radians(args.spread))
+    wanted = Wanted(args.tolerance * 1e-3, args.noise * 1e-3)
+    plan = planned(
+        robot,
+        lambda count: plan_more(posterior, twin, postures, count, wanted),
+        None if args.postures else minutes,
+        args.seconds,
+        args.postures,
+        least=1,
+        offered=len(postures[1]),
+    )
+    where = f"in the region '{args.region}'" if args.region else 'elsewhere in its reach'
+    print(
+        f'so far the corrected robot may be off by {plan.sigma[0] * 1e3:.2g} mm {where} '
+        '(one standard deviation)'
+    )
+    return plan
+
+
+def _in_region(args: argparse.Namespace, robot: Robot) -> tuple[Array, Array]:
+    """Return the postures of --region."""
+    from weld_twin_msgs_py.programs.languages import language_of
+    from weld_twin_msgs_py.programs.source import read_source
+
+    from ...offline.region import region
+    from ..program_options import context_of
+
+    language = ''
+    if Path(args.region).is_file():
+        language = language_of(read_source(args.region), args.region, args.controller or '')
+    context = context_of(args, robot, language or args.controller or 'csv')
+    return region(robot, args.region, context, language)
 
 
 def _print_table(plan: Planned, tolerance: float) -> None:

@@ -42,6 +42,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='how far a point may be moved (default: 2mm 1deg)',
     )
     parser.add_argument(
+        '--tolerance',
+        metavar='LENGTH',
+        help='of the tool, such as 0.3mm: also say how probably it is kept all along the seams',
+    )
+    parser.add_argument(
+        '--noise',
+        default='0.03mm',
+        metavar='LENGTH',
+        help='of a coordinate of your instrument, for what to measure more (default: 0.03mm)',
+    )
+    parser.add_argument(
         '--start',
         metavar='A,A,...',
         help='joints before the first move, in degrees (mm for sliding ones)',
@@ -91,8 +102,9 @@ def _corrected(args: argparse.Namespace, context: Context, program: Program) -> 
         way,
     )
     from weld_twin_nodes.offline.told_twin import other_readings
+    from weld_twin_nodes.offline.tolerances import tolerance_entry
 
-    from ...report.correction_page import correction_page, headline
+    from ...report.correction_page import correction_page, headline, tolerance_told
 
     length, angle = args.max_correction
     caps = Caps(
@@ -107,6 +119,12 @@ def _corrected(args: argparse.Namespace, context: Context, program: Program) -> 
     )
     entry = correction_entry(made, robot, caps) | {'way': way(made, model)}
     entry['notes'] += not_told(content)
+    if args.tolerance:
+        size, noise = (
+            quantity(text, ('mm', 'm', 'um'), option)
+            for text, option in ((args.tolerance, '--tolerance'), (args.noise, '--noise'))
+        )
+        entry['tolerance'] = tolerance_entry(made, model, size, noise)
     inputs = [hashed('program', args.program), hashed('model', args.model)]
     entry['inputs'] = [item.as_dict() for item in inputs]
     with output(args, RESULT) as place:
@@ -114,6 +132,8 @@ def _corrected(args: argparse.Namespace, context: Context, program: Program) -> 
         write_text(place / PAGE, correction_page(entry, inputs))
         _write_entry(place, entry)
     print(f'{Path(args.out) / program.sources[0].name}: {headline(entry)}')
+    for sentence in tolerance_told(entry):
+        print(sentence)
     _tell(entry)
     print(f'report: {Path(args.out) / PAGE}')
     return 0

@@ -64,7 +64,7 @@ def cell(tmp_path_factory):
     )
     assert said.code == 0, said.err
     said = weld_twin(
-        *('correct-program', MADE / FILES[0], '--robot', folder / 'robot.yaml'),
+        *('correct', MADE / FILES[0], '--robot', folder / 'robot.yaml'),
         *('--model', folder / 'found' / 'diagnosis.json', '--out', folder / 'better'),
     )
     assert said.code == 0, said.err
@@ -176,7 +176,7 @@ def test_a_promise_counts_what_a_fitted_base_hides_of_the_arm(cell, tmp_path):
     )
     assert said.code == 0, said.err
     model = ('--model', tmp_path / 'found' / 'diagnosis.json')
-    said = weld_twin('correct-program', MADE / FILES[0], *robot, *model, '--out', tmp_path / 'out')
+    said = weld_twin('correct', MADE / FILES[0], *robot, *model, '--out', tmp_path / 'out')
     assert said.code == 0 and 'frames were fitted to the recording (base)' in said.out
     texts = [
         [(folder / name).read_bytes().decode('latin-1') for name in FILES]
@@ -207,7 +207,7 @@ def off_the_path(folder):
 @pytest.mark.parametrize(('size', 'decided'), [(2e-2, 'as kept'), (2e-6, 'as not kept')])
 def test_a_tolerance_is_decided_by_how_sure_the_correction_is(size, decided, cell, tmp_path):
     said = weld_twin(
-        *('correct-program', MADE / FILES[0], '--robot', cell / 'robot.yaml'),
+        *('correct', MADE / FILES[0], '--robot', cell / 'robot.yaml'),
         *('--model', cell / 'found' / 'diagnosis.json', '--out', tmp_path / 'out'),
         *('--tolerance', f'{size * 1e3:g}mm'),
     )
@@ -225,7 +225,7 @@ def test_a_tolerance_needs_a_model_that_says_how_sure_it_is(cell, tmp_path):
     (tmp_path / 'zero.yaml').write_text(
         '[{effect: joint_offset, joint: joint_a2, offset: 8e-4}]\n'
     )
-    words = ('correct-program', MADE / FILES[0], '--robot', cell / 'robot.yaml')
+    words = ('correct', MADE / FILES[0], '--robot', cell / 'robot.yaml')
     model = ('--model', tmp_path / 'zero.yaml', '--out', tmp_path / 'out')
     said = weld_twin(*words, *model, '--tolerance', '0.3mm')
     assert said.code == 2 and 'diagnosis.json' in said.err and said.err.count('\n') == 1
@@ -234,7 +234,7 @@ def test_a_tolerance_needs_a_model_that_says_how_sure_it_is(cell, tmp_path):
 
 def plan_more(cell, *words, postures=12):
     return weld_twin(
-        *('plan-measurement', '--robot', cell / 'robot.yaml', '--tolerance', 0.02),
+        *('investigate', '--robot', cell / 'robot.yaml', '--tolerance', 0.02),
         *('--model', cell / 'found' / 'diagnosis.json', '--postures', postures, *words),
     )
 

@@ -37,6 +37,11 @@ MISTAKES = (
     'stamps_in_bursts',
     'computed',
     'camera_inverted',
+    'wrong_fixture',
+    'intrinsics',
+    'target_scale',
+    'target_mirrored',
+    'cameras_swapped',
     'other',
 )
 """Kinds of mistakes in data and set-up; docs/unsound.md describes each."""

@@ -31,9 +31,10 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .base_leans import base_leans
+from .carriage import summed
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import turn
 
 
@@ -51,14 +52,36 @@ class BearingTilt(Effect):
     second: Value = ()
 
     name = 'bearing_tilt'
+    title = 'axis wobble'
+    entered = 'program'
     depends_on = 'angle'
     of = 'joint'
     stage = Stage.LINK
     common = False
     by_motion = True
     parameters = (
-        Parameter('lean', 'rad', size=4, typical=2e-4),
-        Parameter('second', 'rad', size=0, typical=2e-4),
+        Parameter(
+            'lean',
+            'rad',
+            size=4,
+            typical=2e-4,
+            range=Plausible.even(
+                2e-4,
+                3e-3,
+                'derived: two hundredths of a millimetre of run-out on a bearing of 0.1 m',
+            ),
+        ),
+        Parameter(
+            'second',
+            'rad',
+            size=0,
+            typical=2e-4,
+            range=Plausible.even(
+                1e-4,
+                1.5e-3,
+                'derived: an oval race leans less than one that is off centre; half of lean',
+            ),
+        ),
     )
 
     def check(self, robot: Robot) -> None:
@@ -98,12 +121,9 @@ class BearingTilt(Effect):
 
     def displace(self, view: View) -> Shift:
         """Return the lean of the frame before the joint."""
-        out: dict[Channel, Array] = {}
-        for name, times in self._waves():
-            for k, part in enumerate(self._parts(view, times)):
-                for channel, value in part.items():
-                    out[channel] = out.get(channel, 0.0) + self.number(name, k) * value
-        return out
+        waves = list(self._waves())
+        values = [self.number(name, k) for name, _ in waves for k in range(4)]
+        return summed(values, [part for _, n in waves for part in self._parts(view, n)])
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return the waves."""
@@ -154,21 +174,9 @@ class BearingTilt(Effect):
         return out if np.size(self.second) else {k: v for k, v in out.items() if k != 'second'}
 
     @classmethod
-    def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: an axis that slides does not turn.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on.
-
-        """
-        if joint is not None and view.robot.prismatic[view.robot.index(joint)]:
-            return 'a joint that slides has no bearing that turns with it'
-        return super().applicable(view, joint)
+    def fits(cls, robot: Robot, joint: str | None) -> bool:
+        """Return whether the joint turns."""
+        return joint is not None and not robot.prismatic[robot.index(joint)]
 
     def remedy(self, robot: Robot) -> str:
         """Return what to mend, in words; see `Hooks.remedy`."""

@@ -391,7 +391,9 @@ def _collect(
             if point.ndim == 1:
                 arm = model.arm(move.tool)
                 jacobian = chain_jacobian(arm, frames(arm, motion.q[at]))
-                step = least_step(jacobian, gap[at], SINGULAR)
+                step = np.zeros(arm.n)  # external axes go where they went
+                own = slice(moved.external, None)
+                step[own] = least_step(jacobian[:, own], gap[at], SINGULAR)
             else:
                 step = _own(moved.place(use), use, point, gap[at])
             steps.setdefault(use.point, []).append(step)

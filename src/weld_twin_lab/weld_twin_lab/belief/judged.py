@@ -16,7 +16,7 @@ from weld_twin_core.diagnosis.result import NAMING
 
 from ..blind.judging import Judged, answers_of, judge
 from .levels_of_truth import alike_by_structure, levels_of, numbers
-from .whole import whole
+from .whole import FEW, whole
 
 AS_WELL = 0.05
 """Share of the noise by which a member of a set may leave more than the cause at work does."""
@@ -109,9 +109,14 @@ def _with_absorbed(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _right(row: Mapping[str, Any], told: Judged) -> bool:
-    """Return whether an answer is right as a whole, sets held to what they predict."""
-    several = 'shown' in row['truth']
-    right = whole(row['truth'], row['verdict']).right if several else told.right
+    """
+    Return whether an answer is right as a whole, sets held to what they predict.
+
+    Of two or three causes those that do not show may be missing, as of four to six.
+    """
+    right = told.right
+    if 'shown' in row['truth'] and not (right and told.kind in FEW):
+        right = whole(row['truth'], row['verdict']).right
     return right and _sets_hold(row)
 
 

@@ -25,6 +25,7 @@ from ..blind.making import Case, truth_of
 from .mix import drawn
 from .several import several
 from .visible import shown
+from .whole import FEW
 
 USUAL, SEVERAL = 'usual', 'several'
 """Mixes of cases."""
@@ -39,8 +40,7 @@ def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
     seed, number : int
         Of the case, as the mix takes them.
     mix : str
-        `USUAL` for `mix.drawn`; `SEVERAL` for `several.several`, whose rows tell which causes
-        show.
+        `USUAL` for `mix.drawn`; `SEVERAL` for `several.several`.
 
     """
     name = f'{seed}/{number}'
@@ -49,7 +49,7 @@ def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
     except Exception as error:
         return {'name': name, 'error': f'not drawn: {error}'}
     row = {'poor': poor, **row_of(name, case, held_out=held_out)}
-    if mix == SEVERAL:
+    if mix == SEVERAL or row['truth']['kind'] in FEW:
         row['truth']['shown'] = shown(case)
     return row
 

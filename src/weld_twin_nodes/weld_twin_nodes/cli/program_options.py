@@ -9,36 +9,55 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from .parsing import Adder
+
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
     from weld_twin_core.arrays import Array
     from weld_twin_msgs_py.programs import Context
+    from weld_twin_msgs_py.programs.controllers import Cell
 
 _UNITS = {'mm': 1e-3, 'um': 1e-6, 'm': 1.0, 'deg': 0.017453292519943295, 'rad': 1.0}
 
 
 def add_program_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that say how the numbers of a program are meant."""
-    parser.add_argument(
-        '--tool',
-        action='append',
-        default=[],
-        metavar='NAME=X,Y,Z,...',
-        help='numbers of a tool that the program only names, as the controller shows them '
-        '(mm and degrees, ABB with a quaternion, Universal Robots in m and rad)',
+    add = Adder(parser, 'how the numbers of a program are meant', rare=True)
+    text = 'numbers of a tool that the program only names, as the controller shows them (mm and '
+    text += 'degrees, ABB with a quaternion, Universal Robots in m and rad)'
+    add('--tool', 'NAME=X,Y,Z,...', text, many=True)
+    add('--base', 'NAME=X,Y,Z,...', 'the same of a base (user frame, work object)', many=True)
+    text = 'of every axis of a Yaskawa arm whose points are in pulses'
+    add('--pulses-per-degree', 'N,N,...', text)
+    text = 'which joint of the robot file each external axis is, such as E1=rail,E2=-tilt (KUKA), '
+    text += 'eax_a=rail (ABB), GP2.J1=tilt (FANUC); a minus where it counts the other way'
+    add('--external', 'E=JOINT,...', text, default='')
+    text = 'bases that go along with the positioner, where the program does not say; or none'
+    add('--on-positioner', 'NAME,...', text)
+    text = (
+        "where a track begins in the controller's world, for positions in frames that stand still"
     )
-    parser.add_argument(
-        '--base',
-        action='append',
-        default=[],
-        metavar='NAME=X,Y,Z,...',
-        help='the same of a base (user frame, work object)',
-    )
-    parser.add_argument(
-        '--pulses-per-degree',
-        metavar='N,N,...',
-        help='of every axis of a Yaskawa arm whose points are in pulses',
-    )
+    add('--world', 'X,Y,Z,...', text)
+
+
+def add_trigger(parser: argparse.ArgumentParser) -> None:
+    """Add the option that names the output by which a program tells the instrument to measure."""
+    text = 'digital output that tells the instrument when to measure (default: {default})'
+    Adder(parser, rare=True)('--trigger', 'N', text, type=int, default=1)
+
+
+def check_program(args: argparse.Namespace) -> None:
+    """Refuse a language that there is not, and an output that no controller has."""
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.programs.writing import WRITERS
+
+    if args.controller not in WRITERS:
+        raise DataError(
+            f'--controller: there is no language {args.controller!r}; known are '
+            + ', '.join(WRITERS)
+        )
+    if not 0 <= args.trigger <= 9999:
+        raise DataError('--trigger must be the number of an output')
 
 
 def context_of(args: argparse.Namespace, robot: Robot, language: str) -> Context:
@@ -65,7 +84,19 @@ def context_of(args: argparse.Namespace, robot: Robot, language: str) -> Context
             raise DataError(f'--pulses-per-degree needs {robot.n} numbers that are not zero')
     tools = _frames(args.tool, '--tool', language)
     bases = _frames(args.base, '--base', language)
-    return Context(robot, controller_of(robot, language, tools, bases), pulses)
+    cell = _cell(args, language)
+    return Context(robot, controller_of(robot, language, tools, bases, cell), pulses)
+
+
+def _cell(args: argparse.Namespace, language: str) -> Cell:
+    from weld_twin_msgs_py.programs.controllers import Cell
+
+    along = None
+    if args.on_positioner is not None:
+        names = {name.strip().lower() for name in args.on_positioner.split(',')}
+        along = frozenset(names - {'none', ''})
+    world = _frames([f'world={args.world}'], '--world', language) if args.world else {}
+    return Cell(args.external, along, world.get('world'))
 
 
 def _frames(given: Sequence[str], option: str, language: str) -> dict[str, Array]:

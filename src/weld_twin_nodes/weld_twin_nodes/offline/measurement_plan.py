@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,8 @@ MOST_ASKED = 500
 LEAST = 24
 """Stations below which a fit names too little of what is there: plans that were carried out with 16
 left up to six times what was promised (docs/first_measurement.md)."""
+SHOWN = (8, 16, 24, 40, 60, 80, 120)
+"""Rows of the table on the terminal, besides the first, the last and the number needed [stations]."""
 SURE = 0.95
 """Share of the region's postures at which the tool is to be within the tolerance."""
 
@@ -162,6 +164,31 @@ def _way(robot: Robot, q: Array) -> list[int]:
     return order
 
 
+def plan_table(plan: Planned, tolerance: float) -> list[str]:
+    """Return how sure so many poses make one, in lines; the tolerance is in metres."""
+    wanted = f'{1e3 * tolerance:g} mm'
+    most, count = len(plan.minutes) - 1, len(plan.q)
+    steps = {0, *SHOWN, count, most}
+    out = [f'poses  minutes  usual error left  within {wanted}']
+    out += [
+        f'{k:5d}  {plan.minutes[k]:7.1f}  {plan.sigma[k] * 1e3:13.3f} mm  {plan.within[k]:8.0%}'
+        for k in sorted(step for step in steps if step <= most)
+    ]
+    if plan.needed is None:
+        out.append(
+            f'all {most} poses that fit into the time keep {wanted} at {plan.within[-1]:.0%} of '
+            'postures; more time, less noise or a smaller --spread help'
+        )
+        return out
+    out.append(f'{count} poses, {plan.minutes[count]:.0f} minutes: base and tool are found along')
+    if plan.within[count] < SURE:
+        out.append(
+            f'{count} poses keep {wanted} at {plan.within[count]:.0%} of postures; more of them, '
+            'less noise or a smaller --spread help'
+        )
+    return out
+
+
 def write_plan(folder: Path, context: Context, language: str | None, plan: Planned) -> None:
     """
     Write the stations and the table to fill in.
@@ -183,6 +210,9 @@ def write_plan(folder: Path, context: Context, language: str | None, plan: Plann
     t = plan.minutes[len(plan.q)] * 60.0 / len(plan.q) * np.arange(1.0, len(plan.q) + 1.0)
     motion = {'static': True, 'joint_names': robot.joint_names, 't': t, 'q': plan.q}
     write_joint_motion(folder / STATIONS, motion, 'Stations of a first measurement')
+    if context.controller.external:  # an import knows joints by the names of the robot file alone
+        plain = replace(context.controller, mix=np.eye(robot.n))
+        context, language = context._replace(controller=plain), None
     shown = context.degrees(4)
     units = np.where(robot.prismatic, 'mm', 'deg')
     labels = [

@@ -11,8 +11,10 @@ from dataclasses import replace
 import diagnoses
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.result import Candidate, Check, Site, Where
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.metrics.conformity import Rule
@@ -21,7 +23,7 @@ from weld_twin_nodes.wording.quantities import counted
 from weld_twin_nodes.wording.verdict import verdict
 from weld_twin_report.report import report_page
 from weld_twin_report.report.acceptance import Demand
-from weld_twin_report.report.belief import belief_of
+from weld_twin_report.report.answer import Answer
 from weld_twin_report.report.controllers import correction
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 from weld_twin_report.report.diagnosis_page import Sheet
@@ -165,7 +167,7 @@ def test_the_controller_is_not_to_be_given_a_curve_that_takes_hardly_anything_of
     card = part(report_page(unknown(1e-6)), 'class="cards"', 'id="seam"')
     assert 'Its curve takes hardly anything off: do not correct programs by it' in card
     assert 'Nothing is to be entered: the curve takes hardly anything off.' in card
-    assert 'correct-program' not in card
+    assert 'weld-twin correct' not in card
 
 
 @pytest.mark.parametrize(('level', 'told'), [('ok', False), ('note', True)])
@@ -279,7 +281,7 @@ def test_a_named_cause_whose_mending_alone_makes_it_worse_is_to_be_mended_with_t
 def test_a_cause_has_one_figure_of_belief_and_no_part_is_less_sure_than_the_whole():
     cause = replace(PLAY.causes[0], name=((Site('backlash', 'elbow_joint'), 0.76),))
     case = replace(PLAY, causes=(cause,), confidence=0.96)
-    assert belief_of(case, cause) == 0.96
+    assert Answer(case).causes[0].belief == 0.96
     card = report_page(case)
     card = card[card.index('class="cards"') :]
     card = card[card.index('How sure') : card.index('<dt>By how much')]
@@ -431,3 +433,67 @@ def test_what_a_cause_does_is_told_at_the_stations_where_there_is_no_seam():
     assert 'Effect at the stations' in page and 'Effect on the seam' not in page
     moving = report_page(PLAY)
     assert 'Effect on the seam' in moving and 'Effect at the stations' not in moving
+
+
+ORDERS = {'kuka': ('ZYX', False), 'fanuc': ('xyz', False), 'abb': (None, True)}
+"""Angles as the makers write them, and whether positions are in metres."""
+
+
+def frame_in(text, brand):
+    """Return the frame that the numbers of a maker stand for."""
+    order, metres = ORDERS[brand]
+    text = re.sub(r'q1 to q4', '', text)
+    numbers = [float(v) for v in re.findall(r'-?\d+\.\d+', text)]
+    out = np.eye(4)
+    if order is None:
+        turn = Rotation.from_quat([*numbers[4:], numbers[3]])
+    else:
+        turn = Rotation.from_euler(order, numbers[3:], degrees=True)
+    out[:3, :3], out[:3, 3] = turn.as_matrix(), np.array(numbers[:3]) * (1.0 if metres else 1e-3)
+    return out
+
+
+@pytest.mark.parametrize('brand', ORDERS)
+def test_a_positioner_that_stands_elsewhere_is_told_as_its_controller_takes_it(brand):
+    """Old and new value, and what to do where the controller has the root at another place."""
+    turn = Rotation.from_euler('xyz', [20.0, -35.0, 110.0], degrees=True)
+    foot = {'xyz': [1.4, 0.2, 0.7], 'quat_xyzw': turn.as_quat().tolist()}
+    high = Rotation.from_euler('z', 90.0, degrees=True)
+    data = load('kuka_kr16_2').to_mapping() | {'name': 'cell'}
+    data['base'] = {'xyz': [0.0, 0.0, 0.5], 'quat_xyzw': high.as_quat().tolist()}
+    data['controller'] = {'base': {'xyz': [0.0, 0.0, 0.1], 'quat_xyzw': [1.0, 0.0, 0.0, 0.0]}}
+    data['workpiece'] = {'base': foot, 'joints': [{'name': 'tilt', 'a': 0.1}]}
+    error = {'effect': 'root_pose', 'xyz': [2e-3, -1e-3, 3e-3], 'rotvec': [1e-3, 2e-3, -3e-3]}
+    told = correction(effect_from_mapping(error), brand, Robot.from_mapping(data))
+
+    def placed(xyz, rotation):
+        out = np.eye(4)
+        out[:3, :3], out[:3, 3] = rotation.as_matrix(), xyz
+        return out
+
+    base = placed([0.0, 0.0, 0.5], high)
+    mine = base @ placed([0.0, 0.0, 0.1], Rotation.from_quat([1.0, 0.0, 0.0, 0.0]))
+    moved = Rotation.from_rotvec(high.apply(error['rotvec']))
+    real = placed(foot['xyz'] + high.apply(error['xyz']), moved * turn)
+    parts = re.split('Old value |; new value |\\. The origin ', told)
+    old, new = (frame_in(part, brand) for part in parts[1:3])
+    np.testing.assert_allclose(old, np.linalg.inv(mine) @ placed(foot['xyz'], turn), atol=2e-6)
+    np.testing.assert_allclose(new, np.linalg.inv(mine) @ real, atol=2e-6)
+    other = placed([0.3, -0.2, 0.4], Rotation.from_rotvec([0.2, 0.1, 1.0]))
+    step = frame_in(parts[3].split('new value is ')[1].split('old value')[0], brand)
+    step[:3, 3] *= 1e-3 if brand == 'abb' else 1.0  # PoseMult is in mm
+    np.testing.assert_allclose(step @ old @ other, new @ other, atol=4e-6)
+
+
+def test_a_frame_on_the_workpiece_is_told_where_it_is_on_the_positioner():
+    """Of a cell poses are measured there, and no bolt of the robot's foot is to blame."""
+    data = load('kuka_kr16_2').to_mapping() | {'name': 'cell'}
+    tool = {'xyz': [0.1, 0.05, 0.08], 'quat_xyzw': [0.0, 0.0, 0.6, 0.8]}
+    data['workpiece'] = {'joints': [{'name': 'turn'}], 'tool': tool}
+    turn, moved = Rotation.from_quat(tool['quat_xyzw']), np.array([0.012, -0.02, 0.004])
+    # What the measuring frame sees of the positioner is displaced by the error.
+    off = {'effect': 'base_pose', 'xyz': (-turn.inv().apply(moved)).tolist(), 'rotvec': [0.0] * 3}
+    told = effect_from_mapping(off).remedy(Robot.from_mapping(data))
+    assert 'at x, y, z = (112.000, 30.000, 84.000) mm' in told
+    assert 'in place of x, y, z = (100.000, 50.000, 80.000) mm' in told
+    assert 'fixture' in told and 'bolts' not in told

@@ -4,9 +4,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
 from weld_twin_core.effects.effect import Effect
+from weld_twin_core.effects.root_pose import RootPose
 from weld_twin_core.effects.wording import further
+from weld_twin_msgs_py.programs.controllers import world_of
+from weld_twin_msgs_py.programs.notation import ABB_POSE, FANUC_POSE, KUKA_POSE, Notation
 
 BRANDS = {
     'abb': 'ABB',
@@ -16,28 +25,12 @@ BRANDS = {
     'yaskawa': 'Yaskawa',
 }
 """By the start of a robot's name, as the bundled models and most URDFs have it."""
-_KINDS = {
-    'joint_offset': 'zero',
-    'joint_slip': 'zero',
-    'base_pose': 'base',
-    'setup_step': 'base',
-    'root_pose': 'root',
-    'tool_pose': 'tool',
-    'tool_slip': 'tool',
-    'wear': 'tool',
-    'payload': 'load',
-    'link_length': 'model',
-    'link_offset': 'model',
-    'link_twist': 'model',
-    'axis_parallelism': 'model',
-}
 _PROGRAM = (
-    'The controller has no field for it: correct the points of the program (weld-twin '
-    'correct-program).'
+    'The controller has no field for it: correct the points of the program (weld-twin correct).'
 )
 UNNAMED = (
     'No field before the cause is known; so long, correct the points of the program (weld-twin '
-    'correct-program).'
+    'correct).'
 )
 """Of a curve: a joint that is off alike everywhere need not be so for its zero."""
 _PLACES = {
@@ -47,21 +40,29 @@ _PLACES = {
     (
         'kuka',
         'root',
-    ): 'Start-up > Calibrate > External kinematic system: change the root point, ROOT '
-    'of MACHINE_DEF[n].',
+    ): 'Start-up > Calibrate > External kinematic system > Root point (numeric): ROOT of '
+    'MACHINE_DEF[n] in the world.',
     ('kuka', 'tool'): 'Start-up > Calibrate > Tool: change TOOL_DATA[n].',
     ('kuka', 'load'): 'Start-up > Calibrate > Tool > Payload data: change LOAD_DATA[n].',
     ('abb', 'zero'): 'Calibration > Calib. parameters: motor calibration offset of the axis, in '
     'radians of the motor: new value = old value {radians_back} * G, where G is radians of the '
     'motor per radian of the joint, with its sign.',
     ('abb', 'base'): 'Change wobj.uframe of the work object, or Base Frame in the topic Motion.',
-    ('abb', 'root'): 'Change Base Frame of the positioner (topic Motion, type Single).',
+    (
+        'abb',
+        'root',
+    ): 'Base Frame of the positioner, such as that of orbit_a, in the world (topic Motion, '
+    'type Single; of two axes that are one unit, Robot).',
     ('abb', 'tool'): 'Change tframe of the tooldata.',
     ('abb', 'load'): 'Change the loaddata, or run LoadIdentify.',
     ('fanuc', 'zero'): 'MENU > SYSTEM > Master/Cal > Single axis master: MSTR POS of the axis, in '
     'degrees: new value = what it reads now {degrees}; then EXEC, without moving it before.',
     ('fanuc', 'base'): 'MENU > SETUP > Frames: change the user frame UFRAME[n].',
-    ('fanuc', 'root'): 'MENU > SETUP > Coord: change the frame of the coordinated pair.',
+    (
+        'fanuc',
+        'root',
+    ): 'MENU > SETUP > Coord: frame of the leader of the coordinated pair, in the world '
+    'of the robot.',
     ('fanuc', 'tool'): 'MENU > SETUP > Frames: change the tool frame UTOOL[n].',
     ('fanuc', 'load'): 'MENU > SYSTEM > Motion: change the payload schedule.',
     (
@@ -91,11 +92,9 @@ _PLACES = {
 """Menus as they are usually called. docs/sheet.md tells which names were found where."""
 _BY_MODEL = ('ur',)
 """Makers whose controllers keep an error of a zero in their model: the readings stay as they are."""
-_GEARED = ('gear_ratio', 'joint_coupling')
-"""Errors that some controllers have a field for."""
 _RATIO = (
     'Where the controller has a field for ratios of gears; else correct the points of the program '
-    '(weld-twin correct-program).'
+    '(weld-twin correct).'
 )
 _ANYWHERE = {
     'zero': 'As the zero of this axis, by mastering it anew: new reading = old reading {far}, with '
@@ -105,7 +104,7 @@ _ANYWHERE = {
     'tool': 'As the tool centre point',
     'load': 'As the payload',
     'model': 'In the kinematic model, where the controller has one that can be edited; else correct '
-    'the points of the program (weld-twin correct-program)',
+    'the points of the program (weld-twin correct)',
 }
 """What takes a correction at any controller, by the kind of the error."""
 _CHECK = (
@@ -118,6 +117,61 @@ UNCHECKED = (
     'controller.'
 )
 """Said wherever a menu is named."""
+
+
+class _Frames(NamedTuple):
+    """
+    How a maker writes a frame of the cell.
+
+    Attributes
+    ----------
+    language : str
+        Whose world it counts from.
+    notation : Notation
+    words : callable
+        Takes its six or seven numbers.
+    moved : str
+        How a frame is displaced by another one in the world, {by} its numbers.
+
+    """
+
+    language: str
+    notation: Notation
+    words: Callable[[list[float]], str]
+    moved: str
+
+
+def _named(names: str, before: str, after: str) -> Callable[[list[float]], str]:
+    def words(numbers: list[float]) -> str:
+        places = (3, 3, 3, 4, 4, 4)
+        shown = zip(names.split(), numbers, places, strict=True)
+        return before + ', '.join(f'{n} {v + 0.0:.{k}f}' for n, v, k in shown) + after
+
+    return words
+
+
+def _in_metres(numbers: list[float]) -> str:
+    place = ', '.join(f'{v * 1e-3 + 0.0:.6f}' for v in numbers[:3])
+    turn = ', '.join(f'{v + 0.0:.7f}' for v in numbers[3:])
+    return f'x, y, z = {place} (in m), q1 to q4 = {turn}'
+
+
+def _rapid(numbers: list[float]) -> str:
+    parts = [f'{v + 0.0:.{k}f}' for v, k in zip(numbers, (3, 3, 3, 7, 7, 7, 7), strict=True)]
+    return f'[[{",".join(parts[:3])}],[{",".join(parts[3:])}]]'
+
+
+_FRAMES = {
+    'kuka': _Frames('krl', KUKA_POSE, _named('X Y Z A B C', '{', '}'), '{by} : old value'),
+    'abb': _Frames('rapid', ABB_POSE, _in_metres, 'PoseMult({by}, old value), both in mm'),
+    'fanuc': _Frames(
+        'fanuc-ls',
+        FANUC_POSE,
+        _named('X Y Z W P R', '', ''),
+        'the frame {by}, times the old value',
+    ),
+}
+"""Makers whose frame of a positioner is told in numbers: as they write it."""
 
 
 def brand_of(robot: str) -> str | None:
@@ -139,11 +193,11 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
         Tells which joints slide; left out, all turn.
 
     """
-    kind = _KINDS.get(effect.name)
-    if kind is None and effect.name not in _BY_PROGRAM:
-        return f'Nothing to enter: {_MATTERS.get(effect.name, _OWN)}.'
-    if effect.name in _GEARED:
+    kind = effect.entered
+    if kind == 'ratio':
         return _RATIO
+    if kind not in _ANYWHERE and kind != 'program':
+        return f'Nothing to enter: {_instead(effect)}.'
     sliding = (
         robot is not None
         and effect.site in robot.joint_names
@@ -151,17 +205,47 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
     )
     off = _off(effect, sliding)
     # The makers' fields of a zero are angles; what a slide's count is not known.
-    if kind is not None and (brand is None or (sliding and kind == 'zero')):
+    if kind in _ANYWHERE and (brand is None or (sliding and kind == 'zero')):
         told = _ANYWHERE[kind].format(**off)
         return told + (
             '.' if brand else '; --controller with the name of its maker tells the menu.'
         )
-    place = _PLACES.get((str(brand), str(kind)))
+    place = _PLACES.get((str(brand), kind))
     if place is None:
         return _PROGRAM
+    if isinstance(effect, RootPose) and robot is not None:
+        return f'{place} {_root(effect, str(brand), robot)} {UNCHECKED}'
     check = _CHECK if kind == 'zero' and brand not in _BY_MODEL else ''
     place = f'{place} {check}'.format(**off).rstrip()
     return f'{place} {UNCHECKED}' if ' > ' in place else place
+
+
+def _root(effect: RootPose, brand: str, robot: Robot) -> str:
+    """Return old and new value of a positioner's root frame as its controller writes them."""
+    form = _FRAMES[brand]
+    world, begins = world_of(robot, form.language)
+    now, new = effect.stands(robot, world)
+
+    def numbers(pose: Array) -> list[float]:
+        return form.notation.numbers(pose, [0.0] * 3 + [1.0] + [0.0] * 3)
+
+    by = numbers(np.asarray(new @ np.linalg.inv(now)))
+    step = _rapid(by) if brand == 'abb' else form.words(by)
+    return (
+        f'Old value {form.words(numbers(now))}; new value {form.words(numbers(new))}. '
+        f'The origin of that world is taken to be {begins}. '
+        'Where the old value there is another one, the controller has the root at another place of '
+        f'the positioner: then the new value is {form.moved.format(by=step)}.'
+    )
+
+
+def _instead(effect: Effect) -> str:
+    """Return what an error is a matter of where a controller has nothing to enter for it."""
+    if not effect.entered:
+        return 'no field of a controller is known for it'
+    if effect.place in ('instrument', 'clock'):
+        return f'the robot is not at fault, but how it was recorded: {effect.entered}'
+    return f'a matter of {effect.entered}'
 
 
 def gearing(effect: Effect) -> str:
@@ -186,43 +270,3 @@ def _off(effect: Effect, sliding: bool) -> dict[str, str]:
         'radians': radians,
         'radians_back': radians_back,
     }
-
-
-_BY_PROGRAM = (
-    'gear_ratio',
-    'transmission_ripple',
-    'joint_coupling',
-    'joint_compliance',
-    'bearing_tilt',
-    'pedestal_tilt',
-    'guide_bend',
-    'guide_tilt',
-    'hose_pull',
-    'joint_curve',
-    'frame_curve',
-)
-"""Errors of the arm that programs can be corrected for and that controllers have no field for."""
-_GEAR = "a matter of the joint's gear"
-_RECORDING = 'the robot is not at fault, but how it was recorded'
-_MATTERS = {
-    'backlash': _GEAR,
-    'hysteresis': _GEAR,
-    'gear_ratio_by_direction': _GEAR,
-    'loaded_play': _GEAR,
-    'friction': "a matter of the joint's gear, bearings and grease",
-    'servo_lag': "a matter of the drive's gains and feed-forward",
-    'vibration': 'a matter of how the motion is planned, and of stiffness',
-    'quantization': 'a matter of the encoder',
-    'cartesian_compliance': 'a matter of stiffness and of the force at the tool',
-    'thermal_growth': 'a matter of warming up, or of the temperature in the cell',
-    'link_warm_up': 'a matter of warming up',
-    'drift': 'a matter of what the frame stands on, or of the temperature',
-    'setup_settling': 'a matter of how the set-up is held',
-    'time_delay': f'{_RECORDING}: its clocks',
-    'clock_rate': f'{_RECORDING}: its clocks',
-    'measurement_scale': f'{_RECORDING}: the scale of the instrument',
-    'refraction': f'{_RECORDING}: warm air bent the line of sight',
-    'instrument_knock': f'{_RECORDING}: the instrument or the base was knocked',
-}
-"""What a cause is a matter of where a controller has nothing to enter for it."""
-_OWN = 'no field of a controller is known for it'

@@ -18,7 +18,7 @@ from weld_twin_msgs_py.programs.languages import LANGUAGES
 
 from ..report.controllers import BRANDS
 
-IMPORT, DIAGNOSE, CORRECT = 'import', 'diagnose', 'correct-program'
+IMPORT, DIAGNOSE, CORRECT = 'import', 'diagnose', 'correct'
 LONGEST = 2000
 """Characters of a field."""
 Choices = tuple[tuple[str, str], ...]
@@ -195,6 +195,18 @@ FIELDS: dict[str, Field] = {
     'pulses_per_degree': Field(
         'Pulses per degree', 'of every axis of a Yaskawa arm', (CORRECT,), _numbers
     ),
+    'external': Field(
+        'External axes', 'which joint each is, such as E1=rail,E2=-tilt', (CORRECT,), _name
+    ),
+    'on_positioner': Field(
+        'Bases on the positioner',
+        'names of bases that go along with it, or none',
+        (CORRECT,),
+        _name,
+    ),
+    'world': Field(
+        'Where the track begins', 'X,Y,Z,... in the world of the controller', (CORRECT,), _numbers
+    ),
     'max_length': Field(
         'Farthest that a point may be moved', 'in mm; empty: 2 mm', (CORRECT,), _millimetres
     ),
@@ -294,7 +306,8 @@ def sentence(text: str, command: str = '') -> str:
         return f'“{titles[name]}”' if name in titles else 'a setting of the command line'
 
     # What is quoted is a whole command line; it can only be typed where the server is.
-    text = re.sub(r"'weld-twin ([a-z-]+)[^']*'", r'the command “\1” where the server runs', text)
+    command = r"'weld-twin ((?:bag |export |history )?[a-z-]+)[^']*'"
+    text = re.sub(command, r'the command “\1” where the server runs', text)
     text = re.sub(r'\bweld-twin ([a-z-]+)', r'“\1”', text)
     text = re.sub(r'(?<![\w-])--([a-z]+(?:-[a-z]+)*)', title, text)
     return text[:1].upper() + text[1:]

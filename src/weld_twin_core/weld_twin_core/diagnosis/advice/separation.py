@@ -128,15 +128,8 @@ def normals(
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
     alternatives : sequence of Alternative
         The explanations to tell apart.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-    candidate : Candidate
     now : Side
         As `at_hand` returned it.
 
@@ -193,14 +186,8 @@ def at_hand(
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
     alternatives : sequence of Alternative
         The explanations to tell apart.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
 
     """
     few = problem.thinned(ROWS)

@@ -63,7 +63,6 @@ class Touchable:
 
     Attributes
     ----------
-    recording : Recording
     rows : array, shape (N, 3, P)
         What each sees of all unknowns; rows that a kind of contact does not have are zero.
 
@@ -220,7 +219,6 @@ def scatter(touches: Sequence[Touchable], errors: int) -> Array:
 
     Parameters
     ----------
-    touches : sequence of Touchable
     errors : int
         Number of unknowns that are no place.
 
@@ -238,12 +236,10 @@ def chosen(
 
     Parameters
     ----------
-    design : Design
     rows : array, shape (N, 3, P)
         Of every touch that could be made.
     weight : array, shape (E, E)
         How much the errors' variances and covariances count.
-    count : int
 
     """
     free = np.ones(len(rows), dtype=bool)

@@ -213,7 +213,8 @@ def _chosen(
 def _places(problem: Problem, model: Model) -> list[Array]:
     """Return the columns of every change."""
     sizes = [change.effect.coordinates().size for change in model.changes]
-    ends = problem.frame_count + np.cumsum(np.array([0, *sizes], dtype=int))
+    first = problem.frame_count + problem.shared_count
+    ends = first + np.cumsum(np.array([0, *sizes], dtype=int))
     return [np.arange(a, b) for a, b in pairwise(ends)]
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...effects.effect import Effect
 from ..algebra.fit import Fit, fit
 from ..result import Site
 from .seed_systems import Choice, evidence, ranking
@@ -25,12 +26,26 @@ SHORTLIST = 7
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """A unit in the place of a found effect: its evidence, and the fit with it."""
+    """
+    A unit in the place of a found effect: its evidence, and the fit with it.
+
+    Attributes
+    ----------
+    site : Site
+    nats : float
+    fit : Fit
+    probability : float
+        Its share of the evidence in this place.
+    behind : float
+        By how much a family that was taken out is ahead in this place [nats]; 0 of none.
+
+    """
 
     site: Site
     nats: float
     fit: Fit
     probability: float = 0.0
+    behind: float = 0.0
 
 
 def rivals(
@@ -41,34 +56,53 @@ def rivals(
 
     Parameters
     ----------
-    work : Workspace
     now : Fit
         The final fit, on the workspace's problem and scale.
-    k : int
     effective : callable
         Number of independent rows of a fit.
 
     """
-    effect, beliefs = now.model.found[k], work.beliefs
+    effect = now.model.found[k]
     rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
-    systems = work.beside(rest.model, rest.residual)
-    ranked = ranking(systems, work.library.units, effective(now))
+    ranked, tried = contenders(work, rest, effective(now), now.model.found)
     own = next((c for c in ranked if c.unit.site == (effect.name, effect.site)), None)
-    taken = {(e.name, e.site) for e in now.model.found}
-    choices = [c for c in ranked if c.unit.site not in taken and c.nats > 0.0]
-    reach = max(beliefs.rival_nats, beliefs.rival_share * choices[0].nats) if choices else 0.0
-    close = [c for c in choices if c.nats > choices[0].nats - reach][:SHORTLIST]
-    tried = [(c, fitted_with(work, rest.model, c.effect())) for c in close]
-    tried = [(c, other) for c, other in tried if not implausible(other.model)]
-    close, fits = [c for c, _ in tried], [other for _, other in tried]
     # One count for all rivals: see `select`.
-    count = effective(min([now, *fits], key=lambda f: f.rss))
+    count = effective(min([now, *(other for _, other in tried)], key=lambda f: f.rss))
     out = [Rival(Site(effect.name, effect.site), nats_in_place(rest, now, count, own), now)]
-    for choice, other in zip(close, fits, strict=True):
-        out.append(
-            Rival(Site(*choice.unit.site), nats_in_place(rest, other, count, choice), other)
-        )
-    return weighed(out, beliefs.temperature)
+    for choice, other in tried:
+        nats = nats_in_place(rest, other, count, choice)
+        out.append(Rival(Site(*choice.unit.site), nats, other))
+    return weighed(out, work.beliefs.temperature)
+
+
+def contenders(
+    work: Workspace, rest: Fit, count: float, taken: Sequence[Effect], most: int = SHORTLIST
+) -> tuple[list[Choice], list[tuple[Choice, Fit]]]:
+    """
+    Return how a library's units rank beside a fit, and those near the best, each fitted with it.
+
+    Parameters
+    ----------
+    work : Workspace
+        With the library asked.
+    rest : Fit
+        What each is added to.
+    count : float
+        Number of independent rows.
+    taken : sequence of Effect
+        Those in the model; they are no contenders.
+    most : int
+        Fitted at the most.
+
+    """
+    beliefs, sites = work.beliefs, {(e.name, e.site) for e in taken}
+    systems = work.beside(rest.model, rest.residual)
+    ranked = ranking(systems, work.library.units, count)
+    choices = [c for c in ranked if c.unit.site not in sites and c.nats > 0.0]
+    reach = max(beliefs.rival_nats, beliefs.rival_share * choices[0].nats) if choices else 0.0
+    close = [c for c in choices if c.nats > choices[0].nats - reach][:most]
+    tried = [(c, fitted_with(work, rest.model, c.effect())) for c in close]
+    return ranked, [(c, other) for c, other in tried if not implausible(other.model)]
 
 
 def weighed(out: Sequence[Rival], temperature: float) -> tuple[Rival, ...]:

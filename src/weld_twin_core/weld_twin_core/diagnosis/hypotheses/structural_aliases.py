@@ -6,18 +6,20 @@ Constant errors that no motion tells apart, whatever the data: they follow from 
 The offset of the first link lifts the tool exactly as a higher base does. Such a pair is told as
 a set even where one of the two was taken out of the library, the simplest member first.
 
-Effects of one joint that come out by the same thing, such as play and friction by the direction,
-are alike in all but their curve. Where one of them is found and another was taken out that fits as
-well, no data can vouch for the name alone, and they are a set too. Where the other fits clearly
-better, what was found stands in for a cause that the library lacks.
+Families that were taken out are still held against what is found, in its place: a hose may do on
+these motions what a load does. Where one of them fits as well, no data can vouch for the name
+alone, and they are a set too. Where it fits clearly better, what was found stands in for a cause
+that the library lacks. None of them is ever named alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arm.robot import Robot
 from ...arrays import Array
@@ -30,9 +32,10 @@ from ..algebra.alias import outside, share_outside, span_of
 from ..algebra.fit import Fit, fit
 from ..beliefs import Beliefs
 from ..result import Site
-from .rivals import Rival, nats_in_place, weighed
+from .library import build
+from .rivals import Rival, contenders, nats_in_place, weighed
 from .search import Search, refitted
-from .selection import fitted_with, implausible
+from .selection import Workspace, backward, fitted_with, implausible
 from .still_joints import hardly_moves, moved_most
 
 POSTURES = 40
@@ -44,18 +47,20 @@ SAME = 1e-6
 SAME_AT_REST = 0.04
 """The same of what is done by a joint at rest: as far as that may travel [rad], a wave that comes once
 per turn departs from a constant."""
-MOST_SEEDS = 3
-"""Instances of an excluded kind that are fitted at most; between them lie sizes ten times apart."""
+MOST_EXCLUDED = 3
+"""Excluded families that are fitted in a place at most: three that fit as well leave no name alone."""
 FEW = 2
 """Instances of a kind that are tried on a joint at rest: what leaks in from either side; of waves
 one does, as all stand still."""
+MOST_PARTS = 6
+"""Coordinates of a frame: what one of its size is made up of is looked for."""
 SEED = 7
 """Of the postures: any generic set gives the same answer."""
 
 
 def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beliefs) -> Search:
     """
-    Return what was found, each constant error with the excluded ones that are the same error.
+    Return what was found, each with the excluded families that may be the same error.
 
     Parameters
     ----------
@@ -65,52 +70,147 @@ def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beli
     beliefs : Beliefs
 
     """
-    slots, better = [], list(found.refused)
-    for k, slot in enumerate(found.slots):
-        if k < len(found.small.model.found):
-            slot, clearly = _extended(found, k, slot, exclude, beliefs)
-            better += clearly
-        slots.append(slot)
-    aliased = replace(found, slots=tuple(slots), refused=tuple(better))
+    named = found.slots[: len(found.small.model.found)]
+    outside = _outside(found, exclude) if named else None
+    slots, refused, behind = list[tuple[Rival, ...]](), list(found.refused), np.zeros(len(named))
+    for k, slot in enumerate(named):
+        more, best = _also(found, k, slot, exclude, outside)
+        if best is not None and (lead := _lead(found, best)) is not None:
+            refused.append(best.fit.model.found[-1])
+            behind = np.where(lead.replaced, np.maximum(behind, lead.nats), behind)
+            more = [rival for rival in more if rival.site != best.site]
+        slots.append(weighed([*slot, *more], beliefs.temperature) if more else slot)
+    slots = [
+        tuple(replace(rival, behind=float(nats)) for rival in slot)
+        for slot, nats in zip(slots, behind, strict=True)
+    ]
+    slots += found.slots[len(named) :]
+    aliased = replace(found, slots=tuple(slots), refused=tuple(refused))
     return _settable_first(aliased, frozenset(exclude))
 
 
-def _extended(
-    found: Search, k: int, slot: tuple[Rival, ...], exclude: Sequence[str], beliefs: Beliefs
-) -> tuple[tuple[Rival, ...], list[Effect]]:
-    """
-    Return a slot with what may be the same error, each fitted in its place.
+def _outside(found: Search, exclude: Sequence[str]) -> Workspace | None:
+    """Return the workspace with a library of what was taken out, or None where that is nothing."""
+    if not exclude:
+        return None
+    work = found.work
+    others = [name for name in REGISTRY if name not in exclude]
+    return replace(work, library=build(work.problem, found.small.model, work.scale, others))
 
-    None of these counts for more than what was found. What was taken out and fits clearly better is
-    no member of the slot, but returned beside it.
+
+def _also(
+    found: Search,
+    k: int,
+    slot: tuple[Rival, ...],
+    exclude: Sequence[str],
+    outside: Workspace | None,
+) -> tuple[list[Rival], Rival | None]:
     """
-    work, features = found.work, found.work.problem.features(found.small.model)
-    taken = {Site(e.name, e.site) for e in found.small.model.found} | {r.site for r in slot}
+    Return what may be the same error as what is in a slot, and the best that was taken out.
+
+    Each is fitted in its place, and none counts for more than what was found.
+    """
+    work, now = found.work, found.small
+    features = work.problem.features(now.model)
+    taken = {Site(e.name, e.site) for e in now.model.found} | {r.site for r in slot}
     constants = [
         rival.site
         for rival in slot
-        if rival.probability >= beliefs.listed and _constant(REGISTRY[rival.site.effect])
+        if rival.probability >= work.beliefs.listed and _constant(REGISTRY[rival.site.effect])
     ]
     seeds = [
-        *_kin(features, found.small.model.found[k], exclude),
         *_same_anywhere(found, constants, exclude),
         *_constants_here(found, features, constants),
     ]
     seeds = [seed for seed in seeds if Site(seed.name, seed.site) not in taken]
-    if not seeds:
-        return slot, []
-    rest = fit(work.problem, found.small.model.without(k), work.scale, None, 4)
-    count, most = found.effective(found.small), max(rival.nats for rival in slot)
-    more, clearly = list[Rival](), list[Effect]()
-    for one in _best_of_each(
-        _in_place(found, features, rest, slot, seed, count) for seed in seeds
-    ):
-        curved = one.site.effect in exclude and not _constant(REGISTRY[one.site.effect])
-        if curved and one.nats > most + beliefs.enter_nats:
-            clearly.append(one.fit.model.found[-1])
-        elif not implausible(one.fit.model):
-            more.append(replace(one, nats=min(one.nats, most)))
-    return weighed([*slot, *more], beliefs.temperature), clearly
+    parts = _parts(found, k, exclude)
+    if not seeds and not parts and outside is None:
+        return [], None
+    rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
+    count, most = found.effective(now), max(rival.nats for rival in slot)
+    alike = [_in_place(found, features, rest, slot, seed, count) for seed in seeds]
+    alike += _together(found, rest, parts, count)
+    best = None
+    if outside is not None:
+        _, tried = contenders(outside, rest, count, now.model.found, MOST_EXCLUDED)
+        more = [Rival(Site(*c.unit.site), nats_in_place(rest, f, count, c), f) for c, f in tried]
+        alike += more
+        # What is the same error on any motion is ahead by its fewer numbers alone.
+        same = {Site(seed.name, seed.site) for seed in seeds}
+        best = max((r for r in more if r.site not in same), key=lambda r: r.nats, default=None)
+    return [
+        replace(one, nats=min(one.nats, most))
+        for one in _best_of_each(alike)
+        if not implausible(one.fit.model)
+    ], best
+
+
+class _Lead(NamedTuple):
+    """By how much evidence something taken out is ahead, and which effects found it replaces."""
+
+    nats: float
+    replaced: NDArray[np.bool_]
+
+
+def _lead(found: Search, other: Rival) -> _Lead | None:
+    """
+    Return by how much something that was taken out is ahead of what was found, where it clearly is.
+
+    Several effects may imitate one: those that are worth nothing beside it are replaced as well.
+    """
+    work, now = found.work, found.small
+    own = backward(work, other.fit, found.effective)
+    kept = {(e.name, e.site) for e in own.model.found}
+    if (other.site.effect, other.site.joint) not in kept:
+        return None
+    bare = fit(work.problem, now.model.with_found(()), work.scale, None, 4)
+    count = found.effective(now)
+    nats = nats_in_place(bare, own, count) - nats_in_place(bare, now, count)
+    if nats <= work.beliefs.enter_nats:
+        return None
+    replaced = [(e.name, e.site) not in kept for e in now.model.found]
+    return _Lead(float(nats), np.array(replaced))
+
+
+def _parts(found: Search, k: int, exclude: Sequence[str]) -> list[Effect]:
+    """
+    Return errors that a person can set which together may be effect k, whatever the motion.
+
+    Where a positioner stands beside a robot is the zero of its first axis, that of the robot's, or
+    both at once.
+    """
+    effects = found.small.model.found
+    own, taken = effects[k], {(e.name, e.site) for e in effects}
+    if not _constant(type(own)) or own.coordinates().size < MOST_PARTS:
+        return []
+    robot = found.baseline.model.robot
+    frames = [_frame_columns(robot, name) for name in sorted(found.work.problem.align)]
+    fitted = span_of(np.concatenate(frames)) if frames else None
+    span, out = np.concatenate([_columns(robot, own), *frames]), []
+    for each in _settable(robot, frozenset(exclude)):
+        rows = _columns(robot, each)
+        seen = rows.any() and (fitted is None or share_outside(rows, fitted).min() > SAME)
+        if (each.name, each.site) not in taken and seen and _inside(rows, span):
+            out.append(each)
+    return out
+
+
+def _together(found: Search, rest: Fit, parts: Sequence[Effect], count: float) -> list[Rival]:
+    """Return errors that take a place together, where none of them does as well without another."""
+    problem, scale = found.work.problem, found.work.scale
+
+    def with_those(some: Sequence[Effect]) -> tuple[float, Fit]:
+        own = fit(problem, rest.model.with_found((*rest.model.found, *some)), scale, None, 4)
+        return nats_in_place(rest, own, count), own
+
+    while len(parts) > 1:
+        nats, own = with_those(parts)
+        fewer = [[e for e in parts if e is not one] for one in parts]
+        best = max(fewer, key=lambda some: with_those(some)[0])
+        if with_those(best)[0] < nats:
+            return [Rival(Site(e.name, e.site), nats, own) for e in parts]
+        parts = best
+    return []
 
 
 def _in_place(
@@ -177,18 +277,6 @@ def _led_by(slot: tuple[Rival, ...], site: Site, small: Fit) -> tuple[Rival, ...
     rest = [rival for rival in slot if rival.site != site]
     whole = sum(rival.probability for rival in (first, *rest))
     return tuple(replace(r, probability=r.probability / whole) for r in (first, *rest))
-
-
-def _kin(features: list[Features], effect: Effect, exclude: Sequence[str]) -> Iterator[Effect]:
-    """Yield instances of excluded kinds that differ from an effect of a joint by their curve alone."""
-    if effect.of != 'joint' or _constant(type(effect)):
-        return
-    maker = features[moved_most(features, effect.site)]
-    for kind in _causes(exclude):
-        like = (kind.of, kind.place, kind.depends_on)
-        alike = kind is not type(effect) and like == ('joint', effect.place, effect.depends_on)
-        if alike and kind.applicable(maker.view, effect.site) is None:
-            yield from maker.seeds(kind, effect.site)[0][:MOST_SEEDS]
 
 
 def _causes(names: Sequence[str]) -> list[type[Effect]]:

@@ -190,12 +190,13 @@ def clear_postures(robot: Robot, spread: float) -> Array:
     """
     middle = plan(robot, default_seam(robot, 'line'), 'smooth', rate_hz=10.0).motion.q
     centre = middle[len(middle) // 2]
+    own = robot.branches[1] if robot.behind else robot
     half = np.where(robot.prismatic, SLIDE, spread)
     low, high = np.maximum(centre - half, robot.lower), np.minimum(centre + half, robot.upper)
     q = low + halton(robot.n, TRIED) * (high - low)
     least = CLEAR * float(abs(robot.a).sum() + abs(robot.d).sum())
-    (height,), (side,) = _room(robot, centre[None])
-    heights, sides = _room(robot, q)
+    (height,), (side,) = _room(own, centre[None, robot.behind :])
+    heights, sides = _room(own, q[:, robot.behind :])
     above = heights > (least if height > least else height - NEARER * abs(height))
     off = sides > (least if side > least else NEARER * side)
     return np.asarray(q[above & off])

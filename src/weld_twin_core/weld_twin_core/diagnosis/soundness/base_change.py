@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What a base frame that changes with time would explain, beyond everything that does not.
+What a change in time of base, tool or a joint would explain, beyond everything that is constant.
 
 Residuals of an arm follow its pose, and poses follow time, so any motion looks a little like a
 change of the frame. Constant frames and a first-order model of the whole arm (geometry, springs,
@@ -11,6 +11,7 @@ out before a change in time is tried.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -44,26 +45,30 @@ GROWN = 1e-4
 """Prior spread of a link's growth [1/K], as loose as the others: aluminium grows by 2.4e-5."""
 UNIT_OFF = 1e-3
 """Prior spread of the instrument's unit of length: half of what is plausible at all."""
+ACTIVE = 0.05
+"""Share of a shape's largest value from which a sample takes part in it."""
+FEWEST = 12.0
+"""Independent rows that are counted at the least: two frames have as many numbers."""
+RANK = 1e-9
+"""Strength of a direction of unit columns below which it is rounding."""
+TIED = 1e-6
+"""Pull of a change to zero, in units of its columns: decides what data leave open."""
 CONSTANTS = np.geomspace(0.05, 0.7, 7)
 """Time constants of settling, as shares of the recording."""
 
 
 @dataclass(frozen=True, eq=False)
-class BaseChange:
+class Rest:
     """
-    The base's motion columns of every sample, and the residual, with the arm projected out.
+    What frames and arm leave of every sample, and what may have changed while it was measured.
 
     Attributes
     ----------
-    residual : array, shape (M, c) in units of noise, frames and arm fitted
-    columns : array, shape (M, c, 6)
-        What the base does to every sample, whitened.
+    residual : array, shape (M, c) in units of noise
     basis : array, shape (M, c, P)
         Orthonormal over all rows: what frames and arm can explain.
-    joints, tools : array, shape (M, c, n) and (M, c, 6)
-        What the joints and the tool do to every sample, whitened.
-    metres, joint_metres, tool_metres : array, shape (M, 3, 6), (M, 3, n) and (M, 3, 6)
-        The columns of the positions, not whitened, for the size of a change.
+    things : dict of (array, array), shapes (M, c, k) and (M, 3, k)
+        What 'base', 'tool' and 'joints' do to every sample, whitened, and to its position [m].
     rows, samples : tuple of int
         Components and samples of every recording.
     noise : float
@@ -72,19 +77,14 @@ class BaseChange:
     """
 
     residual: Array
-    columns: Array
     basis: Array
-    joints: Array
-    tools: Array
-    metres: Array
-    joint_metres: Array
-    tool_metres: Array
+    things: Mapping[str, tuple[Array, Array]]
     rows: tuple[int, ...]
     samples: tuple[int, ...]
     noise: float
 
     def left(self, k: int) -> float:
-        """Return the RMS distance [m] that frames and arm leave of recording k, as a lag counts it."""
+        """Return the RMS distance [m] that is left of recording k, as a lag counts it."""
         own = np.sort((self.residual[self.recording == k][:, :3] ** 2).sum(axis=1))
         return self.noise * float(np.sqrt(own[: max(int(KEPT * own.size), 1)].mean()))
 
@@ -104,104 +104,92 @@ class BaseChange:
         own = [self.residual[self.recording == k][:, :c].ravel() for k, c in enumerate(self.rows)]
         return effective_share(np.concatenate(own), self.rows, self.samples)
 
-    @property
-    def of_joints(self) -> BaseChange:
-        """Return the same with joints that change in place of the base."""
-        return replace(self, columns=self.joints, metres=self.joint_metres)
+    def change(self, thing: str, some: slice = slice(None)) -> Change:
+        """Return a change of base, tool or joints, or of some of their columns."""
+        columns, metres = self.things[thing]
+        return Change(self, columns[:, :, some], metres[:, :, some])
 
-    def of_joint(self, index: int) -> BaseChange:
-        """Return the same with one joint that changes in place of the base."""
-        one = slice(index, index + 1)
-        columns, metres = self.joints[:, :, one], self.joint_metres[:, :, one]
-        return replace(self, columns=columns, metres=metres)
 
-    @property
-    def of_tool(self) -> BaseChange:
-        """Return the same with the tool that changes; where only points are seen it cannot turn."""
-        seen = 6 if 6 in self.rows else 3
-        columns, metres = self.tools[:, :, :seen], self.tool_metres[:, :, :seen]
-        return replace(self, columns=columns, metres=metres)
+@dataclass(frozen=True, eq=False)
+class Change:
+    """One thing that may have changed in some shape of time, (M,), against what is left."""
+
+    rest: Rest
+    columns: Array
+    metres: Array
 
     @cached_property
     def _terms(self) -> tuple[Array, Array, Array]:
         """Return every sample's share of right hand side (M, i), overlap (M, p, i), normal."""
         turned = np.swapaxes(self.columns, 1, 2)
-        right = np.matmul(turned, self.residual[:, :, None])[:, :, 0]
-        overlap = np.matmul(np.swapaxes(self.basis, 1, 2), self.columns)
+        right = np.matmul(turned, self.rest.residual[:, :, None])[:, :, 0]
+        overlap = np.matmul(np.swapaxes(self.rest.basis, 1, 2), self.columns)
         return right, overlap, np.matmul(turned, self.columns)
 
-    def _new(self, shape: Array) -> Array:
-        """Return orthonormal rows that a change in this shape of time adds to the basis."""
-        flat = _flat(self.columns * shape[:, None, None])
-        return _orthonormal(_projected(flat, _flat(self.basis)))
-
-    def _left(self, more: Array) -> Array:
-        left = self.residual.reshape(-1)
-        return np.asarray((left - more @ (more.T @ left)).reshape(self.residual.shape))
-
-    def without(self, shape: Array) -> BaseChange:
-        """Return the same with a change of the base in this shape of time, (M,), fitted too."""
-        more = self._new(shape)
-        basis = np.concatenate([_flat(self.basis), more], axis=1)
-        basis = basis.reshape(*self.residual.shape, -1)
-        return replace(self, residual=self._left(more), basis=basis)
-
-    def past(self, changed: BaseChange, shape: Array) -> BaseChange:
-        """Return the same after another thing changed in this shape of time, (M,)."""
-        after = changed.without(shape)
-        return replace(self, residual=after.residual, basis=after.basis)
-
-    def gain(self, shape: Array) -> float:
-        """Return the sum of squares that a change in this shape of time, (M,), explains."""
-        return float(self.gains(shape[None])[0])
+    def _summed(self, shapes: Array) -> tuple[Array, Array]:
+        """Return right hand sides (S, i) and normal matrices (S, i, i) of shapes, (S, M)."""
+        right, overlap, normal = self._terms
+        count, size = shapes.shape[0], right.shape[1]
+        across = (shapes @ overlap.reshape(len(overlap), -1)).reshape(count, -1, size)
+        own = (shapes**2 @ normal.reshape(len(normal), -1)).reshape(count, size, size)
+        return shapes @ right, own - np.matmul(np.swapaxes(across, 1, 2), across)
 
     def gains(self, shapes: Array) -> Array:
-        """Return the gain of a change in each of several shapes of time, (S, M)."""
-        right, overlap, normal = self._terms
-        return _gained(*_summed(shapes, right, overlap, normal))
+        """Return the sum of squares that each of several shapes, (S, M), explains, (S,)."""
+        right, normal = self._summed(shapes)
+        return np.asarray((right * _solved(right, normal)).sum(axis=1))
 
-    def _fitted(self, shape: Array) -> Array:
-        right, overlap, normal = self._terms
-        right, normal = _summed(shape[None], right, overlap, normal)
-        return _solve(normal[0], right[0])
+    def best(self, shapes: Sequence[Array]) -> Array:
+        """Return the shape that explains most."""
+        return shapes[int(self.gains(np.array(shapes)).argmax())]
 
     def step_gains(self, k: int) -> Array:
         """Return the gain of a step before every sample of recording k, shape (M_k,)."""
-        mine = self.recording == k
-        right, overlap, normal = (_after(term[mine]) for term in self._terms)
-        return _gained(right, normal - np.matmul(np.swapaxes(overlap, 1, 2), overlap))
+        mine = self.rest.recording == k
+        # Sums over each sample and all later ones.
+        right, overlap, normal = (np.cumsum(t[mine][::-1], axis=0)[::-1] for t in self._terms)
+        normal = normal - np.matmul(np.swapaxes(overlap, 1, 2), overlap)
+        return np.asarray((right * _solved(right, normal)).sum(axis=1))
 
     def size(self, shape: Array) -> float:
         """Return the RMS motion [m] of the measured points for the fitted change."""
-        active = np.abs(shape) > 0.05 * np.abs(shape).max()
-        moved = self.metres[active] @ self._fitted(shape)
+        active = np.abs(shape) > ACTIVE * np.abs(shape).max()
+        moved = self.metres[active] @ _solved(*self._summed(shape[None]))[0]
         return float(np.sqrt((moved**2).sum(axis=1).mean()))
+
+    def taken_out(self, shape: Array) -> Rest:
+        """Return what is left once the change is fitted, too."""
+        rest = self.rest
+        flat = _flat(self.columns * shape[:, None, None])
+        new = _orthonormal(_projected(flat, _flat(rest.basis)))
+        left = _projected(rest.residual.reshape(-1), new).reshape(rest.residual.shape)
+        basis = np.concatenate([_flat(rest.basis), new], axis=1)
+        return replace(rest, residual=left, basis=basis.reshape(*left.shape, -1))
 
     def nats(self, shape: Array) -> float:
         """
-        Return the evidence for a change in this shape of time, (M,).
+        Return the evidence for a change.
 
         Noise of positions and of turns, and how many rows are independent, are those the change
         leaves: a step by itself makes residuals that hang together.
         """
-        new = self._new(shape)
-        after = replace(self, residual=self._left(new))
+        rest, after = self.rest, self.taken_out(shape)
         # Of few stations frames and arm take most rows up; those tell nothing for a change.
-        size = float(sum(c * m for c, m in zip(self.rows, self.samples, strict=True)))
-        free = max(1.0 - (self.basis.shape[2] + new.shape[1]) / size, 0.0)
+        size = float(sum(c * m for c, m in zip(rest.rows, rest.samples, strict=True)))
+        free = max(1.0 - after.basis.shape[2] / size, 0.0)
         total, fall = 0.0, 0.0
         for part in (slice(0, 3), slice(3, 6)):
-            before, left = (float((c.residual[:, part] ** 2).sum()) for c in (self, after))
+            before, left = (float((c.residual[:, part] ** 2).sum()) for c in (rest, after))
             if before > 0.0:
-                count = max(after.share * free * after.residual[:, part].size, 12.0)
+                count = max(after.share * free * after.residual[:, part].size, FEWEST)
                 fall += 0.5 * count * float(np.log(before / max(left, 1e-12 * before)))
                 total += count
         return fall - 0.5 * float(self.columns.shape[2] * np.log(total))
 
 
-def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChange:
+def rest_of(parts: list[Array], problem: Problem, model: Model) -> Rest:
     """
-    Return the residual ready to be searched for changes of the base.
+    Return the residual ready to be searched for changes in time.
 
     Parameters
     ----------
@@ -211,44 +199,25 @@ def base_change(parts: list[Array], problem: Problem, model: Model) -> BaseChang
         As `Problem.residuals` took them.
 
     """
-    scale = _scale(parts)
-    features = problem.features(model)
-    rows = problem.rows
-    pairs = list(zip(features, rows, strict=True))
-    frames = [_moved(maker, 'base', 6, c) for maker, c in pairs]
-    tools = [_moved(maker, 'tool', 6, c) for maker, c in pairs]
-    joints = [_moved(maker, 'q', model.robot.n, c) for maker, c in pairs]
+    scale, n = _scale(parts), model.robot.n
+    pairs = list(zip(problem.features(model), problem.rows, strict=True))
     arms = [np.concatenate([part(*pair) for part in (_arm, _grown, _scaled)]) for pair in pairs]
-    left, base, tool, joint, arm = (
-        _stacked([_white(part, scale, k) for k, part in enumerate(each)])
-        for each in ([part[None] for part in parts], frames, tools, joints, arms)
-    )
-    arm = arm[..., np.abs(arm).max(axis=(0, 1)) > 0.0]
-    bases = [base]
+    left, arm = (_whitened(each, scale) for each in ([part[None] for part in parts], arms))
+    things = {}
+    for thing, channel, count in (('base', 'base', 6), ('tool', 'tool', 6), ('joints', 'q', n)):
+        moved = [_moved(maker, channel, count, rows) for maker, rows in pairs]
+        metres = np.concatenate([part[:, :3].transpose(2, 1, 0) for part in moved])
+        things[thing] = _whitened(moved, scale), metres
+    bases = [things['base'][0]]
     if 'base' in problem.align:
         number = np.repeat(np.arange(len(parts)), problem.samples)
-        bases = [base * (number == k)[:, None, None] for k in range(len(parts))]
-    constant = np.concatenate([*bases, tool], axis=2)
-    basis = _basis(arm.reshape(left.size, -1), constant.reshape(left.size, -1))
-    metres, joint_metres, tool_metres = (
-        np.concatenate([part[:, :3].transpose(2, 1, 0) for part in each])
-        for each in (frames, joints, tools)
-    )
+        bases = [bases[0] * (number == k)[:, None, None] for k in range(len(parts))]
+    frames = np.concatenate([*bases, things['tool'][0]], axis=2)
+    arm = arm[..., np.abs(arm).max(axis=(0, 1)) > 0.0]
+    basis = _basis(arm.reshape(left.size, -1), frames.reshape(left.size, -1))
     left = _projected(left.reshape(-1, 1), basis).reshape(left.shape[:2])
     basis = basis.reshape(*left.shape, -1)
-    return BaseChange(
-        residual=left,
-        columns=base,
-        basis=basis,
-        joints=joint,
-        tools=tool,
-        metres=metres,
-        joint_metres=joint_metres,
-        tool_metres=tool_metres,
-        rows=problem.rows,
-        samples=problem.samples,
-        noise=scale.position,
-    )
+    return Rest(left, basis, things, problem.rows, problem.samples, scale.position)
 
 
 def thinned(problem: Problem, parts: list[Array]) -> tuple[Problem, list[Array]]:
@@ -282,12 +251,17 @@ def _moved(maker: Features, name: str, count: int, rows: int) -> Array:
     return np.stack([maker.column((name, j)) for j in range(count)])[:, :rows]
 
 
-def _stacked(parts: list[Array]) -> Array:
-    """Return (M_k, c_k, P) parts as one array, points filled up with empty rows."""
+def _whitened(parts: Sequence[Array], scale: Scale) -> Array:
+    """Return (P, c_k, M_k) columns of all recordings whitened as one array, (M, c, P)."""
+    out = []
     most = max(part.shape[1] for part in parts)
-    return np.concatenate(
-        [np.pad(part, ((0, 0), (0, most - part.shape[1]), (0, 0))) for part in parts]
-    )
+    for part, weight in zip(parts, scale.weights, strict=True):
+        unit = np.full(part.shape[1], 1.0 / scale.position)
+        unit[3:] = 1.0 / scale.orientation
+        white = (part * unit[:, None] * np.sqrt(weight)).transpose(2, 1, 0)
+        # Points are filled up with empty rows.
+        out.append(np.pad(white, ((0, 0), (0, most - part.shape[1]), (0, 0))))
+    return np.concatenate(out)
 
 
 def _arm(maker: Features, rows: int) -> Array:
@@ -346,21 +320,10 @@ def _scaled(maker: Features, rows: int) -> Array:
     return UNIT_OFF * maker.columns(MeasurementScale(), atoms=False)[:, :rows]
 
 
-def _white(part: Array, scale: Scale, k: int) -> Array:
-    """Return (P, c, M) columns whitened as (M, c, P)."""
-    unit = np.full(part.shape[1], 1.0 / scale.position)
-    unit[3:] = 1.0 / scale.orientation
-    white = part * unit[:, None] * np.sqrt(scale.weights[k])
-    return np.asarray(white.transpose(2, 1, 0))
-
-
 def _basis(arm: Array, frames: Array) -> Array:
     """Return an orthonormal basis of frames and of all arm errors strong enough to be seen."""
     frames = _orthonormal(frames)
-    rest = _projected(arm, frames)
-    strength, vectors = np.linalg.eigh(rest.T @ rest)
-    seen = strength > 1.0
-    return np.concatenate([frames, rest @ vectors[:, seen] / np.sqrt(strength[seen])], axis=1)
+    return np.concatenate([frames, _strong(_projected(arm, frames), 1.0)], axis=1)
 
 
 def _orthonormal(columns: Array) -> Array:
@@ -368,8 +331,13 @@ def _orthonormal(columns: Array) -> Array:
     columns = columns[:, size > 0.0] / size[size > 0.0]
     if columns.shape[1] == 0:
         return columns
+    return _strong(columns, RANK)
+
+
+def _strong(columns: Array, least: float) -> Array:
+    """Return orthonormal directions of columns, those of at least so much strength."""
     strength, vectors = np.linalg.eigh(columns.T @ columns)
-    seen = strength > 1e-9
+    seen = strength > least
     return np.asarray(columns @ vectors[:, seen] / np.sqrt(strength[seen]))
 
 
@@ -382,36 +350,14 @@ def _flat(columns: Array) -> Array:
     return columns.reshape(-1, columns.shape[2])
 
 
-def _after(terms: Array) -> Array:
-    """Return sums over each sample and all later ones."""
-    return np.asarray(np.cumsum(terms[::-1], axis=0)[::-1])
-
-
-def _summed(shapes: Array, right: Array, overlap: Array, normal: Array) -> tuple[Array, Array]:
-    """Return right hand sides (S, i) and normal matrices (S, i, i) of several shapes, (S, M)."""
-    count, size = shapes.shape[0], right.shape[1]
-    across = (shapes @ overlap.reshape(len(overlap), -1)).reshape(count, -1, size)
-    own = (shapes**2 @ normal.reshape(len(normal), -1)).reshape(count, size, size)
-    return shapes @ right, own - np.matmul(np.swapaxes(across, 1, 2), across)
-
-
-def _gained(right: Array, normal: Array) -> Array:
-    """Return what each of several changes explains, shape (S,)."""
+def _solved(right: Array, normal: Array) -> Array:
+    """Return the change of each of several systems, (S, i), zero where nothing moves."""
     mass = np.diagonal(normal, axis1=1, axis2=2)
     live = mass > DEAD * max(float(mass.max(initial=0.0)), 1e-300)
     size = np.where(live, np.sqrt(np.maximum(mass, 0.0)), np.inf)
-    scaled = normal / (size[:, :, None] * size[:, None, :]) + 1e-6 * np.eye(mass.shape[1])
+    scaled = normal / (size[:, :, None] * size[:, None, :]) + TIED * np.eye(mass.shape[1])
     unit = (right / size)[:, :, None]
-    return np.asarray((unit * np.linalg.solve(scaled, unit)).sum(axis=(1, 2)))
-
-
-def _solve(normal: Array, right: Array) -> Array:
-    # A direction that nothing moves in (an axis with exact zeros across) stays at zero.
-    mass = np.diag(normal)
-    live = mass > DEAD * max(float(mass.max(initial=0.0)), 1e-300)
-    size = np.where(live, np.sqrt(np.maximum(mass, 0.0)), np.inf)
-    scaled = normal / np.outer(size, size) + 1e-6 * np.eye(len(size))
-    return np.asarray(np.linalg.solve(scaled, right / size) / size)
+    return np.asarray(np.linalg.solve(scaled, unit)[:, :, 0] / size)
 
 
 def other_shapes(age: Array) -> list[Array]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 from .computed import computed, source
 from .efforts import efforts
 from .evidence import Checker
+from .images import images
 from .mixups import mixups
 from .orientation import gravity, orientation
 from .parted import parted
@@ -20,6 +21,7 @@ CHECKS: dict[str, tuple[Checker, str]] = {
     'quantity': (quantity, 'There is enough to work on.'),
     'readings': (stuck, 'No reading stands still while the tool moves.'),
     'tools': (parted, 'No recording has another tool than the first.'),
+    'images': (images, 'No camera measured.'),
     'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
     'gravity': (gravity, 'Gravity pulls down where the base stands.'),
     'efforts': (efforts, 'No measured effort of the joints is used.'),

@@ -22,7 +22,7 @@ from ..algebra.noise_floor import SAME_STATION
 from ..algebra.prior import effect_precision
 from ..algebra.problem import FRAMES, Model, Problem, Scale
 from ..frames.changes import constant_errors
-from .evidence import Case, Finding, Mistake, length
+from .evidence import Case, Finding, length, mistake
 from .limits import COMPUTED, ROUNDED, UNEXPLAINED
 from .mending import measured
 
@@ -49,22 +49,21 @@ STATES = 50
 def computed(case: Case) -> Sequence[Finding]:
     """Return the recordings whose poses were computed from the joint positions beside them."""
     return [
-        Finding.of(_mistake(recording, left))
+        _told(recording, left)
         for k, recording in enumerate(case.recordings)
         if not recording.simulated and (left := _left(case, k)) is not None
     ]
 
 
-def _mistake(recording: Recording, left: float) -> Mistake:
+def _told(recording: Recording, left: float) -> Finding:
     much = 'to the last digit' if left < 1e-7 else f'to {length(max(left, 1e-6))}'
-    return Mistake(
-        'computed',
-        ('instrument',),
+    return mistake(
         f'The poses of {recording.name} agree with a rigid arm {much}, with no noise: they were '
         'computed from these joint positions, as the controller does, and not measured.',
+        'computed',
+        ('instrument',),
         "Record what an instrument measures (a tracker, a camera, contacts); a controller's own "
         'pose (tool0, tcp_pose) tells what it believes, not where the tool is',
-        None,
         of_all=False,
     )
 
@@ -122,7 +121,7 @@ def _stations(recording: Recording, model: Model) -> Problem | None:
         recording.name, JointMotion(seen.t[pick], q[pick], static=True), seen.take(pick)
     )
     problem = Problem((some,), frozenset(FRAMES))
-    fitted = problem.frame_count + effect_precision(model).size
+    fitted = problem.frame_count + problem.shared_count + effect_precision(model).size
     return problem if 3 * pick.size > ENOUGH * fitted else None
 
 
@@ -141,7 +140,8 @@ def _fitted(problem: Problem, model: Model, iterations: int) -> Model:
 def _gap(problem: Problem, model: Model) -> float:
     """Return the median distance that is left [m], made up for what the fit took."""
     (part,) = problem.residuals(model)
-    taken = (problem.frame_count + effect_precision(model).size) / problem.size
+    shared = problem.frame_count + problem.shared_count
+    taken = (shared + effect_precision(model).size) / problem.size
     return float(np.median(np.linalg.norm(part[:3], axis=0))) / float(np.sqrt(1.0 - taken))
 
 

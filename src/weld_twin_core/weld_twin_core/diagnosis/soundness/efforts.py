@@ -74,11 +74,6 @@ def with_sign(recordings: Sequence[Recording], robot: Robot) -> tuple[Recording,
     """
     Return recordings whose efforts are known to hold the load, or to be it.
 
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    robot : Robot
-
     Raises
     ------
     DataError
@@ -108,15 +103,7 @@ def with_sign(recordings: Sequence[Recording], robot: Robot) -> tuple[Recording,
 
 
 def compared(recordings: Sequence[Recording], robot: Robot) -> Efforts | None:
-    """
-    Return what efforts say beside the model's statics; None where none were measured.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    robot : Robot
-
-    """
+    """Return what efforts say beside the model's statics; None where none were measured."""
     if any(recording.effort is None for recording in recordings):
         return None
     loads = _loads(recordings, _weighing(robot))

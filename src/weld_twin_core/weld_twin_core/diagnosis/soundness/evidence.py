@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from ...recording import Recording
 from ..algebra.problem import Model, Problem
 from ..frames.alignment import refined
 from ..result import Unsound
-from .base_change import BaseChange, base_change, thinned
+from .base_change import Rest, rest_of, thinned
 from .lag import Lag, lag
 from .lengths import length
 from .limits import BY_ITSELF, LATE_LEFT, LATE_WORTH, RATE_MOST, UNEXPLAINED
@@ -30,55 +30,39 @@ HINT = 0.9
 """What the gap must fall to for a lag to be looked into, and"""
 EXPLAINED = 0.35
 """for it to be believed once the frames are fitted with it."""
-
-
 LARGEST = 0.99
-"""Quantile of the gaps that stands for the largest; a few may be outliers."""
+"""Quantile of the gaps that stands for the largest."""
 
 
-__all__ = ['Case', 'Checker', 'Finding', 'Mistake', 'distance', 'length', 'listed']
+__all__ = ['Case', 'Checker', 'Finding', 'distance', 'length', 'listed', 'mistake']
 
 
-class Mistake(NamedTuple):
+class Finding(NamedTuple):
     """
-    A mistake in data or set-up; see `weld_twin_core.diagnosis.result.Unsound`.
+    What a check found: a 'note' or a 'warning' in a sentence for people, or a mistake.
 
+    A mistake, level 'unsound', also has what `weld_twin_core.diagnosis.result.Unsound` tells.
     ``mend`` undoes it, None where nothing can; ``of_all`` tells that other recordings of the cell
     have it too; ``alike`` are kinds and places that would explain the data as well.
     """
 
-    kind: str
-    at: tuple[str, ...]
+    level: str
     sentence: str
-    remedy: str
-    mend: Mend | None
+    kind: str = ''
+    at: tuple[str, ...] = ()
+    remedy: str = ''
+    mend: Mend | None = None
     of_all: bool = True
     alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     def told(self, *, applied: bool) -> Unsound:
-        """Return what is told of it in a diagnosis, undone or not."""
-        return Unsound(
-            self.kind,
-            self.at,
-            self.sentence,
-            self.remedy,
-            applied,
-            self.alike,
-            as_entry(self.mend),
-        )
+        """Return what is told of a mistake in a diagnosis, undone or not."""
+        done = as_entry(self.mend)
+        return Unsound(self.kind, self.at, self.sentence, self.remedy, applied, self.alike, done)
 
 
-class Finding(NamedTuple):
-    """What a check found: 'note', 'warning' or 'unsound', and a sentence for people."""
-
-    level: str
-    sentence: str
-    mistake: Mistake | None = None
-
-    @classmethod
-    def of(cls, mistake: Mistake) -> Finding:
-        """Return the finding that a mistake is."""
-        return cls('unsound', mistake.sentence, mistake)
+mistake = partial(Finding, 'unsound')
+"""Returns the mistake of a sentence, kind, place and remedy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +108,9 @@ class Case:
         """
         if self.gap > BY_ITSELF or not any(found):
             return found
-        change = self.change[1]
+        rest = self.rest[1]
         return [
-            late if late is not None and late.after < LATE_WORTH * change.left(k) else None
+            late if late is not None and late.after < LATE_WORTH * rest.left(k) else None
             for k, late in enumerate(found)
         ]
 
@@ -172,16 +156,20 @@ class Case:
         return self._motions(self.lags)
 
     @cached_property
-    def change(self) -> tuple[Problem, BaseChange]:
-        """Return fewer measurements, and what a change in time would explain of their residuals."""
+    def rest(self) -> tuple[Problem, Rest]:
+        """Return fewer measurements, and what frames and arm leave of them."""
         problem, parts = thinned(self.problem, self.residuals)
-        return problem, base_change(parts, problem, self.model)
+        return problem, rest_of(parts, problem, self.model)
 
     @cached_property
     def changes(self) -> list[Slip | Settling]:
         """Return what gave way at an instant, and how the base settled."""
-        most = max(float(np.quantile(distance(part), LARGEST)) for part in self.residuals)
-        return changes(*self.change, self.model.robot.joint_names, most)
+        return changes(*self.rest, self.model.robot.joint_names, self.largest)
+
+    @cached_property
+    def largest(self) -> float:
+        """Return how far the largest gaps are [m]; the last per cent may be outliers."""
+        return max(float(np.quantile(distance(part), LARGEST)) for part in self.residuals)
 
     @property
     def slips(self) -> list[Slip]:

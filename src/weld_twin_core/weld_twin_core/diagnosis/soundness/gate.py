@@ -25,7 +25,7 @@ from ..frames.changes import with_changes
 from ..frames.places import tracked_part
 from ..result import Check, Unsound
 from .checks import CHECKS
-from .evidence import Case, Mistake
+from .evidence import Case, Finding, mistake
 from .limits import ENDS
 from .mending import Given, as_entry, measured
 from .slips import Slip
@@ -51,7 +51,7 @@ class Examined:
         To be diagnosed; None where something is wrong that was not undone.
     checks : tuple of Check
     unsound : tuple of Unsound
-    mistakes : tuple of Mistake
+    mistakes : tuple of Finding
         Those that were undone.
     slips : tuple of Slip
         What seems to have given way at an instant. Of one recording these are causes that ``posed``
@@ -63,7 +63,7 @@ class Examined:
     posed: tuple[Problem, Model] | None
     checks: tuple[Check, ...]
     unsound: tuple[Unsound, ...]
-    mistakes: tuple[Mistake, ...]
+    mistakes: tuple[Finding, ...]
     slips: tuple[Slip, ...] = ()
 
     def told(self, found: Sequence[Effect]) -> tuple[Unsound, ...]:
@@ -104,9 +104,9 @@ class Examined:
     def mended(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
         """Return other recordings of the same cell after the same corrections."""
         out = Given(tuple(recordings), self.given.robot, self.given.align)
-        for mistake in self.mistakes:
-            if mistake.mend is not None and mistake.of_all:
-                out = mistake.mend(out)
+        for each in self.mistakes:
+            if each.mend is not None and each.of_all:
+                out = each.mend(out)
         return tuple(velocities_checked(recording) for recording in out.recordings)
 
 
@@ -136,7 +136,7 @@ def examine(
         There is nothing to work on.
 
     """
-    trial, mistakes, look = given, list[Mistake](), _Look()
+    trial, mistakes, look = given, list[Finding](), _Look()
     for _ in range(ROUNDS):
         found = streams(trial)
         look = _Look()
@@ -144,14 +144,14 @@ def examine(
             posed = aligned(trial.recordings, trial.robot, trial.align, _kept(known, given, trial))
             look = _looked(*with_changes(*posed, trial.may_change, beliefs or Beliefs()))
             found = look.found
-        told = {mistake.sentence for mistake in mistakes}
-        fresh = [mistake for mistake in found if mistake.sentence not in told]
+        told = {each.sentence for each in mistakes}
+        fresh = [each for each in found if each.sentence not in told]
         mistakes += fresh
-        if not fresh or any(mistake.mend is None for mistake in fresh):
+        if not fresh or any(each.mend is None for each in fresh):
             break
-        for mistake in fresh:
-            if mistake.mend is not None:
-                trial = mistake.mend(trial)
+        for each in fresh:
+            if each.mend is not None:
+                trial = each.mend(trial)
     done = apply and look.posed is not None and all(m.mend is not None for m in mistakes)
     return Examined(
         trial if done else given,
@@ -164,10 +164,10 @@ def examine(
     )
 
 
-def _first(mistakes: Sequence[Mistake], *, applied: bool) -> list[Check]:
+def _first(mistakes: Sequence[Finding], *, applied: bool) -> list[Check]:
     """Return what stands before all checks: the mistakes, undone or not."""
     what = 'mended' if applied else 'data and set-up'
-    return [Check(what, 'unsound', mistake.sentence) for mistake in mistakes]
+    return [Check(what, each.level, each.sentence) for each in mistakes]
 
 
 class _Look(NamedTuple):
@@ -175,19 +175,19 @@ class _Look(NamedTuple):
 
     posed: tuple[Problem, Model] | None = None
     checks: tuple[Check, ...] = ()
-    found: list[Mistake] = []
+    found: list[Finding] = []
     dated: tuple[Slip, ...] = ()
     told: tuple[Unsound, ...] = ()
 
-    def marked(self, mistakes: Sequence[Mistake]) -> tuple[Problem, Model] | None:
+    def marked(self, mistakes: Sequence[Finding]) -> tuple[Problem, Model] | None:
         """Return the problem with what gave way, and the model with what was undone."""
         if self.posed is None:
             return None
         alone = len(self.posed[0].recordings) == 1
         dated = tuple(slip.effect() for slip in self.dated) if alone else ()
         problem = replace(self.posed[0], dated=dated)
-        told = tuple(mistake.sentence for mistake in mistakes)
-        made = tuple(e for mistake in mistakes if (e := as_entry(mistake.mend)) is not None)
+        told = tuple(each.sentence for each in mistakes)
+        made = tuple(e for each in mistakes if (e := as_entry(each.mend)) is not None)
         return problem, replace(self.posed[1], mended=told, mends=made)
 
 
@@ -204,12 +204,12 @@ def _looked(problem: Problem, model: Model) -> _Look:
     return _Look((problem, model), tuple(checks), found, dated)
 
 
-def _checked_beside(problem: Problem, model: Model) -> tuple[list[Check], list[Mistake]]:
+def _checked_beside(problem: Problem, model: Model) -> tuple[list[Check], list[Finding]]:
     """Return the same of an instrument's recordings beside contacts; nothing is mended there."""
     part = tracked_part(problem, model)
     checks, found, dated = _checked(*part)
     mistakes = [*found, *(_undated(slip, part[0]) for slip in dated)]
-    return checks, [mistake._replace(mend=None) for mistake in mistakes]
+    return checks, [each._replace(mend=None) for each in mistakes]
 
 
 def _kept(known: Sequence[Effect], given: Given, trial: Given) -> tuple[Effect, ...]:
@@ -219,7 +219,7 @@ def _kept(known: Sequence[Effect], given: Given, trial: Given) -> tuple[Effect, 
 
 def _checked(
     problem: Problem, model: Model
-) -> tuple[list[Check], list[Mistake], tuple[Slip, ...]]:
+) -> tuple[list[Check], list[Finding], tuple[Slip, ...]]:
     """Return what the checks say, the mistakes among it, and what gave way; a mistake ends it."""
     if problem.align:
         model = refined(problem.thinned(FIT_ROWS), model)
@@ -227,7 +227,7 @@ def _checked(
     out: list[Check] = []
     for name, (look, passed) in CHECKS.items():
         found = list(look(case))
-        mistakes = [f.mistake for f in found if f.mistake is not None]
+        mistakes = [each for each in found if each.level == 'unsound']
         if mistakes:
             return out, mistakes, ()
         out += [Check(name, f.level, f.sentence) for f in found] or [Check(name, 'ok', passed)]
@@ -247,7 +247,7 @@ def _same(slip: Slip, other: Slip, problem: Problem) -> bool:
     return slip.recording == other.recording and near
 
 
-def _undated(slip: Slip, problem: Problem) -> Mistake:
+def _undated(slip: Slip, problem: Problem) -> Finding:
     """Return what gave way in one of several recordings: their effects count one time for all."""
     sentence = slip.sentence(problem.recordings[slip.recording])
-    return Mistake(slip.kind, slip.at, sentence, slip.remedy, None, alike=slip.alike)
+    return mistake(sentence, slip.kind, slip.at, slip.remedy, alike=slip.alike)

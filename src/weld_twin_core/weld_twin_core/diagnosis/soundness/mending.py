@@ -93,7 +93,9 @@ def positions_as(given: Given, factor: Array) -> Given:
             continue
         seen = measured(r)
         turn = None if np.prod(factor) < 0.0 else seen.rotation
-        out.append(r.with_measured(replace(seen, position=seen.position * factor, rotation=turn)))
+        # How sure they are was told of what has proved to be something else.
+        scaled = Measurements(seen.t, seen.position * factor, turn, seen.sigma)
+        out.append(r.with_measured(scaled))
     return replace(given, recordings=tuple(out))
 
 
@@ -127,7 +129,7 @@ def turns_as(given: Given, way: str) -> Given:
             continue
         seen = measured(r)
         turn = None if seen.rotation is None else WAYS[way][1](seen.rotation)
-        out.append(r.with_measured(replace(seen, rotation=turn)))
+        out.append(r.with_measured(Measurements(seen.t, seen.position, turn, seen.sigma)))
     return replace(given, recordings=tuple(out))
 
 

@@ -7,25 +7,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from ...arm.robot import Robot
-from ...arm.rotation import rotation_vector
+from ...arm.rotation import quaternion_from_matrix, rotation_vector
 from ...arrays import Array
-from ...effects.base_pose import BasePose
+from ...effects.constant import ChannelError
 from ...effects.effect import Effect
+from ...effects.frame_errors import BasePose, ToolPose
+from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
 from ...effects.joint_compliance import JointCompliance
-from ...effects.joint_offset import JointOffset
-from ...effects.link_length import LinkLength
-from ...effects.link_offset import LinkOffset
-from ...effects.link_twist import LinkTwist
 from ...effects.plausible import plausible
-from ...effects.tool_pose import ToolPose
-from ..algebra.fit import fit, robust_scale
+from ...effects.root_pose import RootPose
 from ..algebra.prior import effect_precision
-from ..algebra.problem import Model, Problem, Scale
-from .evidence import Case, Finding, Mistake, length, listed
+from ..algebra.problem import Model, Problem
+from .evidence import Case, Finding, length, listed, mistake
 from .limits import (
     BESIDE,
     EXPLAINED,
@@ -43,13 +41,13 @@ from .limits import (
     WORTH,
 )
 from .mending import base_turned, frames_fitted
-from .snapshot import FRAMES, Arm, Snapshot, gap, rough_models
-from .suspicions import AXES, Suspicion, doubles, robots, suspicions
+from .snapshot import FRAMES, Arm, Snapshot, bent, gap, rough_models
+from .suspicions import AXES, doubles, robots, suspicions
 
-ROUNDS = 3
-"""Fits, each with the weights of the last."""
-LENGTHS = {'link_length': 'a', 'link_offset': 'd'}
-"""The lengths of a link, and what a robot file calls them."""
+LENGTHS = ('link_length', 'link_offset')
+"""The lengths of a link."""
+HALF_TURN = 179.0
+"""Turn [degrees] from which its sense is rounding."""
 
 
 def mixups(case: Case) -> Sequence[Finding]:
@@ -62,40 +60,53 @@ def mixups(case: Case) -> Sequence[Finding]:
         return _frames(case, shot.gap(shot.model)) or _links(case, shot, arm)
     found, rest = _unravelled(shot, arm, case.problem.align)
     if found:
-        return [Finding.of(_mistake(each, arm.gap, rest.gap)) for each in found]
+        return [_told(each, arm.gap, rest.gap) for each in found]
     return _beyond(case, shot, arm) or _frames(case, shot.gap(shot.model))
 
 
 # Mix-ups ---------------------------------------------------------------------------------------
 
 
-def _mistake(suspicion: Suspicion, before: float, after: float) -> Mistake:
-    words = f'{suspicion.words[0].upper()}{suspicion.words[1:]}'
+class _Tried(NamedTuple):
+    """A suspicion, the data with it undone, and the arm that then fits; others that do as well."""
+
+    suspicion: Finding
+    undone: Snapshot
+    arm: Arm
+    alike: tuple[Finding, ...] = ()
+
+    @property
+    def off(self) -> float:
+        """Return what is still wrong; whatever is shrunk to a point leaves no gap."""
+        return self.arm.off * self.undone.collapsed
+
+
+def _told(tried: _Tried, before: float, after: float) -> Finding:
+    """Return the mistake that a suspicion is, with the gap [m] before and after it is undone."""
+    one, others = tried.suspicion, tried.alike
+    words = f'{one.sentence[0].upper()}{one.sentence[1:]}'
     if after < before:
-        words += f'; undone, the gap falls from {length(before)} to {length(after)}'
-    if suspicion.alike:
-        words += f'. As well it may be that {" or that ".join(s.words for s in suspicion.alike)}'
-    return Mistake(
-        suspicion.kind,
-        suspicion.at,
-        f'{words}.',
-        suspicion.remedy,
-        suspicion.mend,
-        alike=tuple((s.kind, s.at) for s in suspicion.alike),
-    )
+        words += f'; undone, {_falls(before, after)}'
+    if others:
+        words += f'. As well it may be that {" or that ".join(o.sentence for o in others)}'
+    return one._replace(sentence=f'{words}.', alike=tuple((o.kind, o.at) for o in others))
 
 
-def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list[Suspicion], Arm]:
+def _falls(before: float, after: float) -> str:
+    return f'the gap falls from {length(before)} to {length(after)}'
+
+
+def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list[_Tried], Arm]:
     """Return the fewest mix-ups that explain the gap, and the arm without them."""
     for first in (suspicions, doubles):
-        found: list[Suspicion] = []
+        found: list[_Tried] = []
         arm, trial, look = start, shot, first
         while arm.off > 1.0 and len(found) < MOST:
-            best, undone, rest = _best(trial, arm, look(trial.robot), align)
+            best = _best(trial, arm, look(trial.robot), align)
             if best is None:
                 break
             found.append(best)
-            trial, arm, look = undone, rest, suspicions
+            trial, arm, look = best.undone, best.arm, suspicions
         factor = EXPLAINED if shot.possible or not trial.possible else EXPLAINED_IMPOSSIBLE
         told = arm.off < start.off / factor or _as_given(shot, trial, start, align)
         # What is shrunk leaves less of everything; it must leave less for its size as well.
@@ -127,18 +138,18 @@ def _as_given(shot: Snapshot, trial: Snapshot, start: Arm, align: frozenset[str]
 
 
 def _best(
-    shot: Snapshot, before: Arm, tries: Iterable[Suspicion], align: frozenset[str]
-) -> tuple[Suspicion | None, Snapshot, Arm]:
+    shot: Snapshot, before: Arm, tries: Iterable[Finding], align: frozenset[str]
+) -> _Tried | None:
     """
     Return the mix-up whose undoing leaves least, from a rough ranking and a fit of the best.
 
     Of those that do as well, the one that leaves the frames as they were given: a wrist turned
     round by half a turn of its outer joints is one whose middle joint counts the other way.
     """
-    tried = [(suspicion, shot.mended(suspicion.mend)) for suspicion in tries]
+    tried = [(each, shot.mended(each.mend)) for each in tries if each.mend is not None]
     if not tried:  # one joint, and nothing that could be swapped with it
-        return None, shot, before
-    fitted: dict[int, tuple[Suspicion, Snapshot, Arm]] = {}
+        return None
+    fitted: dict[int, _Tried] = {}
     shots = [trial for _, trial in tried]
     # Without orientations a quick fit may end beside the tool vector: then from many starts.
     for thorough in (False,) if shot.turned else (False, True):
@@ -146,23 +157,19 @@ def _best(
         rough = [s.gap(m) * s.collapsed for s, m in zip(shots, models, strict=True)]
         for k in np.argsort(rough, kind='stable')[:SHORTLIST]:
             if k not in fitted:
-                fitted[k] = (*tried[k], shots[k].arm())
-        least = min(arm.off * trial.collapsed for _, trial, arm in fitted.values())
+                fitted[k] = _Tried(tried[k][0], shots[k], shots[k].arm())
+        least = min(each.off for each in fitted.values())
         if least < before.off / EXPLAINED:
             break
     if least > WORTH * before.off:
-        return None, shot, before
-    alike = [each for each in fitted.values() if WORTH * each[2].off * each[1].collapsed <= least]
-    gaps = [each[1].gap_with(align) for each in alike] if len(alike) > 1 else [0.0]
-    first = int(np.argmin(gaps))
-    others = [
-        each[0]
-        for each, left in zip(alike, gaps, strict=True)
-        if WORTH * left <= gaps[first] and each is not alike[first]
-    ]
-    best, trial, arm = alike[first]
-    unlike = {other.words: other for other in others if other.words != best.words}
-    return replace(best, alike=tuple(unlike.values())), trial, arm
+        return None
+    alike = [each for each in fitted.values() if WORTH * each.off <= least]
+    gaps = [each.undone.gap_with(align) for each in alike] if len(alike) > 1 else [0.0]
+    best = alike[int(np.argmin(gaps))]
+    near = (each for each, gap in zip(alike, gaps, strict=True) if WORTH * gap <= min(gaps))
+    others = {each.suspicion.sentence: each.suspicion for each in near}
+    others.pop(best.suspicion.sentence, None)
+    return best._replace(alike=tuple(others.values()))
 
 
 # Frames ----------------------------------------------------------------------------------------
@@ -184,17 +191,22 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
                 return ()
             framed = _framed(shot, model, frozenset(more - given), before, left)
             own = None if framed.kind == 'base_turned' else _within(shot, before, left, given)
-            return [Finding.of(own or framed)]
+            if own and framed.kind == 'wrong_fixture' and own.at == shot.robot.joint_names[:1]:
+                # A fixture that is turned about the positioner's last axis is one with its zero.
+                own = own._replace(alike=(*own.alike, (framed.kind, framed.at)))
+            return [own or framed]
     return ()
 
 
-def _within(shot: Snapshot, before: float, left: float, align: frozenset[str]) -> Mistake | None:
+def _within(shot: Snapshot, before: float, left: float, align: frozenset[str]) -> Finding | None:
     """Return the mix-up that explains as much with no more frames fitted than were to be."""
     most = min(max(LARGE, 2.0 * left), UNDONE)
     for suspicion in suspicions(shot.robot):
-        undone = shot.mended(suspicion.mend).gap_with(align)
-        if undone < min(most, before / EXPLAINED):
-            return _mistake(suspicion, before, undone)
+        assert suspicion.mend is not None
+        undone = shot.mended(suspicion.mend)
+        gap = undone.gap_with(align)
+        if gap < min(most, before / EXPLAINED):
+            return _told(_Tried(suspicion, undone, Arm(shot.model, gap, np.zeros(0))), before, gap)
     return None
 
 
@@ -214,26 +226,25 @@ def _plausible(robot: Robot, model: Model) -> bool:
 
 def _framed(
     shot: Snapshot, model: Model, more: frozenset[str], before: float, left: float
-) -> Mistake:
-    turn = None
-    if more == {'base'}:
-        turn = _turned(shot.robot.T_world_base, model.bases[0])
-    falls = f'the gap falls from {length(before)} to {length(left)}'
+) -> Finding:
+    if more == {'base'} and shot.robot.behind:
+        return _fixture(shot.robot, model.bases, _falls(before, left))
+    turn = _turned(shot.robot.T_world_base, model.bases[0]) if more == {'base'} else None
     if turn is not None:
-        return _base(shot.robot, turn, falls)
+        return _base(shot.robot, turn, _falls(before, left))
     names = listed(sorted(more))
-    return Mistake(
-        'other',
-        tuple(sorted(more)),
+    return mistake(
         f'The gap of {length(before)} is almost only one of frames: with the {names} fitted '
         f'{length(left)} remain.',
+        'other',
+        tuple(sorted(more)),
         f'Have the {names} aligned (--align) if the instrument stands anywhere, or the tool '
         'centre point was never measured',
         partial(frames_fitted, frames=more),
     )
 
 
-def _base(robot: Robot, turn: Array, falls: str) -> Mistake:
+def _base(robot: Robot, turn: Array, falls: str) -> Finding:
     """Return the mistake that a base is that stands turned, shape (3, 3)."""
     vector = np.degrees(rotation_vector(turn))
     k, angle = int(np.abs(vector).argmax()), float(np.linalg.norm(vector))
@@ -242,24 +253,44 @@ def _base(robot: Robot, turn: Array, falls: str) -> Mistake:
     else:
         parts = ', '.join(f'{part:+.0f}' for part in vector / np.abs(vector).max())
         about, size = f'axis ({parts})', angle
-    size = abs(size) if angle > 179.0 else size
+    size = abs(size) if angle > HALF_TURN else size
     first = robot.joint_names[0]
-    alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
-    words = ''
     # About its own first axis an arm cannot tell its base from the zero of its first joint.
-    if k == 2 and about.startswith('z') and not robot.prismatic[0]:
-        alike = (('constant_angle', (first,)),)
-        words = f'; a joint {first} whose zero is off by as much would look the same'
-    return Mistake(
-        'base_turned',
-        ('base',),
+    either = k == 2 and about.startswith('z') and not robot.prismatic[0]
+    words = f'; a joint {first} whose zero is off by as much would look the same'
+    return mistake(
         f'The base of the robot stands turned by {size:.0f} degrees about its {about} against '
         f'the frame that was given; turned back, {falls}.',
+        'base_turned',
+        ('base',),
         'Use the axes of the robot base that the controller counts in (for a UR: base or '
-        f'base_link), or add the turn to the base frame{words}',
+        f'base_link), or add the turn to the base frame{words if either else ""}',
         partial(base_turned, turn=turn),
-        alike=alike,
+        alike=(('constant_angle', (first,)),) if either else (),
     )
+
+
+def _fixture(robot: Robot, bases: Sequence[Array], falls: str) -> Finding:
+    """Return the mistake that poses were measured in another frame of the workpiece than was given."""
+    seen = [np.asarray(np.linalg.inv(base)) for base in bases]
+    steps = [np.asarray(robot.T_world_base @ pose) for pose in seen]
+    far = [float(np.linalg.norm(step[:3, 3])) for step in steps]
+    k = int(np.argmax(far))
+    angle = np.degrees(np.linalg.norm(rotation_vector(steps[k][:3, :3])))
+    at = ', '.join(f'{value:.4f}' for value in seen[k][:3, 3])
+    turn = ', '.join(f'{value:.5f}' for value in quaternion_from_matrix(seen[k][:3, :3]))
+    which = f' of recording {k + 1}' if len(bases) > 1 else ''
+    words = (
+        f'The poses{which} were measured in the frame of another fixture than was given: on the '
+        f'positioner it lies {length(far[k])} from there, turned by {angle:.1f} degrees; with it, '
+        f'{falls}.'
+    )
+    remedy = (
+        "Give the frame of the fixture that was measured on (of a robot file 'tool' of the "
+        f'workpiece: xyz [{at}], quat_xyzw [{turn}]), or have it aligned (--align base)'
+    )
+    mend = partial(frames_fitted, frames=('base',))
+    return mistake(words, 'wrong_fixture', ('base',), remedy, mend)
 
 
 def _turned(given: Array, fitted: Array) -> Array | None:
@@ -286,11 +317,11 @@ def _links(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     found = other_links(shot, align) if case.gap >= SIBLING else None
     if found is None:
         return ()
-    mistake, left = found
-    bundled, undone, rest = _best(shot, arm, robots(shot.robot), align)
-    if bundled is not None and rest.off < 1.0 and other_links(undone, align) is None:
-        mistake = _mistake(bundled, left, rest.gap)
-    return [Finding.of(mistake)]
+    told, left = found
+    bundled = _best(shot, arm, robots(shot.robot), align)
+    if bundled and bundled.arm.off < 1.0 and other_links(bundled.undone, align) is None:
+        return (_told(bundled, left, bundled.arm.gap),)
+    return (told,)
 
 
 def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
@@ -308,30 +339,43 @@ def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
             f'Check that {case.model.robot.name!r} is the robot that was measured, and that '
             'measurements and joint positions of one row belong together'
         )
-        return [Finding.of(Mistake('other', (), words, remedy, None))]
+        return (mistake(words, 'other', (), remedy),)
     # Links and zeros bend to whatever else is wrong; only what explains the gap is believed.
     if arm.gap > LARGE or arm.gap > shot.gap(shot.framed()) / EXPLAINED or case.slips:
         return ()
-    worst = int(arm.strain.argmax())
-    effect = arm.model.found[worst]
-    joint, value = str(effect.site), float(effect.vector()[0])
-    if isinstance(effect, JointOffset):
+    worst = arm.model.found[int(arm.strain.argmax())]
+    if isinstance(worst, RootPose):
         words = (
-            f'The zero of joint {joint!r} lies {np.degrees(value):+.1f} degrees from that of the '
-            'model, which no mastering leaves.'
+            'The positioner stands elsewhere beside the robot than it was given, farther than any '
+            f'root frame is off by. {worst.remedy(shot.robot)}'
         )
-        remedy = f'Master {joint} again, or correct its theta_offset'
-        return [Finding.of(Mistake('constant_angle', (joint,), words, remedy, None))]
-    what = {'link_length': 'a', 'link_offset': 'd', 'link_twist': 'alpha'}[effect.name]
-    size = f'{np.degrees(value):+.1f} degrees' if what == 'alpha' else f'{value * 1e3:+.1f} mm'
+        remedy = 'Measure where it stands, or give the robot file of this cell'
+        return (mistake(words, 'other', ('base',), remedy),)
+    if not isinstance(worst, JointOffset):
+        return (_foreign(case.model.robot, worst, ', more than industrial arms are off by'),)
+    joint, value = str(worst.site), np.degrees(worst.plain('offset'))
     words = (
-        f'The links are not those of {case.model.robot.name!r} as the model has it: {what} of '
-        f'{joint!r} differs by {size}, more than industrial arms are off by.'
+        f'The zero of joint {joint!r} lies {value:+.1f} degrees from that of the model, which no '
+        'mastering leaves.'
     )
-    return [Finding.of(Mistake('other_robot', ('robot',), words, GIVE_ITS_MODEL, None))]
+    remedy = f'Master {joint} again, or correct its theta_offset'
+    return (mistake(words, 'constant_angle', (joint,), remedy),)
 
 
-def other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Mistake, float] | None:
+def _foreign(robot: Robot, worst: Effect, why: str) -> Finding:
+    """Return that the links are those of another arm, by the one that differs most."""
+    assert isinstance(worst, ChannelError)
+    value = float(worst.vector()[0])
+    turns = worst.channel == 'alpha'
+    size = f'{np.degrees(value):+.1f} degrees' if turns else f'{value * 1e3:+.1f} mm'
+    words = (
+        f'The links are not those of {robot.name!r} as the model has it: {worst.channel} of '
+        f'{str(worst.site)!r} differs by {size}{why}.'
+    )
+    return mistake(words, 'other_robot', ('robot',), GIVE_ITS_MODEL)
+
+
+def other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Finding, float] | None:
     """
     Return that the lengths of the links are those of another arm; None where they are not.
 
@@ -347,48 +391,41 @@ def other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Mistake, float] 
 
     """
     problem = replace(shot.problem, align=align)
-    start = _linked(shot, problem)
+    start = shot.framed() if align == FRAMES else shot.aligned(align)
     given = [
         kind() for frame, kind in (('base', BasePose), ('tool', ToolPose)) if frame not in align
     ]
     own = [*given, *_of_joints(shot, (JointOffset, LinkTwist))]
-    fitted = partial(_fitted, problem, start, shot.soft)
-    without = fitted([*own, *_of_joints(shot, (JointCompliance,))])
-    left = gap(problem, without)
+    own += [RootPose()] if shot.robot.behind else []
+
+    def fitted(errors: Sequence[Effect], spread: float = 0.0) -> tuple[Model, float]:
+        """Return the fit of errors by their own priors, lengths by a spread [m], and its gap."""
+        model = start.with_found(tuple(errors))
+        precision = effect_precision(model)
+        if spread > 0.0:
+            names = np.concatenate([np.repeat(e.name, e.coordinates().size) for e in errors])
+            precision = np.where(np.isin(names, LENGTHS), spread**-2.0, precision)
+        # What an arm can have leaves less: more is no noise that would excuse anything.
+        model = bent(problem, model, precision, LARGE)
+        return model, gap(problem, model)
+
+    left = fitted([*own, *_of_joints(shot, (JointCompliance,))])[1]
     if left < LARGE:
         return None
     for spread in LINKS_APART:
-        errors = [*own, *_of_joints(shot, (LinkLength, LinkOffset))]
-        arm = fitted(errors, spread)
-        if LINKS_EXPLAIN * gap(problem, arm) < left:
-            far = _moved(problem, arm) > SIBLING
-            return (_links_swapped(arm, left, gap(problem, arm)), left) if far else None
+        arm, after = fitted([*own, *_of_joints(shot, (LinkLength, LinkOffset))], spread)
+        if LINKS_EXPLAIN * after < left:
+            if _moved(problem, arm) <= SIBLING:
+                return None
+            lengths = [e for e in arm.found if e.name in LENGTHS]
+            worst = max(lengths, key=lambda e: abs(float(e.vector()[0])))
+            why = f'; with other lengths {_falls(left, after)}'
+            return _foreign(arm.robot, worst, why), left
     return None
-
-
-def _linked(shot: Snapshot, problem: Problem) -> Model:
-    return shot.framed() if problem.align == FRAMES else shot.aligned(problem.align)
 
 
 def _of_joints(shot: Snapshot, kinds: Sequence[type[Effect]]) -> list[Effect]:
     return [kind(name) for kind in kinds for name in shot.robot.joint_names]  # type: ignore[call-arg]
-
-
-def _fitted(
-    problem: Problem, start: Model, least: Scale, errors: Sequence[Effect], spread: float = 0.0
-) -> Model:
-    """Return the fit of errors, each with its own prior but lengths with a spread [m]."""
-    model = start.with_found(tuple(errors))
-    precision = effect_precision(model)
-    if spread > 0.0:
-        names = np.concatenate([np.repeat(e.name, e.coordinates().size) for e in errors])
-        precision = np.where(np.isin(names, list(LENGTHS)), spread**-2.0, precision)
-    for _ in range(ROUNDS):
-        scale = robust_scale(problem, problem.residuals(model), least)
-        # What an arm can have leaves less: more is no noise that would excuse anything.
-        scale = replace(scale, position=min(scale.position, LARGE))
-        model = fit(problem, model, scale, precision, iterations=6).model
-    return model
 
 
 def _moved(problem: Problem, arm: Model) -> float:
@@ -397,17 +434,6 @@ def _moved(problem: Problem, arm: Model) -> float:
     pairs = zip(problem.residuals(rest), problem.residuals(arm), strict=True)
     way: Array = np.concatenate([(a - b)[:3] for a, b in pairs], axis=1)
     return float(np.sqrt((way**2).sum(axis=0).mean()))
-
-
-def _links_swapped(arm: Model, before: float, after: float) -> Mistake:
-    lengths = [e for e in arm.found if e.name in LENGTHS]
-    worst = max(lengths, key=lambda e: abs(float(e.vector()[0])))
-    words = (
-        f'The links are not those of {arm.robot.name!r} as the model has it: {LENGTHS[worst.name]} of '
-        f'{str(worst.site)!r} differs by {float(worst.vector()[0]) * 1e3:+.1f} mm; with other '
-        f'lengths the gap falls from {length(before)} to {length(after)}.'
-    )
-    return Mistake('other_robot', ('robot',), words, GIVE_ITS_MODEL, None)
 
 
 GIVE_ITS_MODEL = (

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...arrays import Array
 from ..algebra.problem import Model
-from .evidence import Case, Finding, Mistake
+from .evidence import Case, Finding, mistake
 from .limits import TILTED, UNEXPLAINED
 from .mending import WAYS, turns_as
 from .snapshot import Snapshot, gap
@@ -39,8 +39,7 @@ def orientation(case: Case) -> Sequence[Finding]:
             sentence = f'{words}; undone, they agree with the joints.'
             remedy = 'Mend the convention where the orientations are exported'
             mend = partial(turns_as, way=way)
-            mistake = Mistake('other', ('instrument',), sentence, remedy, mend)
-            return (Finding.of(mistake),)
+            return (mistake(sentence, 'other', ('instrument',), remedy, mend),)
     return (
         Finding(
             'warning',

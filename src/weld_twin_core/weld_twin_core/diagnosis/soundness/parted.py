@@ -12,9 +12,9 @@ import numpy as np
 
 from ...arm.rotation import rotation_vector
 from ...arrays import Array
-from ...effects.tool_pose import ToolPose
+from ...effects.frame_errors import ToolPose
 from ..algebra.problem import Change, Model
-from .evidence import Case, Finding, Mistake, length, listed
+from .evidence import Case, Finding, length, listed, mistake
 from .limits import PARTED, PARTED_LEAST, PARTED_TURN
 from .mending import differing
 from .orientation import WRONG, disagreement
@@ -55,7 +55,7 @@ def parted(case: Case) -> Sequence[Finding]:
     if before.off < 1.0 and turn < WRONG:
         return (Finding('warning', f'{sentence} {remedy}.'),)
     mend = partial(differing, families=('tool_pose',))
-    return (Finding.of(Mistake('reflector_jumped', ('tool',), sentence, remedy, mend)),)
+    return (mistake(sentence, 'reflector_jumped', ('tool',), remedy, mend),)
 
 
 def _with_tools(shot: Snapshot) -> Snapshot:
@@ -63,7 +63,7 @@ def _with_tools(shot: Snapshot) -> Snapshot:
     tools: list[Array] = []
     bases: list[Array] = []
     for k, recording in enumerate(shot.recordings):
-        alone = replace(shot.model, bases=(shot.model.bases[k],), changes=())
+        alone = replace(shot.model, bases=(shot.model.bases[k],), changes=(), common=())
         framed = Snapshot((recording,), alone).framed()
         tools.append(framed.robot.T_flange_tool)
         bases.append(framed.bases[0])

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -87,7 +86,7 @@ def _one_way(case: Case) -> Iterator[Finding]:
 
 def _frames(case: Case) -> Iterator[Finding]:
     """Report directions of the frames in which an error would not show."""
-    problem = replace(case.problem.thinned(3000), changes=())
+    problem = case.problem.thinned(3000).of_frames()
     parts, names = problem.frame_columns(problem.features(case.model))
     columns = problem.whitened(parts, problem.unit_scale())
     if not len(names):

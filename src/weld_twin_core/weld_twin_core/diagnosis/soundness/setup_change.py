@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .evidence import Case, Finding, distance, length
+from .evidence import Case, Finding, length
 from .lengths import instant
 from .slips import KNOCKED, Settling, Slip
 from .snapshot import measured
@@ -18,13 +18,11 @@ SEEN = 2.0
 A change this many times as large as the largest gaps did not happen: whatever is aligned, one side
 of a step keeps half of it. A strong shake makes such steps that other columns undo.
 """
-LARGEST = 0.99
-"""Quantile of the gaps that counts as the largest; the last per cent may be outliers."""
 
 
 def setup(case: Case) -> Sequence[Finding]:
     """Return steps and settling of the set-up; those that are dated are causes, and told there."""
-    most = SEEN * max(float(np.quantile(distance(part), LARGEST)) for part in case.residuals)
+    most = SEEN * case.largest
     out = []
     for each in case.changes:
         if isinstance(each, Settling) and each.size < most:

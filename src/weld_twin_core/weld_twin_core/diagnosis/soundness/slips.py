@@ -18,13 +18,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
+from ...effects.dated import InstrumentKnock, JointSlip, ToolSlip
 from ...effects.effect import Effect
-from ...effects.instrument_knock import InstrumentKnock
-from ...effects.joint_slip import JointSlip
-from ...effects.tool_slip import ToolSlip
 from ...recording import Recording
 from ..algebra.problem import Problem
-from .base_change import CONSTANTS, BaseChange, other_shapes, smooth_shapes
+from .base_change import CONSTANTS, Change, Rest, other_shapes, smooth_shapes
 from .lengths import instant, length
 from .limits import (
     DATED,
@@ -44,11 +42,25 @@ SLOW = 2.0
 NEIGHBOURS = np.geomspace(0.8, 1.25, 7)
 """Factors on a rough time constant that are tried about it."""
 KNOCKED, JUMPED, SLIPPED = 'instrument_knocked', 'reflector_jumped', 'joint_slipped'
-_OTHERWISE = {
-    KNOCKED: 'a knock at instrument or base',
-    JUMPED: 'a jump of the reflector or the tool',
-    SLIPPED: 'a slip of joint {!r}',
+_AGAIN = 'and measure again; or split the recording there and have the'
+_WORDS = {
+    KNOCKED: (
+        'Instrument or base were knocked',
+        'a knock at instrument or base',
+        f'Fasten the instrument and the base, {_AGAIN} base aligned',
+    ),
+    JUMPED: (
+        'The reflector jumped in its nest, or the tool in its holder',
+        'a jump of the reflector or the tool',
+        f'Fasten the reflector or the tool, {_AGAIN} tool aligned',
+    ),
+    SLIPPED: (
+        'Joint {0!r} slipped',
+        'a slip of joint {0!r}',
+        'See to belt, coupling and encoder of {0}, master it and measure again',
+    ),
 }
+"""How each kind is told: what happened, how it is called beside others, what to do about it."""
 
 
 @dataclass(frozen=True)
@@ -86,29 +98,15 @@ class Slip:
 
     def sentence(self, recording: Recording) -> str:
         """Return what happened, in words."""
-        at = instant(recording, self.time)
-        what = {
-            KNOCKED: 'Instrument or base were knocked',
-            JUMPED: 'The reflector jumped in its nest, or the tool in its holder',
-            SLIPPED: f'Joint {self.joint!r} slipped',
-        }[self.kind]
+        at, what = instant(recording, self.time), _WORDS[self.kind][0].format(self.joint)
         out = f'{what} at {at} of {recording.name}: the tool is {length(self.size)} off then.'
-        others = ' or '.join(
-            dict.fromkeys(_OTHERWISE[kind].format(*at) for kind, at in self.alike)
-        )
+        others = ' or '.join(dict.fromkeys(_WORDS[kind][1].format(*at) for kind, at in self.alike))
         return f'{out} {others[0].upper()}{others[1:]} would look the same.' if others else out
 
     @property
     def remedy(self) -> str:
         """Return what to do about it."""
-        return {
-            KNOCKED: 'Fasten the instrument and the base, and measure again; or split the '
-            'recording there and have the base aligned',
-            JUMPED: 'Fasten the reflector or the tool, and measure again; or split the recording '
-            'there and have the tool aligned',
-            SLIPPED: f'See to belt, coupling and encoder of {self.joint}, master it and measure '
-            'again',
-        }[self.kind]
+        return _WORDS[self.kind][2].format(self.joint)
 
     def effect(self) -> Effect:
         """Return the effect to be fitted, of no size yet."""
@@ -134,7 +132,7 @@ class Settling(NamedTuple):
 
 
 def changes(
-    problem: Problem, change: BaseChange, joints: Sequence[str], largest: float
+    problem: Problem, rest: Rest, joints: Sequence[str], largest: float
 ) -> list[Slip | Settling]:
     """
     Return what gave way in the recordings and how the base settled, most evidence first.
@@ -145,8 +143,8 @@ def changes(
     Parameters
     ----------
     problem : Problem
-        The measurements that ``change`` is of.
-    change : BaseChange
+        The measurements that ``rest`` is of.
+    rest : Rest
     joints : sequence of str
         Names in chain order.
     largest : float [m]
@@ -155,19 +153,19 @@ def changes(
     """
     out: list[Slip | Settling] = []
     taken: list[tuple[int, int]] = []
-    whole = change.far
+    whole = rest.far
     for _ in range(MOST_SLIPS):
-        seen = _Seen(problem, change, joints, taken)
+        seen = _Seen(problem, rest, joints, taken)
         best = seen.best()
         if best is None:
             break
-        before, change = change.far, change.past(best.changed, best.shape)
+        before, rest = rest.far, best.change.taken_out(best.shape)
         if best.slip is None:
             named = seen.named(best)
             out += [] if named is None else [named]
             continue
         taken.append((best.slip.recording, best.at))
-        seldom = before - change.far > DATED_SHARE * whole
+        seldom = before - rest.far > DATED_SHARE * whole
         dated = seldom and best.slip.size < DATED_SIZE * largest
         out.append(replace(best.slip, dated=dated))
     return out
@@ -177,7 +175,7 @@ class _Trial(NamedTuple):
     """A change of a recording, its evidence, shape in time (M,), and where it is abrupt if it is."""
 
     nats: float
-    changed: BaseChange
+    change: Change
     shape: Array
     recording: int
     slip: Slip | None = None
@@ -186,15 +184,15 @@ class _Trial(NamedTuple):
     @property
     def gain(self) -> float:
         """Return the sum of squares that it explains."""
-        return self.changed.gain(self.shape)
+        return float(self.change.gains(self.shape[None])[0])
 
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """The change so far explained, and the steps taken out already."""
+    """What is left so far, and the steps taken out already."""
 
     problem: Problem
-    change: BaseChange
+    rest: Rest
     joints: Sequence[str]
     taken: Sequence[tuple[int, int]]
 
@@ -213,22 +211,26 @@ class _Seen:
         return max(trials, key=_nats, default=None)
 
     @cached_property
-    def _kinds(self) -> list[tuple[str, str | None, BaseChange]]:
-        return [
-            (KNOCKED, None, self.change),
-            (JUMPED, None, self.change.of_tool),
-            *((SLIPPED, name, self.change.of_joint(i)) for i, name in enumerate(self.joints)),
-        ]
+    def _base(self) -> Change:
+        return self.rest.change('base')
+
+    @cached_property
+    def _kinds(self) -> list[tuple[str, str | None, Change]]:
+        # Where only points are seen the tool cannot turn.
+        tool = self.rest.change('tool', slice(max(self.rest.rows)))
+        own = (self.rest.change('joints', slice(i, i + 1)) for i in range(len(self.joints)))
+        slips = ((SLIPPED, name, one) for name, one in zip(self.joints, own, strict=True))
+        return [(KNOCKED, None, self._base), (JUMPED, None, tool), *slips]
 
     def _smooth(self, k: int) -> Iterator[_Trial]:
         age = self._age(k)
         possible = smooth_shapes(age)
         if len(self.problem.recordings) > 1:  # moved between recordings, not within one
             possible.append(np.ones(age.size))
-        shapes = np.array([self._placed(shape, k) for shape in possible])
-        for _, _, changed in self._kinds:
-            shape = shapes[int(changed.gains(shapes).argmax())]
-            yield _Trial(changed.nats(shape), changed, shape, k)
+        shapes = [self._placed(shape, k) for shape in possible]
+        for _, _, change in self._kinds:
+            shape = change.best(shapes)
+            yield _Trial(change.nats(shape), change, shape, k)
 
     def _steps(self, k: int) -> Iterator[_Trial]:
         t = measured(self.problem.recordings[k]).t
@@ -238,52 +240,47 @@ class _Seen:
         for recording, at in self.taken:
             if recording == k:
                 allowed[max(at - edge, 0) : at + edge] = False
-        if not allowed.any():
-            return
-        for kind, joint, changed in self._kinds:
-            at = int(np.where(allowed, changed.step_gains(k), -np.inf).argmax())
+        for kind, joint, change in self._kinds if allowed.any() else ():
+            at = int(np.where(allowed, change.step_gains(k), -np.inf).argmax())
             shape = self._placed((np.arange(t.size) >= at).astype(np.float64), k)
             # Every instant was asked; the best of many is better than it should be.
-            nats = changed.nats(shape) - float(np.log(t.size))
+            nats = change.nats(shape) - float(np.log(t.size))
             time = 0.5 * float(t[at - 1] + t[at])
-            slip = Slip(kind, joint, k, time, changed.size(shape), nats)
-            yield _Trial(nats, changed, shape, k, slip, at)
+            slip = Slip(kind, joint, k, time, change.size(shape), nats)
+            yield _Trial(nats, change, shape, k, slip, at)
 
     def named(self, smooth: _Trial) -> Slip | Settling | None:
         """Return what a smooth change of the base is by name, where no other shape does as well."""
-        if smooth.changed is not self.change:
+        if smooth.change is not self._base:
             return None
         k, age = smooth.recording, self._age(smooth.recording)
+        t = measured(self.problem.recordings[k]).t
         if np.array_equal(smooth.shape, self._placed(np.ones(age.size), k)):
-            return self._moved_between(smooth, smooth_shapes(age))
+            if not self._surpasses(smooth.nats, smooth.shape, k, smooth_shapes(age)):
+                return None
+            # A move of the set-up before a recording: of the first, before the second.
+            k, size = max(k, 1), self._base.size(smooth.shape)
+            start = float(measured(self.problem.recordings[k]).t[0])
+            return Slip(KNOCKED, None, k, start, size, smooth.nats, dated=False)
+
+        def settled(constant: float) -> Array:
+            return self._placed(np.exp(-age / constant), k)
 
         def gain(constant: float) -> float:
-            return self.change.gain(self._placed(np.exp(-age / constant), k))
+            return float(self._base.gains(settled(constant)[None])[0])
 
-        rough = max(CONSTANTS, key=gain)
-        constant = float(max(rough * NEIGHBOURS, key=gain))
-        shape = self._placed(np.exp(-age / constant), k)
-        t = measured(self.problem.recordings[k]).t
-        late, size = constant * float(np.ptp(t)), self.change.size(shape)
+        constant = float(max(max(CONSTANTS, key=gain) * NEIGHBOURS, key=gain))
+        shape, late = settled(constant), constant * float(np.ptp(t))
+        nats = self._base.nats(shape)
         slow = self.problem.recordings[k].joints.static or late > SLOW
-        nats = self.change.nats(shape)
         if not slow or not self._surpasses(nats, shape, k, other_shapes(age)):
             return None
-        return Settling(k, late, size, nats)
-
-    def _moved_between(self, smooth: _Trial, others: Sequence[Array]) -> Slip | None:
-        """Return a move of the set-up before a recording: of the first, before the second."""
-        if not self._surpasses(smooth.nats, smooth.shape, smooth.recording, others):
-            return None
-        k = max(smooth.recording, 1)
-        start, size = float(measured(self.problem.recordings[k]).t[0]), smooth.changed.size
-        return Slip(KNOCKED, None, k, start, size(smooth.shape), smooth.nats, dated=False)
+        return Settling(k, late, self._base.size(shape), nats)
 
     def _surpasses(self, nats: float, shape: Array, k: int, others: Sequence[Array]) -> bool:
         """Return whether a change of the base tells much more than in other shapes, or of joints."""
-        shapes = np.array([self._placed(other, k) for other in others])
-        best = shapes[int(self.change.gains(shapes).argmax())]
-        rival = max(self.change.nats(best), self.change.of_joints.nats(shape))
+        best = self._base.best([self._placed(other, k) for other in others])
+        rival = max(self._base.nats(best), self.rest.change('joints').nats(shape))
         return nats > MARGIN + rival
 
     def _age(self, k: int) -> Array:
@@ -292,9 +289,8 @@ class _Seen:
         return np.asarray((t - t[0]) / max(float(np.ptp(t)), 1e-9))
 
     def _placed(self, shape: Array, k: int) -> Array:
-        mine = self.change.recording == k
-        out = np.zeros(mine.size)
-        out[mine] = shape
+        out = np.zeros(self.rest.recording.size)
+        out[self.rest.recording == k] = shape
         return out
 
 
@@ -308,13 +304,13 @@ def _simplest(trials: Sequence[_Trial]) -> _Trial | None:
     if not trials:
         return None
     most = max(trial.gain for trial in trials)
-    whole = float((trials[0].changed.residual ** 2).sum())
+    whole = float((trials[0].change.rest.residual ** 2).sum())
     least = max(NEARLY * most, whole - LEFT_ALIKE * (whole - most))
     enough = [trial for trial in trials if trial.gain >= least > 0.0]
     if not enough:  # nothing to explain, so no number explains it
         return None
-    fewest = min(trial.changed.columns.shape[2] for trial in enough)
-    best = max((t for t in enough if t.changed.columns.shape[2] == fewest), key=_nats)
+    fewest = min(trial.change.columns.shape[2] for trial in enough)
+    best = max((t for t in enough if t.change.columns.shape[2] == fewest), key=_nats)
     if best.slip is None:
         return best
     alike = tuple((t.slip.kind, t.slip.at) for t in enough if t is not best and t.slip is not None)

@@ -13,11 +13,10 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
-from ...effects.joint_offset import JointOffset
-from ...effects.link_length import LinkLength
-from ...effects.link_offset import LinkOffset
-from ...effects.link_twist import LinkTwist
-from ...recording import JointMotion, Recording
+from ...effects.effect import Effect
+from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
+from ...effects.root_pose import RootPose
+from ...recording import JointMotion, Measurements, Recording
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale
 from ..frames.alignment import initial_frames, refined, rough_frames, tracks
@@ -28,6 +27,8 @@ from .limits import (
     LINK_SPREAD,
     OFFSET_MOST,
     OFFSET_SPREAD,
+    ROOT_MOST,
+    ROOT_SPREAD,
     SOFT,
     TWIST_MOST,
     TWIST_SPREAD,
@@ -39,6 +40,8 @@ __all__ = ['FRAMES', 'Arm', 'Snapshot', 'gap', 'measured', 'snapshot']
 
 SAMPLES = 60
 """Samples of a snapshot in all: enough for every error of an arm, few enough for fits at once."""
+ROUNDS, STEPS = 3, 6
+"""Fits of an arm, each with the weights of the last, and the steps of each."""
 FRAMES = frozenset({'base', 'tool'})
 KINDS = (JointOffset, LinkLength, LinkOffset, LinkTwist)
 """Errors that a plausible arm has on every joint."""
@@ -74,7 +77,10 @@ class Snapshot:
     def with_turns(self, turns: list[Array | None]) -> Snapshot:
         """Return the snapshot with other measured rotations, or none."""
         pairs = zip(self.recordings, turns, strict=True)
-        out = [r.with_measured(replace(measured(r), rotation=turn)) for r, turn in pairs]
+        seen = [(r, measured(r), turn) for r, turn in pairs]
+        out = [
+            r.with_measured(Measurements(m.t, m.position, turn, m.sigma)) for r, m, turn in seen
+        ]
         return replace(self, recordings=tuple(out))
 
     @cached_property
@@ -150,22 +156,16 @@ class Snapshot:
         spread, most = np.repeat(usual, self.robot.n), np.repeat(bounds, self.robot.n)
         straight = np.flatnonzero(self.robot.prismatic)
         spread[straight], most[straight] = LINK_SPREAD, LINK_MOST
-        errors = [kind(name) for kind in KINDS for name in self.robot.joint_names]
-        trial, precision = self.framed().with_found(tuple(errors)), spread**-2.0
-        for _ in range(3):
-            trial = self._bent(trial, precision)
-        strain = np.abs([float(e.vector()[0]) for e in trial.found]) / most
+        errors: list[Effect] = [kind(name) for kind in KINDS for name in self.robot.joint_names]
+        if self.robot.behind:
+            root = RootPose()
+            errors.append(root)
+            spread = np.append(spread, np.full(root.vector().size, ROOT_SPREAD))
+            most = np.append(most, ROOT_MOST)
+        start = self.framed().with_found(tuple(errors))
+        trial = bent(self.problem, start, spread**-2.0)
+        strain = np.array([np.abs(e.vector()).max() for e in trial.found]) / most
         return Arm(trial, self.gap(trial), strain)
-
-    def _bent(self, trial: Model, precision: Array) -> Model:
-        """Return the model after a robust fit of both frames and the errors that it has."""
-        scale = robust_scale(self.problem, self.problem.residuals(trial), self.soft)
-        return fit(self.problem, trial, scale, precision, iterations=6).model
-
-    @property
-    def soft(self) -> Scale:
-        """Return the least noise that trial fits assume."""
-        return Scale(*SOFT, self.problem.unit_scale().weights)
 
 
 class Arm(NamedTuple):
@@ -220,6 +220,28 @@ def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
         joints = JointMotion(seen.t[index], q[index], static=True)
         out.append(replace(recording, joints=joints, measured=seen.take(index)))
     return Snapshot(tuple(out), replace(model, found=()))
+
+
+def bent(problem: Problem, start: Model, precision: Array, noise: float = np.inf) -> Model:
+    """
+    Return the model after a robust fit of its frames and the errors that it has.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : Model
+    precision : array, shape (K,)
+        Prior precision of every coordinate of the errors.
+    noise : float [m]
+        At most so much of what is left counts as noise.
+
+    """
+    least, model = Scale(*SOFT, problem.unit_scale().weights), start
+    for _ in range(ROUNDS):
+        scale = robust_scale(problem, problem.residuals(model), least)
+        scale = replace(scale, position=min(scale.position, noise))
+        model = fit(problem, model, scale, precision, iterations=STEPS).model
+    return model
 
 
 def gap(problem: Problem, model: Model) -> float:

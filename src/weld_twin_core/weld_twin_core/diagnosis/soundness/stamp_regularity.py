@@ -14,7 +14,7 @@ from ...bursts import bursts
 from ...recording import Recording
 from ...two_clocks import ONE_CLOCK
 from ..algebra.independent_rows import robust_spread
-from .evidence import Case, Finding, Mistake
+from .evidence import Case, Finding, mistake
 from .lag import Lag
 from .limits import LATE, RATE
 from .mending import stamps_as
@@ -127,7 +127,7 @@ def _recording(recording: Recording, lag: Lag, k: int) -> Iterator[Finding]:
     else:
         return
     if wrong:
-        yield Finding.of(Mistake('clock', ('clock',), sentence, ONE_CLOCK, mend, of_all=False))
+        yield mistake(sentence, 'clock', ('clock',), ONE_CLOCK, mend, of_all=False)
     else:
         yield Finding('note', sentence)
 

@@ -16,7 +16,7 @@ from ...recording import Recording
 from ...two_clocks import ONE_CLOCK
 from ..algebra.problem import FRAMES
 from ..frames.aligned import aligned
-from .evidence import Case, Mistake, length, listed
+from .evidence import Case, Finding, length, listed, mistake
 from .limits import EVEN, EVEN_LEAST, LIKE_LENGTH, MOVED, STILL_SPEED
 from .mending import Given, Mend, measured, stamped_evenly, stamps_as, velocities_left_out
 
@@ -24,9 +24,9 @@ ROUNDS = 2
 """Times that frames and delay are found in turn; a third changes nothing."""
 
 
-def streams(given: Given) -> list[Mistake]:
+def streams(given: Given) -> list[Finding]:
     """Return velocities that cannot be, and clocks that have nothing in common."""
-    out: list[Mistake] = []
+    out: list[Finding] = []
     for k, recording in enumerate(given.recordings):
         if recording.measured is None or recording.joints.static:
             continue
@@ -43,16 +43,16 @@ def velocities_checked(recording: Recording) -> Recording:
     return replace(recording, joints=replace(recording.joints, qd=None))
 
 
-def _velocities(recording: Recording, k: int, names: tuple[str, ...]) -> Iterator[Mistake]:
+def _velocities(recording: Recording, k: int, names: tuple[str, ...]) -> Iterator[Finding]:
     still, moving = _still(recording), np.ptp(recording.joints.q, axis=0) > MOVED
     if still.any():
         at = tuple(names[i] for i in np.flatnonzero(still))
         whose = 'every moving joint' if still.sum() == moving.sum() else listed(at)
-        yield Mistake(
-            'zero_velocities',
-            at,
+        yield mistake(
             f'The joint states of {recording.name} give velocity zero for {whose} while the '
             'positions move.',
+            'zero_velocities',
+            at,
             'Publish measured velocities, or leave the field empty',
             partial(velocities_left_out, k=k),
             of_all=False,
@@ -68,7 +68,7 @@ def _still(recording: Recording) -> NDArray[np.bool_]:
     return np.asarray(moving & (np.abs(joints.qd).max(axis=0) < STILL_SPEED))
 
 
-def _apart(recording: Recording, k: int) -> Iterator[Mistake]:
+def _apart(recording: Recording, k: int) -> Iterator[Finding]:
     """Yield that no measurement lies inside the joint stream."""
     t, seen = recording.joints.t, measured(recording).t
     if seen.size == 0 or ((seen >= t[0]) & (seen <= t[-1])).any():
@@ -78,19 +78,19 @@ def _apart(recording: Recording, k: int) -> Iterator[Mistake]:
     mend = None
     if min(spans) > LIKE_LENGTH * max(spans):
         mend = partial(stamps_as, k=k, late=late, rate=0.0, middle=float(seen[0]))
-    yield Mistake(
-        'clock',
-        ('clock',),
+    yield mistake(
         f'No measurement of {recording.name} lies inside its joint stream '
         f'({t[0]:.3f} to {t[-1]:.3f} s against {seen[0]:.3f} to {seen[-1]:.3f} s): the stamps are '
         'of two clocks.',
+        'clock',
+        ('clock',),
         ONE_CLOCK,
         mend,
         of_all=False,
     )
 
 
-def _in_bursts(given: Given, k: int) -> Iterator[Mistake]:
+def _in_bursts(given: Given, k: int) -> Iterator[Finding]:
     """Yield that measurements were stamped when they were sent, where an even clock explains more."""
     recording = given.recordings[k]
     found = bursts(measured(recording).t)
@@ -102,12 +102,12 @@ def _in_bursts(given: Given, k: int) -> Iterator[Mistake]:
     t = measured(recording).t
     waited = float(np.median(t - evenly(even.first, even.step, even.lost, t.size, t.size)))
     missing = f' ({even.lost.size} were lost on the way)' if even.lost.size else ''
-    yield Mistake(
-        'stamps_in_bursts',
-        ('clock',),
+    yield mistake(
         f'The measurements of {recording.name} are {even.words}: they waited in a buffer{missing}, '
         f'{waited * 1e3:.0f} ms in the middle. Stamped evenly and so much earlier, the gap falls '
         f'from {length(before)} to {length(after)}.',
+        'stamps_in_bursts',
+        ('clock',),
         "Record the instrument's own time of each measurement, or send each at once; --apply "
         'stamps them anew',
         _stamped(even, k, t.size),

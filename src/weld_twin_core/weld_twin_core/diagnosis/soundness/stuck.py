@@ -14,7 +14,7 @@ from ...arrays import Array
 from ...recording import JointMotion, Recording
 from ..algebra.problem import Model
 from ..frames.alignment import refined
-from .evidence import Case, Finding, Mistake, distance, length
+from .evidence import Case, Finding, distance, length, mistake
 from .limits import (
     STUCK_AFTER,
     STUCK_EXPLAINED,
@@ -48,11 +48,11 @@ def stuck(case: Case) -> Sequence[Finding]:
             or max(_joints(case, k), key=lambda pair: pair[0], default=(0.0, None))[1]
         )
         if found is not None:
-            out.append(Finding.of(found))
+            out.append(found)
     return out
 
 
-def _whole(recording: Recording) -> Mistake | None:
+def _whole(recording: Recording) -> Finding | None:
     """Return that all joints stand still together while the measured tool moves."""
     seen = measured(recording)
     for start, end in _runs(recording.joints.q, recording.joints):
@@ -65,7 +65,7 @@ def _whole(recording: Recording) -> Mistake | None:
                 f'The joint positions of {recording.name} stand still {_when(recording, start, end)}'
                 f' while the tool moves by {length(way)}.'
             )
-            return Mistake('joints_stuck', (), sentence, REMEDY, None)
+            return mistake(sentence, 'joints_stuck', (), REMEDY)
     return None
 
 
@@ -80,7 +80,7 @@ def _way(position: Array) -> float:
 REMEDY = 'See to the driver that publishes the joint states, and measure again'
 
 
-def _joints(case: Case, k: int) -> Iterator[tuple[float, Mistake]]:
+def _joints(case: Case, k: int) -> Iterator[tuple[float, Finding]]:
     """Yield joints whose own motion would explain the gap while their reading stands still."""
     recording, refits = case.recordings[k], 0
     for start, end, i in _longest(case, k):
@@ -120,7 +120,7 @@ def _unfitted(case: Case, k: int, inside: NDArray[np.bool_]) -> tuple[Model, Arr
 
 def _freed_there(
     model: Model, recording: Recording, k: int, i: int, run: tuple[int, int], off: Array
-) -> tuple[float, Mistake] | None:
+) -> tuple[float, Finding] | None:
     """Return that a joint went on while its reading stood still, and how much that explains."""
     inside, name = _inside(recording, *run), model.robot.joint_names[i]
     gap, rest = float(np.median(off[inside])), float(np.median(off[~inside]))
@@ -134,7 +134,7 @@ def _freed_there(
         f'{_when(recording, *run)} while the joint moves: the gap there is '
         f'{length(gap)}, and {length(left)} with the joint set free.'
     )
-    return gap / left, Mistake('joints_stuck', (name,), sentence, REMEDY, None)
+    return gap / left, mistake(sentence, 'joints_stuck', (name,), REMEDY)
 
 
 def _runs(q: Array, joints: JointMotion) -> list[tuple[int, int]]:

@@ -26,7 +26,7 @@ from ..algebra.problem import Model, Problem
 from ..frames.places import FEWEST, posed
 from ..hypotheses.library import plain_causes
 from ..result import Unsound
-from .evidence import Mistake
+from .evidence import Finding, mistake
 
 FAR = 8.0
 """Distance from its contact, in median distances, from which a posture is a slip: of normal errors
@@ -64,7 +64,7 @@ class Touched(NamedTuple):
     problem: Problem
     model: Model
     told: tuple[Unsound, ...]
-    mistakes: tuple[Mistake, ...]
+    mistakes: tuple[Finding, ...]
 
 
 def touches(problem: Problem, model: Model) -> Touched:
@@ -137,7 +137,7 @@ def _loose(problem: Problem, rows: list[Array]) -> tuple[float, ...]:
     return tuple(float(value) for value in noise / noise.min())
 
 
-def _broken(recordings: Mapping[int, Recording], points: Mapping[int, Array]) -> Iterator[Mistake]:
+def _broken(recordings: Mapping[int, Recording], points: Mapping[int, Array]) -> Iterator[Finding]:
     """Yield known lengths that cannot be; a few postures in a wrong socket do not move a median."""
     middles = _middles(recordings, points)
     for recording in recordings.values():
@@ -149,13 +149,12 @@ def _broken(recordings: Mapping[int, Recording], points: Mapping[int, Array]) ->
             found = float(np.linalg.norm(middles[one] - middles[other]))
             if abs(found - tie.value) < max(BROKEN * tie.sigma, LEAST_BROKEN):
                 continue
-            yield Mistake(
-                'other',
-                tie.between,
+            yield mistake(
                 f'{one!r} and {other!r} are {tie.value * 1e3:.4g} mm apart by the artefact '
                 f'and {found * 1e3:.4g} mm by the postures: files or labels are mixed up.',
+                'other',
+                tie.between,
                 'Check which file belongs to which contact, and the length in the artefact',
-                None,
             )
 
 

@@ -58,7 +58,6 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
 
     Parameters
     ----------
-    evidence : Evidence
     beliefs : Beliefs, optional
         The usual ones when left out.
 

@@ -32,15 +32,10 @@ def gathered(
 
     Parameters
     ----------
-    found : Search
-    unseen : Unseen
-        Of the final model.
     leftover : Structure
         What generic columns still find beside it.
     shrink : Shrink
         On held-out recordings or on stretches taking their turn.
-    floor : NoiseFloor
-    beliefs : Beliefs
     least : float or None
         As `borne_out` gives it.
     chance : float

@@ -1,0 +1,42 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Time the twin beside its peers, after checking that they agree.
+
+Peers that are not installed are left out. One thread; contenders take turns, so that the ratios
+hold on a busy machine too. Writes benchmark.json, a table (benchmark.md) and how the cost grows
+(growth.png) to the directory.
+"""
+
+from __future__ import annotations
+
+import os
+
+from weld_twin_nodes.cli.options import add_output, output
+from weld_twin_nodes.offline.environment import THREADS
+
+from ...study import Study, option, options, study
+
+ONE_THREAD = {
+    **dict.fromkeys(THREADS, '1'),
+    'XLA_FLAGS': '--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1',
+    'JAX_PLATFORMS': 'cpu',
+}
+"""Read by the libraries when they are imported."""
+
+add_arguments = options(
+    lambda parser: add_output(parser, 'where results go'),
+    option('--quick', False, None, 'small sizes, to see that it runs'),
+    out='',
+)
+
+
+@study
+def run(study: Study) -> None:
+    """Run the benchmark; print results as they come."""
+    os.environ.update(ONE_THREAD)
+
+    from ...benchmark.all_races import FULL, QUICK, benchmark
+
+    sizes = QUICK if study.args.quick else FULL
+    with output(study.args, 'benchmark.json') as folder:
+        benchmark(folder, sizes, lambda line: print(line, flush=True))

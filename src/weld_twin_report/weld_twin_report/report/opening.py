@@ -1,0 +1,342 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The first screen: the verdict, and what a fitter asks first: how far off, may we weld, what to do."""
+
+from __future__ import annotations
+
+from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.metrics.conformity import Rule
+from weld_twin_nodes.wording.mending import advised, left_with, thought_mended
+from weld_twin_nodes.wording.quantities import (
+    counted,
+    left_of,
+    millimetres,
+    odds,
+    percent,
+    small_turn,
+    turns_only,
+)
+from weld_twin_nodes.wording.switches import as_it_is, switches
+from weld_twin_nodes.wording.words import (
+    leading,
+    likely,
+    listed,
+    not_to_be_tried,
+    passed,
+    untried_in_short,
+)
+
+from .acceptance import largest, mark
+from .answer import Answer
+from .cause_answer import CauseAnswer
+from .directions import components, sides_words, worst
+from .html import Child, Figure, Html, joined, lines, pairs, tag
+from .html import figures as drawn
+from .seam_view import at_rest, instant, left_out
+from .warned import warned
+
+_CAUSES = 4
+"""Causes in the table; the cards have more."""
+_VALUES = 2
+"""Values of a cause in the table; its card has more."""
+_SURE_OF = {
+    'identified': 'that every cause named is right, and none is missing',
+    'ambiguous': 'that what is named holds the causes, and none is missing',
+    'unknown': 'that the cause is none of those tried',
+}
+_APART = '\N{NO-BREAK SPACE}\N{NO-BREAK SPACE}'
+"""Between a size and the verdict on it."""
+_HEADS = (
+    *('Cause', 'Share of the gap', 'By how much', 'How sure'),
+    *('If only this is mended', 'Where to enter it'),
+)
+WORDS = (
+    ('gap', 'how far the tool is from where the model of the robot has it: measured minus model'),
+    ('RMS', 'an average of sizes: the root of the mean of the squares'),
+    (
+        'measuring noise',
+        'what the instrument alone makes: nothing below it can be seen in these data',
+    ),
+    (
+        'not used for fitting',
+        'each stretch was predicted from the others, so that nothing is judged on what it was '
+        'learned from',
+    ),
+    (
+        'share',
+        'the part of the squared gap that a cause makes: squares add up to 100 %, lengths do not',
+    ),
+    (
+        'curve',
+        'where the cause has no name: how far the joint is off, as it was measured, over the angle, '
+        'the speed or the like; programs can be corrected by it',
+    ),
+    (
+        'mended',
+        'thought away: the arm as if this cause were gone and all others still there; of a cause '
+        'without a name, programs corrected by its curve',
+    ),
+    (
+        'standard deviation',
+        'two of three values lie within one, 95 of 100 within two',
+    ),
+)
+"""Words of the page that not everybody has, each told once."""
+
+
+def header(answer: Answer) -> Html:
+    """Return what was diagnosed."""
+    kind = tag('p', 'Positional accuracy ', tag('b', 'diagnosis'), class_='kind')
+    return tag('header', kind, tag('p', answer.subject, class_='subject'))
+
+
+def opening(answer: Answer, judged: Html | None = None) -> Html:
+    """Return status, verdict, how it is judged, figures, actions and the causes in a table."""
+    first, second = answer.verdict
+    told = (figures, _holds, _actions, causes_table, _words) if answer.sound else ()
+    return tag(
+        'section',
+        tag('p', answer.status, class_=f'status {answer.diagnosis.status}'),
+        judged,
+        tag('h1', first),
+        tag('p', second, class_='second'),
+        _mended(answer),
+        *(part(answer) for part in told),
+        id_='verdict',
+    )
+
+
+def _mended(answer: Answer) -> Html | None:
+    """Return what was wrong with the data and undone; all that follows stands on it."""
+    if not answer.mended:
+        return None
+    items = tag('ul', *(tag('li', sentence) for sentence in answer.mended))
+    return tag('div', tag('h2', 'Mended before the diagnosis'), items, class_='actions mended')
+
+
+def _actions(answer: Answer) -> Html | None:
+    if not answer.to_do:
+        return None
+    items = tag('ol', *(tag('li', *warned(action)) for action in answer.to_do))
+    title = 'What to do, in this order' if len(answer.to_do) > 1 else 'What to do'
+    return tag('div', tag('h2', title), items, class_='actions')
+
+
+def _holds(answer: Answer) -> Html | None:
+    holds = answer.holds
+    if holds is None:
+        return None
+    told = ' '.join(filter(None, [holds.elsewhere, holds.file, *holds.open]))
+    return tag('p', told, class_='warn' if holds.wide else 'note')
+
+
+def _words(_: Answer) -> Html:
+    """Return what the words of the page mean, folded."""
+    return tag(
+        'details',
+        tag('summary', 'What the words on this page mean'),
+        pairs(WORDS),
+        class_='detail',
+    )
+
+
+def figures(answer: Answer) -> Html:
+    """Return the figures that answer what is asked first."""
+    diagnosis = answer.diagnosis
+    rows = [_off(diagnosis), _worst(diagnosis), _pass(diagnosis, answer.rule), _left(diagnosis)]
+    if diagnosis.status in _SURE_OF:
+        told = f'{_SURE_OF[diagnosis.status]}{answer.together}{_among(diagnosis)}'
+        rows.append(('How sure', odds(diagnosis.confidence), told))
+    return drawn(filter(None, [*rows, _data(answer)]))
+
+
+def _off(diagnosis: Diagnosis) -> Figure:
+    gap = diagnosis.gap
+    told = (
+        f'the gap: RMS of {counted(gap.samples, "sample")}. Measuring noise alone: '
+        f'{millimetres(gap.noise_floor_m)}'
+    )
+    if gap.orientation_rms_rad is not None:
+        told += f'. The tool is turned by {small_turn(gap.orientation_rms_rad)}'
+        left = diagnosis.shrink.orientation_rad
+        if left is not None and diagnosis.effects:
+            told += f', with all mended by {small_turn(left[1])}'
+    return 'How far off', millimetres(gap.rms_m), told
+
+
+def _worst(diagnosis: Diagnosis) -> Figure | None:
+    """Return the largest deviation, where and when it is, and to which side."""
+    found = worst(diagnosis)
+    if found is None or diagnosis.contacts is not None:
+        return None
+    k, sample, _ = found
+    when = instant(diagnosis, k, sample)
+    told = f'at {when}' if at_rest(diagnosis) else f'{when} after the start'
+    if len(diagnosis.recordings) > 1:
+        told = f'{diagnosis.recordings[k].name}, {told}'
+    told += _place(diagnosis, k, sample)
+    parts = components(diagnosis, k, as_it_is(diagnosis, k))
+    if parts is not None and sides_words(parts[sample]):
+        told += f': {sides_words(parts[sample])}'
+    return 'At the worst spot', millimetres(largest(diagnosis)), told
+
+
+def _place(diagnosis: Diagnosis, k: int, sample: int) -> str:
+    """Return where in space a sample was measured."""
+    x, y, z = (f'{1e3 * float(v):.0f}' for v in diagnosis.traces.measured[k][sample])
+    return f", at x {x}, y {y}, z {z} mm in the instrument's frame"
+
+
+def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
+    """Return whether it passes as it is, and what would be left with everything mended."""
+    if rule is None or diagnosis.contacts is not None or not diagnosis.traces.t:
+        return None
+    before, taken = largest(diagnosis), advised(diagnosis)
+    told: list[Child] = ['as it is, on what was recorded']
+    if taken or (diagnosis.effects and not switches(diagnosis)):
+        after = left_with(diagnosis, taken).largest_after
+        told.append(f'; with {_which(diagnosis, taken)} mended {millimetres(after)} at most')
+        told.append(mark(rule, after, _APART))
+    link = 'Each combination' if len(switches(diagnosis)) > 1 else 'How it is judged'
+    link = 'Write it here' if rule.tolerance_m is None else link
+    told.append(joined(['. ', tag('a', link, href='#acceptance')]))
+    return 'May we weld with it', mark(rule, before), joined(told)
+
+
+def _which(diagnosis: Diagnosis, taken: tuple[int, ...]) -> str:
+    """Return what is mended in words: all, or the causes that may be by their number."""
+    count = len(switches(diagnosis))
+    if len(taken) == count:
+        return 'this' if count == 1 else 'all'
+    return f'only cause{"s" if len(taken) > 1 else ""} {listed([str(k + 1) for k in taken])}'
+
+
+def _left(diagnosis: Diagnosis) -> Figure:
+    every, taken = switches(diagnosis), advised(diagnosis)
+    if taken and len(taken) < len(every):
+        left = left_with(diagnosis, taken)
+        told = f'RMS, {percent(left.rms_after / left.rms)} of the RMS gap, on data not used for fitting'
+        name = f'Left with {_which(diagnosis, taken)} mended'
+        return name, millimetres(left.rms_after), told
+    mended = diagnosis.effects or every or not diagnosis.model.found
+    name = 'Left with all mended' if mended else 'Left with what fits best'
+    return name, millimetres(diagnosis.shrink.rms_after_m), _how_much(diagnosis)
+
+
+def _how_much(diagnosis: Diagnosis) -> str:
+    shrink = diagnosis.shrink
+    if not diagnosis.model.found:
+        return 'RMS: nothing was found that could be mended'
+    if turns_only(diagnosis):
+        return 'RMS on data not used for fitting; what was found turns the tool'
+    with_what = '' if diagnosis.effects or switches(diagnosis) else ', and nothing to be entered'
+    value, interval = left_of(shrink)
+    return f'RMS, {value} of the RMS gap, on data not used for fitting{with_what} ({interval})'
+
+
+def _among(diagnosis: Diagnosis) -> str:
+    """Return among which causes an unknown one is not, where some were not to be tried."""
+    if diagnosis.status != 'unknown' or not not_to_be_tried(diagnosis):
+        return ''
+    return f'; {untried_in_short(diagnosis)}, as asked'
+
+
+def _data(answer: Answer) -> Figure | None:
+    """Return how the checks of the data came out."""
+    diagnosis = answer.diagnosis
+    checks = diagnosis.checks
+    if not checks:
+        return None
+    counts = {level: sum(c.level == level for c in checks) for level in ('warning', 'note')}
+    fine = len(checks) - sum(counts.values())
+    told = [counted(n, level) for level, n in counts.items() if n]
+    if counts['warning']:
+        about = [c.name.replace('_', ' ') for c in checks if c.level == 'warning']
+        told[0] += f' ({listed(about)})'
+    out, every = left_out(diagnosis)
+    if out:
+        told.append(f'{out} of {counted(every, "sample")} left out')
+    told += _instrument(answer)
+    word = 'yes, see the notes' if told else 'yes'
+    word = 'see the warnings' if counts['warning'] else word
+    words = f'{passed(fine, len(checks))}{"; " if told else ""}{"; ".join(told)}. '
+    return 'Were the data good', word, joined([words, tag('a', 'Which', href='#checks')])
+
+
+def _instrument(answer: Answer) -> list[str]:
+    """Return which cause sits with what measured, and how much of the gap that makes."""
+    return [
+        f'but cause {k}, {answer.percent(told.cause.share)} of the gap, sits at '
+        f'{likely(told.cause.place)}'
+        for k, told in enumerate(answer.causes[:_CAUSES], 1)
+        if {at for at, _ in leading(told.cause.place)} & {'instrument', 'clock'}
+    ]
+
+
+def causes_table(answer: Answer) -> Html | None:
+    """Return one row for each cause, as on its card; None without any."""
+    diagnosis, rule = answer.diagnosis, answer.rule
+    causes = answer.causes[:_CAUSES]
+    if not causes or rule is None or diagnosis.contacts is not None or diagnosis.families:
+        return None
+    rows = [_row(answer, told, rule) for told in causes]
+    if len(switches(diagnosis)) > 1:
+        rows.append(_together(diagnosis, rule))
+    top = tag('tr', *(tag('th', head, scope='col') for head in _HEADS))
+    return tag(
+        'div',
+        tag('table', tag('thead', top), tag('tbody', *rows), class_='glance'),
+        tag('p', _more(diagnosis), class_='note'),
+        class_='detail',
+    )
+
+
+def _row(answer: Answer, told: CauseAnswer, rule: Rule) -> Html:
+    value, ends = answer.share_of(told)
+    left = told.left
+    cells: list[Child] = [
+        joined([tag('b', value), f' ({ends})']),
+        lines(told.off_in_short(_VALUES)) or 'open',
+        lines(told.sure) or 'not judged',
+        'cannot be told: nothing that was tried stands for it'
+        if left is None
+        else _left_over(left.rms_after, left.largest_after, rule),
+        told.where_to_enter,
+    ]
+    first = tag('a', f'{told.k + 1}. {told.name}', href=f'#cause-{told.k + 1}')
+    with_heads = zip(_HEADS[1:], cells, strict=True)
+    return tag(
+        'tr',
+        tag('th', first, scope='row'),
+        *(tag('td', cell, data_head=head) for head, cell in with_heads),
+    )
+
+
+def _left_over(rms: float, most: float, rule: Rule) -> Html:
+    told = [f'{millimetres(rms)} RMS, {millimetres(most)} at most', mark(rule, most, _APART)]
+    return joined(told)
+
+
+def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
+    left = left_with(diagnosis, range(len(switches(diagnosis))))
+    told = _left_over(left.rms_after, left.largest_after, rule)
+    return tag(
+        'tr',
+        tag('th', 'All mended', scope='row'),
+        *(tag('td', '', class_='blank') for _ in range(3)),
+        tag('td', told, data_head='If all are mended'),
+        tag('td', '', class_='blank')
+        if len(advised(diagnosis)) == len(switches(diagnosis))
+        else tag('td', 'not advised', data_head=_HEADS[-1]),
+    )
+
+
+def _more(diagnosis: Diagnosis) -> Html:
+    more = len(diagnosis.causes) - _CAUSES
+    told: list[Child] = [f'{more} more on the cards. '] if more > 0 else []
+    count = len(switches(diagnosis))
+    if count > 2:
+        every = len(thought_mended(diagnosis)) == 2**count
+        name, at = ('Does it pass', 'acceptance') if every else ('What if', 'seam')
+        told += ['With only two of them mended: see ', tag('a', name, href=f'#{at}'), '. ']
+    return joined([*told, 'A click on a cause leads to its card.'])

@@ -145,7 +145,7 @@ def alike(covariance: Array) -> bool:
 def positive(covariance: Array) -> NDArray[np.bool_]:
     """Return which of covariances, shape (M, c, c), are finite and positive definite, (M,)."""
     size = np.sqrt(np.maximum(np.einsum('mii->mi', covariance), 0.0))
-    good = np.isfinite(covariance).all(axis=(1, 2)) & (size > 0.0).all(axis=1)
+    good: NDArray[np.bool_] = np.isfinite(covariance).all(axis=(1, 2)) & (size > 0.0).all(axis=1)
     unit = covariance[good] / (size[good][:, :, None] * size[good][:, None, :])
     good[good] = np.linalg.eigvalsh(0.5 * (unit + np.swapaxes(unit, 1, 2)))[:, 0] > 0.0
     return good

@@ -10,7 +10,7 @@ from ...twin.posterior import Posterior
 from ..advice import Limits, actions
 from ..advice.next_step import next_step
 from ..calibration.calibrated import Stated, calibrated
-from ..frames.places import NOT_TOLD, not_told
+from ..frames.aligned import NOT_TOLD, not_told
 from ..hypotheses.search import Search
 from ..hypotheses.structural_aliases import never_parted
 from ..levels.causes import causes
@@ -18,8 +18,8 @@ from ..levels.contributions import contributions
 from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
 from ..result import Cause, Diagnosis, Shares, Shrink
-from ..soundness import Examined
 from ..soundness.efforts import compared
+from ..soundness.gate import Examined
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
 from ..verdict.decision import Verdict

@@ -8,7 +8,7 @@ from math import nan
 
 from ..algebra.problem import Model
 from ..result import Diagnosis, Gap, Shrink, Traces, Unexplained, Where
-from ..soundness import Examined
+from ..soundness.gate import Examined
 
 
 def refusal(examined: Examined) -> Diagnosis:

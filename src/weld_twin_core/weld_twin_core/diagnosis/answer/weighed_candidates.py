@@ -11,9 +11,8 @@ from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..levels.free_form import FreeForm
 from ..result import Candidate, Shrink, Unexplained
-from ..verdict.decision import Verdict
+from ..verdict.decision import Left, Verdict
 from ..verdict.evidence import Evidence
-from ..verdict.left import Left
 
 
 def weighed_candidates(found: Search, evidence: Evidence) -> tuple[Candidate, ...]:

@@ -1,0 +1,260 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Do the streams belong to one clock, with stamps and velocities that can be?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Array
+from ...bursts import Bursts, bursts, evenly
+from ...recording import Recording
+from ...two_clocks import ONE_CLOCK
+from ..algebra.independent_rows import robust_spread
+from ..algebra.problem import FRAMES
+from ..frames.aligned import aligned
+from .evidence import Case, Finding, mistake, note, warning
+from .lag import Lag
+from .lengths import falls, listed
+from .limits import HALVED, LATE, LIKE_LENGTH, MOVED, NOISE, RATE, TINY
+from .mending import Given, Mend, stamped_evenly, stamps_as, velocities_left_out
+
+ROUNDS = 2
+"""Times that frames and delay are found in turn; a third changes nothing."""
+
+
+def streams(given: Given) -> list[Finding]:
+    """Return velocities that cannot be, and clocks that have nothing in common."""
+    out: list[Finding] = []
+    for k, recording in enumerate(given.recordings):
+        if recording.measured is None or recording.joints.static:
+            continue
+        out += _velocities(recording, k, given.robot.joint_names)
+        apart = list(_apart(recording, k))
+        out += apart or _in_bursts(given, k)
+    return out
+
+
+def velocities_checked(recording: Recording) -> Recording:
+    """Return the recording without velocities that cannot be."""
+    if not _still(recording).any():
+        return recording
+    return replace(recording, joints=replace(recording.joints, qd=None))
+
+
+def _velocities(recording: Recording, k: int, names: tuple[str, ...]) -> Iterator[Finding]:
+    still, moving = _still(recording), np.ptp(recording.joints.q, axis=0) > MOVED
+    if still.any():
+        at = tuple(names[i] for i in np.flatnonzero(still))
+        whose = 'every moving joint' if still.sum() == moving.sum() else listed(at)
+        yield mistake(
+            f'The joint states of {recording.name} give velocity zero for {whose} while the '
+            'positions move.',
+            'zero_velocities',
+            at,
+            'Publish measured velocities, or leave the field empty',
+            partial(velocities_left_out, k=k),
+            of_all=False,
+        )
+
+
+def _still(recording: Recording) -> NDArray[np.bool_]:
+    """Return which joints move at velocity zero, shape (n,)."""
+    joints = recording.joints
+    if joints.qd is None or joints.static:
+        return np.zeros(joints.q.shape[1], dtype=bool)
+    moving = np.ptp(joints.q, axis=0) > MOVED
+    return np.asarray(moving & (np.abs(joints.qd).max(axis=0) < TINY))
+
+
+def _apart(recording: Recording, k: int) -> Iterator[Finding]:
+    """Yield that no measurement lies inside the joint stream."""
+    t, seen = recording.joints.t, recording.seen.t
+    if seen.size == 0 or ((seen >= t[0]) & (seen <= t[-1])).any():
+        return
+    spans = float(np.ptp(t)), float(np.ptp(seen))
+    late = float(seen[0] - t[0])
+    mend = None
+    if min(spans) > LIKE_LENGTH * max(spans):
+        mend = partial(stamps_as, k=k, late=late, rate=0.0, middle=float(seen[0]))
+    yield mistake(
+        f'No measurement of {recording.name} lies inside its joint stream '
+        f'({t[0]:.3f} to {t[-1]:.3f} s against {seen[0]:.3f} to {seen[-1]:.3f} s): the stamps are '
+        'of two clocks.',
+        'clock',
+        ('clock',),
+        ONE_CLOCK,
+        mend,
+        of_all=False,
+    )
+
+
+def _in_bursts(given: Given, k: int) -> Iterator[Finding]:
+    """Yield that measurements were stamped when they were sent, where an even clock explains more."""
+    recording = given.recordings[k]
+    found = bursts(recording.seen.t)
+    if found is None or recording.contacts is not None:
+        return
+    before, even, after = _evenly(given, k, found)
+    if before < NOISE or HALVED * after > before:
+        return
+    t = recording.seen.t
+    waited = float(np.median(t - evenly(even.first, even.step, even.lost, t.size, t.size)))
+    missing = f' ({even.lost.size} were lost on the way)' if even.lost.size else ''
+    yield mistake(
+        f'The measurements of {recording.name} are {even.words}: they waited in a buffer{missing}, '
+        f'{waited * 1e3:.0f} ms in the middle. Stamped evenly and so much earlier, '
+        f'{falls(before, after)}.',
+        'stamps_in_bursts',
+        ('clock',),
+        "Record the instrument's own time of each measurement, or send each at once; --apply "
+        'stamps them anew',
+        _stamped(even, k, t.size),
+        of_all=False,
+    )
+
+
+def _evenly(given: Given, k: int, found: Bursts) -> tuple[float, Bursts, float]:
+    """Return the median gap [m] as stamped, the even stamps that explain most, and their gap."""
+    alone = replace(given, recordings=(given.recordings[k],))
+    count = given.recordings[k].seen.t.size
+    even = found
+    for _ in range(ROUNDS):
+        (late,) = _posed(_stamped(even, 0, count)(alone)).lags
+        if late is None:
+            break
+        # A delay that grows evenly is another first stamp and another step.
+        first = even.first - (late.late + late.rate * (even.first - late.middle))
+        even = even._replace(first=first, step=even.step * (1.0 - late.rate))
+    after = _posed(_stamped(even, 0, count)(alone))
+    return _posed(alone).gap, even, after.gap
+
+
+def _stamped(even: Bursts, k: int, count: int) -> Mend:
+    """Return what stamps recording k by an even clock."""
+    first, step, lost = even.first, even.step, even.lost
+    return partial(stamped_evenly, k=k, first=first, step=step, lost=lost, count=count)
+
+
+def _posed(given: Given) -> Case:
+    """Return a recording with both frames fitted, wherever they are."""
+    return Case(*aligned(given.recordings, given.robot, FRAMES, ()))
+
+
+GAP = 4.5
+"""A step of so many usual steps is a gap."""
+MISSING = 0.2
+"""Share of lost messages from which a note becomes a warning."""
+JITTER = 0.3
+"""Spread of the steps between stamps, as a share of the usual step, from which it is told."""
+GRIDS = (1e-2, 1e-3)
+"""Grids [s] that clocks are rounded to: hundredths and milliseconds."""
+ENOUGH = 20
+"""Stamps below which their steps say nothing."""
+FEW = 3.0
+"""A lag of fewer samples is left to the fit."""
+
+
+def stamps(case: Case) -> Sequence[Finding]:
+    """Return gaps, jitter and rounding of the joint and measurement stamps."""
+    out: list[Finding] = []
+    for recording in case.recordings:
+        if recording.joints.static:
+            continue
+        for t, what in (
+            (recording.joints.t, 'joint states'),
+            (recording.seen.t, 'measurements'),
+        ):
+            if t.size >= ENOUGH:
+                out += _stream(t, f'The {what} of {recording.name}')
+    return out
+
+
+def _stream(t: Array, name: str) -> Iterator[Finding]:
+    sent = bursts(t)
+    if sent is not None:
+        yield warning(f'{name} are {sent.words}: none has its own time.')
+        return
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    gaps = steps > GAP * usual
+    if gaps.any():
+        lost = float((steps[gaps] / usual - 1.0).sum())
+        level = 'warning' if lost > MISSING * (t.size + lost) else 'note'
+        at = float(t[:-1][gaps][steps[gaps].argmax()])
+        yield Finding(
+            level,
+            f'{name} have {int(gaps.sum())} gap(s), the longest {steps.max():.3g} s at '
+            f't = {at:.3g} s; about {lost:.0f} messages are missing.',
+        )
+    grid = _grid(t)
+    if grid is not None:
+        yield note(
+            f'{name} are stamped in whole {grid * 1e3:g} ms; positions are '
+            f'uncertain by the way made in {grid * 5e2:g} ms.'
+        )
+        return
+    spread = robust_spread(steps[~gaps] - usual)
+    if spread > JITTER * usual:
+        yield note(
+            f'{name} come irregularly: every {usual * 1e3:.3g} ms, give or take '
+            f'{spread * 1e3:.2g} ms.'
+        )
+
+
+def _grid(t: Array) -> float | None:
+    """Return the grid that stamps were rounded to; a grid of the rate itself rounds nothing."""
+    for grid in GRIDS:
+        counts = (t - t[0]) / grid
+        if np.abs(counts - counts.round()).max() > 1e-4:
+            continue
+        steps = np.diff(counts).round()
+        usual = np.median(steps)
+        # Dropped messages make whole multiples of the usual step, rounding makes one more or less.
+        uneven = np.abs(steps - usual) == 1
+        return grid if uneven.mean() > 0.05 and usual > 1 else None
+    return None
+
+
+def clocks(case: Case) -> Sequence[Finding]:
+    """Return how late the measurements of a moving arm are, where that explains the gap."""
+    out: list[Finding] = []
+    for k, late in enumerate(case.lags):
+        if late is not None:
+            out += _recording(case.recordings[k], late, k)
+    return out
+
+
+def _recording(recording: Recording, lag: Lag, k: int) -> Iterator[Finding]:
+    t = recording.seen.t
+    step = max(float(np.median(np.diff(s))) for s in (t, recording.joints.t))
+    start, end = (float(lag.at(edge)) for edge in (t[0], t[-1]))
+    mend = partial(stamps_as, k=k, late=lag.late, rate=lag.rate, middle=lag.middle)
+    if abs(end - start) > step:
+        sentence = (
+            f'The clocks of {recording.name} run apart by {lag.rate * 1e6:.0f} ppm: the '
+            f'measurements are {_late(start)} at the start and {_late(end)} at the end.'
+        )
+        wrong = abs(lag.rate) > RATE
+    elif abs(lag.late) > FEW * step:
+        cause = ', or commanded joints were recorded and the arm lags behind'
+        sentence = (
+            f'The measurements of {recording.name} are {_late(lag.late)} against the joint states:'
+            f' the clocks are not synchronised{cause if lag.late > 0.0 else ""}.'
+        )
+        wrong = abs(lag.late) > LATE
+    else:
+        return
+    if wrong:
+        yield mistake(sentence, 'clock', ('clock',), ONE_CLOCK, mend, of_all=False)
+    else:
+        yield note(sentence)
+
+
+def _late(seconds: float) -> str:
+    return f'{abs(seconds) * 1e3:.0f} ms {"late" if seconds >= 0.0 else "early"}'

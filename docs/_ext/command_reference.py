@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""``{weld-twin-commands}``: what every subcommand says of itself, as ``--help`` prints it."""
+"""``{weld-twin-commands}``: what every subcommand says of itself, as ``--help-all`` prints it."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ WIDTH = '100'
 
 
 def help_of(*words: str) -> str:
-    """Return what ``weld-twin WORDS --help`` prints."""
+    """Return what ``weld-twin WORDS --help-all`` prints."""
     out = io.StringIO()
     columns = os.environ.get('COLUMNS')
     os.environ['COLUMNS'] = WIDTH
     try:
         with contextlib.redirect_stdout(out), contextlib.suppress(SystemExit):
-            main([*words, '--help'])
+            main([*words, '--help-all'])
     finally:
         os.environ.pop('COLUMNS') if columns is None else os.environ.update(COLUMNS=columns)
     return out.getvalue()
@@ -33,9 +33,13 @@ def help_of(*words: str) -> str:
 
 def command_names() -> list[str]:
     """Return the subcommands in the order of ``weld-twin --help``."""
-    _, _, listed = help_of().partition('COMMAND\n')
-    rows = [line for line in listed.splitlines() if line.startswith('    ') and line[4] != ' ']
-    return [row.split()[0] for row in rows]
+    return listed(help_of(), 'commands')
+
+
+def listed(text: str, title: str) -> list[str]:
+    """Return the names that a help lists under a title."""
+    rows = text.partition(f'\n{title}:\n')[2].partition('\n\n')[0].splitlines()
+    return [row.split()[0] for row in rows if row[:2].isspace() and row[2:3].strip()]
 
 
 class Commands(Directive):
@@ -47,8 +51,10 @@ class Commands(Directive):
         for name in command_names():
             section = nodes.section(ids=[f'weld-twin-{name}'], names=[name])
             section += nodes.title(text=f'weld-twin {name}')
-            text = help_of(name)
-            section += nodes.literal_block(text, text, language='text')
+            jobs = [] if name == 'lab' else listed(help_of(name), 'jobs')
+            for words in ((name,), *((name, job) for job in jobs)):
+                text = help_of(*words)
+                section += nodes.literal_block(text, text, language='text')
             out.append(section)
         return out
 

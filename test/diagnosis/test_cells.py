@@ -135,7 +135,7 @@ def test_a_spring_of_the_tilt_is_told_and_the_urdf_is_given_back(tmp_path, robot
 
 def test_programs_refuse_a_positioner_in_one_sentence(tmp_path, robot_file, capfd):
     (tmp_path / 'p.script').write_text('def p():\nend\n', encoding='utf-8')
-    words = ('correct-program', tmp_path / 'p.script', '--robot', robot_file)
+    words = ('correct', tmp_path / 'p.script', '--robot', robot_file)
     assert commanded(*words, '--out', tmp_path / 'o') == 2
     said = capfd.readouterr().err
     assert said.startswith('weld-twin: a corrected program is not there yet for a workpiece that')

@@ -99,12 +99,12 @@ def test_springs_by_statics_do_not(cell):
 
 def test_a_model_by_effort_is_replayed_by_it_and_refuses_without(cell, tmp_path, capsys):
     words = ('--robot', 'ur10e', '--model', cell / 'found' / 'diagnosis.json')
-    assert commanded('predict', cell / 'bag', *words, '--out', tmp_path / 'twin') == 0
+    assert commanded('simulate', cell / 'bag', *words, '--out', tmp_path / 'twin') == 0
     told = capsys.readouterr().out
     assert float(told.split('RMS ')[1].split(' mm')[0]) < 0.07
     bare = replace(read_recording(cell / 'bag', ROBOT), effort=None)
     write_recording(tmp_path / 'bare', bare, ROBOT)
-    assert commanded('predict', tmp_path / 'bare', *words, '--out', tmp_path / 'none') == 2
+    assert commanded('simulate', tmp_path / 'bare', *words, '--out', tmp_path / 'none') == 2
     error = capsys.readouterr().err
     assert 'the joint state tells no effort' in error and error.count('\n') == 1
     assert not (tmp_path / 'none').exists()
@@ -124,7 +124,7 @@ def test_a_program_is_not_corrected_by_efforts_to_come(cell, tmp_path, capsys):
     program = tmp_path / 'joints.csv'
     program.write_text(','.join(ROBOT.joint_names) + '\n0,-1.2,1,0,0,0\n0.1,-1.2,1,0,0,0\n')
     words = ('--robot', 'ur10e', '--model', cell / 'found' / 'diagnosis.json')
-    assert commanded('correct-program', program, *words, '--out', tmp_path / 'better') == 2
+    assert commanded('correct', program, *words, '--out', tmp_path / 'better') == 2
     assert 'a motion that is still to come has none' in capsys.readouterr().err
 
 

@@ -10,7 +10,7 @@ from diagnosis_cells import SIGMA, effect, known_scale, tiny
 from scipy.signal import lfilter
 
 from weld_twin_core.diagnosis.algebra.fit import fit
-from weld_twin_core.diagnosis.answer.standard_errors import standard_errors
+from weld_twin_core.diagnosis.answer.named_effects import standard_errors
 
 OFFSET = effect('joint_offset', joint='elbow_joint', offset=8e-4)
 RUNS = 60

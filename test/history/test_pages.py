@@ -28,7 +28,7 @@ def written(tmp_path_factory):
     for cell in database.cells():
         Runs(database).look(cell)
     database.close()
-    said = weld_twin('fleet', 'page', '--db', place / 'fleet.db', '--out', place / 'pages')
+    said = weld_twin('history', 'page', '--db', place / 'fleet.db', '--out', place / 'pages')
     assert (said.code, said.out) == (0, f'{place}/pages/index.html: 3 cells\n')
     return place / 'pages'
 

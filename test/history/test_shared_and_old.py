@@ -158,7 +158,7 @@ def test_a_lock_that_passes_costs_a_fleet_nothing_and_one_that_stays_is_no_refus
 ):
     file, db = listed
     monkeypatch.setattr('weld_twin_report.history.opening.BUSY', 0.1)
-    words = ('fleet', 'run', file, '--db', db, '--workers', '1')
+    words = ('history', 'run', file, '--db', db, '--workers', '1')
     real = Database.write
 
     def held(self, work, **how):
@@ -230,8 +230,8 @@ def test_reading_makes_nothing_and_another_application_is_left_alone(tmp_path):
     (tmp_path / 'list.csv').write_text(f'cell,recording,robot\na,{BAG},ur5\n')
     for job in (
         ('history', 'show'),
-        ('fleet', 'run', tmp_path / 'list.csv'),
-        ('fleet', 'page', '--out', tmp_path / 'pages'),
+        ('history', 'run', tmp_path / 'list.csv'),
+        ('history', 'page', '--out', tmp_path / 'pages'),
     ):
         said = weld_twin(*job, '--db', db)
         assert said.code == 2 and 'belongs to another application' in said.err
@@ -274,7 +274,7 @@ def test_a_damaged_row_ends_one_cell_and_not_the_page_of_all(tmp_path):
     with sqlite3.connect(db) as connection:
         connection.execute("update verdicts set covariance = x'00' where cell_id = 1 and id = 2")
         connection.execute("update verdicts set effects = '[{' where cell_id = 3")
-    said = weld_twin('fleet', 'page', '--db', db, '--out', tmp_path / 'pages')
+    said = weld_twin('history', 'page', '--db', db, '--out', tmp_path / 'pages')
     assert said.code == 0, said.err
     index = (tmp_path / 'pages/index.html').read_text()
     assert 'line 002' in index and 'line 001' in index
@@ -294,7 +294,7 @@ def test_a_history_that_may_only_be_read_is_read_and_says_so_to_who_writes(diagn
     database.close()
     before = db.read_bytes()
     url = f'sqlite:///file:{db}?mode=ro&uri=true'
-    said = weld_twin('fleet', 'page', '--db', url, '--out', tmp_path / 'pages')
+    said = weld_twin('history', 'page', '--db', url, '--out', tmp_path / 'pages')
     assert said.code == 0, said.err
     words = ('--cell', 'a', '--at', '2026-03-02', '--db', url)
     said = weld_twin('history', 'add', diagnosed, *words)

@@ -123,9 +123,7 @@ def test_each_node_runs_as_installed_with_the_parameter_file(workspace, sourced,
 
 def test_the_command_line_runs_as_installed(workspace, sourced):
     program = workspace / 'install/weld_twin_nodes/lib/weld_twin_nodes/weld-twin'
-    out = subprocess.run(
-        [program, 'info', '--robots'], env=sourced, capture_output=True, text=True
-    )
+    out = subprocess.run([program, 'bag', '--robots'], env=sourced, capture_output=True, text=True)
     assert out.returncode == 0, out.stderr
     assert 'franka_panda' in out.stdout
 

@@ -77,7 +77,7 @@ def told(robot, tool, moves):
 def test_a_program_comes_back_byte_for_byte_without_a_model(language, tmp_path):
     robot, files, _, _ = CELLS[language]
     said = weld_twin(
-        *('correct-program', MADE / files[0], '--robot', robot, '--out', tmp_path / 'out'),
+        *('correct', MADE / files[0], '--robot', robot, '--out', tmp_path / 'out'),
         *OPTIONS.get(language, []),
     )
     assert said.code == 0, said.err
@@ -87,7 +87,7 @@ def test_a_program_comes_back_byte_for_byte_without_a_model(language, tmp_path):
 
 def test_a_job_in_pulses_is_refused_without_their_size(tmp_path):
     said = weld_twin(
-        *('correct-program', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),
+        *('correct', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),
         *('--out', tmp_path / 'out'),
     )
     assert said.code == 2 and '--pulses-per-degree' in said.err
@@ -100,7 +100,7 @@ def test_the_real_tool_goes_where_the_program_meant(language, tmp_path):
     robot = wt.load(name)
     (tmp_path / 'found.yaml').write_text(effects(robot))
     said = weld_twin(
-        *('correct-program', MADE / files[0], '--robot', name, '--out', tmp_path / 'out'),
+        *('correct', MADE / files[0], '--robot', name, '--out', tmp_path / 'out'),
         *('--model', tmp_path / 'found.yaml', *OPTIONS.get(language, [])),
     )
     assert said.code == 0, said.err
@@ -125,7 +125,7 @@ def test_only_digits_of_points_change(language, tmp_path):
     name, files, _, _ = CELLS[language]
     (tmp_path / 'found.yaml').write_text(effects(wt.load(name)))
     weld_twin(
-        *('correct-program', MADE / files[0], '--robot', name, '--out', tmp_path / 'out'),
+        *('correct', MADE / files[0], '--robot', name, '--out', tmp_path / 'out'),
         *('--model', tmp_path / 'found.yaml', *OPTIONS.get(language, [])),
     )
     for old, new in zip(texts(MADE, files), texts(tmp_path / 'out', files), strict=True):
@@ -141,7 +141,7 @@ def corrected(tmp_path, text, *more, name='seam.script', robot='ur5', offset=8e-
         f'- {{effect: joint_offset, joint: {wt.load(robot).joint_names[1]}, offset: {offset}}}\n'
     )
     return weld_twin(
-        *('correct-program', tmp_path / name, '--robot', robot, '--out', tmp_path / 'out'),
+        *('correct', tmp_path / name, '--robot', robot, '--out', tmp_path / 'out'),
         *('--model', tmp_path / 'found.yaml', *more),
     )
 
@@ -215,7 +215,7 @@ def test_the_model_of_another_robot_and_of_unsound_data_is_refused(tmp_path):
     for data, words in ((content, "of the robot 'ur10'"), (unsound, 'were unsound: joints are')):
         (tmp_path / 'diagnosis.json').write_text(json.dumps(data))
         said = weld_twin(
-            *('correct-program', tmp_path / 'seam.script', '--robot', 'ur5'),
+            *('correct', tmp_path / 'seam.script', '--robot', 'ur5'),
             *('--model', tmp_path / 'diagnosis.json', '--out', tmp_path / 'out'),
         )
         assert said.code == 2 and words in said.err
@@ -237,7 +237,7 @@ def a_line_on_which_a_joint_turns_around(tmp_path, found):
     (tmp_path / 'seam.script').write_text(text)
     (tmp_path / 'found.yaml').write_text(yaml.safe_dump(found))
     said = weld_twin(
-        *('correct-program', tmp_path / 'seam.script', '--robot', 'ur5'),
+        *('correct', tmp_path / 'seam.script', '--robot', 'ur5'),
         *('--out', tmp_path / 'out', '--model', tmp_path / 'found.yaml'),
     )
     reach = np.hypot(*front[:2, 3])
@@ -268,7 +268,7 @@ def test_a_correction_finer_than_the_language_writes_is_none(tmp_path):
     found = [{'effect': 'joint_offset', 'joint': 'joint_2_l', 'offset': 4e-6}]
     (tmp_path / 'found.yaml').write_text(yaml.safe_dump(found))
     said = weld_twin(
-        *('correct-program', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),
+        *('correct', MADE / 'bracket.jbi', '--robot', 'yaskawa_ma1440'),
         *('--out', tmp_path / 'out', '--model', tmp_path / 'found.yaml', *OPTIONS['inform']),
     )
     assert said.code == 2 and 'too little is gained' in said.err

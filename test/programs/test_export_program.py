@@ -29,7 +29,7 @@ def exported(language, path, tmp_path, *more):
     robot, suffix, reader, rounding = CELLS[language]
     out = tmp_path / f'measure.{suffix}'
     said = weld_twin(
-        *('export-program', path, '--robot', robot, '--controller', language, '--out', out),
+        *('export', 'program', path, '--robot', robot, '--controller', language, '--out', out),
         *(PULSES if language == 'inform' else ()),
         *more,
     )
@@ -113,7 +113,7 @@ def test_the_controller_comes_to_the_posture_that_was_meant(tmp_path):
 )
 def test_what_cannot_be_written_is_refused_in_one_sentence(words, what, tmp_path):
     said = weld_twin(
-        'export-program', 'line', '--robot', 'ur5', *words, '--out', tmp_path / 'p.src'
+        'export', 'program', 'line', '--robot', 'ur5', *words, '--out', tmp_path / 'p.src'
     )
     assert said.code == 2 and what in said.err and said.err.count('\n') == 1
     assert not list(tmp_path.iterdir())
@@ -125,7 +125,7 @@ def test_a_station_beyond_the_limits_is_refused(tmp_path):
     content = {'kind': 'joints', 'stations': True, 't': [0.0, 9.0, 18.0, 27.0, 36.0]}
     path.write_text(yaml.safe_dump({**content, 'q': q.tolist()}))
     said = weld_twin(
-        *('export-program', path, '--robot', 'kuka_kr16_2', '--controller', 'krl'),
+        *('export', 'program', path, '--robot', 'kuka_kr16_2', '--controller', 'krl'),
         *('--out', tmp_path / 'p.src'),
     )
     assert said.code == 2 and 'limits' in said.err and not (tmp_path / 'p.src').exists()

@@ -95,7 +95,7 @@ def command(name, maker, *more):
 def test_every_makers_arm_is_planned_for_and_simulated(tmp_path):
     (tmp_path / 'none.yaml').write_text('[]')
     for maker in CASES.keys() - {'franka'}:  # seven joints take as long as the other arms together
-        command('plan-measurement', maker, '--tolerance', 0.5, '--minutes', 5, '--seconds', 5)
+        command('investigate', maker, '--tolerance', 0.5, '--minutes', 5, '--seconds', 5)
         seam = ('--effects', tmp_path / 'none.yaml', '--path', 'line', '--profile', 'aggressive')
         command('simulate', maker, *seam, '--out', tmp_path / maker)
 
@@ -157,7 +157,7 @@ def program(maker, arm, folder):
     language, suffix, reader, base, flange, _ = CASES[maker]
     path = folder / f'seam{suffix}'
     if maker not in NEAR:
-        command('export-program', maker, 'arc', '--controller', language, '--out', path)
+        command('export', 'program', maker, 'arc', '--controller', language, '--out', path)
         (_, (near,)), *_ = reader([path.read_bytes().decode('latin-1')])
         return path, near, ()
     near = NEAR[maker]
@@ -187,7 +187,7 @@ def test_a_straight_move_is_corrected_in_the_frames_of_the_urdfs_links(maker, tm
     ]
     (tmp_path / 'zeros.yaml').write_text(yaml.safe_dump(zeros))
     model = ('--model', tmp_path / 'zeros.yaml', '--out', tmp_path / 'better')
-    command('correct-program', maker, path, *model, *options)
+    command('correct', maker, path, *model, *options)
 
     texts = [
         file.read_bytes().decode('latin-1') for file in (path, tmp_path / 'better' / path.name)

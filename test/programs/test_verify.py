@@ -64,7 +64,7 @@ def cell(tmp_path_factory):
     )
     assert said.code == 0, said.err
     said = weld_twin(
-        *('correct-program', MADE / FILES[0], '--robot', folder / 'robot.yaml'),
+        *('correct', MADE / FILES[0], '--robot', folder / 'robot.yaml'),
         *('--model', folder / 'found' / 'diagnosis.json', '--out', folder / 'better'),
     )
     assert said.code == 0, said.err
@@ -176,7 +176,7 @@ def test_a_promise_counts_what_a_fitted_base_hides_of_the_arm(cell, tmp_path):
     )
     assert said.code == 0, said.err
     model = ('--model', tmp_path / 'found' / 'diagnosis.json')
-    said = weld_twin('correct-program', MADE / FILES[0], *robot, *model, '--out', tmp_path / 'out')
+    said = weld_twin('correct', MADE / FILES[0], *robot, *model, '--out', tmp_path / 'out')
     assert said.code == 0 and 'frames were fitted to the recording (base)' in said.out
     texts = [
         [(folder / name).read_bytes().decode('latin-1') for name in FILES]

@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from served import Person, Server, drop, fill, small_disk
 
-from weld_twin_nodes.cli.main import _parser
+from weld_twin_nodes.cli.main import parser_of
 from weld_twin_report.serve.access import _without_token
 from weld_twin_report.serve.fields import CORRECT, sentence
 
@@ -195,9 +195,9 @@ def spoilt_jobs(jobs, address):
 
 def test_what_commands_say_names_fields_of_the_browser():
     """Of every option of the commands behind the forms, in their own words."""
-    for command in ('import', 'diagnose', 'correct-program'):
-        parser = _parser([command])
-        (sub,) = (each for each in parser._actions if each.dest == '==SUPPRESS==' or each.choices)
+    for command in ('import', 'diagnose', 'correct'):
+        parser = parser_of([command])
+        (sub,) = (each for each in parser._actions if each.choices)
         for action in sub.choices[command]._actions:
             for option in action.option_strings:
                 text = f'give {option} in metres, or {option}'
@@ -208,4 +208,4 @@ def test_what_commands_say_names_fields_of_the_browser():
         sentence('name it with --controller', CORRECT) == 'Name it with “Language of the program”'
     )
     assert sentence('name it with --controller') == 'Name it with “Controller”'
-    assert 'weld-twin' not in sentence("it becomes a bag with 'weld-twin recover x'")
+    assert 'weld-twin' not in sentence("it becomes a bag with 'weld-twin bag recover x'")

@@ -262,7 +262,7 @@ def test_a_program_is_corrected_in_the_browser_as_on_the_command_line(server, tm
     model = tmp_path / 'diagnosis.json'
     model.write_text(person.get(f'{address}/diagnosis.json')[2])
     words = ('--model', model, '--max-correction', '1.5mm', '1deg', '--out', tmp_path / 'out')
-    said = weld_twin('correct-program', program, '--robot', 'ur5', *words)
+    said = weld_twin('correct', program, '--robot', 'ur5', *words)
     assert said.code == 0, said.err
     assert corrected == (tmp_path / 'out' / program.name).read_text() != program.read_text()
     # What is wrong is told at once, or asked again, in the words of the fields.

@@ -78,7 +78,7 @@ def done(*words):
 
 def plan(place, *more):
     words = ('--tolerance', 0.3, '--minutes', 9, '--controller', 'krl', '--out', place / 'plan')
-    return weld_twin('plan-measurement', '--robot', ROBOT, *words, *more)
+    return weld_twin('investigate', '--robot', ROBOT, *words, *more)
 
 
 def week(place, number, error, rng):

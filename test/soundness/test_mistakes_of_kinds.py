@@ -206,7 +206,7 @@ def test_points_that_were_lost_before_they_waited_are_counted(rng):
 
 def test_info_tells_the_rate_underneath(rng, tmp_path, capsys):
     write_recording(tmp_path / 'sent', buffered(rng)[0], model())
-    assert main(['info', str(tmp_path / 'sent')]) == 0
+    assert main(['bag', str(tmp_path / 'sent')]) == 0
     told = capsys.readouterr().out
     (row,) = [line.split() for line in told.splitlines() if line.startswith('/measured')]
     assert float(row[4]) == pytest.approx(20.0, abs=0.2)

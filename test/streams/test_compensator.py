@@ -32,7 +32,14 @@ from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior, as_dict
 from weld_twin_lab.campaigns.building.message_packages import messages_importable
 from weld_twin_msgs_py.messages import from_messages
-from weld_twin_msgs_py.messages.topics import AUDIT, CORRECTION, DEVIATION, POSE_IN, POSE_OUT
+from weld_twin_msgs_py.messages.topics import (
+    AUDIT,
+    CORRECTION,
+    DEVIATION,
+    POSE_IN,
+    POSE_OUT,
+    TOOL_WRENCH,
+)
 from weld_twin_nodes.harness import Cell
 
 pytestmark = pytest.mark.cells
@@ -50,8 +57,9 @@ def real_arm():
     return Robot.from_mapping(data)
 
 
-def write_model(path, off=OFF):
-    domain = Domain(NAMES, tuple(((q - 0.4, q + 0.4),) for q in HOME), (0.02,) * 6, (True,) * 6)
+def write_model(path, off=OFF, *more):
+    ranges = tuple(((q - 0.4, q + 0.4),) for q in HOME)
+    domain = Domain(NAMES, ranges, (0.02,) * 6, (True,) * 6, load=(60.0, 60.0))
     rest = Discrepancy(2e-5, 1e-6, np.zeros(6), np.zeros(6), 1.0)
     known = Posterior(Directions((), 1, ()), np.zeros(0), np.zeros((0, 0)), rest, domain)
     content = {
@@ -61,7 +69,7 @@ def write_model(path, off=OFF):
             'tool': ROBOT.T_flange_tool.tolist(),
             'bases': [ROBOT.T_world_base.tolist()],
             'known': [],
-            'found': [{'effect': 'joint_offset', 'joint': NAMES[2], 'offset': off}],
+            'found': [{'effect': 'joint_offset', 'joint': NAMES[2], 'offset': off}, *more],
         },
         'posterior': as_dict(known),
     }
@@ -324,10 +332,38 @@ def test_a_model_exchanged_meanwhile_counts_from_the_next_goal_on(planner):
 
 def test_deviations_that_the_model_does_not_leave_withdraw_it(planner):
     deviation = planner.cell.publisher(DEVIATION)
-    for k in range(20):
-        deviation.publish(planner.cell.messages.vector3(k, np.array([3e-4, 0.0, 0.0])))
+
+    def deviate():
+        for k in range(20):
+            deviation.publish(planner.cell.messages.vector3(k, np.array([3e-4, 0.0, 0.0])))
+
+    planner.to(HOME + 1.0)  # where nothing was recorded, nothing was promised
+    deviate()
+    planner.to(HOME)
+    assert 'does not hold' not in planner.process.log
+    deviate()
     planner.cell.wait(lambda: 'does not hold' in planner.process.log, 'the notice')
     planner.refused(planner.goal(sway()), 'does not hold any more')
+    planner.cell.node.destroy_publisher(deviation)
+
+
+def test_a_tracker_that_was_lost_must_bear_the_model_out_again(planner):
+    deviation = planner.cell.publisher(DEVIATION)
+
+    def deviate(count):
+        for k in range(count):
+            deviation.publish(planner.cell.messages.vector3(k, np.array([1e-5, 0.0, 0.0])))
+        seen(planner.cell, 0.3)
+
+    deviate(5)
+    seen(planner.cell, 2.2)
+    planner.refused(planner.goal(sway()), 'the tracker is lost')
+    deviate(19)
+    planner.refused(planner.goal(sway()), '19 of the 20 measurements')
+    deviate(1)
+    handle, line = planner.send(planner.goal(sway()))
+    assert handle.accepted, line
+    planner.result(handle)
     planner.cell.node.destroy_publisher(deviation)
 
 
@@ -409,6 +445,27 @@ def test_in_the_shadow_nothing_is_changed_and_poses_are_corrected_once_applied(s
     # Faded in where the stream stands.
     step = np.linalg.norm(np.diff(poses.way, axis=0), axis=1).max()
     assert step < 0.6 * np.linalg.norm(poses.way[-1] - poses.way[0])
+    a_load_that_comes_later_counts(shadow, poses)
+
+
+def a_load_that_comes_later_counts(shadow, poses):
+    """A spring of the shoulder under a load that is told while the stream stands."""
+    compliance, pull, here = 6e-6, np.array([0.0, 0.0, -40.0]), shadow.controller.q
+    spring = {'effect': 'joint_compliance', 'joint': NAMES[1], 'compliance': compliance}
+    write_model(shadow.model, OFF, spring)
+    assert shadow.cell.trigger('/compensator/reload').success
+    count = len(poses.out)
+    poses.feed(here, lambda: len(poses.out) > count + 100, 'poses of the new model')
+    unloaded = poses.way[-1]
+    load = shadow.cell.publisher(TOOL_WRENCH)
+    load.publish(shadow.cell.messages.wrench(1, np.array([*pull, 0.0, 0.0, 0.0]), 'base'))
+    count = len(poses.out)
+    poses.feed(here, lambda: len(poses.out) > count + 150, 'poses under the load')
+    beside = np.array([0.0, 1e-6, 0.0, 0.0, 0.0, 0.0])
+    lever = (forward(ROBOT, here + beside) - forward(ROBOT, here - beside))[:3, 3] / 2e-6
+    moved = poses.way[-1] - unloaded
+    np.testing.assert_allclose(moved, -lever * compliance * (lever @ pull), atol=2e-6)
+    assert np.linalg.norm(moved) > 3e-5
 
     # Where nothing was recorded a pose passes as it came, once the stream stands still there.
     far = here + [0.0, 0.0, 0.3, 0.0, 0.0, 0.0]

@@ -11,9 +11,11 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from .arrays import Array, increasing, readonly
+from .cameras import Sightings
 from .contacts import Contacts
 from .cubics import hermite
 from .errors import DataError
+from .pose_noise import Common, PoseNoise, inverse_error
 
 WRENCH_FRAMES = ('tool', 'base')
 
@@ -158,6 +160,10 @@ class Measurements:
         ``R_world_tool``; left out, points were measured.
     sigma : array, shape (M,) [m], optional
         Standard deviation of each position, where the instrument gives it.
+    noise : PoseNoise, optional
+        How sure each is in every direction, where the instrument tells it.
+    common : Common, optional
+        Errors that all samples share; they are fitted along.
 
     Raises
     ------
@@ -178,6 +184,8 @@ class Measurements:
     position: Array
     rotation: Array | None = None
     sigma: Array | None = None
+    noise: PoseNoise | None = None
+    common: Common | None = None
 
     def __post_init__(self) -> None:
         t = increasing(self.t, 'measurement stamps')
@@ -194,6 +202,13 @@ class Measurements:
                     f'sigma of the measurements is negative at sample {int(sigma.argmin())}'
                 )
             object.__setattr__(self, 'sigma', sigma)
+        rows = 3 if self.rotation is None else 6
+        if self.noise is not None and self.noise.root.shape != (t.size, rows, rows):
+            raise DataError(
+                f'noise of the measurements must have {rows} rows for each of {t.size}'
+            )
+        if self.common is not None and self.common.change.shape[:2] != (t.size, rows):
+            raise DataError(f'common errors must have {rows} rows for each of {t.size} samples')
 
     def inverted(self) -> Measurements:
         """
@@ -212,7 +227,11 @@ class Measurements:
             raise DataError('only measured poses can be inverted; these are points')
         turn = np.swapaxes(self.rotation, -1, -2)
         position = -(turn @ self.position[..., None])[..., 0]
-        return Measurements(self.t, position, turn, self.sigma)
+        change = inverse_error(self.position, self.rotation)
+        noise = None if self.noise is None else self.noise.moved(np.linalg.inv(change))
+        common = None if self.common is None else self.common.moved(change)
+        sigma = self.sigma if noise is None else noise.sigma
+        return Measurements(self.t, position, turn, sigma, noise, common)
 
     def take(self, index: np.ndarray) -> Measurements:
         """
@@ -228,6 +247,8 @@ class Measurements:
             self.position[index],
             None if self.rotation is None else self.rotation[index],
             None if self.sigma is None else self.sigma[index],
+            None if self.noise is None else self.noise.take(index),
+            None if self.common is None else self.common.take(index),
         )
 
 
@@ -329,6 +350,8 @@ class Recording:
         Effort of each joint as the controller measured it; there where springs are to take it.
     effort_holds : bool
         The effort is what holds the load, as ROS means it; else it is the load itself.
+    images : Sightings, optional
+        What cameras saw, of which the measurements were made; see `bundle`.
 
     Raises
     ------
@@ -360,6 +383,7 @@ class Recording:
     simulated: bool = False
     effort: JointSignal | None = None
     effort_holds: bool = True
+    images: Sightings | None = None
 
     def __post_init__(self) -> None:
         if self.contacts is not None and self.contacts.size != self.joints.t.size:

@@ -55,7 +55,7 @@ ARGUMENTS = {
     'config': ('', 'parameter file; empty: config/cell.yaml of this package'),
 }
 ENCLAVES = ("'/' + ('", "'.strip('/') or 'weld_twin')")
-"""What stands around the namespace in the folder of the enclaves, as `weld-twin policy` names it."""
+"""What stands around the namespace in the folder of enclaves, as `weld-twin export policy` names it."""
 MODEL = ('base_frame', 'base_from_tf', 'base_link', 'measuring_frame', 'robot', 'tip_link')
 MEASURED = ('joint_prefix', 'measured_frame')
 FLAGS = ('apply', 'base_from_tf', 'managed')

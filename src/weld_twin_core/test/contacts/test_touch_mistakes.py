@@ -11,8 +11,7 @@ import weld_twin_core as wt
 from weld_twin_core.arm.chain import forward, jacobian
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_core.diagnosis.levels.groups import all_groups
-from weld_twin_core.diagnosis.levels.whole_arm import whole_arm_groups
+from weld_twin_core.diagnosis.levels.groups import all_groups, whole_arm_groups
 from weld_twin_core.diagnosis.soundness.touches import touches
 
 SOCKETS = {'a': [0.45, 0.1, 0.3], 'b': [0.45, 0.15, 0.3], 'c': [-0.1, 0.5, 0.4]}

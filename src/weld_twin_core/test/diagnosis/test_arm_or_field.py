@@ -10,7 +10,6 @@ import pytest
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.noise_floor import WIDEST, noise_floor
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem
-from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.alignment import refined
 from weld_twin_core.diagnosis.levels.free_form import FreeForm, Part
 from weld_twin_core.diagnosis.levels.groups import Group
@@ -53,7 +52,7 @@ def blamed(found):
     """Return the places of what was first told as a field of the instrument."""
     field = Group('instrument', 'place', (), np.zeros((0, 0)), np.zeros(0))
     form = FreeForm((Part(field, 10.0, ((field, 1.0),), 0.7),), 0.7, 5.0)
-    (part,) = arm_first(found, form, 6000, Beliefs()).parts
+    (part,) = arm_first(found, form).parts
     return part.weight_of('at')
 
 

@@ -12,8 +12,7 @@ import pytest
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.levels.formulas import Missed, no_noise
-from weld_twin_core.diagnosis.levels.groups import Group
-from weld_twin_core.diagnosis.levels.sparse_groups import (
+from weld_twin_core.diagnosis.levels.free_form import (
     Choosing,
     Folds,
     Member,
@@ -21,6 +20,7 @@ from weld_twin_core.diagnosis.levels.sparse_groups import (
     chosen,
     worth,
 )
+from weld_twin_core.diagnosis.levels.groups import Group
 from weld_twin_core.diagnosis.unseen.folds import posture_regions, steadiness
 from weld_twin_core.diagnosis.verdict.decision import Verdict
 from weld_twin_core.effects.curve import basis

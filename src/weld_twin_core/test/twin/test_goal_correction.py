@@ -246,8 +246,29 @@ def test_a_correction_sets_in_before_an_arm_at_rest_leaves():
     assert there.waits == 0.0
     given_time = corrected_goal(found, goal(first=1.0), limits, Start(asked.q[0]))
     assert given_time.waits == 0.0
-    moving = corrected_goal(found, asked, limits, Start(asked.q[0], moving=True))
+    # What has just arrived, and is to leave from rest, is not given a step either.
+    arrived = corrected_goal(found, asked, limits, Start(asked.q[0], moving=True))
+    assert arrived.waits == out.waits
+    on = Goal(asked.t, *sway(asked.t + 0.5))
+    moving = corrected_goal(found, on, limits, Start(on.q[0], moving=True))
     assert moving.waits == 0.0
+
+
+@pytest.mark.parametrize('moving', [False, True])
+@pytest.mark.parametrize('came', [-1.0, 1.0])
+def test_what_play_does_where_a_goal_begins_is_foretold(moving, came):
+    """The correction of the zero leads out of the gap or back into it, by where the joint came from."""
+    width, zero = 8e-4, -6e-4
+    asked = goal(size=0.05)
+    found = model(play(width), offset(zero, 'shoulder_pan_joint'))
+    start = Start(asked.q[0], moving, np.array([came, 0, 0, 0, 0, 0]))
+    out = corrected_goal(found, asked, GoalLimits(rate=0.2), start)
+    at = fine_times(asked)
+    run, meant = course(out.goal.later(-out.waits), at).q, course(asked, at).q
+    way = np.concatenate([asked.q[0, 0] + [-came * 0.1, 0.0], run[:, 0]])
+    run[:, 0] = through_a_gap(way, width, way[0])[2:] + zero
+    apart = (forward(UR5, run) - forward(UR5, meant))[:, :3, 3]
+    assert out.after == pytest.approx(np.sqrt((apart**2).sum(axis=1).mean()), rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize('first', [0.0, 1.5])

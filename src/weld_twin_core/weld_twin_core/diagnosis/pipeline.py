@@ -13,8 +13,7 @@ from ..recording import Recording
 from .advice import Limits
 from .algebra.noise_floor import noise_floor
 from .algebra.problem import frames_named
-from .answer.answer import answer
-from .answer.refusal import refusal
+from .answer.answer import answer, refusal
 from .beliefs import Beliefs
 from .calibration.calibrated import stated
 from .frames.aligned import not_told

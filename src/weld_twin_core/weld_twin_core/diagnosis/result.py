@@ -37,6 +37,10 @@ MISTAKES = (
     'stamps_in_bursts',
     'computed',
     'camera_inverted',
+    'intrinsics',
+    'target_scale',
+    'target_mirrored',
+    'cameras_swapped',
     'other',
 )
 """Kinds of mistakes in data and set-up; docs/unsound.md describes each."""

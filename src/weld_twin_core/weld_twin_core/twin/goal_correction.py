@@ -324,8 +324,9 @@ class _Work:
 
     def _missing(self, way: Course) -> Array:
         """Return what is missing to the real tool on a course, shape (K, 6) [m, rad]."""
-        stands = self.start.q if self._rests else None
-        recording = approached(self._recording(way), self.start.came, stands)
+        recording = approached(
+            self._recording(way), self.start.came, self.start.q if self._near else None
+        )
         position, rotation = self.real.poses(recording)
         real = np.zeros((way.t.size, 4, 4))
         real[:, :3, 3], real[:, :3, :3] = position[-way.t.size :], rotation[-way.t.size :]
@@ -381,12 +382,17 @@ class _Work:
         return float(max(0.0, needed - float(self.goal.t[0])))
 
     @property
-    def _rests(self) -> bool:
-        """Return whether the arm stands where the goal begins."""
+    def _near(self) -> bool:
+        """Return whether the arm is where the goal begins."""
         here = self.start.q
-        if here is None or self.start.moving:
-            return False
-        return bool(np.abs(self.goal.q[0] - here).max() <= NEAR)
+        return here is not None and bool(np.abs(self.goal.q[0] - here).max() <= NEAR)
+
+    @property
+    def _rests(self) -> bool:
+        """Return whether the arm stands where the goal begins, or comes to rest with it there."""
+        rate = self.goal.qd
+        begins_at_rest = rate is not None and bool(np.abs(rate[0]).max() < AT_REST)
+        return self._near and (begins_at_rest or not self.start.moving)
 
     def _between(self, here: Array, there: Array) -> Array:
         chain = forward(self.bare, np.stack([here, there]))

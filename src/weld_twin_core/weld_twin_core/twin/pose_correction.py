@@ -20,7 +20,8 @@ from ..arm.rotation import angle_between, rotation_matrix
 from ..arrays import Array
 from ..effects.effect import MemoryEffect
 from ..errors import DataError
-from ..motion.inverse.newton import chain_jacobian, least_step
+from ..kernels.single_turn import turn_between, turn_matrix
+from ..motion.inverse.newton import chain_jacobian, least_step, pose_error
 from ..recording import JointMotion
 from .goal_correction import GoalLimits, not_corrected, too_large
 from .posterior import pose_covariances
@@ -33,8 +34,11 @@ CLOSED = 1e-12
 """Error [m, rad] that is rounding."""
 OPEN = 1e-9
 """Error [m, rad] that a solution must not have: that of `compensate`."""
-SLOPE = (1e-3, 2e-3)
+SIDES = np.repeat((1e-3, 2e-3), 3)
 """Distances [m, rad] to either side over which a slope is taken: what bends there is below 1e-9."""
+TRUSTED = np.array([5e-10, *[2e-8] * 12])
+"""Error [m, rad] of a pose, and of those beside it, whose next step need not be looked at: it leaves
+some thousandths, rounding of the pose and some millionths of a slope."""
 EXACT = 2e-10
 """Largest error [m] that what is told between two looks should have."""
 REACH = (2e-5, 5e-4, 1e-2)
@@ -125,9 +129,14 @@ class PoseCorrection:
             It cannot be reached.
 
         """
+        poses = _around(pose)
+        way, size = _away(known, pose)
+        told = _told(known, self._bend, way, size) + between(pose[None], poses) @ known.slope.T
+        meant = moved(poses, told)
         chain = frames(self._arm, known.q[None])
-        step = least_step(chain_jacobian(self._arm, chain), _away(known, pose)[0], SINGULAR)
-        return self._look(pose, known.q + step[0])
+        away = pose_error(chain, meant)
+        q = known.q + least_step(chain_jacobian(self._arm, chain), away, SINGULAR)
+        return self._look(pose, self._closed(self.arm_poses, meant, q), TRUSTED)
 
     def adopt(self, looked: Looked | None) -> None:
         """Go on from an exact correction, and learn how far apart such looks may be; None forgets."""
@@ -204,26 +213,35 @@ class PoseCorrection:
         """Return where the controller has the tool, ``T_base_tool`` of postures (M, n), (M, 4, 4)."""
         return forward(self._arm, q)
 
-    def _look(self, pose: Array, near: Array) -> Looked:
+    def _look(self, pose: Array, near: Array, trusted: Array | float = 0.0) -> Looked:
         """Return the solution of a pose and its slope, all seven times two poses at once."""
-        sizes = np.repeat(SLOPE, 3)
-        beside = np.concatenate([np.diag(sizes), -np.diag(sizes)])
-        poses = np.concatenate([pose[None], moved(pose, beside)])
-        q = self._closed(self._real_poses, poses, np.repeat(near[None], len(poses), axis=0))
+        poses = _around(pose)
+        q = self._closed(
+            self._real_poses, poses, np.broadcast_to(near, (13, near.shape[-1])), trusted
+        )
         added = between(poses, forward(self._arm, q))
-        slope = (added[1:7] - added[7:]) / (2.0 * sizes[:, None])
+        slope = (added[1:7] - added[7:]) / (2.0 * SIDES[:, None])
         return Looked(pose, added[0], slope.T, q[0])
 
-    def _closed(self, poses_of: Callable[[Array], Array], wanted: Array, q: Array) -> Array:
-        """Return joints that close poses, shape (M, n)."""
-        error = between(poses_of(q), wanted)
+    def _closed(
+        self,
+        poses_of: Callable[[Array], Array],
+        wanted: Array,
+        q: Array,
+        trusted: Array | float = 0.0,
+    ) -> Array:
+        """Return joints that close poses, shape (M, n); below ``trusted`` a step is not looked at."""
+        size = np.full(len(q), np.inf)
         for _ in range(ROUNDS):
-            if np.abs(error).max() < CLOSED:
+            error = between(poses_of(q), wanted)
+            size = np.abs(error).max(axis=-1)
+            if (size < CLOSED).all():
                 break
             jacobian = chain_jacobian(self._arm, frames(self._arm, q))
             q = q + least_step(jacobian, error, SINGULAR)
-            error = between(poses_of(q), wanted)
-        if not np.abs(error).max() < OPEN:
+            if (size < trusted).all():
+                return np.asarray(q)
+        if not size.max() < OPEN:
             raise DataError('the pose cannot be reached from where the arm stands')
         return np.asarray(q)
 
@@ -232,6 +250,13 @@ class PoseCorrection:
         out = np.zeros((len(q), 4, 4))
         out[:, :3, :3], out[:, :3, 3], out[:, 3, 3] = rotation, position, 1.0
         return np.asarray(self._back @ out)
+
+
+def _around(pose: Array) -> Array:
+    """Return a pose and those beside it by which its slope is told, shape (13, 4, 4)."""
+    return np.concatenate(
+        [pose[None], moved(pose, np.concatenate([np.diag(SIDES), -np.diag(SIDES)]))]
+    )
 
 
 def _standing(q: Array) -> JointMotion:
@@ -256,12 +281,20 @@ def _onward(before: Array, way: Array) -> bool:
 
 def between(start: Array, end: Array) -> Array:
     """Return what takes poses to others, shape (M, 6) [m, rad], linear part first, in fixed axes."""
+    if start.ndim == end.ndim == 2:
+        turned = turn_between(end[:3, :3], start[:3, :3])
+        return np.array([*(end[:3, 3] - start[:3, 3]).tolist(), *turned])
     turn = angle_between(end[..., :3, :3], start[..., :3, :3])
     return np.concatenate([end[..., :3, 3] - start[..., :3, 3], turn], axis=-1)
 
 
 def moved(pose: Array, twist: Array) -> Array:
-    """Return a pose (4, 4) moved by twists (..., 6) [m, rad], shape (..., 4, 4)."""
+    """Return poses (..., 4, 4) moved by twists (..., 6) [m, rad], shape (..., 4, 4)."""
+    if twist.ndim == 1:
+        one = pose.copy()
+        one[:3, 3] += twist[:3]
+        one[:3, :3] = turn_matrix(twist[3:]) @ pose[:3, :3]
+        return one
     out: Array = np.broadcast_to(pose, (*twist.shape[:-1], 4, 4)).copy()
     out[..., :3, 3] += twist[..., :3]
     out[..., :3, :3] = rotation_matrix(twist[..., 3:]) @ out[..., :3, :3]

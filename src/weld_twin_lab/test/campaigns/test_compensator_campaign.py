@@ -13,7 +13,7 @@ import pytest
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_lab.campaigns.compensating.drawn_cells import HOMES, RECORDED, drawn_goal
-from weld_twin_lab.campaigns.compensator import counted, summary, table, worse
+from weld_twin_lab.campaigns.compensator import counted, summary, table, unfinished, worse
 
 KEPT = Path(__file__).parents[4] / 'docs/results/robustness/compensator.json'
 OTHER = 'exit code 2: weld_twin: diagnosis is of the robot ur10e'
@@ -71,6 +71,16 @@ def test_one_miss_of_any_kind_fails_the_campaign(rows, changes, other):
     nine = [row() for _ in range(18)] + [row(after_m=3e-5), row(after_m=3e-5)]
     assert summary(nine, [CHANGE], OTHER, None)['passed']
     assert not summary(nine + rows, changes, other, None)['passed']
+
+
+def test_whoever_goes_on_tries_what_is_missing_alone():
+    from weld_twin_lab.campaigns.compensating.trial import CHANGES, Known
+
+    begun, last = next(iter(HOMES)), {**CHANGE, 'change': CHANGES[-1]}
+    known = Known([row(robot=begun), row(robot=begun), after(CHANGES[-1])], [last])
+    assert begun not in unfinished(known, 2)
+    assert unfinished(known, 3) == list(HOMES)  # more goals are asked for than before
+    assert unfinished(Known(known.rows, [CHANGE]), 2) == list(HOMES)
 
 
 def test_goals_are_seams_and_those_inside_lie_where_the_arm_was_recorded():

@@ -15,7 +15,9 @@ NEW = {'a.json': b'new', 'b.html': b'new'}
 
 
 def test_a_kill_at_a_change_comes_before_the_file_is_there(tmp_path):
-    assert run_killed(('schema', 'robot', '--out', tmp_path / 'robot.json'), Kill(change=1))
+    assert run_killed(
+        ('export', 'schema', 'robot', '--out', tmp_path / 'robot.json'), Kill(change=1)
+    )
     assert not (tmp_path / 'robot.json').exists()
 
 

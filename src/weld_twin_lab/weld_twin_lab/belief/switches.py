@@ -44,6 +44,10 @@ def third(_: Any, __: Any, given: Any, *___: Any) -> Any:
     return given
 
 
+def no(*_: Any) -> None:
+    """Return nothing at all."""
+
+
 def nothing(*_: Any) -> list[Any]:
     """Return an empty list."""
     return []
@@ -51,8 +55,8 @@ def nothing(*_: Any) -> list[Any]:
 
 MECHANISMS = {
     'library_again': Mechanism('hypotheses.search', 'ROUNDS', lambda: 1),
-    'negligible': Mechanism('hypotheses.search', 'without_negligible', second),
-    'misfit': Mechanism('hypotheses.search', 'without_misfit', second),
+    'negligible': Mechanism('hypotheses.selection', '_negligible', no),
+    'misfit': Mechanism('hypotheses.selection', '_misfit', no),
     'starts_again': Mechanism('hypotheses.selection', 'restarted', second),
     'stand_ins': Mechanism('hypotheses.selection', '_without_stand_in', third),
     'taken_out_alike': Mechanism('hypotheses.structural_aliases', '_kin', nothing),

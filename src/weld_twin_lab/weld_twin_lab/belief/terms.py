@@ -41,6 +41,7 @@ TERMS: dict[str, dict[str, int]] = {
         'evidence': 1,
         'apart': 1,
         'margin': 1,
+        'behind': -1,
         'causes': -1,
         'left': -1,
         'wander': -1,

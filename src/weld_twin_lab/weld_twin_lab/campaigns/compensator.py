@@ -11,12 +11,23 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
+
+from .compensating import NOTHING
+from .latency import pose_table
+
+if TYPE_CHECKING:
+    from .compensating.trial import Known
 
 WORSE = (2e-5, 0.05)
 """A goal is worse if it is farther off than before by more than this [m], and by this share."""
@@ -46,7 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--seed', type=int, default=7, metavar='N', help='decides what is drawn')
     parser.add_argument(
-        '--go-on', action='store_true', help='keep the arms that the file has, and try the others'
+        '--go-on',
+        action='store_true',
+        help='keep the goals and changes that the file has, and try the others',
     )
     parser.add_argument(
         '--turns', type=int, default=20, metavar='N', help='turns of the race of poses, 0 for none'
@@ -56,55 +69,102 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return what became of every goal and of every change, and the race."""
     from .building.message_packages import messages_importable
-    from .keeping.result_file import write_result
+    from .compensating.drawn_cells import HOMES
 
-    with messages_importable():
-        from .compensating.drawn_cells import HOMES
-        from .compensating.pose_race import race
-        from .compensating.trial import other_arm, tried
+    with messages_importable(), _beside() as beside:
+        from .compensating.trial import other_arm
 
-        rows, changes = _before(args)
-        begun = time.monotonic()
+        known = _before(args)
         each = -(-args.goals // len(HOMES))
-        for name in HOMES:
-            if name in _names(rows):
-                continue
-            done, changed = tried(name, args.seed, each, tell)
-            rows += done
-            changes += changed
-            tell(f'{name}: {_told(done)}')
-            made = {**summary(rows, changes, '', None), 'seed': args.seed, 'goals': rows}
-            write_result(args.out, 'compensator', time.monotonic() - begun, made)
+        _in_cells(args, each, known, beside, tell)
         other = other_arm(args.seed)
         tell(other)
-        more = without_cell(args.without_cell, args.seed, tell)
-        poses = race(args.turns, POSES, tell) if args.turns else None
-    found = summary(rows, changes, other, poses)
-    return {**found, 'without_cell': more, 'seed': args.seed, 'goals': rows}
+        without = -(-args.without_cell // len(HOMES))
+        more = without_cell(without, args.seed, beside, tell) if without else None
+        poses = race(args, tell)
+    found = summary(known.rows, known.changes, other, poses)
+    return {**found, 'without_cell': more, 'seed': args.seed, 'goals': known.rows}
 
 
-def without_cell(goals: int, seed: int, tell: Callable[[str], None]) -> dict[str, Any] | None:
+def _in_cells(
+    args: argparse.Namespace,
+    each: int,
+    known: Known,
+    beside: Executor,
+    tell: Callable[[str], None],
+) -> None:
+    """Try every arm that is not through yet; what the next one needs is learned meanwhile."""
+    from .compensating.drawn_cells import right_and_wrong
+    from .compensating.trial import tried
+    from .keeping.result_file import write_result
+
+    begun = time.monotonic()
+    names = unfinished(known, each)
+    models = {name: beside.submit(right_and_wrong, name, args.seed) for name in names}
+    for name in names:
+        for said in tried(name, args.seed, each, models[name].result(), known):
+            tell(f'{name}: {said}')
+            made = {**summary(*known, '', None), 'seed': args.seed, 'goals': known.rows}
+            write_result(args.out, 'compensator', time.monotonic() - begun, made)
+        tell(f'{name}: {_told([row for row in known.rows if row["robot"] == name])}')
+
+
+def unfinished(known: Known, each: int) -> list[str]:
+    """Return the arms that lack a change, or some of so many goals."""
+    from .compensating.drawn_cells import HOMES
+    from .compensating.trial import CHANGES
+
+    changed = {change['robot'] for change in known.changes if change['change'] == CHANGES[-1]}
+    calm = [row['robot'] for row in known.rows if not row['after']]
+    return [name for name in HOMES if name not in changed or calm.count(name) < each]
+
+
+def race(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any] | None:
+    """Return how long poses take beside a relay that copies them; None without turns."""
+    from .compensating.pose_race import race as raced
+
+    return raced(args.turns, POSES, tell) if args.turns else None
+
+
+@contextmanager
+def _beside() -> Iterator[Executor]:
+    """Give a process that computes whenever the cell leaves it time."""
+    pool = ProcessPoolExecutor(1, get_context('spawn'), initializer=os.nice, initargs=(5,))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def without_cell(
+    each: int, seed: int, beside: Executor, tell: Callable[[str], None]
+) -> dict[str, Any]:
     """Return what goals come to that are judged without nodes, by arm and in all."""
     from .compensating.drawn_cells import HOMES
     from .compensating.without_cell import judged
 
-    if not goals:
-        return None
+    doing = {name: beside.submit(judged, name, seed + 1, each) for name in HOMES}
     rows: dict[str, list[dict[str, Any]]] = {}
-    for name in HOMES:
-        rows[name] = judged(name, seed + 1, -(-goals // len(HOMES)))
+    for name, own in doing.items():
+        rows[name] = own.result()
         tell(f'{name}, without a cell: {_told(rows[name])}')
     arms = {name: counted(own) for name, own in rows.items()}
     return {'robots': arms, 'totals': counted([row for own in rows.values() for row in own])}
 
 
-def _before(args: argparse.Namespace) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+def _before(args: argparse.Namespace) -> Known:
     """Return the goals and changes of the file, none where there is no file yet."""
+    from .compensating.trial import Known
+
     file = Path(args.out)
     if not args.go_on or not file.exists():
-        return [], []
+        return Known([], [])
     found = json.loads(file.read_text(encoding='utf-8'))
-    return found['goals'], found['changes']
+    if found['seed'] != args.seed:
+        raise DataError(
+            f"the goals of '{file}' were drawn with --seed {found['seed']}; go on with it"
+        )
+    return Known(found['goals'], found['changes'])
 
 
 def _told(rows: Sequence[dict[str, Any]]) -> str:
@@ -164,7 +224,10 @@ def summary(
     goals = {
         'none worse': not any(worse(row) for row in rows),
         'corrected where it pays': totals['of_them_corrected'] >= CORRECTED * totals['to_correct'],
-        'changes noticed': all(change['noticed'] for change in changes),
+        'changes noticed': all(c['noticed'] for c in changes if c['change'] != NOTHING),
+        'nothing noticed without a change': not any(
+            c['noticed'] for c in changes if c['change'] == NOTHING
+        ),
         'nothing corrected after a change': all(not row['corrected'] for row in after.values()),
         'model of another arm refused': other.startswith('exit code 2'),
         'bound holds': HELD[0] <= held <= HELD[1],
@@ -212,12 +275,7 @@ def table(result: dict[str, Any]) -> str:
         lines.append(markdown.table(HEAD, *(_row(name, one) for name, one in arms)))
     poses = result['poses']
     if poses is not None:
-        rows = [
-            (name, *(f'{poses[name][key] / 1e3:.2f} ms' for key in ('p50_us', 'p99_us')))
-            for name in ('relay', 'compensator')
-        ]
-        rows.append(('ratio', *(f'{poses["ratio"][key]:.2f}' for key in ('p50_us', 'p99_us'))))
-        lines.append(markdown.table(('500 poses a second', 'p50', 'p99'), *rows))
+        lines.append(pose_table(poses))
     return '\n\n'.join(lines)
 
 

@@ -4,8 +4,8 @@
 
 Recorder: joint states at 500 Hz and poses at 100 Hz are recorded with both storages, in files small
 enough that splits are hit too. SIGKILL comes while recording, or while the bag is being completed. What
-`weld-twin recover` finds must be the messages sent, in order and without a gap from the first on, and
-may lack one second at most.
+`weld-twin bag recover` finds must be the messages sent, in order and without a gap from the first on,
+and may lack one second at most.
 
 Commands: each replaces an older result in a folder in which a person's files lie, or adds to a
 database. SIGKILL comes at a random moment, or at a change to files. Every file must be the older one or

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Run a proof: what weld_twin claims, measured by one command each.
+"""Run a proof: what weld_twin claims, one command each.
 
 The proofs that have a command of their own (benchmark, blind, campaign, real-robots) answer here
 too.
@@ -30,7 +30,9 @@ def proofs() -> dict[str, str]:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the proofs, each with its options."""
-    subparsers = parser.add_subparsers(required=True, metavar='PROOF', dest='proof')
+    subparsers = parser.add_subparsers(
+        required=True, metavar='PROOF', dest='proof', title='proofs'
+    )
     for name, path in sorted(proofs().items()):
         module = import_module(path)
         add_command(subparsers, name, module)

@@ -65,7 +65,7 @@ def opened(cases: Path, truths: Path, out: Path) -> list[str]:
     Parameters
     ----------
     cases, truths : Path
-        As ``weld-twin blind make`` writes them. Of the truths, only what was commanded while the
+        As ``weld-twin lab blind make`` writes them. Of the truths, only what was commanded while the
         tool was measured is used.
     out : Path
         Cases that are there already are left as they are.

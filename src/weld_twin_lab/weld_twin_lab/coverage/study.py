@@ -55,7 +55,7 @@ def study(
     out : Path
         Keeps a file per recording.
     cases : Path, optional
-        Directory with ``cases`` and ``truths`` as ``weld-twin blind make`` writes them.
+        Directory with ``cases`` and ``truths`` as ``weld-twin lab blind make`` writes them.
     tell : callable
         Told what is being done.
 

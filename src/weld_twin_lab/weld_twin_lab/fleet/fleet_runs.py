@@ -31,7 +31,7 @@ PATIENCE = 3600.0
 def command(listed: Path, database: str, *words: str) -> list[str]:
     """Return the words of a fleet run."""
     return [
-        sys.executable, '-m', 'weld_twin_nodes', 'fleet', 'run', str(listed), '--db', database, *words,
+        sys.executable, '-m', 'weld_twin_nodes', 'history', 'run', str(listed), '--db', database, *words,
     ]  # fmt: skip
 
 

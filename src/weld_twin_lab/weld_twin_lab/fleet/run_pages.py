@@ -106,7 +106,7 @@ def users_page(found: Mapping[str, Any]) -> str:
         f'# Users of the server\n\n`weld-twin lab users{found["options"]}`\n\n'
         f'What is dropped is {found["recording"]}; the server has one worker. Each user is '
         f'{found["browser"]}. The first in line has no place to see. Malicious files are those of '
-        '`weld-twin campaign fuzz`.\n\n'
+        '`weld-twin lab campaign fuzz`.\n\n'
     )
     if 'hostile' in found:
         told = found['hostile']

@@ -187,7 +187,7 @@ def _planned(cell: Cell) -> np.ndarray:
     """Return the stations that the product plans, shape (N, 6); its program leads to them too."""
     out = cell.place / 'plan'
     limits = ('--tolerance', '0.06', '--minutes', '12', '--noise', '0.02')
-    command('plan-measurement', *cell.words, *limits, '--controller', 'krl', '--out', str(out))
+    command('investigate', *cell.words, *limits, '--controller', 'krl', '--out', str(out))
     plan = yaml.safe_load((out / 'stations.yaml').read_text(encoding='utf-8'))
     return np.array(plan['q'])
 
@@ -340,12 +340,12 @@ def _corrected(
 
 
 def _by_product(cell: Cell, name: str, text: str, out: str) -> dict[str, Any]:
-    """Return what correct-program writes of a program; refused, it is left as it was."""
+    """Return what correct writes of a program; refused, it is left as it was."""
     program, place = cell.place / name, cell.place / out
     program.write_text(text, encoding='utf-8')
     model = ('--model', str(cell.place / 'found' / 'diagnosis.json'))
     try:
-        command('correct-program', str(program), *cell.words, *model, '--out', str(place))
+        command('correct', str(program), *cell.words, *model, '--out', str(place))
     except CommandFailed as error:
         place.mkdir(exist_ok=True)
         (place / name).write_text(text, encoding='utf-8')

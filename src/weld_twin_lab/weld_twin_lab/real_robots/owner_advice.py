@@ -24,7 +24,7 @@ def owner_advice(diagnosis: Diagnosis) -> list[str]:
     strong = sorted(ripples(diagnosis), key=lambda r: -r.rms)[:2]
     if strong:
         out.append(
-            'Send compensated joint commands (weld-twin compensate) for the rest: ripple of the '
+            'Send compensated joint commands (weld-twin correct) for the rest: ripple of the '
             f'gears, most of it in {listed([r.joint for r in strong])}, is repeatable but no '
             'controller has a parameter for it. Measure anew after a gearbox was exchanged.'
         )

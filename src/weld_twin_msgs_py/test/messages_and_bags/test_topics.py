@@ -22,6 +22,7 @@ def test_names_and_types_are_those_of_the_public_interface():
         '/tool_wrench': 'geometry_msgs/WrenchStamped',
         '/temperature': 'sensor_msgs/Temperature',
         '/contact': 'sensor_msgs/Range',
+        '/measured/image_points': 'sensor_msgs/PointCloud2',
     }
 
 

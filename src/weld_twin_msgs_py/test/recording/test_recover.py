@@ -168,7 +168,7 @@ def test_a_step_a_database_was_in_is_undone(tmp_path, numbered, numbers):
 
 
 def test_every_reader_leads_to_the_command(cut_short):
-    command = f"'weld-twin recover {cut_short}'"
+    command = f"'weld-twin bag recover {cut_short}'"
     for path in (cut_short, cut_short.with_name('bag.unfinished')):
         with pytest.raises(DataError, match='cut short') as caught:
             bag_info(path)
@@ -245,7 +245,7 @@ def test_a_full_disk_is_told_in_a_sentence_and_keeps_what_was_on_it(
     process.join()
     assert process.exitcode == 0
     assert f"bag '{tmp_path}/bag' cannot be written: " in said
-    assert f"'weld-twin recover {tmp_path}/bag'" in said
+    assert f"'weld-twin bag recover {tmp_path}/bag'" in said
     recover(tmp_path / 'bag')
     found = numbers(tmp_path / 'bag')
     assert len(found) >= flushed > 0

@@ -24,6 +24,12 @@ UNIT = 0.009
 """By how much the length of a quaternion may differ from one without a closer look."""
 
 
+SURE_POSE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
+"""Type of poses that tell how sure they are."""
+PLAIN, COVARIANCE = 8, 36
+"""Numbers of a pose with its sigma, and of its covariance."""
+
+
 class Role(Enum):
     """What the messages of a topic tell."""
 
@@ -44,9 +50,9 @@ class Taken(NamedTuple):
     stamp : int [ns]
     row : array, shape (width,)
         Joints: positions, then velocities, NaN where they are not told, then efforts where they
-        were asked for. Pose: position,
-        quaternion x y z w, sigma [m] or NaN. Point, sigma: three numbers. Wrench: force and
-        torque. Temperature: one number.
+        were asked for. Pose: position, quaternion x y z w, sigma [m] or NaN, and its covariance
+        where its type has one. Point, sigma: three numbers. Wrench: force and torque. Temperature:
+        one number.
     restarted : bool
         It begins a new run: the stamps before it lie in its future.
 
@@ -106,9 +112,16 @@ class Intake:
         }
 
     @staticmethod
-    def width(role: Role, robot: Robot, *, efforts: bool = False) -> int:
-        """Return how many numbers a row has."""
-        widths = {Role.POSE: 8, Role.POINT: 3, Role.SIGMA: 3, Role.WRENCH: 6, Role.TEMPERATURE: 1}
+    def width(role: Role, robot: Robot, kind: str = '', *, efforts: bool = False) -> int:
+        """Return how many numbers a row of messages of a type has."""
+        pose = PLAIN + COVARIANCE * (kind == SURE_POSE)
+        widths = {
+            Role.POSE: pose,
+            Role.POINT: 3,
+            Role.SIGMA: 3,
+            Role.WRENCH: 6,
+            Role.TEMPERATURE: 1,
+        }
         return widths.get(role, (2 + efforts) * robot.n)
 
     @property
@@ -173,16 +186,17 @@ class Intake:
 
 
 def _pose_row(message: Any) -> Array:
-    """Return position, quaternion and sigma (NaN when the message has none)."""
+    """Return position, quaternion, sigma (NaN when the message has none), and a covariance."""
     inner = getattr(message.pose, 'pose', message.pose)
     p, q = inner.position, inner.orientation
-    sigma = None if inner is message.pose else from_messages.position_sigma(message)
+    plain = inner is message.pose
+    sigma = None if plain else from_messages.position_sigma(message)
     row = [p.x, p.y, p.z, q.x, q.y, q.z, q.w, nan if sigma is None else sigma]
     if not (isfinite(sum(row[:3])) and abs(hypot(*row[3:7]) - 1.0) < UNIT):
         from_messages.pose(message)  # has the sentence, and the bound
-    return np.array(row)
+    return np.array(row if plain else [*row, *message.pose.covariance])
 
 
 def rotations(rows: Array) -> Array:
-    """Return the rotation matrices, shape (N, 3, 3), of pose rows, shape (N, 8)."""
+    """Return the rotation matrices, shape (N, 3, 3), of pose rows, shape (N, 8 or 44)."""
     return matrix_from_quaternion(rows[:, 3:7], 'orientation')

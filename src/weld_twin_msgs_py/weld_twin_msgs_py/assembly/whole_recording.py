@@ -12,6 +12,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
+from weld_twin_core.pose_noise import PoseNoise, alike, positive
 from weld_twin_core.recording import (
     JointMotion,
     JointSignal,
@@ -22,7 +23,7 @@ from weld_twin_core.recording import (
 )
 from weld_twin_core.two_clocks import ONE_CLOCK, apart
 
-from .intake import Role, rotations
+from .intake import PLAIN, Role, rotations
 from .station_stamps import looks_static
 
 LATE_WRENCH = 1.0
@@ -77,7 +78,8 @@ def assembled(
     """
     epoch = int(streams[Role.JOINTS].ns[0])
     motion, effort = _motion(robot, streams[Role.JOINTS])
-    measured = _measurements(streams, epoch)
+    measured, told = _measurements(streams, epoch)
+    notes += told
     if static is None:
         static = looks_static(robot, motion, measured)
     if static:
@@ -130,19 +132,37 @@ def _motion(robot: Robot, joints: Samples) -> tuple[JointMotion, JointSignal | N
     return JointMotion(t, q, np.where(untold, backward_rates(t, q), qd)), told
 
 
-def _measurements(streams: Mapping[Role, Samples], epoch: int) -> Measurements | None:
+def _measurements(
+    streams: Mapping[Role, Samples], epoch: int
+) -> tuple[Measurements | None, tuple[str, ...]]:
+    """Return what was measured, and what is to be said of it."""
+    noise, said = None, tuple[str, ...]()
     if Role.POSE in streams:
         ns, rows = streams[Role.POSE]
         rotation, sigma = rotations(rows), rows[:, 7]
+        noise, said = _noise(rows[:, PLAIN:].reshape(len(rows), -1, 6))
     elif Role.POINT in streams:
         ns, rows = streams[Role.POINT]
         rotation, sigma = None, np.full(ns.size, np.nan)
     else:
-        return None
+        return None, ()
     if Role.SIGMA in streams:
         sigma = _matched_sigma(ns, streams[Role.SIGMA], sigma)
     known = None if np.isnan(sigma).any() else sigma
-    return Measurements(seconds(ns, epoch), rows[:, :3], rotation, known)
+    return Measurements(seconds(ns, epoch), rows[:, :3], rotation, known, noise), said
+
+
+def _noise(covariance: Array) -> tuple[PoseNoise | None, tuple[str, ...]]:
+    """Return how sure poses are in every direction, and what is to be said of it."""
+    if covariance.shape[1] != 6 or not covariance.any() or alike(covariance):
+        return None, ()
+    if not positive(covariance).all():
+        count = int((~positive(covariance)).sum())
+        return None, (
+            f'the covariance of {count} of {len(covariance)} poses is none of all six '
+            'coordinates; how sure poses are in each direction is not taken into account',
+        )
+    return PoseNoise.of(covariance), ()
 
 
 def _matched_sigma(ns: np.ndarray, given: Samples, sigma: Array) -> Array:

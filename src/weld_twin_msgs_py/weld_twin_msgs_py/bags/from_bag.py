@@ -30,6 +30,7 @@ from ..messages.topics import (
 from .columns import LEFT_OUT, Stream
 from .contacts import marks, touching
 from .ends import Ends, never_recorded, uneven_ends
+from .images import images, looking
 from .needed import POSE_TYPES, no_joints, no_measurements, other_names
 from .reader import BagReader
 from .regular import fill_regular
@@ -91,7 +92,8 @@ def read_recording(
         points = bag.topics.get(_topic(names, Role.POINT), ('', 0))[1]
         made = bag.provenance
         touched = marks(bag, names)
-        measured = touched or {Role.POSE, Role.POINT} & set(roles)
+        seen = [] if touched else images(bag, names)
+        measured = touched or seen or {Role.POSE, Role.POINT} & set(roles)
         if needs_measurements and not measured:
             raise DataError(f"bag '{path}': {no_measurements(names, bag.topics)}")
     if streams[Role.JOINTS].messages == intake.joints.others:
@@ -112,7 +114,9 @@ def read_recording(
     )
     if touched:
         return touching(whole, touched, made)
-    if names.measured_inverse and whole.measured is not None:
+    if seen:
+        whole = looking(whole, seen, names, made)
+    elif names.measured_inverse and whole.measured is not None:
         whole = whole.with_measured(whole.measured.inverted())
     return _with_what_is_missing(whole, made, _ends(names, samples))
 
@@ -181,23 +185,25 @@ def _read(
     bag: BagReader, names: TopicNames, roles: Mapping[Role, str], robot: Robot
 ) -> tuple[dict[Role, Stream], Intake]:
     """Return the columns of a bag: read by the thousand where all is as usual, else one by one."""
-    streams, intake = _empty(names, roles, robot)
+    kinds = {role: bag.topics[topic][0] for role, topic in roles.items()}
+    streams, intake = _empty(names, roles, kinds, robot)
     one_each = {topic: role for role, topic in roles.items()}
     whole = not any(split_topic(getattr(names, role.value))[1] for role in roles)
     usual = whole and len(one_each) == len(roles)
     if not (usual and fill_regular(bag, one_each, streams, intake)):
-        streams, intake = _empty(names, roles, robot)
+        streams, intake = _empty(names, roles, kinds, robot)
         _fill(bag, names, streams, intake, robot)
     return streams, intake
 
 
 def _empty(
-    names: TopicNames, roles: Mapping[Role, str], robot: Robot
+    names: TopicNames, roles: Mapping[Role, str], kinds: Mapping[Role, str], robot: Robot
 ) -> tuple[dict[Role, Stream], Intake]:
     joint_names = names_called(robot, names.joint_prefix, dict(names.joint_map))
     intake = Intake(robot, limits=False, joint_names=joint_names, efforts=names.use_effort)
     width = partial(Intake.width, robot=robot, efforts=names.use_effort)
-    return {role: Stream(topic, width(role)) for role, topic in roles.items()}, intake
+    each = {r: Stream(topic, width(r, kind=kinds[r])) for r, topic in roles.items()}
+    return each, intake
 
 
 def _fill(

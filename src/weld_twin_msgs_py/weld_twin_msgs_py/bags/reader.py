@@ -224,7 +224,7 @@ def clear_errors(path: Path) -> Iterator[None]:
     except MemoryError:
         raise DataError(
             f"bag '{path}' needs more memory to be read than there is; where it is damaged, as by a "
-            f"size that nothing has, 'weld-twin recover {path}' takes what is whole of it"
+            f"size that nothing has, 'weld-twin bag recover {path}' takes what is whole of it"
         ) from None
     except PermissionError:
         raise DataError(f"bag '{path}' cannot be read: permission denied") from None
@@ -233,7 +233,7 @@ def clear_errors(path: Path) -> Iterator[None]:
         reason = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
         raise DataError(
             f"bag '{path}' is damaged or was cut short ({reason[:200]}); what is whole of it "
-            f"becomes a bag with 'weld-twin recover {path}'"
+            f"becomes a bag with 'weld-twin bag recover {path}'"
         ) from None
 
 

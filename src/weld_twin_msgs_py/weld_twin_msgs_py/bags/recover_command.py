@@ -17,7 +17,7 @@ SPARE = 10_000_000
 
 def recover_command(path: Path, growing: Path | None = None) -> str:
     """
-    Return ``weld-twin recover`` for a recording, onto another disk where its own has no room.
+    Return ``weld-twin bag recover`` for a recording, onto another disk where its own has no room.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def recover_command(path: Path, growing: Path | None = None) -> str:
         The directory it grew in; it is copied.
 
     """
-    command = ['weld-twin', 'recover', str(path)]
+    command = ['weld-twin', 'bag', 'recover', str(path)]
     needed = _size(path if growing is None else growing) + SPARE
     if not _has_room(path.parent, needed):
         places = (Path.cwd(), Path.home(), Path(tempfile.gettempdir()))

@@ -146,7 +146,7 @@ def _pose_rows(values: Array) -> Array:
     pose = _finite(values[:, :7])
     if (np.abs(np.linalg.norm(pose[:, 3:], axis=1) - 1.0) >= UNIT).any():
         raise Unusual
-    return np.column_stack([pose, _sigma(values[:, 7:])])
+    return np.column_stack([pose, _sigma(values[:, 7:]), values[:, 7:]])
 
 
 def _sigma(covariance: Array) -> Array:

@@ -17,6 +17,7 @@ from weld_twin_core import __version__
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.arrays import Array
+from weld_twin_core.cameras import Sightings
 from weld_twin_core.contacts import Contacts
 from weld_twin_core.recording import Measurements, Recording
 
@@ -28,6 +29,7 @@ from ..messages.topics import (
     ACTUAL_JOINT_STATES,
     CONTACT,
     DEVIATION,
+    IMAGE_POINTS,
     JOINT_STATES,
     MEASURED_POINT,
     MEASURED_POSE,
@@ -38,6 +40,7 @@ from ..messages.topics import (
     TWIN_POSE,
 )
 from ..messages.typestore import TYPES
+from .images import rows_of
 from .writer import BagWriter
 
 _Entry = tuple[int, str, str, bytes]
@@ -98,6 +101,8 @@ def write_recording(
     }
     if recording.contacts is not None:
         made['artefact'] = recording.contacts.artefact.as_mapping()
+    if recording.images is not None:
+        made['seen'] = recording.images.as_mapping()
     entries = _Entries(recording)
     parts = [*entries.inputs(robot)]
     if actual is not None:
@@ -105,7 +110,8 @@ def write_recording(
     if twin is not None:
         parts.append(entries.poses(TWIN_POSE.name, recording.joints.t, *twin))
     if twin is not None and covariance is not None:
-        parts.append(entries.sure_poses(recording.joints.t, *twin, covariance))
+        topic = TWIN_COVARIANCE.name
+        parts.append(entries.sure_poses(topic, recording.joints.t, *twin, covariance))
     if deviation is not None and recording.measured is not None and len(deviation):
         parts.append(entries.vectors(DEVIATION.name, recording.measured.t, deviation))
     with BagWriter(path, storage=storage, provenance=made, beside=beside) as bag:
@@ -130,7 +136,9 @@ class _Entries:
         effort = self.recording.effort
         told = None if effort is None else effort.at(motion.t)
         yield self.joints(JOINT_STATES.name, robot, motion.q, motion.qd, told)
-        if measured is not None:
+        if self.recording.images is not None:
+            yield self.images(self.recording.images)
+        elif measured is not None:
             yield from self.measured(measured)
         if self.recording.contacts is not None:
             yield self.contacts(self.recording.contacts)
@@ -164,6 +172,10 @@ class _Entries:
         position, rotation, sigma = measured.position, measured.rotation, measured.sigma
         if not measured.t.size:
             return
+        if rotation is not None and measured.noise is not None:
+            known = measured.noise.covariance
+            yield self.sure_poses(MEASURED_POSE.name, measured.t, position, rotation, known)
+            return
         if rotation is not None:
             yield self.poses(MEASURED_POSE.name, measured.t, position, rotation)
         else:
@@ -183,13 +195,20 @@ class _Entries:
             message = self.make.contact(ns, contacts.labels[k], value[k], sigma[k])
             yield ns, CONTACT.name, message.__msgtype__, _serialised(message)
 
+    def images(self, seen: Sightings) -> Iterator[_Entry]:
+        """Return what cameras saw, of which the poses are made again when it is read."""
+        for stamp, camera, rows in rows_of(seen):
+            ns = int(self._stamps(np.array([stamp]))[0])
+            message = self.make.image_points(ns, camera, rows)
+            yield ns, IMAGE_POINTS.name, message.__msgtype__, _serialised(message)
+
     def poses(self, topic: str, t: Array, position: Array, rotation: Array) -> Iterator[_Entry]:
         """Return poses, shapes (K, 3) and (K, 3, 3)."""
         first = partial(self.make.pose, position=position[0], rotation=rotation[0], frame_id=WORLD)
         return self._alike(topic, t, first, _pose_rows(position, rotation))
 
     def sure_poses(
-        self, t: Array, position: Array, rotation: Array, covariance: Array
+        self, topic: str, t: Array, position: Array, rotation: Array, covariance: Array
     ) -> Iterator[_Entry]:
         """Return poses with covariance, shapes (K, 3), (K, 3, 3) and (K, 6, 6)."""
         first = partial(
@@ -199,7 +218,7 @@ class _Entries:
             covariance=covariance[0],
         )
         rows = np.hstack([_pose_rows(position, rotation), covariance.reshape(-1, 36)])
-        return self._alike(TWIN_COVARIANCE.name, t, first, rows)
+        return self._alike(topic, t, first, rows)
 
     def vectors(self, topic: str, t: Array, vectors: Array) -> Iterator[_Entry]:
         """Return vectors, shape (K, 3)."""

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.errors import DataError
+from weld_twin_core.kernels.single_turn import quaternion_matrix
 from weld_twin_core.recording import JointMotion
 
 NANOSECONDS = 1_000_000_000
@@ -177,7 +177,7 @@ def pose(message: Any) -> tuple[Array, Array]:
     inner = message.pose
     inner = getattr(inner, 'pose', inner)
     q = inner.orientation
-    rotation = matrix_from_quaternion([q.x, q.y, q.z, q.w], 'orientation of the pose')
+    rotation = quaternion_matrix(q.x, q.y, q.z, q.w, 'orientation of the pose')
     return _xyz(inner.position, 'position of the pose'), rotation
 
 

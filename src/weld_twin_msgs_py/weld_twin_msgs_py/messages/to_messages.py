@@ -21,6 +21,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion
 
 from .from_messages import NANOSECONDS
+from .image_points import DOUBLE, FIELDS
 
 LEVELS = (b'\x00', b'\x01', b'\x02', b'\x03')
 """Levels of a DiagnosticStatus: ok, warn, error, stale."""
@@ -169,6 +170,28 @@ class Messages:
             max_range=0.0,
             range=float(value),
             variance=float(sigma) ** 2,
+        )
+
+    def image_points(self, ns: int, camera: str, rows: Array) -> Any:
+        """Return the PointCloud2 of an image; rows are (N, 4): target, point, u and v [px]."""
+        data = np.ascontiguousarray(rows, dtype='<f8')
+        fields = [
+            self._make(
+                'sensor_msgs/msg/PointField', name=name, offset=8 * k, datatype=DOUBLE, count=1
+            )
+            for k, name in enumerate(FIELDS)
+        ]
+        return self._make(
+            'sensor_msgs/msg/PointCloud2',
+            header=self.header(ns, camera),
+            height=1,
+            width=len(data),
+            fields=fields,
+            is_bigendian=False,
+            point_step=8 * len(FIELDS),
+            row_step=data.nbytes,
+            data=np.frombuffer(data.tobytes(), np.uint8),
+            is_dense=True,
         )
 
     def diagnostics(

@@ -13,7 +13,10 @@ worth as much as a new one.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from weld_twin_core.cameras import Camera, Target
 
 RELIABLE = 'reliable'
 BEST_EFFORT = 'best_effort'
@@ -146,6 +149,12 @@ CONTACT = _stream(
     'the tool point touches what header.frame_id names; range is the measured length where that is '
     'what a contact gives, else 0 [m], variance its variance where known [m^2]',
 )
+IMAGE_POINTS = _stream(
+    '/measured/image_points',
+    'sensor_msgs/msg/PointCloud2',
+    DEEP,
+    'points of targets that the camera named in header.frame_id saw: target, point, u, v [px]',
+)
 TWIN_POSE = _result(
     '/twin/tool_pose',
     'geometry_msgs/msg/PoseStamped',
@@ -198,6 +207,7 @@ TOPICS = (
     MEASURED_POINT,
     MEASURED_SIGMA,
     CONTACT,
+    IMAGE_POINTS,
     TWIN_POSE,
     TWIN_COVARIANCE,
     DEVIATION,
@@ -330,7 +340,7 @@ class TopicNames:
 
     Attributes
     ----------
-    joints, pose, point, sigma, wrench, temperature, contact : str
+    joints, pose, point, sigma, wrench, temperature, contact, images : str
         Topics; a leading slash may be left out.
     joint_prefix : str
         What the joint states put before the names of the robot's joints.
@@ -340,6 +350,8 @@ class TopicNames:
         Whether measured poses are those of something fixed seen from the arm, to be inverted.
     use_effort : bool
         Whether the measured efforts of the joints are read, and have to be there.
+    cameras, targets : tuple of Camera, Target
+        What is known of them, where points in images were measured.
 
     """
 
@@ -350,10 +362,13 @@ class TopicNames:
     wrench: str = TOOL_WRENCH.name
     temperature: str = TEMPERATURE.name
     contact: str = CONTACT.name
+    images: str = IMAGE_POINTS.name
     joint_prefix: str = field(default='', metadata=NO_TOPIC)
     joint_map: tuple[tuple[str, str], ...] = field(default=(), metadata=NO_TOPIC)
     measured_inverse: bool = field(default=False, metadata=NO_TOPIC)
     use_effort: bool = field(default=False, metadata=NO_TOPIC)
+    cameras: tuple[Camera, ...] = field(default=(), metadata=NO_TOPIC)
+    targets: tuple[Target, ...] = field(default=(), metadata=NO_TOPIC)
 
     @classmethod
     def topics(cls) -> tuple[str, ...]:

@@ -3,15 +3,20 @@
 """Tables of joint angles and measured positions or poses, as laboratories leave them."""
 
 from .build import Table, read_table
+from .camera_files import read_camera, read_target
 from .contacts import read_contacts, write_touches
+from .pixels import read_pixels
 from .table_options import TableOptions
 from .two_tables import read_two_tables
 
 __all__ = [
     'Table',
     'TableOptions',
+    'read_camera',
     'read_contacts',
+    'read_pixels',
     'read_table',
+    'read_target',
     'read_two_tables',
     'write_touches',
 ]

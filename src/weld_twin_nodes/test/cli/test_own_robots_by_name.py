@@ -31,7 +31,7 @@ def test_commands_take_it_and_info_lists_it(weld_twin, cell7, tmp_path):
         bag = read_recording(tmp_path / robot, load_robot(robot))
         heights[robot] = bag.measured.position[:, 2].mean()
     assert heights['cell7'] - heights['kuka_kr16_2'] == pytest.approx(0.75, abs=1e-9)
-    listed = weld_twin('info', '--robots').out
+    listed = weld_twin('bag', '--robots').out
     assert listed.splitlines()[-1].split() == ['cell7', 'your', 'own', str(cell7)]
 
 

@@ -51,7 +51,7 @@ def checks(weld_twin, tmp_path):
     def check(name, data):
         out = tmp_path / 'schema.json'
         if not out.exists():
-            assert weld_twin('schema', name, '--out', out).code == 0
+            assert weld_twin('export', 'schema', name, '--out', out).code == 0
         return jsonschema.Draft7Validator(json.loads(out.read_text())).is_valid(data)
 
     return check
@@ -136,12 +136,12 @@ def test_every_effect_of_the_documentation_is_taken(checks):
 
 
 def test_every_effect_has_its_own_part(weld_twin):
-    made = json.loads(weld_twin('schema', 'effects').out)
+    made = json.loads(weld_twin('export', 'schema', 'effects').out)
     assert {part['title'] for part in made['items']['oneOf']} == set(REGISTRY)
 
 
 def test_a_robot_file_has_the_keys_that_its_reader_knows(weld_twin):
-    made = json.loads(weld_twin('schema', 'robot').out)
+    made = json.loads(weld_twin('export', 'schema', 'robot').out)
     for data, keys in (
         ({'joints': [], 'zzz': 1}, made['properties']),
         (joint(zzz=1), made['properties']['joints']['items']['properties']),
@@ -153,6 +153,6 @@ def test_a_robot_file_has_the_keys_that_its_reader_knows(weld_twin):
 
 
 def test_a_kind_that_is_not_there_is_one_sentence(weld_twin):
-    result = weld_twin('schema', 'weather')
+    result = weld_twin('export', 'schema', 'weather')
     assert result.code == 2
     assert "there is no schema 'weather'; there are robot, effects, seam" in result.err

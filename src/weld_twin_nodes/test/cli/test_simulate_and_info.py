@@ -136,7 +136,7 @@ def test_taught_points_from_a_table_are_visited(weld_twin, tmp_path):
 def test_info_says_what_is_there_and_what_it_is_good_for(weld_twin, tmp_path, effects):
     out = tmp_path / 'bag'
     weld_twin('simulate', '--robot', 'ur5', '--effects', effects, '--rate', 40, '--out', out)
-    result = weld_twin('info', out)
+    result = weld_twin('bag', out)
     assert result.code == 0
     joints = next(line for line in result.out.splitlines() if line.startswith('/joint_states'))
     assert joints.split()[1:3] == ['sensor_msgs/msg/JointState', 'joints']
@@ -146,7 +146,7 @@ def test_info_says_what_is_there_and_what_it_is_good_for(weld_twin, tmp_path, ef
 
 
 def test_info_lists_the_bundled_robots(weld_twin):
-    listed = weld_twin('info', '--robots').out
+    listed = weld_twin('bag', '--robots').out
     assert all(name in listed for name in catalog.names())
 
 
@@ -155,7 +155,7 @@ def test_a_bag_that_was_cut_short_is_named(weld_twin, tmp_path):
     weld_twin('simulate', '--robot', 'ur5', '--profile', 'aggressive', '--out', out)
     file = out / 'bag.mcap'
     file.write_bytes(file.read_bytes()[:-4000])
-    result = weld_twin('info', out)
+    result = weld_twin('bag', out)
     assert (result.code, result.out) == (2, '')
     assert 'cut short' in result.err
 
@@ -205,7 +205,7 @@ def test_an_existing_bag_is_not_overwritten(weld_twin, tmp_path):
     assert (tmp_path / 'bag' / 'precious').exists()
 
 
-@pytest.mark.parametrize('words', [(), ('dance',), ('simulate',), ('info',)])
+@pytest.mark.parametrize('words', [(), ('dance',), ('simulate',), ('bag',), ('bag', 'info')])
 def test_wrong_usage_exits_with_2(weld_twin, words):
     result = weld_twin(*words)
     assert result.code == 2
@@ -216,7 +216,8 @@ def test_help_is_quick_because_it_imports_little():
     code = (
         'import sys\n'
         'from weld_twin_nodes.cli import main\n'
-        'for words in (["--help"], ["simulate", "--help"], ["import", "--help"]):\n'
+        'for words in (["--help"], ["simulate", "--help"], ["import", "--help"],\n'
+        '    ["bag", "--help"], ["diagnose", "--help-all"]):\n'
         '    try: main(words)\n'
         '    except SystemExit as stop: assert stop.code == 0\n'
         'slow = {"numpy", "scipy", "rclpy", "matplotlib", "rosbags"} & set(sys.modules)\n'
@@ -227,7 +228,7 @@ def test_help_is_quick_because_it_imports_little():
 
 def test_every_subcommand_has_help(weld_twin):
     listed = weld_twin('--help').out
-    for name in ('demo', 'simulate', 'info', 'import'):
+    for name in ('demo', 'simulate', 'bag', 'import'):
         assert f' {name} ' in listed
         assert weld_twin(name, '--help').code == 0
 
@@ -275,7 +276,7 @@ def test_a_delay_beyond_the_motion_leaves_a_sentence_and_no_bag(weld_twin, tmp_p
 def test_info_tells_the_effects_in_words(weld_twin, tmp_path):
     effect = '{effect: backlash, joint: elbow_joint, width: 5e-4}'
     assert simulated_with(weld_twin, tmp_path, effect).code == 0
-    said = weld_twin('info', tmp_path / 'bag').out
+    said = weld_twin('bag', tmp_path / 'bag').out
     assert 'effects: backlash of elbow_joint (width 0.0005 rad)' in said
     assert 'twin_effects: none' in said
     assert '[' not in said.split('usable')[0].partition('note:')[2]

@@ -48,12 +48,12 @@ def test_the_command_line_has_the_commands_that_write_no_page(tmp_path):
     listed = weld_twin_alone('--help')
     assert listed.returncode == 0, listed.stderr
     assert ' simulate ' in listed.stdout
-    assert ' recover ' in listed.stdout
+    assert ' bag ' in listed.stdout
     assert not {name for name in PAGES if f' {name} ' in listed.stdout}
     words = ('--robot', 'ur5', '--rate', 20, '--path', 'line', '--out', tmp_path / 'bag')
     made = weld_twin_alone('simulate', *words)
     assert made.returncode == 0, made.stderr
-    shown = weld_twin_alone('info', tmp_path / 'bag')
+    shown = weld_twin_alone('bag', tmp_path / 'bag')
     assert 'usable for a diagnosis' in shown.stdout, shown.stderr
 
 

@@ -119,7 +119,7 @@ def told_apart_in_bags(tmp_path, run, capsys):
         with BagReader(tmp_path / name) as bag:
             spaces = {topic.split('/')[1] for topic, (_, count) in bag.topics.items() if count}
         assert spaces - {'diagnostics'} == {name}
-        assert main(['info', str(tmp_path / name), '--namespace', name]) == 0
+        assert main(['bag', str(tmp_path / name), '--namespace', name]) == 0
         assert f'/{name}/measured/tool_pose' in capsys.readouterr().out
         back = read_recording(tmp_path / name, load(robot), TopicNames.within(name))
         assert (back.joints.t.size, back.measured.t.size) == (run.t.size, run.t.size)

@@ -56,6 +56,7 @@ def player(cell, *topics, options=()):
             sys.executable,
             '-m',
             'weld_twin_nodes',
+            'bag',
             'play',
             str(BAG),
             '--rate',

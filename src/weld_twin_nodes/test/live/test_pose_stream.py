@@ -22,10 +22,14 @@ STEP = 0.004
 LIMITS = GoalLimits(rate=5e-3)
 
 
+def correction(offset=6e-4):
+    entry = {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': offset}
+    model = ProgramModel(UR5, (effect_from_mapping(entry),))
+    return PoseCorrection(model, UR5.T_flange_tool)
+
+
 def stream(**options):
-    cause = effect_from_mapping({'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 6e-4})
-    found = PoseCorrection(ProgramModel(UR5, (cause,)), UR5.T_flange_tool)
-    return PoseStream(found, LIMITS, **options)
+    return PoseStream(correction(), LIMITS, **options)
 
 
 class Run:
@@ -80,6 +84,21 @@ def test_a_withdrawal_waits_for_the_standstill():
     assert np.abs(run.added[-1]).max() == 0.0
     run.go(120)
     assert np.linalg.norm(run.added[-1][:3]) > 1e-4
+
+
+def test_another_correction_counts_from_the_standstill_on_and_is_faded_over_to():
+    run, half = Run(stream()), Run(PoseStream(correction(3e-4), LIMITS))
+    for each in (run, half):
+        each.go(60)
+    run.stream.renew(correction(3e-4))
+    for each in (run, half):
+        each.go(100, speed=0.05)
+    assert run.changes(100).max() < 2e-4
+    assert np.linalg.norm(run.added[-1] - half.added[-1]) > 1e-4
+    for each in (run, half):
+        each.go(120)
+    assert run.changes(120).max() < 1.01 * LIMITS.rate
+    np.testing.assert_allclose(run.added[-1], half.added[-1], atol=1e-9)
 
 
 def test_stopped_nothing_is_sent_and_what_comes_from_elsewhere_is_no_beginning():

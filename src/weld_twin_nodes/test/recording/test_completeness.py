@@ -155,6 +155,26 @@ def test_a_node_that_missed_what_it_listens_to_is_named(cell, tmp_path):
     ) in process.log
 
 
+def test_a_recorder_ends_soon_though_its_neighbours_stand_still(cell, tmp_path):
+    process = recorder(cell, tmp_path)
+    twin, analyzer = (
+        cell.start(node, robot='ur5') for node in ('forward_kinematics_twin', 'deviation_analyzer')
+    )
+    listened(cell, '/twin/tool_pose', 2)
+    heard_of(cell, process)
+    twin.signal(signal.SIGSTOP)
+    analyzer.signal(signal.SIGSTOP)
+    begun = time.monotonic()
+    try:
+        assert finish(cell, process) == 0
+        assert time.monotonic() - begun < 3.0
+    finally:
+        twin.signal(signal.SIGCONT)
+        analyzer.signal(signal.SIGCONT)
+    assert '/forward_kinematics_twin has not told what it sent' in process.log
+    assert bag_info(tmp_path / 'bag') is not None
+
+
 def test_a_publisher_that_ended_before_has_told_what_it_sent(cell, tmp_path):
     process = recorder(cell, tmp_path)
     speaker = cell.add(Speaker)
@@ -258,7 +278,7 @@ def test_a_played_bag_is_recorded_whole_and_counted(cell, tmp_path):
     process = recorder(cell, tmp_path)
     bag = Path(__file__).parents[4] / 'bags/elbow_play'
     words = [str(bag), '--rate', '8', '--wait', '60', '--topics', '/joint_states', '/deviation']
-    player = cell.start([sys.executable, '-m', 'weld_twin_nodes', 'play', *words])
+    player = cell.start([sys.executable, '-m', 'weld_twin_nodes', 'bag', 'play', *words])
     cell.wait(lambda: player.code is not None, 'the bag to be played', limit=120.0)
     assert finish(cell, process) == 0
     told = provenance(tmp_path / 'bag')['completeness']
@@ -271,7 +291,7 @@ def test_a_played_bag_is_recorded_whole_and_counted(cell, tmp_path):
 def test_a_player_says_whom_nobody_listens_to(cell):
     bag = Path(__file__).parents[4] / 'bags/elbow_play'
     words = [str(bag), '--rate', '100', '--wait', '0.5', '--topics', '/deviation']
-    player = cell.start([sys.executable, '-m', 'weld_twin_nodes', 'play', *words])
+    player = cell.start([sys.executable, '-m', 'weld_twin_nodes', 'bag', 'play', *words])
     assert player.end(60.0) == 0
     assert 'waited 0.5 s for 1 subscribers of /deviation; playing without' in player.log
 

@@ -107,7 +107,7 @@ def test_the_policy_speaks_of_the_nodes_there_are_and_denies_nothing_by_name():
 
 
 def test_the_file_is_what_the_command_prints(weld_twin):
-    code, printed, _ = weld_twin('policy')
+    code, printed, _ = weld_twin('export', 'policy')
     assert code == 0
     assert printed == POLICY.read_text(encoding='utf-8')
 
@@ -115,6 +115,7 @@ def test_the_file_is_what_the_command_prints(weld_twin):
 def test_a_namespace_and_remaps_change_the_names_they_mean(tmp_path, weld_twin):
     out = tmp_path / 'left.xml'
     words = [
+        'export',
         'policy',
         '--namespace',
         '/left',

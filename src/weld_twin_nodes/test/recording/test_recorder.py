@@ -78,7 +78,7 @@ def test_a_recorder_on_a_full_disk_ends_with_a_sentence_and_loses_nothing_flushe
     assert recorder.end() == 2
     cell.processes.remove(recorder)
     assert 'cannot be written' in recorder.log
-    assert f"'weld-twin recover {tmp_path}/bag'" in recorder.log
+    assert f"'weld-twin bag recover {tmp_path}/bag'" in recorder.log
     assert 'Traceback' not in recorder.log
     recover(tmp_path / 'bag')
     found = numbers(tmp_path / 'bag')

@@ -32,9 +32,9 @@ def cut_short(request, tmp_path):
 
 
 def test_a_reader_leads_to_the_command(cut_short, weld_twin):
-    said = weld_twin('info', cut_short)
+    said = weld_twin('bag', cut_short)
     assert said.code == 2
-    assert f"'weld-twin recover {cut_short}'" in said.err
+    assert f"'weld-twin bag recover {cut_short}'" in said.err
 
 
 def test_the_command_that_is_printed_for_a_full_disk_works(cut_short, weld_twin, monkeypatch):
@@ -46,7 +46,7 @@ def test_the_command_that_is_printed_for_a_full_disk_works(cut_short, weld_twin,
     full = room._replace(used=room.total, free=0)
     usage = lambda place: full if Path(place) == cut_short.parent else room  # noqa: E731
     monkeypatch.setattr(shutil, 'disk_usage', usage)
-    said = weld_twin('info', cut_short)
+    said = weld_twin('bag', cut_short)
     printed = re.search(r"'weld-twin (recover .*)'", said.err)
     assert printed is not None
     assert weld_twin(*shlex.split(printed[1])).code == 0
@@ -57,17 +57,17 @@ def test_the_command_that_is_printed_for_a_full_disk_works(cut_short, weld_twin,
 def test_a_recording_that_was_cut_short_and_renamed_is_found_and_recovered(cut_short, weld_twin):
     renamed = cut_short.with_name('tuesday')
     cut_short.with_name('bag.unfinished').rename(renamed)
-    said = weld_twin('info', renamed)
+    said = weld_twin('bag', renamed)
     assert said.code == 2
-    assert f"'weld-twin recover {renamed}'" in said.err
-    assert weld_twin('recover', renamed).code == 0
+    assert f"'weld-twin bag recover {renamed}'" in said.err
+    assert weld_twin('bag', 'recover', renamed).code == 0
     with BagReader(cut_short.with_name('tuesday_recovered')) as bag:
         assert len(list(bag.messages([JOINT_STATES.name]))) == FLUSHED
 
 
 def test_the_command_says_what_it_found_and_writes_where_it_is_told(cut_short, weld_twin):
     there = cut_short.parent / 'there'
-    said = weld_twin('recover', cut_short, '--out', there)
+    said = weld_twin('bag', 'recover', cut_short, '--out', there)
     assert said.code == 0
     with BagReader(there) as bag:
         count = len(list(bag.messages([JOINT_STATES.name])))
@@ -75,6 +75,6 @@ def test_the_command_says_what_it_found_and_writes_where_it_is_told(cut_short, w
     assert f'{count}  /joint_states' in said.out
     assert 'the original stays' in said.out
     assert not cut_short.exists()
-    again = weld_twin('recover', cut_short, '--out', there)
+    again = weld_twin('bag', 'recover', cut_short, '--out', there)
     assert again.code == 2
     assert 'is not overwritten' in again.err

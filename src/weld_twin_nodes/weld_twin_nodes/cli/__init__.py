@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The command line: one module of `commands` per subcommand."""
+"""The command line: one module or folder of `commands` for each command."""
 
 from .main import main
 

@@ -11,23 +11,47 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from types import ModuleType
 
 from ..offline.environment import THREADS
-from .options import add_command, short_help
+from .options import add_command
+from .parsing import Parser, short_help
 
 USAGE_ERROR = 2
 """Exit code where the user can do something about it."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it: 128 and the number of the signal."""
-FIRST = ('diagnose', 'demo', 'import', 'info', 'predict', 'compensate', 'export')
-"""What people come for, in the order of a first day; the list of commands begins with it."""
-PAGES = (
-    *('correct-program', 'demo', 'diagnose', 'fleet', 'history', 'investigate', 'iso9283'),
-    *('sensitivity', 'serve', 'verify'),
-)
-"""What weld_twin_report brings, a file each; named here to say so where it is not installed."""
-LAB = ('benchmark', 'blind', 'campaign', 'real-robots', 'lab')
-"""The same of weld_twin_lab."""
+NODES, REPORT = 'weld_twin_nodes.cli.commands', 'weld_twin_report.cli.commands'
+COMMANDS = {
+    **dict.fromkeys(('diagnose', 'investigate', 'correct', 'verify'), REPORT),
+    **dict.fromkeys(('simulate', 'detect', 'import', 'bag', 'export'), NODES),
+    **dict.fromkeys(('history', 'iso9283', 'sensitivity', 'serve', 'demo'), REPORT),
+    'lab': 'weld_twin_lab.cli',
+}
+"""Commands in the order of the help, and where each lies: a file, or a folder with a file a job."""
+BEFORE = ('detect',)
+"""Commands that make what another takes; the help of that one tells of them."""
+BRINGS = {'weld_twin_report': 'writes pages', 'weld_twin_lab': 'is a proof'}
+"""What the commands of a package do, for somebody who has not installed it."""
+OLD = {
+    'info': 'bag info',
+    'recover': 'bag recover',
+    'play': 'bag play',
+    'predict': 'simulate',
+    'compensate': 'correct',
+    'correct-program': 'correct',
+    'export-program': 'export program',
+    'policy': 'export policy',
+    'schema': 'export schema',
+    'plan-measurement': 'investigate',
+    'fleet': 'history',
+    'blind': 'lab blind',
+    'benchmark': 'lab benchmark',
+    'campaign': 'lab campaign',
+    'real-robots': 'lab real-robots',
+}
+"""Old spellings of commands, and what they are called now; they work for one release more."""
+HELP = ('-h', '--help', '--help-all')
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -38,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     -------
     int
         0 on success, 2 on a usage or input error, 3 where a diagnosis found data or set-up
-        wrong, 130 when interrupted.
+        wrong, 4 where a correction did not keep its promise, 130 when interrupted.
 
     """
     if argv is None:  # as a program: what it started ends with it, and nothing is loaded yet
@@ -47,8 +71,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             os.environ.setdefault(name, '1')
     words = sys.argv[1:] if argv is None else list(argv)
     try:
-        args = _parser(words).parse_args(words)
-        return int(args.run(args))
+        args = parser_of(words).parse_args(renamed(words))
+        code = int(args.run(args))
+        _say_new_name(words)
+        return code
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:
@@ -67,60 +93,102 @@ def _end(*_: object) -> None:
     raise KeyboardInterrupt
 
 
-def _commands() -> dict[str, str]:
-    """Return the module of every subcommand, a file each: those of the product, then the proofs."""
-    own = _modules('weld_twin_nodes', 'cli.commands')
-    own |= _modules('weld_twin_report', 'cli.commands')
-    return {
-        **{name: own[name] for name in FIRST if name in own},
-        **dict(sorted((name, own[name]) for name in own.keys() - set(FIRST))),
-        **dict(sorted(_modules('weld_twin_lab', 'cli').items())),
-    }
+def _command(words: Sequence[str]) -> str:
+    """Return the first word that is no option: the command as it was typed."""
+    return next((word for word in words if not word.startswith('-')), '')
 
 
-def _modules(package: str, folder: str) -> dict[str, str]:
-    """Return the modules in a folder of a package by their subcommand; none if it is not installed."""
-    found = find_spec(package)
-    if found is None or not found.submodule_search_locations:
-        return {}
-    names = os.listdir(os.path.join(found.submodule_search_locations[0], *folder.split('.')))
-    stems = [name[:-3] for name in names if name.endswith('.py') and name[0] != '_']
-    return {stem.rstrip('_').replace('_', '-'): f'{package}.{folder}.{stem}' for stem in stems}
+def renamed(words: Sequence[str]) -> list[str]:
+    """Return the words with the command as it is called now, and with the job that is meant."""
+    typed = _command(words)
+    if not typed:
+        return list(words)
+    at = list(words).index(typed)
+    out = [*words[:at], *OLD.get(typed, typed).split(), *words[at + 1 :]]
+    module = _module(out[at]) if out[at] in COMMANDS and len(out) > at + 1 else None
+    usual = getattr(module, 'USUAL', None)
+    if usual and out[at + 1] not in (*HELP, *_jobs(module)):
+        out.insert(at + 1, usual)
+    return out
 
 
-def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
-    """Return the parser; only the subcommand in use is loaded with its options."""
-    parser = argparse.ArgumentParser(
+def _say_new_name(words: Sequence[str]) -> None:
+    """Say on stderr what an old spelling is called now."""
+    typed = _command(words)
+    if typed in OLD:
+        print(
+            f"weld-twin: '{typed}' is 'weld-twin {OLD[typed]}' now; the old name goes with the next "
+            'release',
+            file=sys.stderr,
+        )
+
+
+def parser_of(words: Sequence[str] = ()) -> Parser:
+    """
+    Return the parser; only the command in use is loaded with its options.
+
+    Parameters
+    ----------
+    words : sequence of str
+        As they were typed, old spellings included.
+
+    """
+    parser = Parser(
         prog='weld-twin',
         description="Digital twin of a welding robot's positional accuracy.",
         epilog='weld-twin COMMAND --help tells more. Angles are rad, lengths m unless said.',
     )
-    parser.add_argument('--version', action='version', version=_version())
-    subparsers = parser.add_subparsers(required=True, metavar='COMMAND')
-    commands = _commands()
-    chosen = next((word for word in words if not word.startswith('-')), None)
-    for kind, package, brought in (
-        ('writes pages', 'weld_twin_report', PAGES),
-        ('is a proof', 'weld_twin_lab', LAB),
-    ):
-        if chosen in brought and chosen not in commands:
-            parser.error(
-                f"'{chosen}' {kind}; it needs the package {package}, which is not installed"
-            )
-    if chosen in commands:
-        module = import_module(commands[chosen])
-        add_command(subparsers, chosen, module).set_defaults(run=module.run)
-        return parser
-    for name, module_name in commands.items():
-        subparsers.add_parser(name, help=short_help(_docstring(module_name)))
+    parser.add_argument('--version', action='version', version=_version(), help=argparse.SUPPRESS)
+    subparsers = parser.add_subparsers(required=True, metavar='COMMAND', title='commands')
+    typed = _command(words)
+    chosen = OLD.get(typed, typed).partition(' ')[0]
+    package = COMMANDS.get(chosen, '').partition('.')[0]
+    if package and not _installed(package):
+        parser.error(
+            f"'{typed}' {BRINGS[package]}; it needs the package {package}, which is not installed"
+        )
+    for name in [chosen] if package else [name for name in COMMANDS if name not in BEFORE]:
+        if _installed(COMMANDS[name].partition('.')[0]):
+            _add(subparsers, name, chosen)
     return parser
 
 
-def _docstring(module_name: str) -> str:
-    """Return the docstring of a module from its code, which is not run: a list of commands."""
-    loader = getattr(find_spec(module_name), 'loader', None)
-    code = loader.get_code(module_name) if loader else None
-    return str(code.co_consts[0]) if code else ''
+def _add(subparsers: argparse._SubParsersAction[Parser], name: str, chosen: str) -> None:
+    """Add a command; those that are not in use are listed only."""
+    if name != chosen:
+        spec = find_spec(_path(name))
+        code = getattr(spec and spec.loader, 'get_code', lambda _: None)(_path(name))
+        subparsers.add_parser(name, help=short_help(str(code.co_consts[0]) if code else ''))
+        return
+    module = _module(name)
+    jobs = _jobs(module)
+    if not jobs:
+        add_command(subparsers, name, module).set_defaults(run=module.run)
+        return
+    text = (module.__doc__ or '').strip()
+    parser = subparsers.add_parser(name, help=short_help(text), description=text)
+    parser.example = module.EXAMPLE
+    places = parser.add_subparsers(required=True, metavar='JOB', title='jobs')
+    for job in jobs:
+        made = import_module(f'{module.__name__}.{job}')
+        add_command(places, job, made).set_defaults(run=made.run)
+
+
+def _path(name: str) -> str:
+    return f'{COMMANDS[name]}.{name}{"_" * (name == "import")}'
+
+
+def _module(name: str) -> ModuleType:
+    return import_module(_path(name))
+
+
+def _jobs(module: ModuleType | None) -> list[str]:
+    """Return the jobs of a command that is a folder, none of another."""
+    return list(getattr(module, 'JOBS', ()))
+
+
+def _installed(package: str) -> bool:
+    return find_spec(package) is not None
 
 
 def _version() -> str:

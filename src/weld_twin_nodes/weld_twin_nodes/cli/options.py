@@ -6,13 +6,17 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from .parsing import Adder, Parser, short_help
+
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.cameras import Camera, Target
     from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.messages.topics import TopicNames
     from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
@@ -24,30 +28,23 @@ PARTS = {
 }
 """What the topics may hold besides the usual; after a colon, the part that is meant."""
 TOPIC_OPTIONS = ('joint', 'pose', 'point', 'wrench', 'temperature')
+TOPICS = (
+    *('namespace', 'joint_prefix', 'joint_map', 'measured_inverse', 'use_effort'),
+    *('camera', 'target'),
+    *(f'{name}_topic' for name in TOPIC_OPTIONS),
+)
+"""Attributes of the options of `add_topics`."""
 
 
 def add_robot(parser: argparse.ArgumentParser, *, required: bool = True) -> None:
     """Add the options that name a robot."""
-    parser.add_argument(
-        '--robot',
-        required=required,
-        type=_robot_file,
-        metavar='R',
-        help='a bundled robot or one of your own (weld-twin info --robots lists them), a robot file '
-        'or a URDF',
-    )
-    parser.add_argument(
-        '--base-link',
-        metavar='LINK',
-        help="first link of a chain in a URDF; the controller's base is there too",
-    )
-    parser.add_argument('--tip-link', metavar='LINK', help='last link of a chain in a URDF')
-    parser.add_argument(
-        '--flange-link',
-        metavar='LINK',
-        help='link of a URDF where the controller has its flange; left out, tool0, flange or the '
-        'last one that moves, as the file has it',
-    )
+    add = Adder(parser)
+    text = "a robot of 'weld-twin bag --robots', a robot file or a URDF"
+    add('--robot', 'R', text, required=required, type=_robot_file)
+    add = Adder(parser, 'chain of a URDF', rare=True)
+    add('--base-link', 'LINK', "first link of the chain; the controller's base is there too")
+    add('--tip-link', 'LINK', 'last link of the chain')
+    add('--flange-link', 'LINK', "the controller's flange (default: tool0, flange or as it moves)")
 
 
 def _robot_file(spec: str) -> str:
@@ -95,40 +92,48 @@ def say_doubts(twin: Twin, path: str) -> None:
 
 def add_topics(parser: argparse.ArgumentParser) -> None:
     """Add the options that say what the topics of a bag are called."""
-    group = parser.add_argument_group('topics, for bags recorded elsewhere')
-    group.add_argument(
-        '--namespace',
-        default='',
-        metavar='NS',
-        help='namespace of the robot; left stands for /left/...',
-    )
+    add = Adder(parser, 'topics, for bags recorded elsewhere', rare=True)
+    add('--namespace', 'NS', 'namespace of the robot; left stands for /left/...', default='')
     for name in TOPIC_OPTIONS:
-        group.add_argument(f'--{name}-topic', metavar='TOPIC', help=PARTS.get(name))
-    group.add_argument(
-        '--joint-prefix',
-        default='',
-        metavar='TEXT',
-        help="what the joint states put before the robot's joint names (default: any one prefix)",
-    )
-    group.add_argument(
-        '--joint-map',
-        nargs='+',
-        default=[],
-        metavar='JOINT=NAME',
-        help='joints of the robot and what the joint states call them, such as joint_1=A1',
-    )
-    group.add_argument(
-        '--measured-inverse',
-        action='store_true',
-        help='the measured poses are those of something fixed seen from the arm, such as of a board '
-        'by a camera on the arm; they are inverted',
-    )
-    group.add_argument(
-        '--use-effort',
-        action='store_true',
-        help='springs of joints take JointState.effort [N m] for their load, in the place of the '
-        "model's statics; a model that was learned so has it read without this",
-    )
+        add(f'--{name}-topic', 'TOPIC', PARTS.get(name, f'of the {name}'))
+    text = "what the joint states put before the robot's joint names (default: any one prefix)"
+    add('--joint-prefix', 'TEXT', text, default='')
+    text = 'joints of the robot and what the joint states call them, such as joint_1=A1'
+    add('--joint-map', 'JOINT=NAME', text, nargs='+', default=[])
+    text = 'the poses are those of something fixed seen from the arm, as of a board by a camera'
+    add('--measured-inverse', text)
+    text = "springs of joints take JointState.effort [N m] for their load, not the model's statics"
+    add('--use-effort', text)
+    add_cameras(parser)
+
+
+def add_cameras(parser: argparse.ArgumentParser) -> None:
+    """Add the options that describe cameras and what they look at."""
+    add = Adder(parser, 'cameras', rare=True)
+    text = 'camera_info of a camera, with mount: tool or world; once for each'
+    add('--camera', 'NAME=FILE', text, many=True)
+    text = 'points of a target or numbers of a board [m], with mount: tool or world'
+    add('--target', 'NAME=FILE', text, many=True)
+
+
+def cameras_of(args: argparse.Namespace) -> tuple[tuple[Camera, ...], tuple[Target, ...]]:
+    """Return the cameras and targets that the options describe."""
+    from weld_twin_msgs_py.tables import read_camera, read_target
+
+    cameras = tuple(read_camera(*_named(text, '--camera')) for text in args.camera)
+    # What a camera on the tool looks at stands still, where nothing else is said.
+    mounts = {camera.mount for camera in cameras}
+    other = 'world' if mounts == {'tool'} else 'tool'
+    return cameras, tuple(read_target(*_named(text, '--target'), other) for text in args.target)
+
+
+def _named(text: str, option: str) -> tuple[str, str]:
+    from weld_twin_core.errors import DataError
+
+    name, mark, path = text.partition('=')
+    if not (name and mark and path):
+        raise DataError(f"{option} takes NAME=FILE, got '{text}'")
+    return name, path
 
 
 def topics_of(args: argparse.Namespace) -> TopicNames:
@@ -148,8 +153,11 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
             raise DataError(f"--joint-map takes JOINT=NAME, got '{text}'")
         pairs.append((joint, name))
     names = replace(TopicNames.within(args.namespace), **named)
+    cameras, targets = cameras_of(args)
     return replace(
         names,
+        cameras=cameras,
+        targets=targets,
         joint_prefix=args.joint_prefix,
         joint_map=tuple(pairs),
         measured_inverse=args.measured_inverse,
@@ -167,33 +175,22 @@ def _learned_by_effort(args: argparse.Namespace) -> bool:
 
 def add_pool(parser: argparse.ArgumentParser) -> None:
     """Add the options that say where tasks run."""
-    parser.add_argument(
-        '--workers', type=int, default=0, metavar='N', help='processes (default: all cores)'
-    )
-    parser.add_argument(
-        '--scheduler',
-        default='',
-        metavar='ADDRESS',
-        help='Dask cluster to run on instead; it must see the same directories',
-    )
+    add = Adder(parser)
+    add('--workers', 'N', 'processes (default: all cores)', type=int, default=0)
+    text = 'Dask cluster to run on instead; it must see the same directories'
+    add('--scheduler', 'ADDRESS', text, default='', rare=True)
 
 
 def add_output(parser: argparse.ArgumentParser, text: str, default: str | None = None) -> None:
     """Add the options of a command that writes a folder of files."""
-    parser.add_argument(
-        '--out', required=default is None, default=default, metavar='DIR', help=text
-    )
+    Adder(parser)('--out', 'DIR', text, required=default is None, default=default)
     add_force(parser)
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
     """Add the option that settles what is in the way."""
-    parser.add_argument(
-        '--force',
-        action='store_true',
-        help='write also where files are in the way that weld-twin has not written, or that were '
-        'changed since; they are kept as NAME.kept-1',
-    )
+    text = 'write also where files of yours are in the way; they are kept as NAME.kept-1'
+    Adder(parser, rare=True)('--force', text)
 
 
 def output(args: argparse.Namespace, mark: str) -> AbstractContextManager[Path]:
@@ -205,7 +202,7 @@ def output(args: argparse.Namespace, mark: str) -> AbstractContextManager[Path]:
 
 def add_file_output(parser: argparse.ArgumentParser, text: str, *, required: bool = False) -> None:
     """Add the options of a command that writes one file."""
-    parser.add_argument('--out', required=required, metavar='FILE', help=text)
+    Adder(parser)('--out', 'FILE', text, required=required)
     add_force(parser)
 
 
@@ -218,15 +215,40 @@ def output_file(args: argparse.Namespace) -> AbstractContextManager[Path]:
 
 def add_bag_output(parser: argparse.ArgumentParser) -> None:
     """Add the options of a command that writes a bag."""
-    parser.add_argument(
-        '--out', required=True, metavar='BAG', help='bag to write; it must not exist yet'
-    )
-    parser.add_argument('--storage', choices=('mcap', 'sqlite3'), default='mcap')
+    Adder(parser)('--out', 'BAG', 'bag to write; it must not exist yet', required=True)
+    add_storage(parser)
 
 
-def short_help(docstring: str) -> str:
-    """Return the first line of a docstring, as a list of subcommands shows it."""
-    return docstring.strip().partition('\n')[0].replace('%', '%%')
+def add_storage(parser: argparse.ArgumentParser) -> None:
+    """Add the option that says in which form a bag is written."""
+    text = 'form of the bag: mcap or sqlite3 (default: mcap)'
+    Adder(parser, rare=True)('--storage', text, choices=('mcap', 'sqlite3'), default='mcap')
+
+
+def refuse(args: argparse.Namespace, names: Sequence[str], why: str) -> None:
+    """
+    Refuse options that do nothing with what else was given.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+    names : sequence of str
+        Attributes of options that are None, empty or False unless given.
+    why : str
+        The rest of the sentence that begins with the option.
+
+    Raises
+    ------
+    DataError
+        One of them was given.
+
+    """
+    from weld_twin_core.errors import DataError
+
+    for name in names:
+        value = getattr(args, name)
+        if value or (value is not None and not isinstance(value, bool | str | list | tuple)):
+            raise DataError(f'--{name.replace("_", "-")} {why}')
 
 
 def add_command(subparsers: Any, name: str, module: ModuleType) -> argparse.ArgumentParser:
@@ -239,15 +261,15 @@ def add_command(subparsers: Any, name: str, module: ModuleType) -> argparse.Argu
     name : str
         As the user types it.
     module : module
-        With ``add_arguments(parser)``; the first line of its docstring is the short help.
+        With ``add_arguments(parser)`` and maybe ``EXAMPLE``, a whole command line; the first line
+        of its docstring is the short help.
 
     """
     text = (module.__doc__ or '').strip()
     parser: argparse.ArgumentParser = subparsers.add_parser(
-        name,
-        help=short_help(text),
-        description=text,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        name, help=short_help(text), description=text
     )
+    if isinstance(parser, Parser):
+        parser.example = getattr(module, 'EXAMPLE', '')
     module.add_arguments(parser)
     return parser

@@ -9,6 +9,8 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from .parsing import Adder
+
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
     from weld_twin_core.arrays import Array
@@ -19,26 +21,33 @@ _UNITS = {'mm': 1e-3, 'um': 1e-6, 'm': 1.0, 'deg': 0.017453292519943295, 'rad': 
 
 def add_program_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that say how the numbers of a program are meant."""
-    parser.add_argument(
-        '--tool',
-        action='append',
-        default=[],
-        metavar='NAME=X,Y,Z,...',
-        help='numbers of a tool that the program only names, as the controller shows them '
-        '(mm and degrees, ABB with a quaternion, Universal Robots in m and rad)',
-    )
-    parser.add_argument(
-        '--base',
-        action='append',
-        default=[],
-        metavar='NAME=X,Y,Z,...',
-        help='the same of a base (user frame, work object)',
-    )
-    parser.add_argument(
-        '--pulses-per-degree',
-        metavar='N,N,...',
-        help='of every axis of a Yaskawa arm whose points are in pulses',
-    )
+    add = Adder(parser, 'how the numbers of a program are meant', rare=True)
+    text = 'numbers of a tool that the program only names, as the controller shows them (mm and '
+    text += 'degrees, ABB with a quaternion, Universal Robots in m and rad)'
+    add('--tool', 'NAME=X,Y,Z,...', text, many=True)
+    add('--base', 'NAME=X,Y,Z,...', 'the same of a base (user frame, work object)', many=True)
+    text = 'of every axis of a Yaskawa arm whose points are in pulses'
+    add('--pulses-per-degree', 'N,N,...', text)
+
+
+def add_trigger(parser: argparse.ArgumentParser) -> None:
+    """Add the option that names the output by which a program tells the instrument to measure."""
+    text = 'digital output that tells the instrument when to measure (default: {default})'
+    Adder(parser, rare=True)('--trigger', 'N', text, type=int, default=1)
+
+
+def check_program(args: argparse.Namespace) -> None:
+    """Refuse a language that there is not, and an output that no controller has."""
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.programs.writing import WRITERS
+
+    if args.controller not in WRITERS:
+        raise DataError(
+            f'--controller: there is no language {args.controller!r}; known are '
+            + ', '.join(WRITERS)
+        )
+    if not 0 <= args.trigger <= 9999:
+        raise DataError('--trigger must be the number of an output')
 
 
 def context_of(args: argparse.Namespace, robot: Robot, language: str) -> Context:

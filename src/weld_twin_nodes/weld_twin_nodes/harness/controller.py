@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,8 @@ class Controller(Node):
         Where the arm stands.
     pace : float
         How many times as fast as the goals say it runs them.
+    beside : callable, optional
+        Times [s] of a goal that it visits beside those of its beat.
 
     Attributes
     ----------
@@ -53,13 +55,15 @@ class Controller(Node):
         joint_names: Sequence[str],
         q: Array,
         pace: float = 1.0,
+        beside: Callable[[Goal], Array] | None = None,
         name: str = 'joint_trajectory_controller',
         **kwargs: Any,
     ) -> None:
         from control_msgs.action import FollowJointTrajectory
 
         super().__init__(name, **kwargs)
-        self._kind, self._names, self._pace = FollowJointTrajectory, tuple(joint_names), pace
+        self._kind, self._names = FollowJointTrajectory, tuple(joint_names)
+        self._pace, self._beside = pace, beside
         self.q = np.array(q, dtype=np.float64)
         self.goals: list[Any] = []
         self.track: list[tuple[int, float]] = []
@@ -68,7 +72,7 @@ class Controller(Node):
         self._states = self.create_publisher(
             JOINT_STATES.message_class(), JOINT_STATES.relative, JOINT_STATES.offered.to_rclpy()
         )
-        self._now: tuple[Any, Goal, int, Future] | None = None
+        self._now: tuple[Any, Goal, list[float], Future] | None = None
         self._timer = self.create_timer(TICK, self._look)
         self._server = ActionServer(
             self,
@@ -109,7 +113,7 @@ class Controller(Node):
         if goal.t[0] > 0.0:
             rates = [None if r is None else np.vstack([np.zeros_like(r[:1]), r]) for r in goal[2:]]
             goal = Goal(np.append(0.0, goal.t), np.vstack([self.q, goal.q]), *rates)
-        self._now, self.track = (handle, goal, 0, done), []
+        self._now, self.track = (handle, goal, self._visited(goal), done), []
         end = await done
         if end == 'done':
             handle.succeed()
@@ -120,22 +124,31 @@ class Controller(Node):
             handle.abort()
         return result
 
+    def _visited(self, goal: Goal) -> list[float]:
+        """
+        Return the times [s] of a goal at which the arm is told to be, the last one first.
+
+        By looks, not by the clock: one that comes late must not leave out where a joint turns.
+        """
+        end = float(goal.t[-1])
+        beat = np.append(np.arange(0.0, end, TICK * self._pace), end)
+        more = np.zeros(0) if self._beside is None else self._beside(goal)
+        return np.union1d(beat, more)[::-1].tolist()
+
     def _look(self) -> None:
         """Go on, and tell where the arm is."""
         if self._now is None:
             self._tell()
             return
-        handle, goal, looks, done = self._now
-        # By looks, not by the clock: one that comes late must not leave out where a joint turns.
-        t = min(looks * TICK * self._pace, float(goal.t[-1]))
-        self._now = (handle, goal, looks + 1, done)
+        handle, goal, left, done = self._now
+        t = left.pop()
         way = course(goal, np.array([t]))
         self.q = way.q[0]
         self.track.append((self._tell(way.qd[0]), t))
         feedback = self._kind.Feedback(joint_names=list(self._names))
         feedback.desired.positions = self.q.tolist()
         handle.publish_feedback(feedback)
-        if handle.is_cancel_requested or t >= goal.t[-1]:
+        if handle.is_cancel_requested or not left:
             self._now = None
             done.set_result('cancelled' if handle.is_cancel_requested else 'done')
 

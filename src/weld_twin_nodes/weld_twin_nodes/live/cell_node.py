@@ -54,10 +54,11 @@ LAST_WORDS = 8.0
 Seconds an ending node waits in all until its subscribers have everything. Acknowledgements take
 milliseconds; what was lost on the way is sent again with Fast DDS's heartbeat, every 3 s, and on a
 busy machine the first of them may be lost too. Where a subscriber does not tell of itself it is
-`ALIVE` alone: one that stands still would keep the node, and `ros2 launch` ends by force what takes 5 s.
+`ALIVE` alone, counted from when the node was told to end: one that stands still would keep the node,
+and `ros2 launch` ends by force what takes 5 s.
 """
 ACKNOWLEDGED = 0.2
-"""Seconds between two looks at who still tells of itself."""
+"""Seconds between two looks at who still tells of itself, and that everybody is given."""
 FORWARDS = 10.0
 """Seconds of a jump of the clock forwards that is told: a bag that is played jumps by its pauses."""
 KNOWN = 2.0
@@ -82,6 +83,7 @@ class CellNode(Node):
         self.refused = 0
         self.finished = False
         self.failure: TwinError | None = None
+        self.ending_since: float | None = None
         self.frames: Any = None
         """What the node knows of `/tf`, if it listens to it; see `tf_frames`."""
         self._warned: dict[str, float] = {}
@@ -138,7 +140,13 @@ class CellNode(Node):
 
     def end(self) -> None:
         """Come to an end as by Ctrl-C: at once, unless there is something to complete."""
-        self.finished = True
+        self.ending_since = time.monotonic()
+        if self.complete():
+            self.finished = True
+
+    def complete(self) -> bool:
+        """Return whether there is nothing to complete; else begin with it, and be finished later."""
+        return True
 
     def destroy_node(self) -> None:
         """Tell what was sent in all, and stay until everybody has it."""
@@ -162,11 +170,11 @@ class CellNode(Node):
         """Wait until all who take an output have all of it, or stand still; and say so."""
         while True:
             live = readers(self, output.topic) <= self.neighbours.alive()
-            left = begun + (LAST_WORDS if live else ALIVE) - time.monotonic()
-            slice_s = min(max(left, READY_EVERY), ACKNOWLEDGED)
-            if output.wait_for_all_acked(Duration(seconds=slice_s)):
+            asked = begun if self.ending_since is None else self.ending_since
+            end = begun + LAST_WORDS if live else asked + ALIVE
+            if output.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED)):
                 return
-            if left <= 0.0:
+            if time.monotonic() > end:
                 break
         self.get_logger().warning(
             f'{output.topic}: a subscriber has not taken in all that was sent to it; this node ends '
@@ -287,12 +295,16 @@ class CellNode(Node):
         """Return what takes the type and the bytes of a message, whatever they are."""
         read, turn = {usual: reader(usual)}, self._plain_turn(topic)
 
+        counted = topic.stamped and topic.steady
+
         def use(message: Any) -> None:
-            if topic.stamped and topic.steady:
-                at = message.header.stamp
-                state.stamped(at.sec * 1_000_000_000 + at.nanosec)
-            callback(message)
-            state.used = state.last
+            try:
+                callback(message)
+                state.used = state.last
+            finally:  # whoever waits for the answer does not wait for the books
+                if counted:
+                    at = message.header.stamp
+                    state.stamped(at.sec * 1_000_000_000 + at.nanosec)
 
         def guarded(kind: str, data: bytes) -> None:
             state.arrived()

@@ -8,7 +8,8 @@ import json
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future as Done
+from concurrent.futures import ThreadPoolExecutor, wait
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
@@ -75,6 +76,8 @@ LOOK_EVERY = 0.5
 """Seconds between two looks at whether the model is to be used still."""
 LATE = 0.5
 """A goal that should have begun so long ago [s] begins in the middle, and its correction with a step."""
+WRITTEN = 1.0
+"""Seconds an ending node gives its disk to take the audit."""
 WITHDRAWN = 'withdrawn'
 """Under which the node keeps why it corrects nothing."""
 
@@ -165,13 +168,15 @@ class Compensator(ManagedNode):
         self._intake = Intake(self.robot, joint_names=self.joint_names, mend=True)
         self._arm = ArmState()
         self._around: tuple[Any, float | None] = (None, None)
+        self._streamed = self._around
         self._model: LoadedModel | None = None
         self._active = False
         self._told, self._looked_at, self._outdated = '', -np.inf, ''
         self._watch = Supervision()
         self._listened, self._most_age = False, self.setting('max_age')
         self._stream: PoseStream | None = None
-        self._beside, self._goals = (ThreadPoolExecutor(1) for _ in range(2))
+        self._beside, self._goals, self._books = (ThreadPoolExecutor(1) for _ in range(3))
+        self._written: Done[None] | None = None
         self._out = self.offer(POSE_OUT)
         self._correction = self.offer(CORRECTION, awaited=False)
         self._audit = self.offer(AUDIT, awaited=False)
@@ -229,8 +234,10 @@ class Compensator(ManagedNode):
         self._stream = None
 
     def destroy_node(self) -> None:
-        """End what is worked out beside."""
-        for pool in (self._beside, self._goals):
+        """End what is worked out beside; what became of goals is written before."""
+        if self._written is not None:
+            wait([self._written], WRITTEN)
+        for pool in (self._beside, self._goals, self._books):
             pool.shutdown(wait=False, cancel_futures=True)
         if self._relay is not None:
             self._relay.close()
@@ -303,7 +310,16 @@ class Compensator(ManagedNode):
         self._arm.take(taken[0][1], time.monotonic())
 
     def _on_deviation(self, message: Any) -> None:
-        self._watch.take(from_messages.vector3(message), time.monotonic())
+        now = time.monotonic()
+        arm = self._arm.where(now, self._most_age)
+        if (
+            arm is not None
+            and self._model is not None
+            and not self._model.read.recorded(arm[None])[0]
+        ):
+            self._watch.pass_over(now)
+            return
+        self._watch.take(from_messages.vector3(message), now)
 
     def _withdrawn(self) -> str:
         """Return why nothing is to be corrected now; empty where there is nothing."""
@@ -314,6 +330,8 @@ class Compensator(ManagedNode):
     def _look(self) -> None:
         """Look at the model file, and tell that the model is withdrawn, or is not any more."""
         self._listened = self._correction.get_subscription_count() > 0
+        if self._stream is not None and self._around is not self._streamed:
+            self._stream.renew(self._pose_correction())
         if self._model is not None:
             self._outdated = self._model.outdated(self.setting('max_model_age'))
         why = self._withdrawn() if self._active else ''
@@ -346,8 +364,13 @@ class Compensator(ManagedNode):
 
     # Poses -----------------------------------------------------------------------------------
 
+    def _pose_correction(self) -> PoseCorrection:
+        """Return what corrects poses under the present load and temperature."""
+        self._streamed = self._around
+        return PoseCorrection(self._present(), self.robot.T_flange_tool)
+
     def _renew_stream(self) -> None:
-        correction = PoseCorrection(self._present(), self.robot.T_flange_tool)
+        correction = self._pose_correction()
         for name in correction.left_out:
             self.remark(f'{name} is not corrected in poses, which do not tell what comes next')
         self._stream = PoseStream(
@@ -365,16 +388,26 @@ class Compensator(ManagedNode):
 
     def _on_pose(self, message: Any) -> None:
         self._frame.take(message.header.frame_id)
+        stream = self._stream
+        if stream is None:
+            self._on_pose_inactive(message)
+        else:
+            self._on_pose_for(stream, message)
         self.remark(self._frame.remark)
+
+    def _on_pose_inactive(self, message: Any) -> None:
+        self.refuse(self.resolve_topic_name(POSE_IN.relative), INACTIVE)
+        if self.setting('on_refusal') == 'pass' and self.setting('apply'):
+            encode, _ = self._encoder(message.header.frame_id)
+            self._out.publish(
+                encode(from_messages.stamp_ns(message), *from_messages.pose(message))
+            )
+
+    def _on_pose_for(self, stream: PoseStream, message: Any) -> None:
+        """Send what becomes of a pose; all that may be late comes after that."""
         position, rotation = from_messages.pose(message)
         stamp = from_messages.stamp_ns(message)
         encode, encode_twist = self._encoder(message.header.frame_id)
-        stream = self._stream
-        if stream is None:
-            self.refuse(self.resolve_topic_name(POSE_IN.relative), INACTIVE)
-            if self.setting('on_refusal') == 'pass' and self.setting('apply'):
-                self._out.publish(encode(stamp, position, rotation))
-            return
         now = time.monotonic()
         arm = self._arm.where(now, self._most_age)
         # Of poses that come in a burst, the stamps tell how far they are apart; where they are set.
@@ -506,9 +539,12 @@ class Compensator(ManagedNode):
         self._write_audit(text)
 
     def _write_audit(self, text: str) -> None:
+        """Add a line to the file beside: poses do not wait for a disk."""
         path = self.setting('audit')
-        if not path:
-            return
+        if path:
+            self._written = self._books.submit(self._append, path, text)
+
+    def _append(self, path: str, text: str) -> None:
         try:
             with Path(path).open('a', encoding='utf-8') as file:
                 file.write(text + '\n')

@@ -94,6 +94,10 @@ class SentBook:
                 out.append(node)
         return out
 
+    def tellers(self, topic: str) -> set[str]:
+        """Return the nodes that told of messages they sent on a topic."""
+        return {node for (node, _), told in self._tellers.items() if topic in told}
+
     def sent(self, topic: str) -> Sent | None:
         """Return what was sent on a topic by all who told, None if nobody did."""
         rows = [told[topic] for told in self._tellers.values() if topic in told]

@@ -64,10 +64,10 @@ class ModelNode(CellNode):
 
     def _on_joints(self, message: Any) -> None:
         sample = self.stream.step(message)
-        self._input.others = self.stream.passed_over
-        self._remark()
         if sample is not None:
             self.publish(sample)
+        self._input.others = self.stream.passed_over
+        self._remark()
 
     def _remark(self) -> None:
         for sentence in self.stream.remarks:

@@ -102,13 +102,12 @@ class Recorder(ManagedNode):
         """Complete the bag before anything else happens."""
         self._close()
 
-    def end(self) -> None:
+    def complete(self) -> bool:
         """Begin to take in what is under way; the node is finished when it is there."""
         self._ending = True
-        if self._run is None:
-            super().end()
-        else:
+        if self._run is not None:
             self._run.end()
+        return self._run is None
 
     def destroy_node(self) -> None:
         """Complete the bag."""

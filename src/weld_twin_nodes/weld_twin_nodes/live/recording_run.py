@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 from weld_twin_core import __version__
@@ -27,15 +27,16 @@ LOOK_EVERY = 0.2
 """Seconds between two looks for new topics."""
 DRAIN_EVERY = 0.05
 """Seconds between two looks at whether an ending recorder has everything."""
-TOLD_WITHIN = 5.0
+TOLD_WITHIN = 2.0
 """
-Seconds an ending recorder waits for the publishers' last counts. Each tells once a second; on a
-crowded machine some seconds late; one that takes longer hangs.
+Seconds an ending recorder waits for the publishers' last counts. Each tells once a second; one that
+takes longer stands still, and an end may take three seconds in all.
 """
 ARRIVED_WITHIN = 4.0
 """
 Seconds without a message after which what is still missing will not come. Fast DDS tells every 3 s
-what it has sent, and a reader that lacks some of it asks for it then.
+what it has sent, and a reader that lacks some of it asks for it then. Of a node that stands still,
+or has ended, nothing will.
 """
 LONGEST = 9.0
 """Seconds in all; `ros2 launch` kills what has not ended ten seconds after Ctrl-C."""
@@ -162,9 +163,14 @@ class RecordingRun:
             self._lacked, self._moved = lacking, now
         since = now - self._ending_since
         untold = self._untold() and since < TOLD_WITHIN
-        coming = lacking and now - self._moved < ARRIVED_WITHIN
+        coming = self._still_sent(lacking) and now - self._moved < ARRIVED_WITHIN
         if not (untold or coming) or since > LONGEST or self._bag.failure is not None:
             self._conclude()
+
+    def _still_sent(self, lacking: Collection[str]) -> bool:
+        """Return whether a node that sent what is lacking goes on telling of itself."""
+        alive = self._node.neighbours.alive()
+        return any(self._book.tellers(topic) & alive for topic in lacking)
 
     def _untold(self) -> list[str]:
         """Return the nodes recorded here that have not told what they sent since the end."""

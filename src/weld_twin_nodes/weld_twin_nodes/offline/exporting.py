@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from weld_twin_core.motion.paths import KINDS
 from weld_twin_core.motion.planned_motion import Plan as SeamPlan
 from weld_twin_core.motion.programs import travel
 from weld_twin_msgs_py.files.joint_file import EASY, REST, read_joint_motion
+from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.programs import Context, read_sources, to_moves
 from weld_twin_msgs_py.programs.source import Source
-from weld_twin_msgs_py.programs.writing import Exported, ExportMove, written
+from weld_twin_msgs_py.programs.writing import Exported, ExportMove, sheet, written
 
 from .seam_motion import plan_motion
 
@@ -111,6 +112,40 @@ def export(
     text = written(made, language)
     _read_again(made, text, language)
     return made, text, [*_singular(robot, plan.q), *context.controller.notes]
+
+
+def write_program(
+    out: Path, told_as: Path, path: str, context: Context, language: str, how: Speeds, **more: Any
+) -> list[str]:
+    """
+    Write a program and the sheet that says how to load it; return what to tell.
+
+    Parameters
+    ----------
+    out : Path
+        Program to write; the sheet goes beside it.
+    told_as : Path
+        Where it will be found.
+    path, context, language, how
+        As `export` takes them.
+    **more
+        ``trigger`` and ``seam_speed`` of `export`; ``faster``, how to have it run faster.
+
+    """
+    faster = str(more.pop('faster', ''))
+    made, text, notes = export(path, context, language, out.stem, how, **more)
+    fast = f"at most {how.share:.0%} of the joints' speed and {how.tool * 1e3:g} mm/s"
+    first = f' That is for the first run{faster}.' if how.share <= SLOW[0] else ''
+    write_text(out, text)
+    guide = f'{out.name}.md'
+    write_text(
+        out.with_name(guide), sheet(made, language, out.name, f'It runs {fast}.{first}', notes)
+    )
+    return [
+        f'{told_as}: {len(made.moves)} moves in {language}, {fast}',
+        *(f'note: {note}' for note in notes),
+        f'how to load it and to record: {told_as.with_name(guide)}',
+    ]
 
 
 def _refuse_slides(robot: Robot, language: str) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 import hashlib
 import time
 from dataclasses import dataclass, replace
-from math import hypot
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from weld_twin_core.errors import ModelError
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
 
+from ..streams.supervision import Promise
 from .correcting import program_model
 from .told_twin import other_readings
 
@@ -35,8 +35,8 @@ class LoadedModel:
     digest : str
         Of the content of the file.
     read : ProgramModel
-    promised : float, optional [m]
-        RMS distance of measurements from the twin that the model leaves on unseen data.
+    promised : Promise, optional
+        How far measurements are from the twin that has the model.
     modified : float
         When the file was written [s since 1970].
 
@@ -45,7 +45,7 @@ class LoadedModel:
     path: Path
     digest: str
     read: ProgramModel
-    promised: float | None
+    promised: Promise | None
     modified: float
 
     def outdated(self, most_age: float = 0.0) -> str:
@@ -98,7 +98,7 @@ def loaded(robot: Robot, path: str) -> LoadedModel:
         modified, digest = file.stat().st_mtime, _digest(file)
     except OSError as error:
         raise ModelError(f"the model '{path}' cannot be read: {error.strerror}") from None
-    promised = None
+    content: dict[str, Any] = {}
     if file.suffix.lower() == '.json':
         content = read_diagnosis(file)
         why = other_readings(content)
@@ -107,17 +107,24 @@ def loaded(robot: Robot, path: str) -> LoadedModel:
                 f"the model of '{path}' takes mended joint positions, and here they come as they "
                 f'are: {why}'
             )
-        promised = _promised(content)
     read = program_model(robot, file)
-    if promised is not None and read.posterior is not None:
-        promised = hypot(promised, read.posterior.recorded_m)
-    return LoadedModel(file, digest, read, promised, modified)
+    return LoadedModel(file, digest, read, _promised(content, read), modified)
 
 
-def _promised(content: dict[str, Any]) -> float | None:
-    shrink = content.get('shrink')
-    left = shrink.get('rms_after_m') if isinstance(shrink, dict) else None
-    return float(left) if isinstance(left, int | float) and left > 0.0 else None
+def _promised(content: dict[str, Any], read: ProgramModel) -> Promise | None:
+    """Return what a model leaves on unseen data; None where its file does not say so."""
+    left = _number(content, 'shrink', 'rms_after_m')
+    if not left:
+        return None
+    unsure = 0.0 if read.posterior is None else read.posterior.recorded_m
+    return Promise.of(left, unsure, max(int(_number(content, 'gap', 'samples')), 1))
+
+
+def _number(content: dict[str, Any], part: str, key: str) -> float:
+    """Return a number of a diagnosis; 0 where it has none."""
+    values = content.get(part)
+    value = values.get(key) if isinstance(values, dict) else None
+    return float(value) if isinstance(value, int | float) else 0.0
 
 
 def _digest(path: Path) -> str:

@@ -32,6 +32,8 @@ MOST_ASKED = 500
 LEAST = 24
 """Stations below which a fit names too little of what is there: plans that were carried out with 16
 left up to six times what was promised (docs/first_measurement.md)."""
+SHOWN = (8, 16, 24, 40, 60, 80, 120)
+"""Rows of the table on the terminal, besides the first, the last and the number needed [stations]."""
 SURE = 0.95
 """Share of the region's postures at which the tool is to be within the tolerance."""
 
@@ -155,6 +157,31 @@ def _way(robot: Robot, q: Array) -> list[int]:
         times[:, order[-1]] = np.inf
         order.append(int(times[order[-1]].argmin()))
     return order
+
+
+def plan_table(plan: Planned, tolerance: float) -> list[str]:
+    """Return how sure so many poses make one, in lines; the tolerance is in metres."""
+    wanted = f'{1e3 * tolerance:g} mm'
+    most, count = len(plan.minutes) - 1, len(plan.q)
+    steps = {0, *SHOWN, count, most}
+    out = [f'poses  minutes  usual error left  within {wanted}']
+    out += [
+        f'{k:5d}  {plan.minutes[k]:7.1f}  {plan.sigma[k] * 1e3:13.3f} mm  {plan.within[k]:8.0%}'
+        for k in sorted(step for step in steps if step <= most)
+    ]
+    if plan.needed is None:
+        out.append(
+            f'all {most} poses that fit into the time keep {wanted} at {plan.within[-1]:.0%} of '
+            'postures; more time, less noise or a smaller --spread help'
+        )
+        return out
+    out.append(f'{count} poses, {plan.minutes[count]:.0f} minutes: base and tool are found along')
+    if plan.within[count] < SURE:
+        out.append(
+            f'{count} poses keep {wanted} at {plan.within[count]:.0%} of postures; more of them, '
+            'less noise or a smaller --spread help'
+        )
+    return out
 
 
 def write_plan(folder: Path, context: Context, language: str | None, plan: Planned) -> None:

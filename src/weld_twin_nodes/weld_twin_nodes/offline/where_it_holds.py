@@ -89,7 +89,7 @@ def which_file(alone: Alone | None) -> str:
     if alone is None or alone.unseen_m < AS_GOOD * alone.whole_unseen_m:
         return ''
     return (
-        'Take diagnosis.json (weld-twin correct-program or compensate): it leaves '
+        'Take diagnosis.json (weld-twin correct): it leaves '
         f'{_mm(alone.whole_unseen_m)} on data that were not fitted. robot.yaml and robot.urdf '
         f'cannot hold all that was found, and leave {_mm(alone.unseen_m)} by themselves.'
     )

@@ -118,7 +118,12 @@ class PoseStream:
         self.correction, self._limits = correction, limits
         self._passing, self._shadow, self._later = passing, shadow, later
         self._coming: Callable[[], Found | None] | None = None
+        self._fresh: PoseCorrection | None = None
         self.forget()
+
+    def renew(self, correction: PoseCorrection) -> None:
+        """Go on with another correction from the next standstill on, or the next beginning."""
+        self._fresh = correction
 
     def forget(self) -> None:
         """Begin anew with the next pose."""
@@ -159,6 +164,8 @@ class PoseStream:
             self.forget()
         self._last = now
         rest = self._rested(pose, now)
+        if self._fresh is not None and (rest >= REST or self._mode != 'corrected'):
+            self._exchange(self._fresh)
         self._adopt_coming(now)
         added, why = self._wanted(pose, now, rest, arm, withdrawn)
         if self._shadow:
@@ -189,6 +196,14 @@ class PoseStream:
             self._coming = lambda: done
         else:
             self._coming = self._later(work)
+
+    def _exchange(self, fresh: PoseCorrection) -> None:
+        """Take another correction; what was added stays until it is faded over."""
+        self.correction, self._fresh = fresh, None
+        self._coming = self._next = self._speeds = self._doubted = None
+        self._refused, self._sizes, self._doubts = '', 0.0, 0.0
+        if self._mode == 'corrected':
+            self._mode = 'held'
 
     # What is wanted --------------------------------------------------------------------------
 

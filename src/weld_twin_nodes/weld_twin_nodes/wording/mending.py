@@ -190,7 +190,7 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
     return [
         first,
         f'Until that is found, programs can be corrected by its curve{without} (weld-twin '
-        f'correct-program): the largest deviation goes from {_both(left)}.',
+        f'correct): the largest deviation goes from {_both(left)}.',
     ]
 
 

@@ -42,7 +42,7 @@ def plant(tmp_path):
 
 def test_bad_recordings_harm_nobody_and_nothing_runs_twice(plant):
     db = plant / 'fleet.db'
-    words = ['fleet', 'run', plant / 'list.csv', '--db', db, '--workers', '2']
+    words = ['history', 'run', plant / 'list.csv', '--db', db, '--workers', '2']
     first = weld_twin(*words, '--keep', plant / 'kept')
     assert (first.code, first.out) == (1, f'{plant}/list.csv: 2 done, 3 refused\n')
     assert 'line 3' in first.err and 'line 4' in first.err and "'no_robot'" in first.err

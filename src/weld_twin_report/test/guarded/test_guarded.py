@@ -39,9 +39,9 @@ def test_a_command_runs_and_tells_its_steps(warm, tmp_path):
 
 
 def test_a_refusal_is_its_sentence(warm):
-    done = warm.run(['info', '/nowhere/at/all'])
+    done = warm.run(['bag', '/nowhere/at/all'])
     assert done.code == 2 and "'/nowhere/at/all'" in done.said
-    assert warm.run(['info', '--robots']).code == 0
+    assert warm.run(['bag', '--robots']).code == 0
 
 
 @pytest.mark.parametrize(
@@ -55,12 +55,12 @@ def test_what_takes_too_much_is_ended_and_the_next_one_runs(limits, said, tmp_pa
         assert done.code != 0 and said in done.said
         assert not (tmp_path / 'found').exists()
         if limits.memory > 1e9:
-            assert guarded.run(['info', '--robots']).code == 0
+            assert guarded.run(['bag', '--robots']).code == 0
 
 
 def test_a_command_that_is_killed_from_outside_is_told_so(tmp_path):
     with Guarded(Limits(cpu_s=180)) as guarded:
-        assert guarded.run(['info', '--robots']).code == 0
+        assert guarded.run(['bag', '--robots']).code == 0
 
         def kill(step):
             (warm_pid,) = [str(guarded._process.pid)]
@@ -69,12 +69,12 @@ def test_a_command_that_is_killed_from_outside_is_told_so(tmp_path):
         words = ['diagnose', BAG, '--robot', 'ur5', '--out', tmp_path / 'found']
         done = guarded.run(words, kill)
         assert 'killed from outside' in done.said and '180' not in done.said
-        assert guarded.run(['info', '--robots']).code == 0
+        assert guarded.run(['bag', '--robots']).code == 0
 
 
 def test_a_process_that_is_killed_is_told_and_started_again(tmp_path):
     with Guarded() as guarded:
-        assert guarded.run(['info', '--robots']).code == 0
+        assert guarded.run(['bag', '--robots']).code == 0
         (warm_pid,) = [
             pid
             for pid in children(os.getpid())
@@ -85,6 +85,6 @@ def test_a_process_that_is_killed_is_told_and_started_again(tmp_path):
         killed.start()
         words = ['diagnose', BAG, '--robot', 'ur5', '--out', tmp_path / 'found']
         assert 'has ended' in guarded.run(words).said
-        assert guarded.run(['info', '--robots']).code == 0
+        assert guarded.run(['bag', '--robots']).code == 0
         time.sleep(0.1)
         assert not Path(f'/proc/{warm_pid}').exists()

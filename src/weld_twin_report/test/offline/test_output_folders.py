@@ -53,7 +53,7 @@ def program(tmp_path):
 
 def correct(weld_twin, program, out, *more):
     """Write a program back: the quickest command that writes a folder."""
-    return weld_twin('correct-program', program, '--robot', 'kuka_kr6_r900', '--out', out, *more)
+    return weld_twin('correct', program, '--robot', 'kuka_kr6_r900', '--out', out, *more)
 
 
 def kept_history(path):
@@ -77,10 +77,10 @@ def test_a_web_site_is_not_taken_for_pages_of_a_fleet(weld_twin, tmp_path):
     (site / 'index.html').write_text('<h1>Welders of Ghent</h1>')
     (site / 'style.css').write_text('h1 {}')
     before = content(site)
-    refused = weld_twin('fleet', 'page', '--db', history, '--out', site)
+    refused = weld_twin('history', 'page', '--db', history, '--out', site)
     assert refused.code == 2 and 'no list says that weld-twin wrote it' in refused.err
     assert content(site) == before
-    forced = weld_twin('fleet', 'page', '--db', history, '--out', site, '--force')
+    forced = weld_twin('history', 'page', '--db', history, '--out', site, '--force')
     assert forced.code == 0, forced.err
     assert (site / 'index.kept-1.html').read_text() == before['index.html'].decode()
     assert (site / 'style.css').read_bytes() == before['style.css']
@@ -150,7 +150,7 @@ def test_a_bag_and_a_file_go_where_a_link_leads(weld_twin, tmp_path):
         (tmp_path / name).symlink_to(tmp_path / f'disk/{name}')
     words = ('simulate', '--robot', 'ur5', '--path', 'line', '--profile', 'smooth', '--rate', 10)
     assert weld_twin(*words, '--out', tmp_path / 'bag').code == 0
-    assert weld_twin('schema', 'robot', '--out', tmp_path / 'schema.json').code == 0
+    assert weld_twin('export', 'schema', 'robot', '--out', tmp_path / 'schema.json').code == 0
     assert (tmp_path / 'bag').is_symlink() and (tmp_path / 'schema.json').is_symlink()
     assert (tmp_path / 'disk/bag/metadata.yaml').is_file()
     assert json.loads((tmp_path / 'disk/schema.json').read_text())
@@ -158,14 +158,14 @@ def test_a_bag_and_a_file_go_where_a_link_leads(weld_twin, tmp_path):
     assert weld_twin(*words, '--out', tmp_path / 'bag').code == 2
     (tmp_path / 'disk/schema.json').write_text('changed')
     before['schema.json'] = b'changed'
-    assert weld_twin('schema', 'robot', '--out', tmp_path / 'schema.json').code == 2
+    assert weld_twin('export', 'schema', 'robot', '--out', tmp_path / 'schema.json').code == 2
     assert content(tmp_path / 'disk') == before
 
 
 def test_a_prediction_whose_table_is_in_the_way_leaves_no_bag(weld_twin, tmp_path):
     bag, table = Path(__file__).parents[4] / 'bags/elbow_play', tmp_path / 'poses.csv'
     table.write_text('mine')
-    words = ('predict', bag, '--robot', 'ur5', '--model', f'{bag}.yaml', '--table', table)
+    words = ('simulate', bag, '--robot', 'ur5', '--model', f'{bag}.yaml', '--table', table)
     assert weld_twin(*words, '--out', tmp_path / 'predicted').code == 2
     assert content(tmp_path) == {'poses.csv': b'mine'}
 
@@ -205,7 +205,7 @@ def test_a_folder_of_a_persons_is_not_taken_for_ours_because_one_file_in_it_is(
     weld_twin, program, tmp_path
 ):
     (tmp_path / 'thesis.tex').write_text('years of work')
-    assert weld_twin('schema', 'robot', '--out', tmp_path / 'robot.json').code == 0
+    assert weld_twin('export', 'schema', 'robot', '--out', tmp_path / 'robot.json').code == 0
     refused = correct(weld_twin, program, tmp_path)
     assert refused.code == 2 and 'holds something else already' in refused.err
     assert correct(weld_twin, program, tmp_path, '--force').code == 0

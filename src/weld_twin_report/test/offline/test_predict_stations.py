@@ -77,7 +77,7 @@ def diagnosed(tmp_path_factory):
 
 def test_stations_without_measurements_are_predicted_as_stations(weld_twin, tmp_path, diagnosed):
     q = CENTRE + 0.8 * HALF * RNG.uniform(-1.0, 1.0, (20, 6))
-    result = weld_twin('predict', bag(tmp_path / 'asked', q), '--robot', ARM.name,
+    result = weld_twin('simulate', bag(tmp_path / 'asked', q), '--robot', ARM.name,
                        '--model', diagnosed, '--out', tmp_path / 'told')  # fmt: skip
     assert result.code == 0, result.err
     sigma = float(re.search(r'within ([\d.e-]+) mm', result.out)[1])
@@ -95,7 +95,7 @@ def test_a_delay_and_a_lag_do_nothing_at_rest(weld_twin, tmp_path, seen):
     ]
     (tmp_path / 'effects.yaml').write_text(yaml.safe_dump(effects))
     asked = bag(tmp_path / 'asked', Q[:10], set(seen))
-    result = weld_twin('predict', asked, '--robot', ARM.name, '--model', tmp_path / 'effects.yaml',
+    result = weld_twin('simulate', asked, '--robot', ARM.name, '--model', tmp_path / 'effects.yaml',
                        '--out', tmp_path / 'told')  # fmt: skip
     assert result.code == 0, result.err
     np.testing.assert_allclose(predicted(tmp_path / 'told'), real_points(Q[:10]), atol=1e-9)
@@ -106,7 +106,7 @@ def test_a_temperature_that_the_bag_lacks_is_said(weld_twin, tmp_path):
     effects = [{'effect': 'thermal_growth', 'coefficient': 12e-6, 'reference': 20.0}]
     (tmp_path / 'effects.yaml').write_text(yaml.safe_dump(effects))
     asked = bag(tmp_path / 'asked', Q[:6])
-    words = ('predict', asked, '--robot', ARM.name, '--model', tmp_path / 'effects.yaml', '--out')
+    words = ('simulate', asked, '--robot', ARM.name, '--model', tmp_path / 'effects.yaml', '--out')
     cold = weld_twin(*words, tmp_path / 'cold')
     assert cold.code == 2 and 'say it with --temperature' in cold.err
     assert weld_twin(*words, tmp_path / 'warm', '--temperature', 30).code == 0

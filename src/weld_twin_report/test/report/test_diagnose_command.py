@@ -197,7 +197,7 @@ def twin_poses(bag):
 def test_predict_adds_what_was_found_at_every_joint_state(cell, found, tmp_path):
     model = found / 'diagnosis.json'
     out = tmp_path / 'predicted'
-    assert run('predict', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    assert run('simulate', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out) == 0
     ns, position = twin_poses(out)
     recording = read_recording(cell / 'second', load('ur5'))
     assert np.array_equal(ns - recording.epoch_ns, np.round(recording.joints.t * 1e9))
@@ -235,7 +235,7 @@ def test_predicted_poses_are_those_of_the_instrument_at_the_same_stamp(cell, tmp
         tmp_path / 'm.json', robot, [{'effect': 'time_delay', 'delay': DELAY}], [base], tool
     )
     out = tmp_path / 'p'
-    assert run('predict', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    assert run('simulate', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
     _, position = twin_poses(out)
     motion = read_recording(cell / 'first', robot).joints
     nominal = Twin(robot.with_frames(tool=tool))
@@ -258,7 +258,7 @@ def test_with_several_set_ups_the_bag_tells_which_is_meant(cell, tmp_path, capsy
         hashes.append({'use': 'recording', 'path': name, 'sha256': digest.hexdigest()})
     own = write_model(tmp_path / 'own.json', load('ur5'), [], bases, inputs=hashes)
     other = write_model(tmp_path / 'other.json', load('ur5'), [], bases, inputs=hashes[:1])
-    predict = ('predict', cell / 'second', '--robot', 'ur5')
+    predict = ('simulate', cell / 'second', '--robot', 'ur5')
     assert run(*predict, '--model', own, '--out', tmp_path / 'a') == 0
     assert run(*predict, '--model', other, '--out', tmp_path / 'b') == 2
     assert '--setup 1 to 2' in capsys.readouterr().err
@@ -327,7 +327,7 @@ def test_compensated_commands_put_the_tool_where_it_was_wanted(cell, tmp_path, c
         [np.eye(4)],
     )
     out = tmp_path / 'commands'
-    assert run('compensate', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    assert run('correct', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
     nominal = read_recording(cell / 'first', load('ur5')).joints
     commands = read_recording(out, load('ur5')).joints
     assert np.abs(commands.q - (nominal.q - OFFSET * np.eye(6)[2])).max() < 1e-9
@@ -376,7 +376,7 @@ def covariances(bag):
 def test_predict_says_how_sure_it_is_at_every_pose(cell, found, tmp_path, capsys):
     out = tmp_path / 'predicted'
     model = found / 'diagnosis.json'
-    assert run('predict', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    assert run('simulate', cell / 'second', '--robot', 'ur5', '--model', model, '--out', out) == 0
     assert 'within' in capsys.readouterr().out
     ns, position = twin_poses(out)
     sure_ns, sure_position, covariance = covariances(out)
@@ -395,7 +395,7 @@ def test_predict_says_how_sure_it_is_at_every_pose(cell, found, tmp_path, capsys
 def test_where_it_was_measured_the_twin_is_sure_within_the_noise(cell, found, tmp_path):
     out = tmp_path / 'predicted'
     model = found / 'diagnosis.json'
-    assert run('predict', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    assert run('simulate', cell / 'first', '--robot', 'ur5', '--model', model, '--out', out) == 0
     covariance = covariances(out)[2][:, :3, :3]
     assert np.sqrt(np.linalg.eigvalsh(covariance)[:, -1]).max() < 1e-4
     assert json.loads((out / 'prediction.json').read_text()) == {'outside': []}
@@ -404,7 +404,7 @@ def test_where_it_was_measured_the_twin_is_sure_within_the_noise(cell, found, tm
 def test_the_table_of_a_prediction_has_columns_for_sigma(cell, found, tmp_path):
     model, table = found / 'diagnosis.json', tmp_path / 'poses.csv'
     words = ('--robot', 'ur5', '--model', model, '--out', tmp_path / 'p', '--table', table)
-    assert run('predict', cell / 'second', *words) == 0
+    assert run('simulate', cell / 'second', *words) == 0
     rows = list(csv.DictReader(table.open()))
     _, position, covariance = covariances(tmp_path / 'p')
     got = np.array([[float(row[f'{axis}_m']) for axis in 'xyz'] for row in rows])
@@ -424,7 +424,7 @@ def test_a_joint_taken_beyond_what_was_recorded_is_told_with_its_time(cell, foun
     write_recording(tmp_path / 'far', Recording('far', JointMotion(t, q)), robot)
     out = tmp_path / 'predicted'
     model = found / 'diagnosis.json'
-    assert run('predict', tmp_path / 'far', '--robot', 'ur5', '--model', model, '--out', out) == 0
+    assert run('simulate', tmp_path / 'far', '--robot', 'ur5', '--model', model, '--out', out) == 0
     outside = json.loads((out / 'prediction.json').read_text())['outside']
     mine = [item for item in outside if 'beyond' in item['why']]
     assert [item['why'] for item in mine] == ['wrist_1_joint is 0.96 rad beyond what was recorded']
@@ -444,7 +444,7 @@ def test_a_model_written_without_a_posterior_still_predicts_and_says_so(
     (tmp_path / 'old.json').write_text(json.dumps(data))
     out = tmp_path / 'predicted'
     words = ('--robot', 'ur5', '--model', tmp_path / 'old.json', '--out', out)
-    assert run('predict', cell / 'second', *words) == 0
+    assert run('simulate', cell / 'second', *words) == 0
     assert 'has no posterior' in capsys.readouterr().out
     assert covariances(out)[0].size == 0
     assert not (out / 'prediction.json').exists()
@@ -464,7 +464,7 @@ def test_a_spoilt_posterior_is_one_line(cell, found, tmp_path, capsys, spoil, re
     spoil(data['posterior'])
     (tmp_path / 'spoilt.json').write_text(json.dumps(data))
     words = ('--robot', 'ur5', '--model', tmp_path / 'spoilt.json', '--out', tmp_path / 'p')
-    assert run('predict', cell / 'second', *words) == 2
+    assert run('simulate', cell / 'second', *words) == 2
     err = capsys.readouterr().err
     assert reason in err
     assert err.count('\n') == 1
@@ -478,7 +478,7 @@ def test_compensate_holds_back_where_the_model_knows_little(cell, found, tmp_pat
     write_recording(tmp_path / 'far', Recording('far', JointMotion(t, q)), robot)
     out = tmp_path / 'commands'
     words = ('--robot', 'ur5', '--model', found / 'diagnosis.json', '--out', out)
-    assert run('compensate', tmp_path / 'far', *words) == 0
+    assert run('correct', tmp_path / 'far', *words) == 0
     told = capsys.readouterr().out
     assert 'outside what was recorded' in told
     assert (

@@ -138,7 +138,7 @@ def test_nothing_is_predicted_from_unsound_data(bags, tmp_path, capsys):
     out = tmp_path / 'd'
     assert run('diagnose', bags / 'swapped', '--robot', 'ur5', '--out', out) == 3
     capsys.readouterr()
-    words = ('predict', bags / 'sound', '--robot', 'ur5', '--model', out / 'diagnosis.json')
+    words = ('simulate', bags / 'sound', '--robot', 'ur5', '--model', out / 'diagnosis.json')
     assert run(*words, '--out', tmp_path / 'p') == 2
     err = capsys.readouterr().err
     assert 'its data were unsound' in err and 'swapped' in err and err.count('\n') == 1
@@ -156,12 +156,12 @@ def test_velocity_zero_beside_moving_positions_is_named_and_left_out(tmp_path):
     assert (effect['effect'], effect['joint']) == ('joint_offset', 'elbow_joint')
 
 
-@pytest.mark.parametrize('command', ['predict', 'compensate', 'export'])
+@pytest.mark.parametrize('command', ['simulate', 'correct', 'export'])
 def test_the_model_of_another_robot_is_refused(found, bags, tmp_path, capsys, command):
     model = found / 'diagnosis.json'
     words = {
-        'predict': ('predict', bags / 'sound', '--model', model),
-        'compensate': ('compensate', bags / 'sound', '--model', model),
+        'simulate': ('simulate', bags / 'sound', '--model', model),
+        'correct': ('correct', bags / 'sound', '--model', model),
         'export': ('export', model),
     }[command]
     assert run(*words, '--robot', 'ur10', '--out', tmp_path / 'x') == 2

@@ -165,7 +165,7 @@ def test_the_controller_is_not_to_be_given_a_curve_that_takes_hardly_anything_of
     card = part(report_page(unknown(1e-6)), 'class="cards"', 'id="seam"')
     assert 'Its curve takes hardly anything off: do not correct programs by it' in card
     assert 'Nothing is to be entered: the curve takes hardly anything off.' in card
-    assert 'correct-program' not in card
+    assert 'weld-twin correct' not in card
 
 
 @pytest.mark.parametrize(('level', 'told'), [('ok', False), ('note', True)])

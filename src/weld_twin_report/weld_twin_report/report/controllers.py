@@ -32,12 +32,11 @@ _KINDS = {
     'axis_parallelism': 'model',
 }
 _PROGRAM = (
-    'The controller has no field for it: correct the points of the program (weld-twin '
-    'correct-program).'
+    'The controller has no field for it: correct the points of the program (weld-twin correct).'
 )
 UNNAMED = (
     'No field before the cause is known; so long, correct the points of the program (weld-twin '
-    'correct-program).'
+    'correct).'
 )
 """Of a curve: a joint that is off alike everywhere need not be so for its zero."""
 _PLACES = {
@@ -95,7 +94,7 @@ _GEARED = ('gear_ratio', 'joint_coupling')
 """Errors that some controllers have a field for."""
 _RATIO = (
     'Where the controller has a field for ratios of gears; else correct the points of the program '
-    '(weld-twin correct-program).'
+    '(weld-twin correct).'
 )
 _ANYWHERE = {
     'zero': 'As the zero of this axis, by mastering it anew: new reading = old reading {far}, with '
@@ -105,7 +104,7 @@ _ANYWHERE = {
     'tool': 'As the tool centre point',
     'load': 'As the payload',
     'model': 'In the kinematic model, where the controller has one that can be edited; else correct '
-    'the points of the program (weld-twin correct-program)',
+    'the points of the program (weld-twin correct)',
 }
 """What takes a correction at any controller, by the kind of the error."""
 _CHECK = (

@@ -79,7 +79,7 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
     rest = {key: value for key, value in wanted.items() if key not in told}
     if wanted.get('motion'):
         rest['as a program'] = (
-            'weld-twin export-program next_experiment.yaml writes it in the language of the '
+            'weld-twin export program next_experiment.yaml writes it in the language of the '
             'controller, with a sheet on how to load it'
         )
     if minutes(wanted):

@@ -34,7 +34,7 @@ from .controllers import gearing
 _LARGEST = 3
 """Actions told; the others are counted."""
 TOGETHER = (
-    'Take them in together, by corrected programs (weld-twin correct-program), or by the corrected '
+    'Take them in together, by corrected programs (weld-twin correct), or by the corrected '
     'robot.yaml or robot.urdf, whose head says what it leaves by itself: one by one they are not '
     'certain, their sum is.'
 )

@@ -18,7 +18,7 @@ from weld_twin_msgs_py.programs.languages import LANGUAGES
 
 from ..report.controllers import BRANDS
 
-IMPORT, DIAGNOSE, CORRECT = 'import', 'diagnose', 'correct-program'
+IMPORT, DIAGNOSE, CORRECT = 'import', 'diagnose', 'correct'
 LONGEST = 2000
 """Characters of a field."""
 Choices = tuple[tuple[str, str], ...]
@@ -294,7 +294,8 @@ def sentence(text: str, command: str = '') -> str:
         return f'“{titles[name]}”' if name in titles else 'a setting of the command line'
 
     # What is quoted is a whole command line; it can only be typed where the server is.
-    text = re.sub(r"'weld-twin ([a-z-]+)[^']*'", r'the command “\1” where the server runs', text)
+    command = r"'weld-twin ((?:bag |export |history )?[a-z-]+)[^']*'"
+    text = re.sub(command, r'the command “\1” where the server runs', text)
     text = re.sub(r'\bweld-twin ([a-z-]+)', r'“\1”', text)
     text = re.sub(r'(?<![\w-])--([a-z]+(?:-[a-z]+)*)', title, text)
     return text[:1].upper() + text[1:]

@@ -221,7 +221,7 @@ class Job:
         """Return the words that correct a program."""
         robot = self.asked.robot
         robot = f'{MODEL}/{robot}' if robot.lower().endswith(OTHERS) else robot
-        out = ['correct-program', str(place / main_file(self.names)), '--robot', robot]
+        out = [CORRECT, str(place / main_file(self.names)), '--robot', robot]
         out += ['--model', f'{MODEL}/{DIAGNOSIS}', '--out', FOUND]
         return out + words(self.asked.told, CORRECT)
 

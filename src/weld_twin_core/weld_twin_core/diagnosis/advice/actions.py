@@ -21,7 +21,6 @@ def actions(
 
     Parameters
     ----------
-    found : sequence of Effect
     robot : Robot
         The nominal model: what is entered in the controller now.
     mends : sequence of mapping

@@ -184,8 +184,6 @@ def at_hand(
         What is believed so far; everything is taken about it.
     alternatives : sequence of Alternative
         The explanations to tell apart.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
 
     """
     few = problem.thinned(ROWS)

@@ -213,12 +213,10 @@ def chosen(
 
     Parameters
     ----------
-    design : Design
     rows : array, shape (N, 3, P)
         Of every touch that could be made.
     weight : array, shape (E, E)
         How much the errors' variances and covariances count.
-    count : int
 
     """
     free = np.ones(len(rows), dtype=bool)

@@ -10,18 +10,18 @@ products take one number a sample and column instead of three or six.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 
 from ...arm.channels import Shift
 from ...arrays import Array
 from ...twin.features import Features
+from .definite import Index
 from .problem import Problem, Scale
-from .unit_scale import Index
 
 Rows = slice | Index
 """Some rows: a slice, or their numbers."""
@@ -35,40 +35,49 @@ def rows_of(labels: Array) -> list[Rows]:
     return [np.flatnonzero(labels == k) for k in range(int(labels.max()) + 1)]
 
 
-class Columns(Protocol):
+class Columns(ABC):
     """Whitened columns, in whatever way they are kept."""
 
     @property
+    @abstractmethod
     def count(self) -> int:
         """Return how many there are."""
 
+    @abstractmethod
     def written_out(self) -> Array:
         """Return the columns, shape (K, rows)."""
 
+    @abstractmethod
     def products(self, rows: Array) -> Array:
         """Return their products with other rows, shape (R, rows), as shape (K, R)."""
 
+    @abstractmethod
     def normal(self) -> Array:
         """Return their products with each other, shape (K, K)."""
 
-    def largest(self) -> float:
-        """Return their largest entry, by size."""
-
+    @abstractmethod
     def peaks(self) -> Array:
         """Return the largest entry of each, by size, shape (K,)."""
 
+    @abstractmethod
     def mixed(self, weights: Array) -> Array:
         """Return sums of them with weights, shape (..., K), as shape (..., rows)."""
 
+    @abstractmethod
     def chosen(self, index: Index) -> Columns:
         """Return some of them."""
 
+    @abstractmethod
     def within(self, rows: Rows) -> Columns:
         """Return them on some rows, all those of a sample or none."""
 
+    def largest(self) -> float:
+        """Return their largest entry, by size."""
+        return float(self.peaks().max(initial=0.0))
+
 
 @dataclass(frozen=True, eq=False)
-class Whole:
+class Whole(Columns):
     """
     Columns written out.
 
@@ -82,39 +91,27 @@ class Whole:
 
     @property
     def count(self) -> int:
-        """Return how many there are."""
         return int(self.rows.shape[0])
 
     def written_out(self) -> Array:
-        """Return the columns, shape (K, rows)."""
         return self.rows
 
     def products(self, rows: Array) -> Array:
-        """Return their products with other rows, shape (R, rows), as shape (K, R)."""
         return np.asarray(self.rows @ rows.T)
 
     def normal(self) -> Array:
-        """Return their products with each other, shape (K, K)."""
         return np.asarray(self.rows @ self.rows.T)
 
-    def largest(self) -> float:
-        """Return their largest entry, by size."""
-        return float(self.peaks().max(initial=0.0))
-
     def peaks(self) -> Array:
-        """Return the largest entry of each, by size, shape (K,)."""
         return np.asarray(np.abs(self.rows).max(axis=1, initial=0.0))
 
     def mixed(self, weights: Array) -> Array:
-        """Return sums of them with weights, shape (..., K), as shape (..., rows)."""
         return np.asarray(weights @ self.rows)
 
     def chosen(self, index: Index) -> Whole:
-        """Return some of them."""
         return Whole(self.rows[index])
 
     def within(self, rows: Rows) -> Whole:
-        """Return them on some rows."""
         return Whole(self.rows[:, rows])
 
 
@@ -144,12 +141,10 @@ class MovedJoint:
 
         Parameters
         ----------
-        problem : Problem
         features : sequence of Features
             Of every recording, at the model.
         scale : Scale
             What the rows are divided by.
-        joint : int
 
         """
         parts = [
@@ -183,13 +178,12 @@ class MovedJoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Amounts:
+class Amounts(Columns):
     """
     Columns that move one joint.
 
     Attributes
     ----------
-    joint : MovedJoint
     each : array, shape (K, samples) [rad or m]
         By how much each moves it.
 
@@ -200,39 +194,27 @@ class Amounts:
 
     @property
     def count(self) -> int:
-        """Return how many there are."""
         return int(self.each.shape[0])
 
     def written_out(self) -> Array:
-        """Return the columns, shape (K, rows)."""
         return self.joint.moved_by(self.each)
 
     def products(self, rows: Array) -> Array:
-        """Return their products with other rows, shape (R, rows), as shape (K, R)."""
         return np.asarray(self.each @ self.joint.summed(rows).T)
 
     def normal(self) -> Array:
-        """Return their products with each other, shape (K, K)."""
         return np.asarray((self.each * self.joint.square) @ self.each.T)
 
-    def largest(self) -> float:
-        """Return their largest entry, by size."""
-        return float(self.peaks().max(initial=0.0))
-
     def peaks(self) -> Array:
-        """Return the largest entry of each, by size, shape (K,)."""
         return np.asarray((np.abs(self.each) * self.joint.most).max(axis=1, initial=0.0))
 
     def mixed(self, weights: Array) -> Array:
-        """Return sums of them with weights, shape (..., K), as shape (..., rows)."""
         return self.joint.moved_by(weights @ self.each)
 
     def chosen(self, index: Index) -> Amounts:
-        """Return some of them."""
         return Amounts(self.joint, self.each[index])
 
     def within(self, rows: Rows) -> Amounts:
-        """Return them on some rows, all those of a sample or none."""
         samples = self.joint.samples(rows)
         return Amounts(self.joint.within(rows), self.each[:, samples])
 
@@ -262,7 +244,6 @@ def amounts(shifts: Sequence[Sequence[Shift]], joint: int, samples: Sequence[int
     ----------
     shifts : sequence of sequence of Shift
         Of every recording, K features each.
-    joint : int
     samples : sequence of int
         Of every recording.
 

@@ -3,7 +3,8 @@
 """
 Factors and inverses of large positive definite matrices, in the place of the matrix.
 
-A copy of a matrix of more than a thousand columns takes as long as a good part of its factor.
+A copy of a matrix of more than a thousand columns takes as long as a good part of its factor. At unit
+scale, as radians and metres in one matrix differ by orders of magnitude.
 """
 
 from __future__ import annotations
@@ -12,17 +13,23 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 from scipy.linalg.blas import dsymm, dsymv
 from scipy.linalg.lapack import dpocon, dpotrf, dpotri, dpotrs, dtrtri
 
 from ...arrays import Array
-from .unit_scale import Index
 
 SAFE = 100.0
 """The condition is an estimate, good to some factor: so much is left between."""
 STRIP = 64
 """Rows of a triangle worked on at once: what a strip holds beyond it is a few per cent."""
+Index = NDArray[np.intp]
+
+FLAT = 1e-9
+"""A column whose norm falls below this share once others are projected out carries nothing new."""
+EMPTY = 1e-300
+"""Least squared norm of a column; keeps a column of zeros from a division by zero."""
 
 
 def inverted(matrix: Array) -> Array:
@@ -136,7 +143,6 @@ def well_conditioned(matrix: Array, least: float) -> bool:
     ----------
     matrix : array, shape (P, P)
         Symmetric.
-    least : float
 
     """
     factor, failed = dpotrf(matrix.T, lower=1, clean=0)
@@ -173,3 +179,27 @@ def _squared_rows(upper: Array) -> Array:
         parts = np.triu(strip[:, :STRIP]), strip[:, STRIP:]
         out[start : start + STRIP] = sum(np.einsum('ij,ij->i', part, part) for part in parts)
     return out
+
+
+def unit_diagonal(normal: Array, damping: float = 0.0) -> tuple[Array, Array]:
+    """
+    Return a normal matrix with ones on its diagonal, and the norms of its columns.
+
+    Parameters
+    ----------
+    normal : array, shape (P, P)
+    damping : float
+        Added to the diagonal of ones, so that columns that repeat others do no harm.
+
+    Returns
+    -------
+    scaled : array, shape (P, P)
+        ``normal / outer(size, size)``; solve it for ``right / size`` and divide by ``size``.
+    size : array, shape (P,)
+
+    """
+    size = np.sqrt(np.maximum(normal.diagonal(), EMPTY))
+    scaled = normal / (size[:, None] * size)
+    each = np.arange(size.size)
+    scaled[each, each] += damping
+    return scaled, size

@@ -19,8 +19,8 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.features import Features
 from .atoms import Amounts, Columns, MovedJoint, Rows, Whole, amounts, gathered, moved_joint
+from .definite import Index
 from .problem import Model, Problem, Scale
-from .unit_scale import Index
 
 MANY = 32
 """Coordinates of one effect from which on they are kept apart from what its joint does to the
@@ -29,14 +29,7 @@ tool: products of fewer are as quick written out."""
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """
-    Whitened columns in pieces, in order.
-
-    Attributes
-    ----------
-    pieces : tuple of Columns
-
-    """
+    """Whitened columns in pieces, in order."""
 
     pieces: tuple[Columns, ...]
 
@@ -112,19 +105,7 @@ def _across(one: Columns, other: Columns) -> Array:
 
 
 def designed(problem: Problem, model: Model, scale: Scale) -> tuple[Design, list[str]]:
-    """
-    Return the whitened columns of frames and found effects, and their names.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-
-    """
+    """Return the whitened columns of frames and found effects, and their names."""
     features = problem.features(model)
     parts, names = problem.frame_columns(features)
     pieces: list[Columns] = [Whole(problem.whitened(parts, scale))]

@@ -7,18 +7,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ...arrays import Array
+from .definite import unit_diagonal
 from .designed import designed
 from .independent_rows import measured_axes, robust_spread
 from .prior import effect_precision, frame_prior
 from .problem import Model, Problem, Scale
-from .unit_scale import unit_diagonal
 
 DAMPING, DAMPED = 1e-9, 1e6
 """Least and greatest damping of a step, in units of the columns: from Gauss-Newton to none."""
@@ -51,7 +51,6 @@ class Fit:
 
     Attributes
     ----------
-    model : Model
     residual : array, shape (rows,)
         Whitened residual at the solution.
     coordinates : array, shape (K,)
@@ -74,19 +73,7 @@ class Fit:
 
 
 def design(problem: Problem, model: Model, scale: Scale) -> tuple[Array, list[str]]:
-    """
-    Return the whitened columns of frames and found effects, shape (P, rows), and names.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-
-    """
+    """Return the whitened columns of frames and found effects, shape (P, rows), and names."""
     columns, names = designed(problem, model, scale)
     return columns.written_out(), names
 
@@ -97,10 +84,6 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
     step : array, shape (P,)
         Of base and tool frames (xyz, rotvec), changes between recordings, and fit coordinates.
 
@@ -114,6 +97,12 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
     if 'tool' in problem.align:
         model = model.retooled(step[at : at + 6])
         at += 6
+    shared = [np.zeros(0) for _ in model.bases] if problem.common else list(model.common)
+    for k, own in problem.common:
+        size = own.mean.size
+        shared[k] = model.shared(k, size) + step[at : at + size]
+        at += size
+    model = replace(model, common=tuple(shared))
     effects = []
     for effect in (*(change.effect for change in model.changes), *model.found):
         now = effect.coordinates()
@@ -151,46 +140,17 @@ def fit(
     precision : array, shape (K,), optional
         Prior precision of every effect coordinate, about zero, in whitened units; that of
         machines at large when left out.
-    iterations : int
     tolerance : float
         Stops when the objective falls by less than this share.
 
     """
     prior = effect_precision(model) if precision is None else precision
-    here = descended(_Point.at(problem, model, scale, prior), iterations, tolerance)
+    here = _descended(_Point.at(problem, model, scale, prior), iterations, tolerance)
     return Fit(here.model, here.residual, coordinates(here.model))
 
 
-class Point(Protocol):
-    """A place on the way of a fit: what it costs, which way is down, and the place a step away."""
-
-    @property
-    def cost(self) -> float:
-        """Return what is to become small."""
-
-    @property
-    def normal_equations(self) -> tuple[Array, Array]:
-        """Return normal matrix (P, P) and right-hand side (P,) of a step, the priors included."""
-
-    def stepped(self: P, step: Array) -> P:
-        """Return the place a step, shape (P,), away."""
-
-
-P = TypeVar('P', bound=Point)
-
-
-def descended(start: P, iterations: int, tolerance: float) -> P:
-    """
-    Return the place that Levenberg and Marquardt lead to.
-
-    Parameters
-    ----------
-    start : Point
-    iterations : int
-    tolerance : float
-        Stops when the cost falls by less than this share.
-
-    """
+def _descended(start: _Point, iterations: int, tolerance: float) -> _Point:
+    """Return the place that Levenberg and Marquardt lead to."""
     here, damping = start, DAMPING
     for _ in range(iterations):
         there = None
@@ -228,12 +188,6 @@ class _Point:
 
         Parameters
         ----------
-        problem : Problem
-            The recordings to explain, and the frames that are fitted along.
-        model : Model
-            What is believed so far; everything is taken about it.
-        scale : Scale
-            The noise that residuals are measured in, and the weight of every sample.
         prior : array, shape (K,)
             Prior precision of every effect coordinate, about zero.
 
@@ -297,7 +251,6 @@ def robust_scale(
 
     Parameters
     ----------
-    problem : Problem
     residuals : list of array, shape (c, M)
     least : Scale, optional
         Never return less noise than this.
@@ -308,8 +261,9 @@ def robust_scale(
     told = problem.told_weights
     residuals = [part * np.sqrt(own) for part, own in zip(residuals, told, strict=True)]
     lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
-    position = np.concatenate([measured_axes(r[:3]).ravel() for r in residuals])
-    turn = np.concatenate([r[3:].ravel() for r in residuals])
+    sure = problem.as_sure(residuals)
+    position = np.concatenate([measured_axes(rows).ravel() for rows, _ in sure])
+    turn = np.concatenate([part[3:].ravel() for part in residuals])
     sigma = robust_spread(position) / lost
     sigma_turn = robust_spread(turn) / lost if turn.size else 1.0
     if least is not None:
@@ -317,10 +271,10 @@ def robust_scale(
     sigma = max(sigma, 1e-9)
     sigma_turn = max(sigma_turn, LEAST_TURN * sigma)
     weights = []
-    for part, own in zip(residuals, told, strict=True):
-        off = np.sqrt((part[:3] ** 2).sum(axis=0) / 3.0) / sigma
-        if part.shape[0] > 3:
-            off = np.maximum(off, np.sqrt((part[3:] ** 2).sum(axis=0) / 3.0) / sigma_turn)
+    for (shifts, turns), own in zip(sure, told, strict=True):
+        off = np.sqrt((shifts**2).sum(axis=0) / max(len(shifts), 3)) / sigma
+        if turns.size:
+            off = np.maximum(off, np.sqrt((turns**2).sum(axis=0) / 3.0) / sigma_turn)
         weights.append(own * np.minimum(1.0, (HUBER / np.maximum(off, 1e-12)) ** 2))
     return Scale(sigma, sigma_turn, tuple(weights))
 
@@ -365,12 +319,6 @@ def robust_fit(
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
     precision : array, shape (K,), optional
         Prior precision of the fit coordinates; left out, there is no prior.
     rounds : int

@@ -38,7 +38,6 @@ class Change(NamedTuple):
     ----------
     recording : int
         Counted from 0; never 0.
-    effect : Effect
 
     """
 
@@ -81,7 +80,6 @@ class Model:
 
     Attributes
     ----------
-    robot : Robot
     bases : tuple of array, shape (4, 4)
     known, found : tuple of Effect
         Effects given by the user, and those this diagnosis put in.
@@ -95,6 +93,9 @@ class Model:
         How it was undone, as plain values to be made again; see `soundness.mending`.
     alone : Alone or None
         What its robot file does by itself; None where that is not known.
+    common : tuple of array
+        Errors that all samples of an instrument share, one array for every recording, empty where
+        it has none; nothing before they are fitted.
 
     """
 
@@ -107,6 +108,7 @@ class Model:
     given: tuple[int, ...] = ()
     mends: tuple[Mapping[str, Any], ...] = ()
     alone: Alone | None = None
+    common: tuple[Array, ...] = ()
 
     def twin(self, k: int) -> Twin:
         """Return the twin of recording k."""
@@ -128,6 +130,10 @@ class Model:
         """Return the model with the tool moved by (xyz, rotvec)."""
         tool = _moved(self.robot.T_flange_tool, step, left=False)
         return replace(self, robot=self.robot.with_frames(tool=tool))
+
+    def shared(self, k: int, count: int) -> Array:
+        """Return the errors that all samples of recording k share, shape (count,)."""
+        return self.common[k] if self.common else np.zeros(count)
 
     def without(self, k: int) -> Model:
         """Return the model without found effect k."""

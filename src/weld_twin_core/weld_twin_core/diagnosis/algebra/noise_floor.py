@@ -53,7 +53,6 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
 
     Parameters
     ----------
-    problem : Problem
     residuals : list of array, shape (c, M)
         Of the best model at hand. What it leaves bounds the floor from above; repeated stations
         and third differences in time, where the data have them, are not touched by its faults.

@@ -35,9 +35,13 @@ def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
     Return the prior precision of the frame columns, and how far the frames are off, (F,) each.
 
     In the order of `Problem.frame_columns`; nothing is believed of frames without an anchor.
-    What may differ between recordings is believed to be as large as in a machine.
+    Errors that samples share come in standard deviations. What may differ between recordings is
+    believed to be as large as in a machine.
     """
     precision, off = _anchored(problem, model)
+    beside = [model.shared(k, own.mean.size) - own.mean for k, own in problem.common]
+    precision = np.concatenate([precision, *(np.ones(part.size) for part in beside)])
+    off = np.concatenate([off, *beside])
     spread = [spreads(model.robot, change.effect) for change in model.changes]
     now = [change.effect.coordinates() for change in model.changes]
     own = np.concatenate([np.zeros(0), *spread]) ** -2.0 if spread else np.zeros(0)

@@ -17,6 +17,7 @@ from ...arrays import Array
 from ...contacts import Unknowns, places, unknowns
 from ...effects.effect import Effect
 from ...errors import DataError, ModelError
+from ...pose_noise import Common
 from ...recording import Measurements, Recording
 from ...twin.features import Features, Remembered
 from .independent_rows import by_sample
@@ -35,6 +36,8 @@ __all__ = [
 ]
 
 FRAMES = ('base', 'tool')
+LEAST_WEIGHT = 1e-12
+"""Weight of a sample that counts as none; keeps it from a division by zero."""
 PLACES = 3
 """Places of contacts from which on each is left out as a whole. Of two, one alone would have to tell
 of the other what only both together show."""
@@ -168,6 +171,35 @@ class Problem:
         """Return the number of coordinates of the frames that are fitted along."""
         return 6 * (('base' in self.align) * len(self.stands) + ('tool' in self.align))
 
+    @property
+    def shared_count(self) -> int:
+        """Return the number of errors that samples of an instrument share, after the frames."""
+        return sum(common.mean.size for _, common in self.common)
+
+    @cached_property
+    def common(self) -> list[tuple[int, Common]]:
+        """Return the recordings whose samples share errors of their instrument, and these."""
+        each = enumerate(_measured(r).common for r in self.recordings)
+        return [(k, common) for k, common in each if common is not None]
+
+    def of_frames(self) -> Problem:
+        """Return the problem with nothing fitted along but base and tool."""
+        return replace(self.not_shared(), changes=())
+
+    def not_shared(self) -> Problem:
+        """Return the problem without errors that samples of an instrument share."""
+        if not self.common:
+            return self
+        pairs = ((r, _measured(r)) for r in self.recordings)
+        bare = tuple(r.with_measured(replace(m, common=None)) for r, m in pairs)
+        return replace(self, recordings=bare)
+
+    @cached_property
+    def roots(self) -> list[Array | None]:
+        """Return what makes independent rows of each recording's poses; None of those not told."""
+        told = (_measured(r).noise for r in self.recordings)
+        return [None if noise is None else noise.root for noise in told]
+
     def touching(self, model: Model) -> Problem:
         """Return the problem with its contacts as a model sees them; no contacts, no change."""
         each: list[Unknowns | None] = []
@@ -260,6 +292,9 @@ class Problem:
             if measured.rotation is not None:
                 parts.append(angle_between(measured.rotation, poses.rotation).T)
             out.append(np.concatenate(parts))
+        for k, common in self.common:
+            off = model.shared(k, common.mean.size)
+            out[k] = out[k] - np.einsum('mcz,z->cm', common.change, off)
         return out
 
     def features(self, model: Model) -> list[Features]:
@@ -297,19 +332,70 @@ class Problem:
         """
         out = []
         taken = self.places_taken(scale)
-        for k, (part, weight) in enumerate(zip(parts, scale.weights, strict=True)):
-            unit = np.full(part.shape[-2], 1.0 / scale.position)
-            unit[3:] = 1.0 / scale.orientation
-            turned = np.swapaxes(part, -1, -2)
-            scaled = np.empty(turned.shape)
-            np.multiply(turned, np.sqrt(weight)[:, None] * unit, out=scaled)
-            rows = scaled.reshape(*part.shape[:-2], weight.size * unit.size)
+        for k, part in enumerate(parts):
+            rows = self.in_noise(k, part, scale).reshape(*part.shape[:-2], -1)
             own = taken[k] if taken else None
             if own is not None:
                 ways, left = own
                 rows = rows - ((rows @ ways.T) * (1.0 - left)) @ ways
             out.append(rows)
         return out[0] if len(out) == 1 else np.concatenate(out, axis=-1)
+
+    def in_noise(self, k: int, part: Array, scale: Scale) -> Array:
+        """
+        Return a residual-like part (..., c, M) of recording k in units of noise, (..., M, c).
+
+        Where an instrument tells how sure its poses are, rows are mixed until each is as sure as
+        a usual coordinate.
+        """
+        turned = np.swapaxes(part, -1, -2)
+        unit = np.full(part.shape[-2], 1.0 / scale.position)
+        root = self.roots[k]
+        if root is None:
+            unit[3:] = 1.0 / scale.orientation
+        else:
+            turned = (root @ turned[..., None])[..., 0]
+        out = np.empty(turned.shape)
+        np.multiply(turned, np.sqrt(scale.weights[k])[:, None] * unit, out=out)
+        return out
+
+    def informed(self, k: int, part: Array, scale: Scale) -> Array:
+        """Return a part (c, M) of recording k times what is known of its rows, (c, M)."""
+        root, size = self.roots[k], np.full((len(part), 1), scale.position**-2)
+        if root is not None:
+            part = np.einsum('mji,mjk,km->im', root, root, part)
+        else:
+            size[3:] = scale.orientation**-2
+        return np.asarray(part * size * scale.weights[k])
+
+    def measured_rows(self, values: Array, scale: Scale) -> list[Array]:
+        """Return `whitened` rows as shifts [m] and turns [rad] again, (M, c) per recording."""
+        out = []
+        for k, part in enumerate(self.by_sample(values)):
+            root, unit = self.roots[k], np.full(part.shape[1], scale.position)
+            if root is None:
+                unit[3:] = scale.orientation
+            else:
+                part = np.linalg.solve(root, part[..., None])[..., 0]
+            weight = np.maximum(scale.weights[k], LEAST_WEIGHT)
+            out.append(part * unit / np.sqrt(weight)[:, None])
+        return out
+
+    def as_sure(self, parts: list[Array]) -> list[tuple[Array, Array]]:
+        """
+        Return residual-like parts as rows in metres and rows in radians, (k, M) each.
+
+        Where an instrument tells how sure its poses are, all rows are in metres, and as sure as
+        a usual coordinate.
+        """
+        out = []
+        for part, root in zip(parts, self.roots, strict=True):
+            if root is None:
+                out.append((part[:3], part[3:]))
+            else:
+                rows = np.einsum('mij,jm->im', root, part)
+                out.append((rows, rows[:0]))
+        return out
 
     def by_sample(self, values: Array) -> list[Array]:
         """Return what `whitened` has laid out in rows as one array per recording, (M, c, ...)."""
@@ -322,6 +408,7 @@ class Problem:
             names += [f'base {group[0]}.{j}' for group in self.stands for j in range(6)]
         if 'tool' in self.align:
             names += [f'tool.{j}' for j in range(6)]
+        names += [f'common {k}.{j}' for k, own in self.common for j in range(own.mean.size)]
         parts = []
         groups = [('base', group) for group in self.stands if 'base' in self.align]
         groups += [('tool', tuple(range(len(features))))] * ('tool' in self.align)
@@ -331,6 +418,11 @@ class Problem:
             for p, (kind, group) in enumerate(groups):
                 for j in range(6 if k in group else 0):
                     block[6 * p + j] = self.seen(k, maker.column((kind, j)))
+            at = self.frame_count
+            for other, own in self.common:
+                if other == k:
+                    block[at : at + own.mean.size] = own.change.transpose(2, 1, 0)
+                at += own.mean.size
             parts.append(np.concatenate([block, *self._change_columns(k, maker)]))
         sizes = [change.effect.coordinates().size for change in self.changes]
         names += [f'change {i}.{j}' for i, size in enumerate(sizes) for j in range(size)]
@@ -355,9 +447,6 @@ class Problem:
 
         Parameters
         ----------
-        features : list of Features
-            One per recording; see `Problem.features`.
-        effect : Effect
         atoms : bool
             Its linear features; else the derivatives by its fit coordinates.
 

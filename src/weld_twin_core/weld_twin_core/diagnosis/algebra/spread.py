@@ -18,9 +18,8 @@ import numpy as np
 
 from ...arrays import Array
 from .atoms import rows_of
-from .definite import inverted, well_conditioned
+from .definite import inverted, unit_diagonal, well_conditioned
 from .designed import Design
-from .unit_scale import unit_diagonal
 
 BLOCKS = 24
 """Stretches whose scores are held apart: enough to tell a variance to a third."""
@@ -51,7 +50,7 @@ def covariance(
 
     """
     inverse, size = unit_inverse(columns, ridge)
-    stretches = rows_of(np.unique(labels, return_inverse=True)[1])
+    stretches = rows_of(np.unique(labels, return_inverse=True)[1].astype(float))
     each = [columns.within(rows).times(residual[rows]) / size for rows in stretches]
     scores = inverse @ np.stack(each, axis=1)
     blocks = max(len(each), 2)
@@ -67,7 +66,6 @@ def unit_inverse(columns: Design, ridge: Array) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    columns : Design
     ridge : array, shape (P,)
         Prior precision.
 
@@ -75,6 +73,8 @@ def unit_inverse(columns: Design, ridge: Array) -> tuple[Array, Array]:
     normal = columns.normal()
     normal[np.diag_indices_from(normal)] += ridge
     scaled, size = unit_diagonal(normal)
+    if not size.size:
+        return scaled, size  # LAPACK complains of a matrix of no columns.
     if well_conditioned(scaled, SINGULAR):
         return inverted(scaled), size
     return np.asarray(np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True)), size

@@ -1,35 +1,53 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The whole answer of a diagnosis, from what each step found."""
+"""The whole answer of a diagnosis, from what each step found; or that there is none."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import nan
 from typing import Any
+
+import numpy as np
 
 from ...twin.posterior import Posterior
 from ..advice import Limits, actions
 from ..advice.next_step import next_step
+from ..algebra.fit import trusted
+from ..algebra.problem import Model
+from ..beliefs import Beliefs
 from ..calibration.calibrated import Stated, calibrated
 from ..frames.aligned import NOT_TOLD, not_told
+from ..frames.changes import told, untold
+from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..hypotheses.structural_aliases import never_parted
 from ..levels.causes import causes
 from ..levels.contributions import contributions
 from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
-from ..result import Cause, Diagnosis, Shares, Shrink
+from ..result import (
+    Candidate,
+    Cause,
+    Changed,
+    Check,
+    Diagnosis,
+    Gap,
+    Shares,
+    Shrink,
+    Traces,
+    Unexplained,
+    Where,
+)
 from ..soundness.efforts import compared
 from ..soundness.gate import Examined
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
-from ..verdict.decision import Verdict
+from ..verdict.decision import Left, Verdict
 from ..verdict.evidence import Evidence
-from .changed import changed, untold_check
 from .contact_spreads import contact_spreads
-from .gap import gap, traces
 from .named_effects import named_effects
 from .share_intervals import with_intervals
-from .weighed_candidates import unexplained, weighed_candidates
 
 
 def answer(
@@ -50,12 +68,6 @@ def answer(
 
     Parameters
     ----------
-    found : Search
-    unseen : Unseen
-        Of the final model.
-    evidence : Evidence
-    verdict : Verdict
-    shrink : Shrink
     examined : Examined
         Whether the data are sound, and what was mended.
     posterior : Posterior
@@ -130,3 +142,155 @@ def _compared(found: Search, examined: Examined, verdict: Verdict) -> dict[str, 
         'unsound': examined.told(found.final.model.found),
         'same': never_parted(found, verdict.sets),
     }
+
+
+def changed(found: Search, families: Sequence[str]) -> tuple[Changed, ...]:
+    """Return what differs between the recordings beyond noise, by recording."""
+    if not families:
+        return ()
+    items = told(found.problem, found.final.model, found.scale, found.precision, families)
+    return tuple(
+        Changed(
+            item.change.recording,
+            item.change.effect,
+            item.change.effect.errors(np.sqrt(np.diag(item.covariance))),
+        )
+        for item in items
+    )
+
+
+def untold_check(found: Search, families: Sequence[str]) -> tuple[Check, ...]:
+    """Return a note of what may have changed without being seen."""
+    names = untold(found.problem, found.final.model, families)
+    if not names:
+        return ()
+    return (
+        Check(
+            'changes',
+            'note',
+            'Whether it changed between the recordings cannot be told of: '
+            f'{", ".join(names)}. Frames that are fitted take its place, or nothing shows it.',
+        ),
+    )
+
+
+def gap(found: Search, floor: float) -> Gap:
+    """
+    Return the size of the gap over trusted samples.
+
+    Parameters
+    ----------
+    found : Search
+        Its baseline holds frames and known effects only.
+    floor : float
+        RMS of the noise alone, [m].
+
+    """
+    parts = found.problem.residuals(found.baseline.model)
+    good = trusted(found.scale.weights)
+    distance = np.concatenate(
+        [np.linalg.norm(p[:3, g], axis=0) for p, g in zip(parts, good, strict=True)]
+    )
+    turns = [p[3:, g] for p, g in zip(parts, good, strict=True) if p.shape[0] > 3]
+    turn = None
+    if turns:
+        turn = float(np.sqrt(np.mean(np.concatenate([(t**2).sum(axis=0) for t in turns]))))
+    return Gap(
+        rms_m=float(np.sqrt((distance**2).mean())),
+        mean_m=float(distance.mean()),
+        max_m=float(distance.max()),
+        orientation_rms_rad=turn,
+        samples=int(distance.size),
+        noise_floor_m=floor,
+    )
+
+
+def traces(found: Search) -> Traces:
+    """Return the position residuals before and after, sample by sample."""
+    recordings = found.problem.recordings
+    before = found.problem.residuals(found.baseline.model)
+    after = found.problem.residuals(found.final.model)
+    return Traces(
+        t=tuple(r.measured.t for r in recordings if r.measured is not None),
+        measured=tuple(r.measured.position for r in recordings if r.measured is not None),
+        before=tuple(p[:3].T for p in before),
+        after=tuple(p[:3].T for p in after),
+        trusted=tuple(trusted(found.scale.weights)),
+    )
+
+
+def weighed_candidates(found: Search, evidence: Evidence) -> tuple[Candidate, ...]:
+    """Return the hypotheses for every slot, those of the strongest effect first."""
+    out = []
+    for slot in evidence.slots:
+        least = _position_rms(found, slot[0])
+        for rival in slot:
+            rms = evidence.after * _position_rms(found, rival) / max(least, 1e-300)
+            shrink = 1.0 - rms / max(evidence.gap, 1e-300)
+            out.append(Candidate(rival.site, rival.probability, rms, shrink))
+    return tuple(out)
+
+
+def _position_rms(found: Search, rival: Rival) -> float:
+    """Return the RMS position residual of a rival's fit, weighted, [m]."""
+    parts = found.work.problem.by_sample(rival.fit.residual)
+    total = sum(float((part[:, :3] ** 2).sum()) for part in parts)
+    count = sum(found.work.problem.samples)
+    return found.work.scale.position * float(np.sqrt(total / max(count, 1)))
+
+
+def unexplained(
+    beliefs: Beliefs,
+    evidence: Evidence,
+    verdict: Verdict,
+    shrink: Shrink,
+    placing: FreeForm | None,
+) -> Unexplained:
+    """
+    Return what remains after the verdict, and what that or the gap itself depends on.
+
+    Parameters
+    ----------
+    shrink : Shrink
+        Of the model that is carried.
+    placing : FreeForm or None
+        What tells the places of an unknown gap, so that this says what the causes say.
+
+    """
+    case = Left(evidence, beliefs)
+    names = evidence.structure.depends_on if case.structured else ()
+    if verdict.status == 'unknown' and placing is not None and placing.parts:
+        names = tuple(dict.fromkeys(part.words for part in placing.parts))
+    return Unexplained(shrink.rms_after_m, case.above_noise, names)
+
+
+def refusal(examined: Examined) -> Diagnosis:
+    """
+    Return the diagnosis that there is none: status 'unsound', every figure not a number.
+
+    Parameters
+    ----------
+    examined : Examined
+        With the mistakes found.
+
+    """
+    robot = examined.given.robot
+    return Diagnosis(
+        gap=Gap(nan, nan, nan, None, 0, nan),
+        where=Where((), {}, (), {}, (), ()),
+        status='unsound',
+        effects=(),
+        confidence=nan,
+        indistinguishable=(),
+        reasons=tuple(item.sentence for item in examined.unsound),
+        candidates=(),
+        shrink=Shrink(nan, nan, nan, (nan, nan), ''),
+        unexplained=Unexplained(nan, above_noise=False),
+        next_experiment=None,
+        actions=tuple(f'{item.remedy}.' for item in examined.unsound),
+        checks=examined.checks,
+        model=Model(robot, (robot.T_world_base,)),
+        traces=Traces((), (), (), ()),
+        recordings=examined.given.recordings,
+        unsound=examined.unsound,
+    )

@@ -27,7 +27,6 @@ def contact_spreads(found: Search, unseen: Unseen) -> ContactResult | None:
 
     Parameters
     ----------
-    found : Search
     unseen : Unseen
         Of the final model; each place is left out in turn where there are enough.
 

@@ -1,21 +1,39 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The effects that a verdict names, with their standard errors."""
+"""
+The effects that a verdict names, with their standard errors.
+
+A standard error is the largest of what three reasons give: the covariance of `algebra.spread`; other
+optima that fit nearly as well; and formulas that are idealised.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Array
 from ...effects.effect import Effect
+from ..algebra import spread
+from ..algebra.designed import Design, designed
+from ..algebra.fit import coordinates
+from ..algebra.prior import frame_prior
+from ..algebra.problem import Model, Problem, Scale
+from ..algebra.spread import BLOCKS
 from ..hypotheses.search import Search
+from ..hypotheses.starts import profile
 from ..result import Cause, Found, Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
-from .standard_errors import standard_errors
 
 LEAST_SHARE = 1e-3
 """Share of the rows that counts as independent at the least; keeps a division finite."""
+UNSEEN = 1e-2
+"""A coordinate a thousand times its typical size must move some row by this much noise."""
 
 
 def named_effects(
@@ -26,11 +44,8 @@ def named_effects(
 
     Parameters
     ----------
-    found : Search
     unseen : Unseen
         Of the final model; tells how far each effect moves the tool.
-    verdict : Verdict
-    causes : sequence of Cause
 
     Returns
     -------
@@ -71,3 +86,96 @@ def _told(
         for site in group[:1]
         if site in sites
     ]
+
+
+def standard_errors(
+    problem: Problem, model: Model, scale: Scale, precision: Array, share: float
+) -> list[dict[str, Any]]:
+    """
+    Return the standard errors of every found effect, in the shape of its parameters.
+
+    Parameters that are not fitted, that rest on a bound or that the data do not show have none.
+
+    Parameters
+    ----------
+    problem, model, scale
+        A model fitted to all measurements.
+    precision : array, shape (K,)
+        Of the prior of all fit coordinates, about zero.
+    share : float
+        Of the rows that count as independent.
+
+    """
+    if not model.found:
+        return []
+    variance = np.diag(covariance(problem, model, scale, precision, share))
+    at, out = 0, []
+    for k, effect in enumerate(model.found):
+        size = effect.coordinates().size
+        own = np.sqrt(variance[at : at + size])
+        at += size
+        own = np.maximum(own, _elsewhere(problem, model, scale, k, share))
+        out.append(effect.errors(np.hypot(own, idealised(effect))))
+    return out
+
+
+def covariance(
+    problem: Problem, model: Model, scale: Scale, precision: Array, share: float
+) -> Array:
+    """
+    Return the covariance of all fit coordinates, shape (K, K); NaN for those that have none.
+
+    Parameters
+    ----------
+    problem, model, scale, precision, share
+        As `standard_errors` takes them.
+
+    """
+    columns, _ = designed(problem, model, scale)
+    count = coordinates(model).size
+    prior = precision if precision.size else np.zeros(count)
+    live = np.concatenate([np.ones(columns.count - count, bool), _free(model)])
+    live &= _visible(columns, model)
+    columns = columns.chosen(np.flatnonzero(live))
+    ridge = np.concatenate([frame_prior(problem, model)[0], prior])[live]
+    residual = problem.whitened(problem.residuals(model), scale)
+    out = np.full((live.size, live.size), np.nan)
+    labels = problem.block_labels(BLOCKS)
+    out[np.ix_(live, live)] = spread.covariance(columns, ridge, residual, labels, share)
+    return out[live.size - count :, live.size - count :]
+
+
+def _free(model: Model) -> NDArray[np.bool_]:
+    """Return which fit coordinates are off their bounds, shape (K,)."""
+    out: list[bool] = []
+    for effect in model.found:
+        specs = [effect.components()[k][0] for k in effect.fitted()]
+        out += [
+            p.lower < value < p.upper for p, value in zip(specs, effect.coordinates(), strict=True)
+        ]
+    return np.array(out, dtype=bool)
+
+
+def _visible(columns: Design, model: Model) -> NDArray[np.bool_]:
+    """Return which columns the data show, shape (P,)."""
+    scales = np.concatenate([effect.coordinate_scales() for effect in model.found])
+    reach = np.concatenate([np.ones(columns.count - scales.size), 1e3 * scales])
+    return np.asarray(columns.peaks() * reach > UNSEEN)
+
+
+def _elsewhere(problem: Problem, model: Model, scale: Scale, k: int, share: float) -> Array:
+    """Return how far instances that fit nearly as well spread about effect k, per coordinate."""
+    effect = model.found[k]
+    trials = profile(problem, model, scale, k)
+    if trials is None or not effect.coordinates().size:
+        return np.zeros(effect.coordinates().size)
+    others, worse = trials
+    weight = np.exp(-0.5 * share * np.maximum(worse, 0.0))
+    apart = np.array([other.coordinates() for other in others]) - effect.coordinates()
+    return np.asarray(np.sqrt(weight @ apart**2 / (1.0 + weight.sum())))
+
+
+def idealised(effect: Effect) -> Array:
+    """Return how far real arms differ from the formulas, per coordinate."""
+    specs = [effect.components()[k][0] for k in effect.fitted()]
+    return np.array([p.idealised for p in specs]) * np.abs(effect.coordinates())

@@ -26,7 +26,7 @@ from ..levels.causes import LISTED, covering
 from ..result import Cause, Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
-from .standard_errors import covariance, idealised
+from .named_effects import covariance, idealised
 
 DRAWS = 1000
 """Enough for the ends of an interval to be good to a few per cent of its width."""
@@ -49,11 +49,6 @@ def with_intervals(
 
     Parameters
     ----------
-    told : sequence of Cause
-    found : Search
-    unseen : Unseen
-        Of its final model.
-    verdict : Verdict
     floor : float
         RMS of the noise alone [m].
 
@@ -96,8 +91,6 @@ def _coordinates(rng: np.random.Generator, found: Search, missed: float) -> Arra
 
     Parameters
     ----------
-    rng : Generator
-    found : Search
     missed : float
         Share of what is left that is no noise. It spreads over a number of directions, as what
         formulas are believed to miss does.
@@ -195,10 +188,5 @@ def _fitted_parts(problem: Problem, scale: Scale, fit: Fit) -> Array:
 
 def _positions(problem: Problem, scale: Scale, rows: Array) -> Array:
     """Return the position part of whitened rows in every trusted sample, (3 samples,) [m]."""
-    parts = zip(problem.by_sample(rows), scale.weights, trusted(scale.weights), strict=True)
-    return np.concatenate(
-        [
-            (part[good, :3] * (scale.position / np.sqrt(weight[good]))[:, None]).ravel()
-            for part, weight, good in parts
-        ]
-    )
+    parts = zip(problem.measured_rows(rows, scale), trusted(scale.weights), strict=True)
+    return np.concatenate([part[good, :3].ravel() for part, good in parts])

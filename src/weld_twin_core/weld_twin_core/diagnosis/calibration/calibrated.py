@@ -39,7 +39,6 @@ class Statement:
     cause : int or None
         Which of the causes it is about; of a name before causes are put together, which effect
         found; None of the answer as a whole.
-    features : mapping from str to float
     probability : float
         Of what `features.KINDS` says.
 
@@ -58,8 +57,6 @@ class Stated:
 
     Attributes
     ----------
-    table : tuple of Row
-        The table of answers.
     names : tuple of Statement
         Of every effect found; of many small errors one for all that are named.
     situation : mapping from str to float
@@ -87,12 +84,6 @@ def stated(
 
     Parameters
     ----------
-    found : Search
-    unseen : Unseen
-        Of its final model.
-    evidence : Evidence
-    table : tuple of Row
-        The table of answers.
     rival : Curved or None
         The free-form explanation in place of all names.
 
@@ -121,7 +112,6 @@ def calibrated(
 
     Parameters
     ----------
-    verdict : Verdict
     causes : sequence of Cause
         With the weights of the table of answers.
     before : Stated

@@ -121,6 +121,7 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
             'weight': odds(row.mass),
             'evidence': log1(row.gap),
             'margin': log1(min(row.margin, FAR)),
+            'behind': log1(row.leader.behind),
             'apart': log(min(row.apart, FAR)),
             'size': log(size),
             'wander': log(wandered),

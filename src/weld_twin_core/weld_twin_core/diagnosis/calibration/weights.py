@@ -100,15 +100,7 @@ class Calibration:
     card: Mapping[str, Any]
 
     def probability(self, kind: str, features: Features) -> float:
-        """
-        Return how often such statements were right.
-
-        Parameters
-        ----------
-        kind : str
-        features : mapping from str to float
-
-        """
+        """Return how often such statements were right."""
         return self.statements[kind].probability(features)
 
     def sure(self, what: str, probability: float) -> bool:
@@ -119,7 +111,6 @@ class Calibration:
         ----------
         what : str
             'answer' or 'cause'.
-        probability : float
 
         """
         return probability >= self.sure_from[what]

@@ -175,7 +175,9 @@ def tracked_part(problem: Problem, model: Model) -> tuple[Problem, Model]:
     part = replace(
         problem, recordings=recordings, anchor=anchor, touched=(), given=given, loose=()
     )
-    return part, replace(model, bases=tuple(model.bases[k] for k in kept), given=given)
+    bases = tuple(model.bases[k] for k in kept)
+    common = tuple(model.common[k] for k in kept) if model.common else ()
+    return part, replace(model, bases=bases, given=given, common=common)
 
 
 def not_told(problem: Problem) -> tuple[str, ...]:

@@ -23,13 +23,13 @@ from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...errors import ModelError
 from ...twin.features import joints_of
+from ..algebra.definite import unit_diagonal
 from ..algebra.designed import Design, designed
 from ..algebra.fit import coordinates, design, fit, robust_fit, robust_scale
 from ..algebra.independent_rows import effective_share
 from ..algebra.prior import effect_precision, frame_offset, frame_prior
 from ..algebra.problem import Change, Model, Problem, Scale
 from ..algebra.spread import BLOCKS, covariance, unit_inverse
-from ..algebra.unit_scale import unit_diagonal
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 
@@ -214,7 +214,8 @@ def _chosen(
 def _places(problem: Problem, model: Model) -> list[Array]:
     """Return the columns of every change."""
     sizes = [change.effect.coordinates().size for change in model.changes]
-    ends = problem.frame_count + np.cumsum(np.array([0, *sizes], dtype=int))
+    first = problem.frame_count + problem.shared_count
+    ends = first + np.cumsum(np.array([0, *sizes], dtype=int))
     return [np.arange(a, b) for a, b in pairwise(ends)]
 
 

@@ -10,7 +10,6 @@ frames explain the recordings as well, they stand.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -76,7 +75,7 @@ def shown(
         Errors of this size in units of the least noise, squared, and the directions in columns.
 
     """
-    problem = replace(problem.thinned(ROWS), changes=())
+    problem = problem.thinned(ROWS).of_frames()
     parts, names = problem.frame_columns(problem.features(model))
     size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in names])
     if not names:
@@ -100,7 +99,7 @@ def held(found: Fit, problem: Problem, scale: Scale, precision: Array, given: Ro
         return found
     off, weight = _off(problem, found.model, given)
     back = np.linalg.lstsq(weight[:, None] * free.vectors, -weight * off, rcond=1e-9)[0]
-    count = _between(found.model) + found.coordinates.size
+    count = problem.shared_count + _between(found.model) + found.coordinates.size
     step = np.concatenate([free.vectors @ back, np.zeros(count)])
     model = stepped(problem, found.model, step)
     for _ in range(ROUNDS):

@@ -34,7 +34,6 @@ class Library:
         All columns, whitened, in the order of their numbers.
     systems : SeedSystems
         The normal matrix of every seed.
-    units : tuple of Unit
     absent : dict
         Why a family is not considered, by name.
 
@@ -78,21 +77,7 @@ def candidate_kinds(exclude: Sequence[str], align: frozenset[str]) -> list[type[
 
 
 def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] = ()) -> Library:
-    """
-    Return the library at a model: one set of columns that all hypotheses share.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-    exclude : sequence of str
-        Families taken out of the library.
-
-    """
+    """Return the library at a model: one set of columns that all hypotheses share."""
     features = problem.features(model)
     pulls = _pulls(problem, model, scale)
     shelf = _Shelf(problem, scale, features, pulls, dict.fromkeys(exclude, EXCLUDED))
@@ -109,11 +94,8 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
 
 def _pulls(problem: Problem, model: Model, scale: Scale) -> list[Array]:
     """Return how strongly what is left pulls at the tool of every recording, (3 or 6, M) each."""
-    residuals = problem.residuals(model)
-    for residual, weights in zip(residuals, scale.weights, strict=True):
-        residual[:3] *= weights / scale.position**2
-        residual[3:] *= weights / scale.orientation**2
-    return [problem.pulled(k, residual) for k, residual in enumerate(residuals)]
+    known = (problem.informed(k, r, scale) for k, r in enumerate(problem.residuals(model)))
+    return [problem.pulled(k, rows) for k, rows in enumerate(known)]
 
 
 def _applicable(kind: type[Effect], joint: str | None, features: list[Features]) -> str | None:
@@ -214,7 +196,6 @@ def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
 
     Parameters
     ----------
-    robot : Robot
     view : View
         The samples that reach them.
     on : collection of str

@@ -26,12 +26,26 @@ SHORTLIST = 7
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """A unit in the place of a found effect: its evidence, and the fit with it."""
+    """
+    A unit in the place of a found effect: its evidence, and the fit with it.
+
+    Attributes
+    ----------
+    site : Site
+    nats : float
+    fit : Fit
+    probability : float
+        Its share of the evidence in this place.
+    behind : float
+        By how much a family that was taken out is ahead in this place [nats]; 0 of none.
+
+    """
 
     site: Site
     nats: float
     fit: Fit
     probability: float = 0.0
+    behind: float = 0.0
 
 
 def rivals(
@@ -42,10 +56,8 @@ def rivals(
 
     Parameters
     ----------
-    work : Workspace
     now : Fit
         The final fit, on the workspace's problem and scale.
-    k : int
     effective : callable
         Number of independent rows of a fit.
 

@@ -25,8 +25,6 @@ from .selection import (
     forward,
     implausible,
     possible_part,
-    without_misfit,
-    without_negligible,
 )
 
 SEARCH_ROWS = 9000
@@ -51,7 +49,6 @@ class Search:
         All measurements, with the final noise and weights.
     baseline : Fit
         Frames and known effects only.
-    final : Fit
     precision : array, shape (K,)
         Prior precision of the final fit's coordinates.
     work : Workspace
@@ -112,14 +109,10 @@ def effective_rows(
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
     found : Fit
         A fit of the problem.
     bare_rss : float
         Whitened sum of squares before any effect was found.
-    beliefs : Beliefs
-        The numbers that decide.
     trust : float
         Exponent between 0 and 1; see above.
 
@@ -140,16 +133,8 @@ def search(
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
     start : Model
         The nominal robot with frames to start from, and the effects known.
-    exclude : sequence of str
-        Families taken out of the library.
-    beliefs : Beliefs
-        The numbers that decide.
-    progress : callable
-        Told in a few words what has been done.
 
     """
     full = problem.thinned(FIT_ROWS)
@@ -193,7 +178,6 @@ def refitted(found: Search, small: Fit) -> Search:
 
     Parameters
     ----------
-    found : Search
     small : Fit
         The choice, fitted on the workspace's measurements.
 
@@ -236,10 +220,7 @@ def _chosen(
         refused = []
         steps = forward(work, now, hopeful, beliefs.many, progress, refused.append)
         if steps:
-            now = steps[-1].fit
-            now = backward(work, now, effective)
-            now = without_negligible(work, now)
-            now = without_misfit(work, now)
+            now = backward(work, steps[-1].fit, effective)
         # Of what enters one by one, what came later may stand for some that came before.
         crowded = small.at_rest and len(now.model.found) >= beliefs.many
         model = now.model
@@ -256,10 +237,6 @@ def possible(work: Workspace, now: Fit, refused: list[Effect]) -> Fit:
 
     Parameters
     ----------
-    work : Workspace
-        The problem with its library, multiplied out.
-    now : Fit
-        The fit so far.
     refused : list of Effect
         Those refused so far; more are added to it.
 
@@ -273,21 +250,7 @@ def possible(work: Workspace, now: Fit, refused: list[Effect]) -> Fit:
 def settled(
     work: Workspace, now: Fit, effective: Callable[[Fit], float], progress: Progress
 ) -> tuple[Fit, tuple[tuple[Rival, ...], ...]]:
-    """
-    Return the fit in which every effect is the best in its place, and its rivals.
-
-    Parameters
-    ----------
-    work : Workspace
-        The problem with its library, multiplied out.
-    now : Fit
-        The fit so far.
-    effective : callable
-        From a fit to the number of its independent rows.
-    progress : callable
-        Told in a few words what has been done.
-
-    """
+    """Return the fit in which every effect is the best in its place, and its rivals."""
     for attempt in range(SWAPS + 1):
         slots = []
         for k, effect in enumerate(now.model.found):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.unit_scale import EMPTY, FLAT, Index, unit_diagonal
+from ..algebra.definite import EMPTY, FLAT, Index, unit_diagonal
 
 SINGULAR = 1e-11
 """Added to the diagonal of ones, so that columns that repeat others do no harm; far above
@@ -36,7 +36,6 @@ class Unit:
 
     Attributes
     ----------
-    family : str
     joint : str or None
     seeds : tuple of Effect
         Instances that span it; more than one where a parameter bends the response.
@@ -286,8 +285,6 @@ class Choice:
 
     Attributes
     ----------
-    unit : Unit
-    seed : int
     columns : array of int
         Of the seed, those that earn their place.
     nats : float

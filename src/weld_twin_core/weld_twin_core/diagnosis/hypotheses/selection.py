@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,7 +42,6 @@ class Workspace:
 
         Parameters
         ----------
-        model : Model
         residual : array, shape (rows,)
             What the model leaves, whitened.
 
@@ -74,7 +73,6 @@ def forward(
 
     Parameters
     ----------
-    work : Workspace
     start : Fit
         The baseline: frames and known effects.
     effective : callable
@@ -204,18 +202,7 @@ def possible_part(model: Model) -> Model:
 
 
 def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:
-    """
-    Return the fit of a model with one more effect, merged where its kind can merge.
-
-    Parameters
-    ----------
-    work : Workspace
-        The problem with its library, multiplied out.
-    model : Model
-        What is believed so far; everything is taken about it.
-    effect : Effect
-
-    """
+    """Return the fit of a model with one more effect, merged where its kind can merge."""
     effect = started(work.problem, model, work.scale, effect)
     return fit(work.problem, model.with_found(merged(model.found, effect)), work.scale, None, 5)
 
@@ -249,81 +236,64 @@ def restarted(work: Workspace, now: Fit) -> Fit:
 
 
 def backward(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fit:
-    """
-    Return the fit with every effect dropped that is not worth its freedom given the others.
-
-    Parameters
-    ----------
-    work : Workspace
-        The problem with its library, multiplied out.
-    now : Fit
-        The fit so far.
-    effective : callable
-        From a fit to the number of its independent rows.
-
-    """
+    """Return the fit with every effect dropped that is not needed given the others, the least first."""
     now = restarted(work, now)
     while now.model.found:
-        count = effective(now)
-        losses = []
-        for k in range(len(now.model.found)):
-            less = fit(work.problem, now.model.without(k), work.scale, None, 4)
-            freedom = now.coordinates.size - less.coordinates.size
-            losses.append((evidence(less.rss, less.rss - now.rss, freedom, count), less))
-        worst = min(losses, key=lambda item: item[0])
-        if worst[0] >= work.beliefs.enter_nats:
+        every = range(len(now.model.found))
+        less = [fit(work.problem, now.model.without(k), work.scale, None, 4) for k in every]
+        sizes = [_size(work, now, now.model.without(k)) for k in every]
+        reasons = (
+            _worthless(work, now, less, effective),
+            _negligible(work, sizes),
+            _misfit(work, now, less, sizes),
+        )
+        needless = next((k for k in reasons if k is not None), None)
+        if needless is None:
             break
-        now = worst[1]
+        now = less[needless]
     return now
 
 
-def without_negligible(work: Workspace, now: Fit) -> Fit:
+def _worthless(
+    work: Workspace, now: Fit, less: Sequence[Fit], effective: Callable[[Fit], float]
+) -> int | None:
+    """Return the effect that is worth least, where it is not worth its freedom."""
+    count = effective(now)
+    nats = []
+    for one in less:
+        freedom = now.coordinates.size - one.coordinates.size
+        nats.append(evidence(one.rss, one.rss - now.rss, freedom, count))
+    least = int(np.argmin(nats))
+    return least if nats[least] < work.beliefs.enter_nats else None
+
+
+def _negligible(work: Workspace, sizes: Sequence[float]) -> int | None:
     """
-    Return the fit without effects far below the noise beside a larger one.
+    Return the smallest effect, where it is far below the noise beside a larger one.
 
     Thousands of rows make a micrometre significant; next to a larger cause it is more likely the
     difference between that cause and its model.
     """
-    beliefs = work.beliefs
-    while now.model.found:
-        sizes = [_size(work, now, now.model.without(k)) for k in range(len(now.model.found))]
-        least = int(np.argmin(sizes))
-        if sizes[least] > (beliefs.negligible if len(sizes) > 1 else beliefs.invisible):
-            break
-        now = fit(work.problem, now.model.without(least), work.scale, None, 4)
-    return now
+    least = int(np.argmin(sizes))
+    most = work.beliefs.negligible if len(sizes) > 1 else work.beliefs.invisible
+    return least if sizes[least] <= most else None
 
 
-def without_misfit(work: Workspace, now: Fit) -> Fit:
+def _misfit(work: Workspace, now: Fit, less: Sequence[Fit], sizes: Sequence[float]) -> int | None:
     """
-    Return the fit without effects that are no more than what a larger one's formula misses.
+    Return the effect that is no more than what a larger one's formula misses.
 
     A gear in motion is not its formula: of a large effect some per cent are left, far above chance
     over thousands of rows, and a second effect on the same joint may take them. Where it takes
     away less than that share of the largest, and less than noise, it is not told. Stations are
     left alone, as the geometry of an arm has no such misfit.
-
-    Parameters
-    ----------
-    work : Workspace
-        The problem with its library, multiplied out.
-    now : Fit
-        The fit so far.
-
     """
-    beliefs = work.beliefs
-    while len(now.model.found) > 1 and not work.problem.at_rest:
-        largest = max(_size(work, now, now.model.without(k)) for k in range(len(now.model.found)))
-        most = min(beliefs.misfit_noise, beliefs.misfit_share * largest)
-        less = [
-            fit(work.problem, now.model.without(k), work.scale, None, 4)
-            for k in range(len(now.model.found))
-        ]
-        least = min(less, key=lambda one: one.rss)
-        if np.sqrt(max(least.rss - now.rss, 0.0) / now.residual.size) > most:
-            break
-        now = least
-    return now
+    if len(less) < 2 or work.problem.at_rest:
+        return None
+    most = min(work.beliefs.misfit_noise, work.beliefs.misfit_share * max(sizes))
+    least = int(np.argmin([one.rss for one in less]))
+    taken = max(less[least].rss - now.rss, 0.0) / now.residual.size
+    return least if np.sqrt(taken) <= most else None
 
 
 def _size(work: Workspace, now: Fit, less: Model) -> float:

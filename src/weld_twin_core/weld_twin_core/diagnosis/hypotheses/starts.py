@@ -31,7 +31,6 @@ class Profile(NamedTuple):
 
     Attributes
     ----------
-    effects : list of Effect
     gains : array, shape (D,)
         Fall of the whitened sum of squares, frames and the other effects fitted anew.
 
@@ -46,17 +45,6 @@ def started(problem: Problem, model: Model, scale: Scale, effect: Effect) -> Eff
     Return the instance of an effect from which to fit it beside those a model has.
 
     The effect itself where its kind has no need of a search.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-    effect : Effect
-
     """
     if not searched(effect):
         return effect
@@ -84,12 +72,6 @@ def profile(
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
     k : int
         Which of the found effects, counted from 0.
 
@@ -124,9 +106,6 @@ class _Looker:
 
     Attributes
     ----------
-    problem : Problem
-    scale : Scale
-    features : list of Features
     residual : array, shape (rows,)
         With frames and effects in the model fitted.
     basis : array, shape (rows, P)
@@ -142,19 +121,7 @@ class _Looker:
 
     @classmethod
     def of(cls, problem: Problem, model: Model, scale: Scale) -> _Looker:
-        """
-        Take the residual and its columns at a model.
-
-        Parameters
-        ----------
-        problem : Problem
-            The recordings to explain, and the frames that are fitted along.
-        model : Model
-            What is believed so far; everything is taken about it.
-        scale : Scale
-            The noise that residuals are measured in, and the weight of every sample.
-
-        """
+        """Take the residual and its columns at a model."""
         basis = span_of(design(problem, model, scale)[0]).T
         residual = problem.whitened(problem.residuals(model), scale)
         residual = residual - basis @ (basis.T @ residual)
@@ -190,10 +157,8 @@ class _Looker:
 
     def _white(self, maker: Features, joint: int, k: int) -> Array:
         """Return what one joint does in recording k, whitened, shape (M, c)."""
-        unit = np.full(self.problem.rows[k], 1.0 / self.scale.position)
-        unit[3:] = 1.0 / self.scale.orientation
-        column = self.problem.seen(k, maker.column(('q', joint))).T
-        return np.asarray(column * unit * np.sqrt(self.scale.weights[k])[:, None])
+        column = self.problem.seen(k, maker.column(('q', joint)))
+        return self.problem.in_noise(k, column, self.scale)
 
 
 def _same(one: list[Effect], other: list[Effect]) -> bool:

@@ -37,15 +37,7 @@ def hardly_moves(features: list[Features], effect: Effect) -> bool:
 
 
 def narrow(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:
-    """
-    Return the joints that do not move widely, all recordings together.
-
-    Parameters
-    ----------
-    recordings : sequence of Recording
-    robot : Robot
-
-    """
+    """Return the joints that do not move widely, all recordings together."""
     ends = [(r.joints.q.min(axis=0), r.joints.q.max(axis=0)) for r in recordings]
     travel = np.max([high for _, high in ends], axis=0) - np.min([low for low, _ in ends], axis=0)
     wide = np.minimum(WIDE, MOST_OF_IT * (robot.upper - robot.lower))

@@ -16,8 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arm.robot import Robot
 from ...arrays import Array
@@ -33,7 +35,7 @@ from ..result import Site
 from .library import build
 from .rivals import Rival, contenders, nats_in_place, weighed
 from .search import Search, refitted
-from .selection import Workspace, fitted_with, implausible
+from .selection import Workspace, backward, fitted_with, implausible
 from .still_joints import hardly_moves, moved_most
 
 POSTURES = 40
@@ -66,15 +68,22 @@ def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beli
     beliefs : Beliefs
 
     """
-    slots, better = [], list(found.refused)
     named = found.slots[: len(found.small.model.found)]
     outside = _outside(found, exclude) if named else None
+    slots, refused, behind = list[tuple[Rival, ...]](), list(found.refused), np.zeros(len(named))
     for k, slot in enumerate(named):
-        more, clearly = _also(found, k, slot, exclude, outside)
+        more, best = _also(found, k, slot, exclude, outside)
+        if best is not None and (lead := _lead(found, best)) is not None:
+            refused.append(best.fit.model.found[-1])
+            behind = np.where(lead.replaced, np.maximum(behind, lead.nats), behind)
+            more = [rival for rival in more if rival.site != best.site]
         slots.append(weighed([*slot, *more], beliefs.temperature) if more else slot)
-        better += clearly
+    slots = [
+        tuple(replace(rival, behind=float(nats)) for rival in slot)
+        for slot, nats in zip(slots, behind, strict=True)
+    ]
     slots += found.slots[len(named) :]
-    aliased = replace(found, slots=tuple(slots), refused=tuple(better))
+    aliased = replace(found, slots=tuple(slots), refused=tuple(refused))
     return _settable_first(aliased, frozenset(exclude))
 
 
@@ -93,20 +102,19 @@ def _also(
     slot: tuple[Rival, ...],
     exclude: Sequence[str],
     outside: Workspace | None,
-) -> tuple[list[Rival], list[Effect]]:
+) -> tuple[list[Rival], Rival | None]:
     """
-    Return what may be the same error as what is in a slot, each fitted in its place.
+    Return what may be the same error as what is in a slot, and the best that was taken out.
 
-    None of these counts for more than what was found. What was taken out and fits clearly better is
-    no member of the slot, but returned beside it.
+    Each is fitted in its place, and none counts for more than what was found.
     """
-    work, beliefs, now = found.work, found.work.beliefs, found.small
+    work, now = found.work, found.small
     features = work.problem.features(now.model)
     taken = {Site(e.name, e.site) for e in now.model.found} | {r.site for r in slot}
     constants = [
         rival.site
         for rival in slot
-        if rival.probability >= beliefs.listed and _constant(REGISTRY[rival.site.effect])
+        if rival.probability >= work.beliefs.listed and _constant(REGISTRY[rival.site.effect])
     ]
     seeds = [
         *_same_anywhere(found, constants, exclude),
@@ -114,22 +122,51 @@ def _also(
     ]
     seeds = [seed for seed in seeds if Site(seed.name, seed.site) not in taken]
     if not seeds and outside is None:
-        return [], []
+        return [], None
     rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
     count, most = found.effective(now), max(rival.nats for rival in slot)
     alike = [_in_place(found, features, rest, slot, seed, count) for seed in seeds]
+    best = None
     if outside is not None:
         _, tried = contenders(outside, rest, count, now.model.found, MOST_EXCLUDED)
-        alike += [
-            Rival(Site(*c.unit.site), nats_in_place(rest, own, count, c), own) for c, own in tried
-        ]
-    more, clearly = list[Rival](), list[Effect]()
-    for one in _best_of_each(alike):
-        if one.site.effect in exclude and one.nats > most + beliefs.enter_nats:
-            clearly.append(one.fit.model.found[-1])
-        elif not implausible(one.fit.model):
-            more.append(replace(one, nats=min(one.nats, most)))
-    return more, clearly
+        more = [Rival(Site(*c.unit.site), nats_in_place(rest, f, count, c), f) for c, f in tried]
+        alike += more
+        # What is the same error on any motion is ahead by its fewer numbers alone.
+        always_alike = {Site(seed.name, seed.site) for seed in seeds}
+        parted = [rival for rival in more if rival.site not in always_alike]
+        best = max(parted, key=lambda rival: rival.nats, default=None)
+    return [
+        replace(one, nats=min(one.nats, most))
+        for one in _best_of_each(alike)
+        if not implausible(one.fit.model)
+    ], best
+
+
+class _Lead(NamedTuple):
+    """By how much evidence something taken out is ahead, and which effects found it replaces."""
+
+    nats: float
+    replaced: NDArray[np.bool_]
+
+
+def _lead(found: Search, other: Rival) -> _Lead | None:
+    """
+    Return by how much something that was taken out is ahead of what was found, where it clearly is.
+
+    Several effects may imitate one: those that are worth nothing beside it are replaced as well.
+    """
+    work, now = found.work, found.small
+    own = backward(work, other.fit, found.effective)
+    kept = {(e.name, e.site) for e in own.model.found}
+    if (other.site.effect, other.site.joint) not in kept:
+        return None
+    bare = fit(work.problem, now.model.with_found(()), work.scale, None, 4)
+    count = found.effective(now)
+    nats = nats_in_place(bare, own, count) - nats_in_place(bare, now, count)
+    if nats <= work.beliefs.enter_nats:
+        return None
+    replaced = [(e.name, e.site) not in kept for e in now.model.found]
+    return _Lead(float(nats), np.array(replaced))
 
 
 def _in_place(

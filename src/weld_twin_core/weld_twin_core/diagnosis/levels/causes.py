@@ -73,17 +73,10 @@ def causes(
 
     Parameters
     ----------
-    found : Search
-    unseen : Unseen
-        Of its final model.
-    table : sequence of Row
-        The table of answers.
-    verdict : Verdict
     rival : Curved or None
         The free-form explanation; it is the model itself where ``unseen`` is its own.
     floor : float
         RMS of the noise alone [m].
-    beliefs : Beliefs
     placing : FreeForm or None
         What tells the places of an unknown gap; the curves carried, where left out.
 

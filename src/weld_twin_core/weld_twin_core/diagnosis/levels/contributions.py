@@ -25,7 +25,6 @@ def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | No
     ----------
     unseen : Unseen
         Of the model that the causes stand for.
-    causes : sequence of Cause
 
     """
     if not any(cause.members for cause in causes):
@@ -59,9 +58,4 @@ def _fields(unseen: Unseen) -> Array:
 
 def _metres(unseen: Unseen, rows: Array) -> list[Array]:
     """Return the position part of whitened rows, (M, 3) [m] for every recording."""
-    parts = zip(unseen.problem.by_sample(rows), unseen.scale.weights, strict=True)
-    size = unseen.scale.position
-    return [
-        np.asarray(part[:, :3] * (size / np.sqrt(np.maximum(w, 1e-12)))[:, None])
-        for part, w in parts
-    ]
+    return [part[:, :3] for part in unseen.problem.measured_rows(rows, unseen.scale)]

@@ -11,7 +11,8 @@ import numpy as np
 
 from ...effects.effect import Effect
 from ...recording import Recording
-from ..algebra.fit import fit, robust_fit, robust_scale
+from ..algebra.fit import Fit, fit, robust_fit, robust_scale
+from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Shrink, Site
@@ -32,7 +33,6 @@ class Curved:
 
     Attributes
     ----------
-    form : FreeForm
     kept : tuple of Effect
         Effects that stayed beside it: those named beyond doubt, and the set-up's own motion.
     found : Search
@@ -61,7 +61,6 @@ def curved(found: Search, beliefs: Beliefs) -> Curved | None:
     ----------
     found : Search
         The set-up's own motion that it holds stays beside the curves.
-    beliefs : Beliefs
 
     """
     if found.dense:
@@ -77,12 +76,10 @@ def standing(
 
     Parameters
     ----------
-    found : Search
     verdict : Verdict
         Of any other status, nothing changes.
     alone : Curved or None
         The free-form explanation without names.
-    beliefs : Beliefs
 
     """
     if verdict.status != 'unknown' or found.dense:
@@ -107,12 +104,18 @@ def _setup(found: Search) -> list[Effect]:
     return [effect for effect in found.final.model.found if not effect.cause]
 
 
+def bare_fit(found: Search, kept: Sequence[Effect] = ()) -> tuple[Problem, Fit, Scale]:
+    """Return some of the measurements, the fit on them of frames and what stays, and its noise."""
+    small = found.problem.thinned(ROWS)
+    start = found.baseline.model.with_found(tuple(kept))
+    noise = robust_scale(small, small.residuals(start))
+    return small, *robust_fit(small, start, noise, rounds=1)
+
+
 def _beside(
     found: Search, kept: Sequence[Effect], beliefs: Beliefs, *, wandering: bool = False
 ) -> Curved | None:
-    small = found.problem.thinned(ROWS)
-    start = found.baseline.model.with_found(tuple(kept))
-    bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)
+    small, bare, scale = bare_fit(found, kept)
     form = free_form(small, scale, bare, np.zeros(0), beliefs, wandering=wandering)
     if not form.parts:
         return None
@@ -158,12 +161,9 @@ def carried(
     ----------
     found, unseen, shrink
         Of the effects found.
-    verdict : Verdict
     rival : Curved or None
         The free-form explanation; carried where the verdict is 'unknown' and it predicts as well.
         What makes unseen data worse than the nominal robot does is not carried at all, nor told.
-    holdout : sequence of Recording
-    beliefs : Beliefs
 
     """
     if verdict.status != 'unknown':

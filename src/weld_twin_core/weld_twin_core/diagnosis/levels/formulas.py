@@ -100,17 +100,7 @@ class Missed(NamedTuple):
 
 
 def missed(found: Search, unseen: Unseen, beliefs: Beliefs) -> Missed:
-    """
-    Return what the formulas of the effects found miss, as far as it is beyond doubt.
-
-    Parameters
-    ----------
-    found : Search
-    unseen : Unseen
-        Of its final model.
-    beliefs : Beliefs
-
-    """
+    """Return what the formulas of the effects found miss, as far as it is beyond doubt."""
     if found.dense:
         return Missed()
     loose = [
@@ -132,8 +122,6 @@ def no_noise(verdict: Verdict, rival: Curved | None, left: Missed, beliefs: Beli
         Of any other status, nothing changes.
     rival : Curved or None
         The free-form explanation, whether or not it can be carried to another motion.
-    left : Missed
-    beliefs : Beliefs
 
     """
     if verdict.status != 'none':
@@ -171,16 +159,7 @@ def _misses(one: Beside) -> str:
 
 
 def beside_names(found: Search, unseen: Unseen) -> list[Beside]:
-    """
-    Return what free forms at the places of the effects found predict beside all of them.
-
-    Parameters
-    ----------
-    found : Search
-    unseen : Unseen
-        Of its final model.
-
-    """
+    """Return what free forms at the places of the effects found predict beside all of them."""
     problem, model = unseen.problem, found.final.model
     if problem.touched or not model.found:
         return []

@@ -5,6 +5,12 @@ Every place that could be at fault, and everything the fault could depend on, wi
 
 A group is a place and a dependence, spanned by curves (`JointCurve`, `FrameCurve`) or, where no
 curve can be carried over to another motion, by plain columns. Groups compete as wholes.
+
+Some places no single joint shows: the instrument, all links alike, a weight at the tool. A wrong unit
+of length looks like small constants of several joints, a weight like several springs, links that warm
+up like several lengths. One group for each lets the simplest explanation win. Beside them stand loops
+of joints: lost motion that builds up over a travel, without a formula for how. None of these can be
+carried to another motion as a curve; they say where, and on what it depends.
 """
 
 from __future__ import annotations
@@ -14,13 +20,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...arm.dynamics import wrench_rotation
+from ...arm.dynamics import payload_torque, wrench_rotation
 from ...arrays import Array
-from ...effects.curve import QUANTITIES
+from ...effects.associative_scan import play
+from ...effects.curve import QUANTITIES, basis
 from ...effects.effect import Effect
 from ...effects.frame_curve import FrameCurve
 from ...effects.joint_curve import JointCurve
 from ...twin.features import Features
+from ...twin.resampling import Picker
 from ..algebra.problem import Model, Problem, Scale
 
 KNOTS = {'angle': 7, 'direction': 2, 'speed': 5, 'load': 4, 'temperature': 3, 'time': 6}
@@ -36,6 +44,17 @@ WANDERS = 16
 LOOSE = 100.0
 """Carriers may be so many times their typical size: their group has been found by its columns."""
 OFF_AXIS = ('d', 'a', 'alpha', 'beta')
+RANGES = 4
+"""Knots over the distance from the instrument: straight, bent, and bent back."""
+WARM = 3
+"""Knots over the temperature."""
+LOOPS = (2e-3, 1e-2, 4e-2, 0.16)
+"""Widths [rad, or tens of centimetres] of the gaps in series that make up a loop: from what acts
+like a gap to what takes a quarter of a radian to build up."""
+SLIDING = 0.1
+"""Metres of a joint that slides which are looked at as a radian of one that turns."""
+NEAR = 1e-3
+"""Span of distances [m] below which there is one distance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,19 +102,7 @@ class Group:
 
 
 def all_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
-    """
-    Return the groups that these data can show at all.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-
-    """
+    """Return the groups that these data can show at all."""
     features = problem.features(model)
     out = []
     for at, on, curves in _curved(features, model):
@@ -109,16 +116,7 @@ def all_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
 
 
 def wandering_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
-    """
-    Return groups of what a joint loses by its direction, more and less as time goes on.
-
-    Parameters
-    ----------
-    problem : Problem
-    model : Model
-    scale : Scale
-
-    """
+    """Return groups of what a joint loses by its direction, more and less as time goes on."""
     features = problem.features(model)
     if problem.at_rest:
         return []
@@ -148,8 +146,6 @@ def spanned(
 
     Parameters
     ----------
-    problem : Problem
-    scale : Scale
     at, on : str
         Place and dependence.
     curves : tuple of Effect
@@ -258,7 +254,6 @@ def smooth_field(problem: Problem, k: int, maker: Features) -> Array:
 
     Parameters
     ----------
-    problem : Problem
     k : int
         Which recording, counted from 0.
     maker : Features
@@ -286,3 +281,92 @@ def _yielding(problem: Problem, k: int, maker: Features) -> Array:
     for axis in range(3):
         out[axis, :3] = (rotation[:, :, axis] * force[:, axis, None]).T
     return problem.seen(k, out)
+
+
+def whole_arm_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
+    """Return the groups of causes that act at several joints at once, and loops of each joint."""
+    features = problem.features(model)
+    out = [
+        spanned(
+            problem, scale, at, on, (), [problem.seen(k, part) for k, part in enumerate(parts)]
+        )
+        for at, on, parts in _yielded(features)
+        if not (at == 'instrument' and problem.untracked)
+    ]
+    return [group for group in out if group.columns.size]
+
+
+def _yielded(features: list[Features]) -> Iterator[tuple[str, str, list[Array]]]:
+    yield 'instrument', 'place', [_sighted(maker, None) for maker in features]
+    knots = _spaced([_distance(maker) for maker in features], RANGES, NEAR)
+    if knots is not None:
+        yield 'instrument', 'place', [_sighted(maker, knots) for maker in features]
+    if any(maker.view.effort is None for maker in features):  # else what hangs there was measured
+        yield 'load', 'load', [_weighed_down(maker) for maker in features]
+        yield 'load', 'load', [_carried(maker) for maker in features]
+    if all(maker.view.temperature is not None for maker in features):
+        warmth = [np.asarray(maker.view.temperature) for maker in features]
+        knots = _spaced(warmth, WARM, LEAST['temperature'])
+        if knots is not None:
+            pairs = zip(features, warmth, strict=True)
+            yield (
+                'base',
+                'temperature',
+                [_grown(m)[None] * basis(knots, w)[:, None] for m, w in pairs],
+            )
+            pairs = zip(features, warmth, strict=True)
+            middle = 0.5 * (knots[0] + knots[-1])
+            yield 'base', 'temperature', [_grown(m)[None] * (w - middle) for m, w in pairs]
+    if not all(maker.run.view.static for maker in features):
+        for index, joint in enumerate(features[0].twin.robot.joint_names):
+            yield joint, 'direction', [_looped(maker, index) for maker in features]
+
+
+def _spaced(values: list[Array], count: int, least: float) -> tuple[float, ...] | None:
+    low, high = min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+    return tuple(np.linspace(low, high, count).tolist()) if high - low > least else None
+
+
+def _distance(maker: Features) -> Array:
+    return np.asarray(np.linalg.norm(maker.run.poses.position, axis=1))
+
+
+def _sighted(maker: Features, knots: tuple[float, ...] | None) -> Array:
+    """Return the position along the line of sight, by distance: (1 or knots, 6, M)."""
+    out = np.zeros((1, 6, maker.at.size))
+    out[0, :3] = maker.run.poses.position.T
+    return out if knots is None else out * basis(knots, _distance(maker))[:, None]
+
+
+def _weighed_down(maker: Features) -> Array:
+    """Return every joint bent by the torque of a mass at the tool, (n, 6, M)."""
+    torque = _torque(maker)
+    return np.array([maker.column(('q', i)) * t for i, t in enumerate(torque)])
+
+
+def _carried(maker: Features) -> Array:
+    """Return what a mass at the tool does through the springs that are known, (1, 6, M)."""
+    return maker.changes([{('tau', i): t for i, t in enumerate(_torque(maker))}])
+
+
+def _torque(maker: Features) -> Array:
+    view = maker.view
+    return payload_torque(view.robot, view.frames, 1.0, np.zeros(3))
+
+
+def _grown(maker: Features) -> Array:
+    """Return what all lengths grown by the same share do, (6, M)."""
+    robot = maker.twin.robot
+    lengths = [((k, i), float(getattr(robot, k)[i])) for i in range(robot.n) for k in ('a', 'd')]
+    return np.asarray(sum(length * maker.column(channel) for channel, length in lengths if length))
+
+
+def _looped(maker: Features, index: int) -> Array:
+    """Return a joint that trails in gaps of several widths in series, (L, 6, M)."""
+    view = maker.joint_view
+    unit = SLIDING if view.robot.prismatic[index] else 1.0
+    q = view.joint(index)
+    widths = unit * np.array(LOOPS)[:, None]
+    trails = play(q, widths, np.full(len(LOOPS), q[0])) - q
+    at = Picker(maker.recording.joints, maker.run.view.t).pick(trails)
+    return np.asarray(maker.column(('q', index))[None] * at[:, None, :])

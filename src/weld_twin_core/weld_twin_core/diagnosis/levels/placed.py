@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..algebra.fit import Fit, robust_fit, robust_scale
+from ..algebra.fit import Fit
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
@@ -24,7 +24,7 @@ from ..result import Site
 from ..unseen.folds import least_gain
 from ..unseen.unseen_stretches import Base, Unseen
 from ..verdict.decision import Verdict
-from .curved import ROWS, Curved
+from .curved import Curved, bare_fit
 from .formulas import Missed
 from .free_form import FreeForm, Part, free_form
 from .groups import Group, all_groups, smooth_field, spanned
@@ -62,13 +62,11 @@ def placed(
     ----------
     found : Search
         The effects found, before curves take their place.
-    verdict : Verdict
     rival : Curved or None
         The free-form explanation that can be carried; what stays beside it stays here too.
     missed : Missed
         What the formulas miss. Joints that noise comes from are places, too, where no group finds
         any.
-    beliefs : Beliefs
 
     """
     if verdict.status != 'unknown':
@@ -76,7 +74,7 @@ def placed(
     form = _grouped(found, verdict, rival, beliefs)
     if any(one.on == 'place' for one in missed.forms):
         form = _with_field(form, beliefs)
-    form = arm_first(found, form, ROWS, beliefs)
+    form = arm_first(found, form)
     return _with_scatter(form, missed.scattered)
 
 
@@ -90,9 +88,7 @@ def _grouped(found: Search, verdict: Verdict, rival: Curved | None, beliefs: Bel
     told = {site for group in verdict.sets for site in group}
     own = [e for e in found.final.model.found if Site(e.name, e.site) in told or not e.cause]
     kept = own if rival is None else rival.kept
-    small = found.problem.thinned(ROWS)
-    start = found.baseline.model.with_found(tuple(kept))
-    bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)
+    small, bare, scale = bare_fit(found, kept)
     form = free_form(small, scale, bare, none, beliefs, whole_arm=True)
     if form.parts:
         return form
@@ -138,25 +134,12 @@ def _scattering(one: Scatter) -> Part:
     return Part(rounded, 1.0, ((rounded, ROUNDED), (jumping, JUMPING)), one.share)
 
 
-def arm_first(found: Search, form: FreeForm, rows: int, beliefs: Beliefs) -> FreeForm:
-    """
-    Return a form whose field of the instrument is a set with the joints, where they are one.
-
-    Parameters
-    ----------
-    found : Search
-    form : FreeForm
-    rows : int
-        Rows that the two are compared on.
-    beliefs : Beliefs
-
-    """
+def arm_first(found: Search, form: FreeForm) -> FreeForm:
+    """Return a form whose field of the instrument is a set with the joints, where they are one."""
     fields = [part for part in form.parts if part.group.at == 'instrument']
     if not fields or _tilt(found.problem, found.baseline.model) > TILT:
         return form
-    small = found.problem.thinned(rows)
-    start = found.baseline.model
-    bare, scale = robust_fit(small, start, robust_scale(small, small.residuals(start)), rounds=1)
+    small, bare, scale = bare_fit(found)
     joints, bases = _joints(small, bare, scale), _bases(small, bare, scale)
     every = [group for each in joints.values() for group in each]
     arm = _gain(bases, every) if every else 0.0

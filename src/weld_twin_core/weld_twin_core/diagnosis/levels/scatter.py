@@ -52,7 +52,6 @@ class Scatter(NamedTuple):
 
     Attributes
     ----------
-    joint : str
     share : float
         Of the squared noise.
     size : float
@@ -69,16 +68,7 @@ class Scatter(NamedTuple):
 
 
 def scatter(found: Search, unseen: Unseen) -> list[Scatter]:
-    """
-    Return the scatter of every joint; none where the data cannot tell it from the instrument's.
-
-    Parameters
-    ----------
-    found : Search
-    unseen : Unseen
-        Of its final model.
-
-    """
+    """Return the scatter of every joint; none where the data cannot tell it from the instrument's."""
     problem, model = unseen.problem, found.final.model
     features = problem.features(model)
     parts = problem.by_sample(unseen.targets[0])

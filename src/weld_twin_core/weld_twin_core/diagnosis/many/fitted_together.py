@@ -60,11 +60,6 @@ def fitted_together(
     ----------
     found : Search
         The effects found one by one.
-    exclude : sequence of str
-        Families taken out of the library.
-    beliefs : Beliefs
-    progress : callable
-        Told what has been done.
 
     """
     stations = sum(found.problem.samples)
@@ -259,7 +254,6 @@ def members_beside(few: Search, many: Search, beliefs: Beliefs) -> int:
     ----------
     few, many : Search
         What was found one by one, and all kinds fitted together.
-    beliefs : Beliefs
 
     """
     unseen = Unseen.of(many.problem, many.scale, many.final, many.precision)

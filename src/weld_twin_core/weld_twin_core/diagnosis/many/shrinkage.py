@@ -163,14 +163,6 @@ def shrunk_step(
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-    beliefs : Beliefs
-        The numbers that decide.
     learn : bool
         Whether sizes are learned; see `learned_precision`.
 
@@ -187,14 +179,6 @@ def shrunk_fit(
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-    beliefs : Beliefs
-        The numbers that decide.
     learn : bool
         Whether sizes are learned; see `learned_precision`.
 
@@ -236,14 +220,7 @@ def _learned(
 
 
 def believed(model: Model) -> Array:
-    """
-    Return the prior precision of every coordinate; curves are as high as ripple usually is.
-
-    Parameters
-    ----------
-    model : Model
-
-    """
+    """Return the prior precision of every coordinate; curves are as high as ripple usually is."""
     parts = [effect_precision(model.with_found((effect,))) for effect in model.found]
     for effect, part in zip(model.found, parts, strict=True):
         if not (effect.cause or effect.of_setup):

@@ -47,16 +47,6 @@ def many_small(
 
     Parameters
     ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    exclude : sequence of str
-        Families taken out of the library.
-    beliefs : Beliefs
-        The numbers that decide.
-    progress : callable
-        Told in a few words what has been done.
     orders : int, optional
         The most orders of waves, where the measurements are too few to learn any size from; all
         that they tell when left out, and sizes are learned.
@@ -125,7 +115,8 @@ def _apart_from_frames(
     where the joint moves.
     """
     scale = problem.unit_scale()
-    frames = problem.whitened(problem.frame_columns(features)[0], scale)
+    # What an instrument's samples share is known within its spread, and takes no place for free.
+    frames = problem.whitened(problem.not_shared().frame_columns(features)[0], scale)
     out, span = [], span_of(frames)
     for effect in effects:
         own = problem.whitened(problem.effect_columns(features, effect, atoms=False), scale)
@@ -163,18 +154,6 @@ def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
     Return the model with the set-up's own creep and step in time, where they show.
 
     Both are nuisance: they are part of where the frames were, not of the robot.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-    beliefs : Beliefs
-        The numbers that decide.
-
     """
     for kind in [kind for kind in REGISTRY.values() if kind.of_setup and not kind.dated]:
         features = problem.features(model)

@@ -27,7 +27,6 @@ class Waves:
 
     Attributes
     ----------
-    joint : int
     columns : list of array, shape (c, M)
         d pose / d joint of every recording.
     masses : list of array, shape (c, M)
@@ -62,12 +61,6 @@ class Waves:
 
         Parameters
         ----------
-        problem : Problem
-            The recordings to explain, and the frames that are fitted along.
-        features : list of Features
-            One per recording; see `Problem.features`.
-        scale : Scale
-            The noise that residuals are measured in, and the weight of every sample.
         joint : int
             Counted from 0.
         orders : array, shape (K,) [1/rev]
@@ -83,10 +76,8 @@ class Waves:
         columns, masses, waves = [], [], []
         normal = np.zeros((orders.size, 2, 2))
         for r, maker in enumerate(features):
-            unit = np.full((problem.rows[r], 1), scale.position**-2)
-            unit[3:] = scale.orientation**-2
             column = problem.seen(r, maker.column(('q', joint)))
-            mass = column * unit * scale.weights[r]
+            mass = problem.informed(r, column, scale)
             angle = orders[:, None] * maker.view.q[:, joint]
             sine, cosine = np.sin(angle), np.cos(angle)
             weight = (column * mass).sum(axis=0)
@@ -125,18 +116,6 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
 
     The score statistic of sine and cosine at every order costs one small product per joint; the
     strongest line enters, the residual it explains is taken off, and the look is repeated.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    scale : Scale
-        The noise that residuals are measured in, and the weight of every sample.
-    beliefs : Beliefs
-        The numbers that decide.
-
     """
     kinds = [effect.waves for effect in model.found if effect.waves is not None]
     if not kinds:

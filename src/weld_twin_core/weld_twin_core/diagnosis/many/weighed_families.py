@@ -40,7 +40,6 @@ class WeighedFamily:
 
     Attributes
     ----------
-    effect : str
     growths : tuple of float
         By what share the RMS error of each part left out, stretches of time and regions of
         posture, grows without it, all other kinds chosen and the frames fitted anew. Of a kind that
@@ -89,9 +88,6 @@ def weighed_families(found: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[W
     ----------
     found : Search
         Of all kinds fitted together.
-    unseen : Unseen
-        Of its final model.
-    beliefs : Beliefs
 
     """
     effects = found.final.model.found

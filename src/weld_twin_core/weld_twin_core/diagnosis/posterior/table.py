@@ -99,22 +99,13 @@ def table_of(slots: Sequence[Slot], beliefs: Beliefs) -> tuple[Row, ...]:
     ----------
     slots : sequence of tuple of Rival
         For every effect found, itself and its rivals, most probable first.
-    beliefs : Beliefs
 
     """
     return tuple(Row(slot, named_together(slot, beliefs)) for slot in slots)
 
 
 def named_together(slot: Slot, beliefs: Beliefs) -> tuple[Site, ...]:
-    """
-    Return the leader alone when it is sure, else all worth naming, the simplest first.
-
-    Parameters
-    ----------
-    slot : tuple of Rival
-    beliefs : Beliefs
-
-    """
+    """Return the leader alone when it is sure, else all worth naming, the simplest first."""
     if slot[0].probability >= beliefs.sure:
         return (slot[0].site,)
     listed = dict.fromkeys(r.site for r in slot if r.probability >= beliefs.listed)

@@ -52,7 +52,6 @@ def alone(problem: Problem, model: Model, shrink: Shrink, *, many: bool = False)
 
     Parameters
     ----------
-    problem : Problem
     model : Model
         The whole model, fitted.
     shrink : Shrink

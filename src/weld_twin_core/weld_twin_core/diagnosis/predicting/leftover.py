@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
+from ..algebra.definite import Index
 from ..algebra.designed import Design
 from ..algebra.fit import solve_scaled
 from ..algebra.independent_rows import by_sample
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Problem, Scale
-from ..algebra.unit_scale import Index
 
 HALVINGS = 3
 """Eight blocks: each leaves out an eighth, few enough for the others to stand for the fit."""

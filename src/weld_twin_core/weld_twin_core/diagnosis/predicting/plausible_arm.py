@@ -133,7 +133,6 @@ def discrepancy(robot: Robot, rest: Rest, fine: Array, found: Sequence[Effect]) 
 
     Parameters
     ----------
-    robot : Robot
     rest : Rest
         What is left over where it was recorded.
     fine : array, shape (n,)

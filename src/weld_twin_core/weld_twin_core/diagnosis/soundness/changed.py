@@ -109,7 +109,7 @@ def _with_tools(shot: Snapshot) -> Snapshot:
     tools: list[Array] = []
     bases: list[Array] = []
     for k, recording in enumerate(shot.recordings):
-        alone = replace(shot.model, bases=(shot.model.bases[k],), changes=())
+        alone = replace(shot.model, bases=(shot.model.bases[k],), changes=(), common=())
         framed = Snapshot((recording,), alone).framed()
         tools.append(framed.robot.T_flange_tool)
         bases.append(framed.bases[0])

@@ -121,7 +121,7 @@ def _stations(recording: Recording, model: Model) -> Problem | None:
         recording.name, JointMotion(seen.t[pick], q[pick], static=True), seen.take(pick)
     )
     problem = Problem((some,), frozenset(FRAMES))
-    fitted = problem.frame_count + effect_precision(model).size
+    fitted = problem.frame_count + problem.shared_count + effect_precision(model).size
     return problem if 3 * pick.size > ENOUGH * fitted else None
 
 
@@ -140,7 +140,8 @@ def _fitted(problem: Problem, model: Model, iterations: int) -> Model:
 def _gap(problem: Problem, model: Model) -> float:
     """Return the median distance that is left [m], made up for what the fit took."""
     (part,) = problem.residuals(model)
-    taken = (problem.frame_count + effect_precision(model).size) / problem.size
+    shared = problem.frame_count + problem.shared_count
+    taken = (shared + effect_precision(model).size) / problem.size
     return float(np.median(np.linalg.norm(part[:3], axis=0))) / float(np.sqrt(1.0 - taken))
 
 

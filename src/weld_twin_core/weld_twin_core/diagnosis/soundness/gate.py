@@ -27,6 +27,7 @@ from .changed import parted, setup
 from .computed import computed, source
 from .efforts import efforts
 from .evidence import Case, Checker, Finding, mistake
+from .images import images
 from .limits import ENDS
 from .mending import Given, as_entry
 from .mixups import mixups
@@ -47,6 +48,7 @@ CHECKS: dict[str, tuple[Checker, str]] = {
     'quantity': (quantity, 'There is enough to work on.'),
     'readings': (stuck, 'No reading stands still while the tool moves.'),
     'tools': (parted, 'No recording has another tool than the first.'),
+    'images': (images, 'No camera measured.'),
     'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
     'gravity': (gravity, 'Gravity pulls down where the base stands.'),
     'efforts': (efforts, 'No measured effort of the joints is used.'),

@@ -191,3 +191,33 @@ ROUNDED = 1e-5
 PARTED_TURN = 0.01
 """Turn [rad] that an arm leaves of orientations below which no tool is looked at: zeros and twists of
 an arm as delivered turn the tool by some milliradians."""
+IMAGE_FAR = 1.5
+"""
+Noise of a pixel [px] from which images are looked into.
+
+Corners of boards are found within 0.05 to 0.5 px, circles of markers within 1 px.
+"""
+IMAGE_UNDONE = 0.5
+"""Share of that noise that undoing a mistake of cameras or targets may leave."""
+IMAGE_ALIKE = 1.1
+"""Share of that noise that is as good as it was: lenses that follow leave as much."""
+LENS_DOUBT = 4.0
+"""How far a lens may be from its calibration, in the spreads below, before it is looked into."""
+LENS_FAR = 8.0
+"""
+How far a lens may be from its calibration, in spreads between calibrations of one lens.
+
+Calibrations with few images of a board are off by two or three of them; another lens, or another
+zoom, by ten and more.
+"""
+BEHIND = 0.8
+"""Share of the images in which a board must show its back; of small ones, some seem to lean over."""
+TARGET_SCALE = 6e-3
+"""
+Share by which all that cameras measure may be too large for the way of the arm.
+
+Links off by some millimetres in a metre make half of it; a printer that fits the page makes 2 % and
+more.
+"""
+TARGET_EXPLAINS = 0.5
+"""Share of the squared gap that it must explain."""

@@ -81,7 +81,8 @@ def positions_as(given: Given, factor: Array) -> Given:
 
     def scaled(seen: Measurements) -> Measurements:
         turn = None if np.prod(factor) < 0.0 else seen.rotation
-        return replace(seen, position=seen.position * factor, rotation=turn)
+        # How sure they are was told of what has proved to be something else.
+        return Measurements(seen.t, seen.position * factor, turn, seen.sigma)
 
     return _seen_as(given, scaled)
 
@@ -122,8 +123,8 @@ def turns_as(given: Given, way: str) -> Given:
     """Return what was given with measured rotations, shape (M, 3, 3), by one of `WAYS`."""
 
     def turned(seen: Measurements) -> Measurements:
-        turn = seen.rotation
-        return seen if turn is None else replace(seen, rotation=WAYS[way][1](turn))
+        turn = None if seen.rotation is None else WAYS[way][1](seen.rotation)
+        return Measurements(seen.t, seen.position, turn, seen.sigma)
 
     return _seen_as(given, turned)
 

@@ -17,7 +17,7 @@ from ...effects.joint_offset import JointOffset
 from ...effects.link_length import LinkLength
 from ...effects.link_offset import LinkOffset
 from ...effects.link_twist import LinkTwist
-from ...recording import JointMotion, Recording
+from ...recording import JointMotion, Measurements, Recording
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale
 from ..frames.alignment import initial_frames, refined, rough_frames, tracks
@@ -74,7 +74,10 @@ class Snapshot:
 
     def pointed(self) -> Snapshot:
         """Return the snapshot without measured rotations."""
-        out = [r.with_measured(replace(r.seen, rotation=None)) for r in self.recordings]
+        seen = [
+            Measurements(r.seen.t, r.seen.position, None, r.seen.sigma) for r in self.recordings
+        ]
+        out = [r.with_measured(m) for r, m in zip(self.recordings, seen, strict=True)]
         return replace(self, recordings=tuple(out))
 
     @cached_property

@@ -36,12 +36,8 @@ def borne_out(
 
     Parameters
     ----------
-    found : Search
     holdout : sequence of Recording
         Never fitted; without any nothing changes.
-    exclude : sequence of str
-        Families taken out of the library.
-    beliefs : Beliefs
 
     Returns
     -------

@@ -33,7 +33,6 @@ def ways_to_divide(problem: Problem, stretches: int = STRETCHES) -> list[Array]:
 
     Parameters
     ----------
-    problem : Problem
     stretches : int
         How many, about.
 
@@ -55,7 +54,6 @@ def posture_regions(problem: Problem, halvings: int = 3) -> Array:
 
     Parameters
     ----------
-    problem : Problem
     halvings : int
         2 to this power is the number of regions.
 

@@ -44,12 +44,6 @@ def held_out_shrink(
     ----------
     found : Search
         The fitted effects and the noise they leave.
-    unseen : Unseen
-        What models with more or fewer effects predict on stretches left out.
-    holdout : sequence of Recording
-        Recordings that were not fitted; none, and stretches take their turn.
-    beliefs : Beliefs
-        The numbers that decide.
 
     """
     model = found.final.model
@@ -90,8 +84,6 @@ def left_on(found: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> fl
     ----------
     found : Search
         Its final model is judged.
-    holdout : sequence of Recording
-    beliefs : Beliefs
 
     """
     return float(np.sqrt(_on_bags(found, holdout, beliefs.other_setup)[1].mean()))
@@ -112,8 +104,6 @@ def reached_by_chance(
         Its final model is judged.
     unseen : Unseen
         Of this model.
-    holdout : sequence of Recording
-    beliefs : Beliefs
 
     """
     if not holdout:
@@ -126,12 +116,16 @@ def reached_by_chance(
 
 def _log_variance(squares: Array, labels: Array) -> float:
     """Return the variance of the logarithm of an RMS, by leaving out one stretch at a time."""
-    names = np.unique(labels)
-    if names.size < FEWEST:
+    if np.unique(labels).size < FEWEST:
         # Of so many Gaussian readings in three coordinates each.
         return 1.0 / (6.0 * squares.size)
-    logs = [0.5 * np.log(max(float(squares[labels != n].mean()), 1e-300)) for n in names]
-    return float(jackknife(np.array(logs)))
+    return float(jackknife(_log_sizes(squares, labels)))
+
+
+def _log_sizes(squares: Array, labels: Array) -> Array:
+    """Return the logarithm of an RMS with each stretch left out in turn."""
+    means = [squares[labels != name].mean() for name in np.unique(labels)]
+    return np.asarray(0.5 * np.log(np.maximum(means, 1e-300)))
 
 
 def _of_others(ratio: float, interval: tuple[float, float]) -> tuple[float, float]:
@@ -291,16 +285,10 @@ def ratio_interval(
 
     """
     ratio = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
-    names = np.unique(labels)
-    if names.size < FEWEST:
+    if np.unique(labels).size < FEWEST:
         spread = ratio / np.sqrt(2.0 * max(before.size, 2))
         return ratio, (max(ratio - 2.0 * spread, 0.0), ratio + 2.0 * spread)
-    logs = []
-    for name in names:
-        keep = labels != name
-        pair = (max(after[keep].mean(), 1e-300), max(before[keep].mean(), 1e-300))
-        logs.append(0.5 * np.log(pair[0] / pair[1]))
-    variance = float(jackknife(np.array(logs)))
+    variance = float(jackknife(_log_sizes(after, labels) - _log_sizes(before, labels)))
     if elsewhere is not None:
         apart = np.log(max(elsewhere, 1e-300) / max(ratio, 1e-300))
         variance += min(abs(float(apart)), farthest) ** 2

@@ -11,7 +11,7 @@ that bring it say what it depends on.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,8 @@ from .unseen_stretches import Unseen
 KNOTS = 8
 """Bumps over a range of angle or time: a bump is as wide as an eighth of it, finer ones would
 follow the noise."""
+TURNS = 1e-4
+"""Travel [rad, m] from which on a joint counts as moving."""
 TOLD = 3
 """Things that what remains depends on, told at the most; further ones are echoes of these."""
 
@@ -42,7 +44,6 @@ class Structure:
         Share of the squared error on unseen stretches that they take away.
     sure : float
         The gain over its standard error between stretches.
-    depends_on : tuple of str
 
     """
 
@@ -53,19 +54,7 @@ class Structure:
 
 
 def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
-    """
-    Return what generic columns add to a model on stretches not used for fitting.
-
-    Parameters
-    ----------
-    unseen : Unseen
-        What models with more or fewer effects predict on stretches left out.
-    model : Model
-        What is believed so far; everything is taken about it.
-    beliefs : Beliefs
-        The numbers that decide.
-
-    """
+    """Return what generic columns add to a model on stretches not used for fitting."""
     base = unseen.base(range(len(model.found)))
     found = [
         (base.gain(columns), name)
@@ -82,66 +71,66 @@ def _generic(problem: Problem, model: Model, scale: Scale) -> Iterator[tuple[str
     """Yield named groups of whitened generic columns, (E, rows) of unit mean square."""
     features = problem.features(model)
     for i, joint in enumerate(model.robot.joint_names):
-        angle = _column_group(problem, features, scale, i, _angle)
-        if angle is not None:
-            yield f'the angle of {joint}', angle
-        motion = _column_group(problem, features, scale, i, _motion)
-        if motion is not None:
+        angles = [maker.run.view.q[:, i] for maker in features]
+        low, high = min(float(q.min()) for q in angles), max(float(q.max()) for q in angles)
+        if high - low >= TURNS:
+            each = [bumps(q, low, high) for q in angles]
+            yield f'the angle of {joint}', of_joint(problem, features, scale, i, each)
+            each = [_motion(maker, i) for maker in features]
+            motion = of_joint(problem, features, scale, i, each)
             yield f'the speed and acceleration of {joint}', motion
     if problem.untracked and not problem.placed:
         return  # no instrument measured, and nothing shows where the base stands
-    yield 'time', _pose_group(problem, features, scale, _time)
-    yield 'a step in time', _pose_group(problem, features, scale, _steps)
-    yield 'the place in the workspace', _pose_group(problem, features, scale, _place)
-    yield 'time, seen from the tool', _pose_group(problem, features, scale, _time, of_tool=True)
-    yield (
-        'a step in time, seen from the tool',
-        _pose_group(problem, features, scale, _steps, of_tool=True),
-    )
+    time, steps, place = ([f(maker) for maker in features] for f in (_time, _steps, _place))
+    yield 'time', _of_pose(problem, features, scale, time)
+    yield 'a step in time', _of_pose(problem, features, scale, steps)
+    yield 'the place in the workspace', _of_pose(problem, features, scale, place)
+    seen = 'seen from the tool'
+    yield f'time, {seen}', _of_pose(problem, features, scale, time, of_tool=True)
+    yield f'a step in time, {seen}', _of_pose(problem, features, scale, steps, of_tool=True)
 
 
-def _column_group(
-    problem: Problem, features: list[Features], scale: Scale, i: int, regressors: object
-) -> Array | None:
-    lows = min(float(m.run.view.q[:, i].min()) for m in features)
-    highs = max(float(m.run.view.q[:, i].max()) for m in features)
-    if highs - lows < 1e-4:
-        return None
-    each = [regressors(maker, i, lows, highs) for maker in features]  # type: ignore[operator]
-    if any(values.size == 0 for values in each):
-        return None
+def of_joint(
+    problem: Problem, features: Sequence[Features], scale: Scale, i: int, each: Sequence[Array]
+) -> Array:
+    """
+    Return what a joint does to the tool if it moves by some amounts, (E, rows), in units.
+
+    Parameters
+    ----------
+    i : int
+        The joint, counted from 0.
+    each : sequence of array, shape (E, M)
+        The amounts, for every recording; of stations the side alone, where paths have more.
+
+    """
+    most = max(map(len, each))
     parts = [
-        problem.seen(k, maker.column(('q', i)))[None] * values[:, None, :]
-        for k, (maker, values) in enumerate(zip(features, _alike_in_number(each), strict=True))
+        problem.seen(k, maker.column(('q', i)))[None] * _padded(values, most)[:, None, :]
+        for k, (maker, values) in enumerate(zip(features, each, strict=True))
     ]
     return in_units(problem.whitened(parts, scale))
 
 
-def _alike_in_number(each: list[Array]) -> list[Array]:
+def _padded(values: Array, most: int) -> Array:
     """Return as many rows for stations as for paths: of the motion they show its side alone."""
-    most = max(len(values) for values in each)
-    out = []
-    for values in each:
-        if len(values) < most:
-            padded = np.zeros((most, values.shape[1]))
-            padded[SIDE] = values[0]
-            out.append(padded)
-        else:
-            out.append(values)
+    if len(values) == most:
+        return values
+    out = np.zeros((most, values.shape[1]))
+    out[SIDE] = values[0]
     return out
 
 
-def _pose_group(
+def _of_pose(
     problem: Problem,
-    features: list[Features],
+    features: Sequence[Features],
     scale: Scale,
-    regressors: object,
+    each: Sequence[Array],
     *,
     of_tool: bool = False,
 ) -> Array:
     parts = []
-    for k, maker in enumerate(features):
-        values = regressors(maker)  # type: ignore[operator]
+    for k, (maker, values) in enumerate(zip(features, each, strict=True)):
         block = np.zeros((3, values.shape[0], 6, values.shape[1]))
         axes = maker.run.poses.rotation if of_tool else np.eye(3)[None]
         for j in range(3):
@@ -168,11 +157,7 @@ def bumps(x: Array, low: float, high: float, count: int = KNOTS) -> Array:
     return np.exp(-0.5 * ((x - centres) / width) ** 2)
 
 
-def _angle(maker: Features, i: int, low: float, high: float) -> Array:
-    return bumps(maker.run.view.q[:, i], low, high)
-
-
-def _motion(maker: Features, i: int, low: float, high: float) -> Array:
+def _motion(maker: Features, i: int) -> Array:
     view = maker.run.view
     if view.static or view.t.size < 4:
         step = np.sign(np.diff(view.q[:, i], prepend=view.q[:1, i]))

@@ -24,12 +24,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
 from ..algebra.atoms import Rows, rows_of
-from ..algebra.definite import Triangle, inverses
+from ..algebra.definite import Index, Triangle, inverses, unit_diagonal
 from ..algebra.designed import Design, designed
 from ..algebra.fit import Fit, trusted
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.unit_scale import Index, unit_diagonal
 from .folds import STRETCHES, Gain, gain, ways_to_divide
 
 DAMPING = 1e-11
@@ -56,7 +55,6 @@ class Unseen:
 
     Attributes
     ----------
-    problem, scale : Problem, Scale
     labels : array, shape (rows,)
         Stretch of every row.
     columns : Design
@@ -90,12 +88,6 @@ class Unseen:
 
         Parameters
         ----------
-        problem : Problem
-            The recordings to explain, and the frames that are fitted along.
-        scale : Scale
-            The noise that residuals are measured in, and the weight of every sample.
-        fit : Fit
-            The fitted model with its columns.
         precision : array, shape (K,)
             Prior precision of the fit coordinates, one over variance.
 
@@ -335,11 +327,8 @@ class Unseen:
 
     def squares(self, residual: Array) -> Array:
         """Return the squared position error of every trusted sample, shape (samples,) [m^2]."""
-        out = [
-            ((part[:, :3] * self.scale.position) ** 2).sum(axis=1) / weight
-            for part, weight in self._weighted(residual)
-        ]
-        return np.concatenate(out)
+        rows = self.problem.measured_rows(residual, self.scale)
+        return np.concatenate([(part[:, :3] ** 2).sum(axis=1) for part in self._trusted(rows)])
 
     def rms(self, residual: Array) -> float:
         """Return the RMS position error over trusted samples, [m]."""
@@ -347,22 +336,19 @@ class Unseen:
 
     def turn_rms(self, residual: Array) -> float | None:
         """Return the RMS orientation error over trusted samples [rad], None without any."""
-        out = [
-            ((part[:, 3:] * self.scale.orientation) ** 2).sum(axis=1) / weight
-            for part, weight in self._weighted(residual)
-            if part.shape[1] > 3
-        ]
-        return float(np.sqrt(np.concatenate(out).mean())) if out else None
+        rows = self.problem.measured_rows(residual, self.scale)
+        parts = [part[:, 3:] for part in self._trusted(rows) if part.shape[1] > 3]
+        return float(np.sqrt((np.concatenate(parts) ** 2).sum(axis=1).mean())) if parts else None
 
     def trusted_labels(self) -> Array:
         """Return the stretch of every trusted sample."""
-        return np.concatenate([part[:, 0] for part, _ in self._weighted(self.labels)])
+        rows = self.problem.by_sample(self.labels)
+        return np.concatenate([part[:, 0] for part in self._trusted(rows)])
 
-    def _weighted(self, values: Array) -> list[tuple[Array, Array]]:
-        """Return the rows of trusted samples, (m, c), and their weights, one per recording."""
-        parts = zip(self.problem.by_sample(values), self.scale.weights, strict=True)
-        good = trusted(self.scale.weights)
-        return [(part[g], w[g]) for (part, w), g in zip(parts, good, strict=True)]
+    def _trusted(self, parts: list[Array]) -> list[Array]:
+        """Return the rows of trusted samples, (m, c) per recording."""
+        pairs = zip(parts, trusted(self.scale.weights), strict=True)
+        return [part[good] for part, good in pairs]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from ..algebra.fit import trusted
 from ..algebra.problem import Model, Problem
 from ..hypotheses.search import Search
 from ..result import Cause, Where
+from .leftover_structure import of_joint
 from .unseen_stretches import Unseen
 
 REGRESSORS = (
@@ -48,8 +49,6 @@ def locate(found: Search, final: Unseen, causes: Sequence[Cause] = ()) -> Where:
     ----------
     found : Search
         Its baseline is the model before any effect was found.
-    final : Unseen
-        Of the final model.
     causes : sequence of Cause
         Of the answer, if there are any: joints and regimes are then theirs, so that they say what
         the answer says, also where a cause sits at no joint or its place is not certain.
@@ -136,14 +135,8 @@ def _map(problem: Problem, baseline: Unseen, model: Model) -> Array:
     out = np.zeros((model.robot.n, len(REGRESSORS)))
     for i in range(model.robot.n):
         for r, name in enumerate(REGRESSORS):
-            parts = []
-            for k, maker in enumerate(features):
-                values = _regressor(maker, i, name)
-                column = problem.seen(k, maker.column(('q', i)))[None]
-                parts.append(column * values[:, None, :])
-            block = problem.whitened(parts, baseline.scale)
-            size = np.sqrt((block**2).mean(axis=1))
-            block = block[size > 1e-12] / size[size > 1e-12, None]
+            each = [_regressor(maker, i, name) for maker in features]
+            block = of_joint(problem, features, baseline.scale, i, each)
             if block.shape[0]:
                 after = baseline.squares(base.extended(block, [1.0])[0]).mean()
                 out[i, r] = max(0.0, 1.0 - float(after / max(before, 1e-300)))

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,6 +53,23 @@ class DrawnGoal(NamedTuple):
     inside: bool
 
 
+class Learned(NamedTuple):
+    """
+    What a diagnosis learned of an arm.
+
+    Attributes
+    ----------
+    text : str
+        The diagnosis.json.
+    noise : float [m]
+        Standard deviation of a coordinate of the instrument that it was learned with.
+
+    """
+
+    text: str
+    noise: float
+
+
 def drawn_causes(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]:
     """Return three causes of a usual size, two constants and one that hangs on the posture or way."""
     joints = robot.joint_names
@@ -77,18 +95,25 @@ def drawn_causes(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]
     return [first, second, others[int(rng.integers(len(others)))]]
 
 
-def learned(robot: Robot, causes: list[dict[str, Any]], rng: np.random.Generator) -> str:
-    """Return the diagnosis.json of an arm with causes."""
+def learned(robot: Robot, causes: list[dict[str, Any]], rng: np.random.Generator) -> Learned:
+    """Return what a diagnosis learns of an arm with causes."""
     t = np.arange(0.0, SECONDS, 1.0 / RATE)
     pace = rng.uniform(0.5, 1.3, robot.n)
     turn = rng.uniform(0.0, 2.0 * np.pi, robot.n)
     q = np.array(HOMES[robot.name]) + RECORDED * np.sin(np.outer(t, pace) + turn)
     commanded = Recording('learning', JointMotion(t, np.clip(q, robot.lower, robot.upper)))
     real = Twin(robot, effects_from_list(causes, robot)).poses(commanded)
-    noise = rng.normal(scale=rng.choice(NOISE), size=real.position.shape)
-    seen = Measurements(t, real.position + noise, real.rotation)
+    noise = float(rng.choice(NOISE))
+    errors = rng.normal(scale=noise, size=real.position.shape)
+    seen = Measurements(t, real.position + errors, real.rotation)
     found = diagnose([commanded.with_measured(seen)], robot, experiment=False)
-    return diagnosis_text(found, ())
+    return Learned(diagnosis_text(found, ()), noise)
+
+
+def right_and_wrong(name: str, seed: int) -> tuple[Learned, Learned]:
+    """Return what is learned of an arm, and of one of the same kind with other causes."""
+    robot, causes, rng = cell_of(name, seed)
+    return learned(robot, causes, rng), learned(robot, drawn_causes(robot, rng), rng)
 
 
 def drawn_goal(robot: Robot, rng: np.random.Generator) -> DrawnGoal:
@@ -147,6 +172,13 @@ def _along(bare: Robot, begin: Array, rng: np.random.Generator) -> Goal | None:
     qd: Array = np.asarray(np.gradient(q, t, axis=0, edge_order=2))
     qd[0] = qd[-1] = 0.0
     return Goal(t, q, qd) if rng.random() < 0.7 else Goal(t, q)
+
+
+def goals_of(name: str, seed: int, first: int, count: int) -> Iterator[DrawnGoal]:
+    """Yield goals of an arm, counted from 0; each is the same whichever were drawn before it."""
+    robot, arm = load(name), sorted(HOMES).index(name)
+    for k in range(first, first + count):
+        yield drawn_goal(robot, np.random.default_rng([seed, arm, k]))
 
 
 def cell_of(name: str, seed: int) -> tuple[Robot, list[dict[str, Any]], np.random.Generator]:

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from rclpy.action import ActionClient
@@ -23,8 +23,8 @@ from rclpy.action import ActionClient
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.twin.goal_correction import GoalLimits, Refusal, corrected_goal
-from weld_twin_core.twin.goal_motion import Goal, course
+from weld_twin_core.twin.goal_correction import GoalLimits, Refusal, Start, corrected_goal
+from weld_twin_core.twin.goal_motion import Goal, course, fine_times
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.messages import from_messages
@@ -32,41 +32,67 @@ from weld_twin_msgs_py.messages.topics import AUDIT, DEVIATION, MEASURED_POSE
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.controller import Controller
 
-from .drawn_cells import DrawnGoal, cell_of, drawn_causes, drawn_goal, learned, true_effects
+from . import NOTHING
+from .drawn_cells import (
+    HOMES,
+    INSIDE,
+    DrawnGoal,
+    Learned,
+    cell_of,
+    goals_of,
+    learned,
+    true_effects,
+)
 
 PACE = 10.0
 """How many times as fast as they say goals run: nothing in these cells hangs on speed."""
-RETURN = 3.0
+RETURN = 1.5
 """Length of a way back, or to where a goal begins [s]."""
+NEAR_TURN = np.arange(-0.2, 0.2, 0.01)
+"""Times around a turn [s] at which the arm is looked at too: play is taken up in some hundredths."""
 NOTICE = 30.0
 """Longest time [s] after a change until goals count."""
 SETTLED = 1.5
 """Time [s] in which everything that is under way has arrived."""
 JUMP = 4.0
 """By how much the clock of the measurements jumps [s]: the most that an injector takes."""
+CALM = 10.0
+"""Time [s] without a change in which nothing may be noticed."""
 EACH = 3
 """Goals after each change."""
 CHANGES = ('clock jumped', 'load changed', 'wrong model', 'tracker lost')
+AFTER = 100_000
+"""Number of the first goal after a change: those before are counted from 0."""
+
+
+class Known(NamedTuple):
+    """What became of goals, and of changes, so far."""
+
+    rows: list[dict[str, Any]]
+    changes: list[dict[str, Any]]
 
 
 class CellTrial:
     """A cell that goals are sent to."""
 
-    def __init__(self, cell: Cell, folder: Path, name: str, seed: int) -> None:
+    def __init__(
+        self, cell: Cell, folder: Path, name: str, seed: int, models: tuple[Learned, Learned]
+    ) -> None:
         from control_msgs.action import FollowJointTrajectory
 
         self.cell, self.kind, self.name = cell, FollowJointTrajectory, name
         self.robot, self.causes, self.rng = cell_of(name, seed)
-        self.right = learned(self.robot, self.causes, self.rng)
+        self.right, self.wrong = models
         self.model = folder / 'diagnosis.json'
-        self.model.write_text(self.right)
+        self.model.write_text(self.right.text)
         self._late = 0
         self._begin()
 
     def _begin(self) -> None:
         cell, robot = self.cell, self.robot
-        first = drawn_goal(robot, self.rng).goal.q[0]
-        self.controller = cell.add(Controller, robot.joint_names, first, PACE)
+        self.controller = cell.add(
+            Controller, robot.joint_names, HOMES[self.name], PACE, self._turns
+        )
         common = {'robot': self.name, 'reliable_inputs': True}
         cell.start('error_injector', effects=self._effects(), **common)
         cell.start('forward_kinematics_twin', model=str(self.model), **common)
@@ -90,6 +116,15 @@ class CellTrial:
             cell.wait(client.server_is_ready, 'the actions')
         cell.meet()
         cell.wait(lambda: len(self.deviations) > 0, 'a deviation')
+
+    def _turns(self, goal: Goal) -> Array:
+        """Return times [s] of a goal around where joints with play turn around: much happens there."""
+        at = fine_times(goal)
+        played = [e['joint'] for e in self.causes if e['effect'] == 'backlash']
+        ways = [course(goal, at).qd[:, self.robot.joint_names.index(name)] for name in played]
+        turns = [at[1:][np.diff(np.sign(qd)) != 0.0] for qd in ways]
+        near = np.concatenate([*turns, at[:1]])[:, None] + NEAR_TURN
+        return np.asarray(near[(near > at[0]) & (near < at[-1])])
 
     def _audited(self, message: Any) -> None:
         self.audit.append(json.loads(message.data))
@@ -137,7 +172,9 @@ class CellTrial:
         self.deviations.messages.clear()
         way = course(goal, np.minimum(np.array(meant), goal.t[-1]))
         apart = np.array(real) - forward(self.robot, way.q)[:, :3, 3]
-        return float(np.sqrt((apart**2).sum(axis=1).mean()))
+        # The arm is looked at more often where it turns; each look stands for its part of the time.
+        share = np.gradient(np.array(meant)) if len(meant) > 1 else np.ones(1)
+        return float(np.sqrt(np.average((apart**2).sum(axis=1), weights=share)))
 
     def measured_until(self, stamp: int) -> None:
         """Wait until the tool was measured at a stamp [ns]."""
@@ -150,16 +187,16 @@ class CellTrial:
     def judged(self, drawn: DrawnGoal, after: str) -> dict[str, Any]:
         """Return what became of a goal, run as it is and through the compensator."""
         goal = drawn.goal
-        beyond = goal.q[0] - 0.05 * np.sign(goal.q[min(3, len(goal.q) - 1)] - goal.q[0])
+        came = np.sign(goal.q[min(3, len(goal.q) - 1)] - goal.q[0])
         offs = []
         taken, line = True, dict[str, Any]()
         for through in (False, True):
-            self.to(beyond)
+            self.to(goal.q[0] - 0.05 * came)
             self.to(goal.q[0])
             taken, line = self.run(goal, through=through)
             if taken:
                 offs.append(self.off(goal, line.get('waits_s', 0.0)))
-        best = self._best(goal)
+        best = self._best(goal, Start(goal.q[0], False, came))
         return {
             'robot': self.name,
             'after': after,
@@ -169,53 +206,54 @@ class CellTrial:
             'before_m': offs[0],
             'after_m': offs[1] if taken else offs[0],
             'best_m': min(best, offs[0]),
+            'expected_m': line.get('expected_after_m'),
             'bound_m': line.get('bound_m'),
             'largest_m': line.get('largest_m'),
         }
 
-    def _best(self, goal: Goal) -> float:
+    def _best(self, goal: Goal, start: Start) -> float:
         """Return what would be left with the true causes [m]."""
         true = ProgramModel(self.robot, true_effects(self.robot, self.causes))
-        found = corrected_goal(true, goal, GoalLimits(acceleration=20.0))
+        found = corrected_goal(true, goal, GoalLimits(acceleration=20.0), start)
         return np.inf if isinstance(found, Refusal) else found.after
 
     # Changes ---------------------------------------------------------------------------------
 
     def changed(self, what: str) -> dict[str, Any]:
         """Change something, and wait for the notice; return how long that took."""
-        begun, count = time.monotonic(), len(self.compensator.log)
-        if what == 'clock jumped':
-            self._inject({'effect': 'time_delay', 'delay': JUMP})
+        count, limit = len(self.compensator.log), CALM if what == NOTHING else NOTICE
+        acting: tuple[dict[str, Any], ...] = ()
+        # The tracker that the model was learned with; goals are judged without its noise.
+        noise = {'effect': 'measurement_noise', 'sigma': self.right.noise}
+        if what == 'wrong model':
+            self.model.write_text(self.wrong.text)
+            self._reload()
+        elif what == 'clock jumped':
+            acting = ({'effect': 'time_delay', 'delay': JUMP},)
             self._late = round(JUMP * 1e9)
         elif what == 'load changed':
-            self._inject(*_load(self.robot))
-        elif what == 'tracker lost':
+            acting = _load(self.robot)
+        self._inject(*acting, noise)
+        begun = time.monotonic()
+        if what == 'tracker lost':
             self.analyzer.stop()
-        else:
-            other = drawn_causes(self.robot, self.rng)
-            self.model.write_text(learned(self.robot, other, self.rng))
-            self._reload()
-            begun = time.monotonic()
 
         def noticed() -> bool:
             told = self.compensator.log[count:]
             return 'does not hold' in told or 'is lost' in told
 
         # The arm goes to and fro meanwhile: measurements of one place tell of one place.
-        while not noticed() and time.monotonic() - begun < NOTICE:
-            self.to(self.controller.q + 0.1 * self.rng.uniform(-1.0, 1.0, self.robot.n))
-        return {
-            'robot': self.name,
-            'change': what,
-            'noticed': noticed(),
-            'seconds': round(time.monotonic() - begun, 2),
-        }
+        while not noticed() and time.monotonic() - begun < limit:
+            self.to(HOMES[self.name] + INSIDE * self.rng.uniform(-1.0, 1.0, self.robot.n))
+        seconds = round(time.monotonic() - begun, 2)
+        self._inject(*acting)
+        return {'robot': self.name, 'change': what, 'noticed': noticed(), 'seconds': seconds}
 
     def restore(self) -> None:
         """Undo all changes."""
         self._late = 0
         self._inject()
-        self.model.write_text(self.right)
+        self.model.write_text(self.right.text)
         self._reload()
         end = time.monotonic() + SETTLED
         self.cell.wait(lambda: time.monotonic() > end, 'what is under way')
@@ -244,24 +282,33 @@ def _load(robot: Robot) -> tuple[dict[str, Any], ...]:
 
 
 def tried(
-    name: str, seed: int, goals: int, tell: Callable[[str], None]
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Return what became of the goals of one arm, and of its changes."""
-    rows, changes = [], []
+    name: str, seed: int, goals: int, models: tuple[Learned, Learned], known: Known
+) -> Iterator[str]:
+    """
+    Add what becomes of the goals of one arm, and of its changes, to what is known already.
+
+    Yields what came of it so far, again and again.
+    """
+    done = sum(row['robot'] == name and not row['after'] for row in known.rows)
+    changes = {change['change'] for change in known.changes if change['robot'] == name}
     with _cell() as (cell, folder):
-        trial = CellTrial(cell, folder, name, seed)
-        for k in range(goals):
-            rows.append(trial.judged(drawn_goal(trial.robot, trial.rng), ''))
-            if k % 10 == 9:
-                tell(f'{name}: {k + 1} of {goals} goals')
-        for what in CHANGES:
-            changes.append(trial.changed(what))
-            tell(f'{name}: {changes[-1]}')
-            for _ in range(EACH):
-                rows.append(trial.judged(drawn_goal(trial.robot, trial.rng), what))
+        trial = CellTrial(cell, folder, name, seed, models)
+        for k, drawn in enumerate(goals_of(name, seed, done, goals - done), done + 1):
+            known.rows.append(trial.judged(drawn, ''))
+            if k % 10 == 0:
+                yield f'{k} of {goals} goals'
+        # Nothing is changed first: that too could be taken for a change.
+        for k, what in enumerate((NOTHING, *CHANGES)):
+            if what in changes:
+                continue
+            found = trial.changed(what)
+            if what != NOTHING:
+                for drawn in goals_of(name, seed, AFTER + EACH * k, EACH):
+                    known.rows.append(trial.judged(drawn, what))
+            known.changes.append(found)
+            yield str(found)
             if what != CHANGES[-1]:
                 trial.restore()
-    return rows, changes
 
 
 @contextmanager
@@ -274,7 +321,7 @@ def other_arm(seed: int) -> str:
     """Return what a compensator says that is given the model of another arm."""
     names = ('ur5', 'ur10e')
     robot, causes, rng = cell_of(names[1], seed)
-    text = learned(robot, causes, rng)
+    text = learned(robot, causes, rng).text
     with _cell() as (cell, folder):
         model = folder / 'diagnosis.json'
         model.write_text(text)

@@ -31,7 +31,7 @@ def judged(name: str, seed: int, goals: int) -> list[dict[str, Any]]:
     robot, causes, rng = cell_of(name, seed)
     with TemporaryDirectory() as place:
         file = Path(place) / 'diagnosis.json'
-        file.write_text(learned(robot, causes, rng))
+        file.write_text(learned(robot, causes, rng).text)
         model = program_model(robot, file)
     true = ProgramModel(robot, true_effects(robot, causes))
     rows = []

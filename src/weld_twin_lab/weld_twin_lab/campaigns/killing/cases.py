@@ -84,7 +84,7 @@ def _diagnose(place: Path) -> Once:
 
 def _plan(place: Path) -> Once:
     def words(k: int, out: Path) -> Words:
-        return ('plan-measurement', '--robot', ROBOT, '--tolerance', 0.3, '--minutes', 9,
+        return ('investigate', '--robot', ROBOT, '--tolerance', 0.3, '--minutes', 9,
                 '--controller', ('krl', 'csv')[k], '--out', out)  # fmt: skip
 
     return folder_case('plan-measurement', place, words)
@@ -99,7 +99,7 @@ def _correct(place: Path) -> Once:
         program.write_text(PROGRAM.format(turn=10 + k), encoding='utf-8')
 
     def words(k: int, out: Path) -> Words:
-        return ('correct-program', programs[k], '--robot', ROBOT,
+        return ('correct', programs[k], '--robot', ROBOT,
                 '--model', model, '--out', out)  # fmt: skip
 
     return folder_case('correct-program', place, words)
@@ -123,7 +123,7 @@ def _page(place: Path) -> Once:
     _, databases = _histories(place)
 
     def words(k: int, out: Path) -> Words:
-        return ('fleet', 'page', '--db', databases[k], '--out', out)
+        return ('history', 'page', '--db', databases[k], '--out', out)
 
     return folder_case('fleet page', place, words)
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Methods of different make on the same sealed cases, by the same rules.
 
-Puts cases of `weld-twin blind make` into an open form, has every method answer them in a process
+Puts cases of `weld-twin lab blind make` into an open form, has every method answer them in a process
 of its own, and scores the answers. Anybody's method can enter: --enter NAME='COMMAND {case} {out}'.
 With --ur5 and --ur10, stations of two measured arms are asked, too. A run that was stopped goes on:
 what is in --out is not made again. Remove the directory of a method to have it answer anew.

@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--cases',
         metavar='DIR',
-        help='sealed cases: holds cases and truths, as weld-twin blind make writes them',
+        help='sealed cases: holds cases and truths, as weld-twin lab blind make writes them',
     )
     parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
 

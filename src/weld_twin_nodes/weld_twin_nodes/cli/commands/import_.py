@@ -1,9 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Tables of joint angles and measured positions, poses or contacts into a bag.
+"""Make a bag of a table of what was measured, seen or touched.
 
 Delimiter, units and columns are read from the table where they are plain, and every guess is
-printed; an option settles what is not. Lists of columns are separated by commas.
+printed; an option settles what is not. Lists of columns are separated by commas. For pixels of
+cameras give --camera and --target; weld-twin detect makes a table of images.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from ..options import add_bag_output, add_robot, robot_of
+from ..options import add_bag_output, add_cameras, add_robot, cameras_of, robot_of
+from ..parsing import Adder
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -19,93 +21,65 @@ if TYPE_CHECKING:
     from weld_twin_core.recording import Recording
     from weld_twin_msgs_py.tables import Table, TableOptions
 
-LISTS = ('joint', 'position', 'target', 'difference', 'rotation', 'sigma')
+EXAMPLE = 'weld-twin import examples/files/measurements.csv --robot ur5 --out my_cell'
+COLUMNS = ('joint', 'position', 'target', 'difference', 'rotation', 'sigma')
 """Options that take several columns."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options; each is an attribute of `weld_twin_msgs_py.tables.TableOptions`."""
-    parser.add_argument('file', metavar='FILE.csv')
+    add = Adder(parser)
+    add('file', 'FILE.csv', 'table of text')
     add_robot(parser)
     add_bag_output(parser)
-    parser.add_argument(
-        '--contacts',
-        metavar='ARTEFACT.yaml',
-        help='the table holds joint angles and what was touched; this file describes it',
-    )
-    parser.add_argument(
-        '--measured',
-        metavar='FILE',
-        help='FILE.csv has the joints alone; this one has what the instrument measured',
-    )
-    parser.add_argument(
-        '--clock-offset',
-        type=float,
-        default=0.0,
-        metavar='S',
-        help='added to the stamps of --measured',
-    )
-    parser.add_argument('--table', metavar='CSV', help='also write every deviation from the twin')
-    parser.add_argument('--picture', metavar='PNG', help='also draw the deviations')
+    text = 'FILE.csv has joint angles and what was touched; this file describes it'
+    add('--contacts', 'ARTEFACT.yaml', text)
+    text = 'FILE.csv has the joints alone; this one has what the instrument measured'
+    add('--measured', 'FILE', text)
+    text = 'added to the stamps of --measured'
+    add('--clock-offset', 'S', text, type=float, default=0.0, rare=True)
+    add('--table', 'CSV', 'also write every deviation from the twin', rare=True)
+    add('--picture', 'PNG', 'also draw the deviations', rare=True)
+    add_cameras(parser)
+    _add_units(parser)
     _add_reading(parser)
-
-
-def _add_reading(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group('how to read the table')
-    for name in LISTS:
-        group.add_argument(f'--{name}-columns', metavar='A,B,C', type=_names)
-    group.add_argument('--temperature-column', metavar='A')
-    group.add_argument('--time-column', metavar='A')
-    group.add_argument('--length-unit', choices=('m', 'mm'))
-    group.add_argument('--angle-unit', choices=('rad', 'deg'), help='unit of the joint angles')
-    group.add_argument('--slide-unit', choices=('m', 'mm'), help='unit of joints that slide')
-    group.add_argument('--rotation-unit', choices=('rad', 'deg'), help='unit of measured angles')
-    group.add_argument(
-        '--rotation',
-        metavar='ORDER',
-        help='order of the angles: XYZ, ZYX, ... (intrinsic), or rotvec',
-    )
-    group.add_argument(
-        '--difference',
-        choices=('add', 'subtract'),
-        default='add',
-        help='whether measured is target plus or minus difference',
-    )
-    group.add_argument('--positions-only', action='store_true', help='do not read orientations')
-    group.add_argument(
-        '--skip-rows',
-        metavar='N,N',
-        type=_numbers,
-        default=(),
-        help='rows to leave out; the first row under the header is 1',
-    )
-    group.add_argument(
-        '--marker', metavar='NAME', help='what is meant, where an export has several markers'
-    )
-    group.add_argument('--delimiter', help='comma, semicolon or tab')
-    group.add_argument('--decimal', choices=('.', ','))
     _add_counting(parser)
 
 
+def _add_units(parser: argparse.ArgumentParser) -> None:
+    add = Adder(parser, 'where the header does not tell')
+    add('--length-unit', 'unit of lengths', choices=('m', 'mm'))
+    add('--angle-unit', 'unit of the joint angles', choices=('rad', 'deg'))
+    add('--slide-unit', 'unit of joints that slide', choices=('m', 'mm'), rare=True)
+    add('--rotation-unit', 'unit of measured angles', choices=('rad', 'deg'), rare=True)
+    text = 'order of the angles: XYZ, ZYX, ... (intrinsic), or rotvec'
+    add('--rotation', 'ORDER', text, rare=True)
+
+
+def _add_reading(parser: argparse.ArgumentParser) -> None:
+    add = Adder(parser, 'how to read the table', rare=True)
+    for name in COLUMNS:
+        add(f'--{name}-columns', 'A,B,C', f'columns of the {name}', type=_names)
+    add('--temperature-column', 'A', 'column of the temperature')
+    add('--time-column', 'A', 'column of the stamps')
+    text = 'whether measured is target plus or minus difference'
+    add('--difference', text, choices=('add', 'subtract'), default='add')
+    add('--positions-only', 'do not read orientations')
+    text = 'rows to leave out; the first row under the header is 1'
+    add('--skip-rows', 'N,N', text, type=_numbers, default=())
+    add('--marker', 'NAME', 'what is meant, where an export has several markers')
+    add('--delimiter', 'SIGN', 'comma, semicolon or tab')
+    add('--decimal', 'sign of decimals', choices=('.', ','))
+
+
 def _add_counting(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group('how the controller counts its joints')
-    group.add_argument(
-        '--joint-signs',
-        metavar='1,-1,...',
-        type=_floats,
-        help='of every joint, where the controller counts it the other way than the model',
-    )
-    group.add_argument(
-        '--joint-offsets',
-        metavar='DEG,DEG,...',
-        type=_floats,
-        help='added to every joint [deg, mm for a slide], such as 0,-90,90,0,0,0',
-    )
-    group.add_argument(
-        '--coupled',
-        metavar='3+2',
-        help="the model's joint 3 is that of the table plus joint 2; 3-2 takes it off",
-    )
+    add = Adder(parser, 'how the controller counts its joints')
+    text = '-1 for every joint that the controller counts the other way than the model'
+    add('--joint-signs', '1,-1,...', text, type=_floats)
+    text = 'added to every joint [deg, mm for a slide], such as 0,-90,90,0,0,0'
+    add('--joint-offsets', 'DEG,DEG,...', text, type=_floats)
+    text = "the model's joint 3 is that of the table plus joint 2; 3-2 takes it off"
+    add('--coupled', '3+2', text)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -151,8 +125,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _read(args: argparse.Namespace, robot: Robot, options: TableOptions) -> Table:
     """Return the recording of one file, or of a log and what was measured beside it."""
-    from weld_twin_msgs_py.tables import read_table, read_two_tables
+    from weld_twin_msgs_py.tables import read_pixels, read_table, read_two_tables
 
+    if args.camera or args.target:
+        return read_pixels(args.file, robot, *cameras_of(args), options)
     if args.measured is None:
         return read_table(args.file, robot, options)
     return read_two_tables(args.file, args.measured, robot, options, args.clock_offset)

@@ -1,69 +1,93 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Offline twin: a bag with everything the live nodes would publish along a seam."""
+"""The twin offline: a bag of a seam, or of a recording.
+
+Without a BAG: everything that the live nodes would publish along a seam. With a BAG and a --model: the
+tool pose of the twin with these effects at every joint state, in the frame of the measurements: what
+the instrument would read at each stamp.
+"""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
-from ..options import add_bag_output, add_robot, robot_of, twin_of
+from ..options import (
+    TOPICS,
+    add_bag_output,
+    add_robot,
+    add_topics,
+    refuse,
+    robot_of,
+    say_doubts,
+    topics_of,
+    twin_of,
+)
+from ..parsing import Adder
+
+EXAMPLE = (
+    'weld-twin simulate --robot ur5 --effects bags/elbow_play.yaml --path spline --out my_bag'
+)
+SEAM = {
+    'path': 'line',
+    'profile': 'smooth',
+    'rate': 125.0,
+    'speed': 0.0,
+    'seed': 0,
+    'start_stamp': 1_000_000_000,
+}
+"""What is simulated of a seam unless told; a stamp [ns] of 0 would mean unset."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
+    add = Adder(parser)
+    add('bag', 'BAG', 'recording with joint states; left out, a seam is simulated', nargs='?')
     add_robot(parser)
-    parser.add_argument('--effects', metavar='E.yaml', default='', help='effects to inject')
-    parser.add_argument(
-        '--model',
-        metavar='FILE',
-        default='',
-        help='effects that the twin knows: an effects file or diagnosis.json',
-    )
-    parser.add_argument(
-        '--allow-implausible',
-        action='store_true',
-        help='take values of effects that no machine comes near, for a study of extremes',
-    )
-    _add_motion(parser)
+    text = 'effects that the twin knows: diagnosis.json, or an effects file'
+    add('--model', 'FILE', text, default='')
     add_bag_output(parser)
+    _add_seam(parser)
+    add = Adder(parser, 'of a recording')
+    text = 'recording of the diagnosis whose set-up is meant, if the set-up moved between them'
+    add('--setup', 'N', text, type=int, rare=True)
+    text = 'of the arm, where the bag has none or another is meant'
+    add('--temperature', 'DEGC', text, type=float)
+    add('--table', 'FILE.csv', 'also write the poses as a table, with standard deviations')
+    add_topics(parser)
 
 
-def _add_motion(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        '--path',
-        metavar='P',
-        default='line',
-        help='path file, or a bundled seam: line, arc, circle, polyline, spline, weave',
-    )
-    parser.add_argument(
-        '--profile',
-        default='smooth',
-        help='time law: constant, trapezoid, s-curve, smooth, aggressive (default: smooth)',
-    )
-    parser.add_argument(
-        '--speed',
-        type=float,
-        default=0.0,
-        metavar='M/S',
-        help='travel speed (default: as fast as profile and joints allow)',
-    )
-    parser.add_argument(
-        '--rate', type=float, default=125.0, metavar='HZ', help='samples a second (default: 125)'
-    )
-    parser.add_argument(
-        '--seed', type=int, default=0, help='seed of the measurement noise (default: 0)'
-    )
-    parser.add_argument(
-        '--start-stamp',
-        type=int,
-        default=1_000_000_000,
-        metavar='NS',
-        help='stamp of the first sample [ns]; 0 would mean unset (default: 1 s)',
-    )
+def _add_seam(parser: argparse.ArgumentParser) -> None:
+    add = Adder(parser, 'of a seam')
+    add('--effects', 'E.yaml', 'effects to inject', default='')
+    text = 'path file, or line, arc, circle, polyline, spline, weave (default: line)'
+    add('--path', 'P', text)
+    text = 'time law: constant, trapezoid, s-curve, smooth, aggressive (default: smooth)'
+    add('--profile', 'LAW', text)
+    text = 'travel speed (default: as fast as profile and joints allow)'
+    add('--speed', 'M/S', text, type=float)
+    add('--rate', 'HZ', 'samples a second (default: 125)', type=float)
+    add('--seed', 'N', 'seed of the measurement noise (default: 0)', type=int)
+    text = 'stamp of the first sample (default: 1 s)'
+    add('--start-stamp', 'NS', text, type=int, rare=True)
+    text = 'take values that no machine comes near, for a study of extremes'
+    add('--allow-implausible', text, rare=True)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the bag and print the deviation."""
+    """Write the bag of a seam, or of a recording."""
+    if args.bag is not None:
+        refuse(args, (*SEAM, 'effects', 'allow_implausible'), 'is of a seam; leave it or BAG out')
+        return _predict(args)
+    refuse(args, ('setup', 'temperature', 'table', *TOPICS), 'is of a recording; give a BAG')
+    for name, usual in SEAM.items():
+        if getattr(args, name) is None:
+            setattr(args, name, usual)
+    return _simulate(args)
+
+
+def _simulate(args: argparse.Namespace) -> int:
+    """Write the bag of a seam and print the deviation."""
     from weld_twin_core.errors import DataError
 
     from ...offline.seam_motion import plan_motion, stamps
@@ -78,14 +102,8 @@ def run(args: argparse.Namespace) -> int:
         for path in (args.effects, args.model)
     )
     plan = plan_motion(robot, args.path, args.profile, args.rate, args.speed)
-    simulation = Simulation(
-        real,
-        model,
-        plan.motion,
-        stamps(plan.motion.t, args.start_stamp),
-        args.seed,
-        plan.length,
-    )
+    begin = stamps(plan.motion.t, args.start_stamp)
+    simulation = Simulation(real, model, plan.motion, begin, args.seed, plan.length)
     made = {'path': args.path, 'profile': args.profile, 'rate_hz': args.rate}
     metrics = write_simulation(args.out, simulation, storage=args.storage, provenance=made)
     if plan.report.slowed > 1.0:
@@ -95,4 +113,39 @@ def run(args: argparse.Namespace) -> int:
         f'{plan.length:.3f} m; deviation RMS {metrics["RMS"] * 1e3:.4f} mm, '
         f'max {metrics["max"] * 1e3:.4f} mm, D_norm {metrics["D_norm"]:.3g}'
     )
+    return 0
+
+
+def _predict(args: argparse.Namespace) -> int:
+    """Write the bag; say how far measured and twin are apart where something was measured."""
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.bags import read_recording
+
+    from ...offline.prediction import on_one_clock, predictor, told_sureness, write_prediction
+    from ...offline.prediction_table import write_prediction_table
+
+    if not args.model:
+        raise DataError('say with --model which effects the twin of a recording has')
+    if args.table and Path(args.table).exists():
+        raise DataError(f"'{args.table}' exists already and is not overwritten")
+    robot = robot_of(args)
+    # Two clocks may be what the diagnosis mended.
+    recording = read_recording(args.bag, robot, topics_of(args), one_clock=False)
+    if args.temperature is not None:
+        recording = recording.at_temperature(args.temperature)
+    model = predictor(robot, args.model, args.bag, recording, args.setup)
+    recording = on_one_clock(recording if model.source is None else model.source)
+    if model.told:
+        print(f'note: {model.told}')
+    say_doubts(model.twin, args.model)
+    made = {'model': str(args.model)}
+    got = write_prediction(args.out, model, recording, storage=args.storage, provenance=made)
+    if args.table:
+        write_prediction_table(args.table, model, recording)
+    line = f'{args.out}: {recording.joints.t.size} poses with {len(model.twin.effects)} effects'
+    if got.rms_m is not None:
+        line += f'; measured minus twin RMS {got.rms_m * 1e3:.4f} mm'
+    print(line)
+    for sentence in told_sureness(model, got):
+        print(sentence)
     return 0

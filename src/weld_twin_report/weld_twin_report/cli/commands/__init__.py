@@ -1,3 +1,3 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Subcommands that write pages; `weld_twin_nodes.cli.commands` says what a module here has."""
+"""Commands that write pages; `weld_twin_nodes.cli.commands` says what a module here has."""

@@ -1,22 +1,22 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The whole job on an embedded example: live nodes, a bag, its deviations, a picture."""
+"""The whole job on an example: live nodes, a bag, a page."""
 
 from __future__ import annotations
 
 import argparse
 
 from weld_twin_nodes.cli.options import add_output
+from weld_twin_nodes.cli.parsing import Adder
+
+EXAMPLE = 'weld-twin demo --out out'
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     add_output(parser, 'directory for the results (default: out)', default='out')
-    parser.add_argument(
-        '--closed-loop',
-        action='store_true',
-        help='weld the seam again through the compensator, and show both beside each other',
-    )
+    text = 'weld the seam again through the compensator, and show both beside each other'
+    Adder(parser)('--closed-loop', text)
 
 
 def run(args: argparse.Namespace) -> int:

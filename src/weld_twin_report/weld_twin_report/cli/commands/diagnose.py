@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Say where the gap lies, which effect causes it, and how far it shrinks.
+"""Say where the gap lies, what causes it, how far it shrinks.
 
 Writes diagnosis.json, a page to read (report.html) and the corrected model to the directory. Ends
 with 3 where data or set-up are wrong (units, joints swapped, another robot): page and
@@ -29,6 +29,7 @@ from weld_twin_nodes.cli.options import (
     topics_of,
     twin_of,
 )
+from weld_twin_nodes.cli.parsing import Adder
 
 if TYPE_CHECKING:
     from weld_twin_core.diagnosis import Diagnosis
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
     from ...report.diagnosis_page import Sheet
 
+EXAMPLE = 'weld-twin diagnose my_bag --robot ur5 --align base,tool --out found'
 LINES = 'WELD_TWIN_PROGRESS'
 """Variable of the environment: 'lines' has every step told as a line on stderr."""
 BRANDS = ('abb', 'fanuc', 'kuka', 'ur', 'yaskawa')
@@ -53,128 +55,70 @@ JOINT_STATES = 150_000
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument(
-        'bags', nargs='+', metavar='BAG', help='recordings of the cell, of one robot'
-    )
+    add = Adder(parser)
+    add('bags', 'BAG', 'recordings of the cell, of one robot', nargs='+')
     add_robot(parser)
+    add_output(parser, 'directory for the results')
     _add_setup(parser)
-    _add_next(parser)
     _add_causes(parser)
     _add_sheet(parser)
-    add_output(parser, 'directory for the results')
+    _add_next(parser)
     add_topics(parser)
 
 
 def _add_setup(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        '--holdout',
-        action='append',
-        default=[],
-        metavar='BAG',
-        help='a recording that is not fitted; the shrink is judged on it; may be given again',
+    add = Adder(parser, 'how it was measured')
+    text = 'a recording that is not fitted; the shrink is judged on it; may be given again'
+    add('--holdout', 'BAG', text, many=True)
+    text = 'frames that are not known, and are fitted: base, tool, or base,tool'
+    add('--align', 'FRAMES', text, default='')
+    text = (
+        'errors that may differ between the recordings, such as joint_offset,tool_pose,base_pose'
     )
-    parser.add_argument(
-        '--align',
-        default='',
-        metavar='FRAMES',
-        help='frames that are not known, and are fitted: base, tool, or base,tool',
-    )
-    parser.add_argument(
-        '--changed',
-        nargs=2,
-        action='append',
-        default=[],
-        metavar=('BAG', 'WHAT'),
-        help='what was changed in the cell for one of the bags: load=KG hung from the tool point '
+    add('--may-change', 'NAMES', text, default='')
+    text = 'what was changed in the cell for one of the bags: load=KG hung from the tool point '
+    text += (
         '(load=KG,X,Y,Z: there in the tool frame [m]; below 0: taken off), another tool, or the '
-        'instrument moved; may be given again',
     )
-    parser.add_argument(
-        '--apply',
-        action='store_true',
-        help='if data or set-up are wrong and one correction explains it, make it and go on',
-    )
-
-
-def _add_next(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        '--experiment-minutes',
-        type=float,
-        metavar='MIN',
-        help='that the next experiment may take, with what has to be set up (default: 60)',
-    )
-    parser.add_argument(
-        '--confirm',
-        action='store_true',
-        help='where the question is closed, but some joints did not move widely, plan an '
-        'experiment in which they do',
-    )
-    parser.add_argument(
-        '--cell-box',
-        default='',
-        metavar='NUMBERS',
-        help='x,y,z of the lower and of the upper corner [m], in the measuring frame: the arm stays '
-        'between them in the next experiment',
-    )
+    text += 'instrument moved; may be given again'
+    add('--changed', 'BAG', 'WHAT', text, many=True, rare=True)
+    text = 'describes what the contacts of the bags touched, where they were not imported with it'
+    add('--contacts', 'ARTEFACT.yaml', text, rare=True)
+    text = 'if data or set-up are wrong and one correction explains it, make it and go on'
+    add('--apply', text)
 
 
 def _add_causes(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        '--contacts',
-        metavar='ARTEFACT.yaml',
-        help='describes what the contacts of the bags touched, where they were not imported with it',
-    )
-    parser.add_argument(
-        '--effects-known',
-        default='',
-        metavar='FILE',
-        help='effects file or diagnosis.json; the twin has these effects from the start',
-    )
-    parser.add_argument(
-        '--exclude-effect',
-        action='extend',
-        nargs='+',
-        default=[],
-        metavar='NAME',
-        help='effects that cannot be the cause',
-    )
-    parser.add_argument(
-        '--may-change',
-        default='',
-        metavar='NAMES',
-        help='errors that may differ between the recordings, such as '
-        'joint_offset,tool_pose,base_pose; the result says what changed since the first',
-    )
+    add = Adder(parser, 'what is known of the causes')
+    text = 'effects file or diagnosis.json; the twin has these effects from the start'
+    add('--effects-known', 'FILE', text, default='')
+    text = 'effects that cannot be the cause'
+    add('--exclude-effect', 'NAME', text, action='extend', nargs='+', default=[])
 
 
 def _add_sheet(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        '--tolerance',
-        type=float,
-        metavar='MM',
-        help='largest deviation allowed; the page says by ISO 14253-1 whether the robot passes',
-    )
-    parser.add_argument(
-        '--uncertainty',
-        type=float,
-        metavar='MM',
-        help='standard uncertainty of a measured position, from the certificate of the instrument',
-    )
-    parser.add_argument(
-        '--joint-names',
-        default='',
-        metavar='A|J|FILE',
-        help='what joints are called on the page: a prefix (A1, A2, ...), or a YAML file with '
-        'lines "joint: name"',
-    )
-    parser.add_argument(
-        '--controller',
-        choices=BRANDS,
-        help='whose controller it is, if the name of the robot does not tell',
-    )
-    parser.add_argument(
-        '--pdf', action='store_true', help='print the page to report.pdf, to sign; needs Chromium'
-    )
+    add = Adder(parser, 'what the page shows')
+    text = 'largest deviation allowed; the page says by ISO 14253-1 whether the robot passes'
+    add('--tolerance', 'MM', text, type=float)
+    text = 'standard uncertainty of a measured position, from the certificate of the instrument'
+    add('--uncertainty', 'MM', text, type=float, rare=True)
+    text = 'what joints are called: a prefix (A1, A2, ...), or a YAML file of lines "joint: name"'
+    add('--joint-names', 'A|J|FILE', text, default='', rare=True)
+    text = 'whose controller it is, if the name of the robot does not tell'
+    add('--controller', text, choices=BRANDS, rare=True)
+    add('--pdf', 'print the page to report.pdf, to sign; needs Chromium')
+
+
+def _add_next(parser: argparse.ArgumentParser) -> None:
+    add = Adder(parser, 'the next experiment', rare=True)
+    text = 'that it may take, with what has to be set up (default: 60)'
+    add('--experiment-minutes', 'MIN', text, type=float)
+    text = 'where the question is closed, but some joints did not move widely, plan one in which '
+    text += 'they do'
+    add('--confirm', text)
+    text = 'x,y,z of the lower and of the upper corner [m], in the measuring frame: the arm stays '
+    text += 'between them'
+    add('--cell-box', 'NUMBERS', text, default='')
 
 
 def _sheet(args: argparse.Namespace) -> Sheet:

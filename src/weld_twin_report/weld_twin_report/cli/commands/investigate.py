@@ -1,11 +1,11 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Diagnose, say what to measure next, take the recording in, and go on until it is decided.
+"""Diagnose, say what to measure next, until it is decided.
 
-Begin with a directory and recordings; --robot and --budget belong to the beginning. Record the
-experiment that it asks for (experiment.yaml, and a program with --controller), and go on with the
-directory and the new bag. The directory alone tells where it stands. With --live the experiment is
-run and recorded in the cell that is up, one after the other. It ends when the cause is sure, when the
+Before anything is measured, --tolerance plans the first measurement: how many postures, which, and
+how sure one will be; DIR gets them with a table to fill in. Begin with DIR and recordings; --robot
+and --budget belong to the beginning. Record the experiment that it asks for (experiment.yaml), and go
+on with DIR and the new bag. DIR alone tells where it stands. It ends when the cause is sure, when the
 budget is spent, or when nothing would part what is left, and says which.
 """
 
@@ -15,10 +15,23 @@ import argparse
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from weld_twin_nodes.cli.options import add_force, add_robot
+from weld_twin_nodes.cli.options import add_force, add_robot, output, refuse, robot_of
+from weld_twin_nodes.cli.parsing import Adder
+from weld_twin_nodes.cli.program_options import (
+    add_program_options,
+    add_trigger,
+    check_program,
+    context_of,
+)
 
+if TYPE_CHECKING:
+    from weld_twin_core.arm.robot import Robot
+    from weld_twin_msgs_py.programs import Context
+    from weld_twin_nodes.offline.measurement_plan import Planned
+
+EXAMPLE = 'weld-twin investigate cell7 bags/elbow_play --robot ur5 --budget 45'
 EXPERIMENT, BAG = 'experiment.yaml', 'recording'
 SLOWER = 2.0
 """A generator that goes from station to station may take this times what was planned."""
@@ -28,48 +41,132 @@ BUDGET = 60.0
 """Minutes of experiments, with what has to be set up for them, unless told: one visit to a cell."""
 CHAIN = ('--base-link', '--tip-link', '--flange-link')
 """Options that say which links of a URDF the arm is between, and where its tools begin."""
+PLAN = {'minutes': None, 'postures': None, 'noise': 0.03, 'seconds': 10.0, 'spread': 75.0}
+"""What a plan is made with unless told: minutes, number, mm, s and degrees."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('directory', metavar='DIR', help='the investigation')
-    parser.add_argument('bags', nargs='*', metavar='BAG', help='recordings to begin or go on with')
+    add = Adder(parser)
+    add('directory', 'DIR', 'the investigation', nargs='?')
+    add('bags', 'BAG', 'recordings to begin or go on with', nargs='*')
     add_robot(parser, required=False)
-    parser.add_argument(
-        '--budget', type=float, metavar='MIN', help=f'minutes of experiments (default: {BUDGET:g})'
-    )
-    parser.add_argument('--align', default='', metavar='FRAMES', help='as for diagnose')
-    parser.add_argument('--effects-known', default='', metavar='FILE', help='as for diagnose')
-    parser.add_argument('--cell-box', default='', metavar='NUMBERS', help='as for diagnose')
-    parser.add_argument(
-        '--controller',
-        default='',
-        metavar='L',
-        help='write the experiment as a program too, as export-program does',
-    )
-    parser.add_argument(
-        '--changed',
-        metavar='WHAT',
-        help='what was changed in the cell for the new bags, where it was not what was asked: '
-        'load=KG, tool, instrument, or nothing',
-    )
+    text = f'minutes of experiments (default: {BUDGET:g})'
+    add('--budget', 'MIN', text, type=float)
+    add('--align', 'FRAMES', 'as for diagnose', default='')
+    add('--effects-known', 'FILE', 'as for diagnose', default='', rare=True)
+    add('--cell-box', 'NUMBERS', 'as for diagnose', default='', rare=True)
+    text = 'write what is to be measured as a program too, as export program does'
+    add('--controller', 'L', text, default='')
+    text = 'what was changed in the cell for the new bags, where it was not what was asked: '
+    text += 'load=KG, tool, instrument, or nothing'
+    add('--changed', 'WHAT', text)
     add_force(parser)
-    parser.add_argument(
-        '--live',
-        action='store_true',
-        help='run experiments with the trajectory generator and record them, in the cell that is '
-        'up; stops where something in the cell has to be changed first',
-    )
-    parser.add_argument(
-        '--playback',
-        type=float,
-        default=1.0,
-        metavar='X',
-        help='with --live: speed against real time (default: 1)',
-    )
+    text = 'run and record experiments in the cell that is up, until something has to be changed'
+    add('--live', text)
+    text = 'with --live: speed against real time (default: {default})'
+    add('--playback', 'X', text, type=float, default=1.0, rare=True)
+    _add_plan(parser)
+    add_trigger(parser)
+    add_program_options(parser)
+
+
+def _add_plan(parser: argparse.ArgumentParser) -> None:
+    add = Adder(parser, 'plan the first measurement')
+    add('--tolerance', 'MM', 'of the tool, such as 0.3; asks for a plan', type=float)
+    add('--minutes', 'M', 'there is time for', type=float)
+    add('--postures', 'N', 'so many, in place of as many as are needed', type=int)
+    text = 'standard deviation of a measured coordinate: about 0.03 with a tracker or a measuring '
+    text += 'arm, 0.1 with cameras, 0.1 to 0.2 with a pin (default: 0.03)'
+    add('--noise', 'MM', text, type=float)
+    text = 'that one station takes, the way to it apart (default: 10)'
+    add('--seconds', 'S', text, type=float, rare=True)
+    text = 'every joint turns so far to either side of a usual posture (default: 75)'
+    add('--spread', 'DEG', text, type=float, rare=True)
+    add('--out', 'FOLDER', 'where the plan goes, instead of DIR', rare=True)
 
 
 def run(args: argparse.Namespace) -> int:
+    """Plan, begin, go on, or tell where it stands."""
+    from weld_twin_core.errors import DataError
+
+    if args.tolerance is not None:
+        return _planned(args)
+    refuse(args, (*PLAN, 'out'), 'is of a plan; say with --tolerance what it is for')
+    if args.directory is None:
+        raise DataError('give DIR, the folder of the investigation, or plan with --tolerance')
+    return _investigated(args)
+
+
+def _planned(args: argparse.Namespace) -> int:
+    """Print how many stations and how sure; write the files."""
+    from math import radians
+
+    from weld_twin_core.errors import DataError
+    from weld_twin_nodes.offline.measurement_plan import plan_table, planned
+
+    refuse(args, ('live', 'budget', 'changed'), 'is of an investigation, not of a plan')
+    if args.bags:
+        raise DataError('a plan comes before the first recording; leave --tolerance or BAG out')
+    if args.robot is None:
+        raise DataError('a plan needs --robot')
+    if args.controller:
+        check_program(args)
+    args.out = args.out or args.directory
+    if args.controller and not args.out:
+        raise DataError('--controller writes a program; say with --out where')
+    if args.minutes is None and args.postures is None:
+        raise DataError('say with --minutes for how long there is time, or how many --postures')
+    given = {name: getattr(args, name) for name in PLAN if getattr(args, name) is not None}
+    how: dict[str, Any] = {**PLAN, **given}
+    minutes = 1.0 if how['minutes'] is None else how['minutes']
+    if not (0.0 < how['seconds'] <= 3600.0 and 0.0 < minutes <= 10_000.0):
+        raise DataError('--minutes and --seconds must be above zero')
+    how |= {'noise': how['noise'] * 1e-3, 'spread': radians(how['spread'])}
+    robot, tolerance = robot_of(args), args.tolerance * 1e-3
+    plan = planned(robot, tolerance, **how)
+    print('\n'.join(plan_table(plan, tolerance)))
+    if args.out:
+        _write_plan(args, robot, plan, how['seconds'])
+    return 0
+
+
+def _write_plan(args: argparse.Namespace, robot: Robot, plan: Planned, seconds: float) -> None:
+    import numpy as np
+
+    from weld_twin_nodes.offline.measurement_plan import STATIONS, TABLE, write_plan
+
+    # Without a controller the table counts as the model does, which this one's language does too.
+    context = context_of(args, robot, args.controller or 'csv')
+    out, lines = Path(args.out), list[str]()
+    with output(args, TABLE) as folder:
+        write_plan(folder, context, args.controller or None, plan)
+        if args.controller:
+            lines = _program(args, context, folder / STATIONS, out, 'measure', seconds)
+    print('\n'.join([f'stations: {out / STATIONS}', f'table to fill in: {out / TABLE}', *lines]))
+    if not np.array_equal(context.controller.mix, np.eye(robot.n)):
+        print('J3 counts from the ground there: import the table with --coupled 3+2')
+
+
+def _program(
+    args: argparse.Namespace,
+    context: Context,
+    path: Path,
+    told_in: Path,
+    name: str,
+    dwell: float | None = None,
+) -> list[str]:
+    """Write a path file as a program beside it, and return what to tell."""
+    from weld_twin_msgs_py.programs.languages import LANGUAGES
+    from weld_twin_nodes.offline.exporting import Speeds, write_program
+
+    name += LANGUAGES[args.controller].extensions[0]
+    how = Speeds() if dwell is None else Speeds(dwell=dwell)
+    places = (path.with_name(name), told_in / name)
+    return write_program(*places, str(path), context, args.controller, how, trigger=args.trigger)
+
+
+def _investigated(args: argparse.Namespace) -> int:
     """Begin, go on, or tell where it stands."""
     from weld_twin_core.errors import DataError
     from weld_twin_nodes.offline.investigation import STATE, read_state
@@ -78,13 +175,13 @@ def run(args: argparse.Namespace) -> int:
 
     directory = Path(args.directory)
     begun = (directory / STATE).exists()
-    if not args.bags and not args.live and (args.budget is None or not begun):
-        if not begun:
-            raise DataError(f"'{directory}' is no investigation; begin one with recordings")
+    if not begun and not args.bags:
+        raise DataError(
+            f"'{directory}' is no investigation; begin one with recordings, or plan with --tolerance"
+        )
+    if not args.bags and not args.live and args.budget is None:
         print(headline(read_state(directory)))
         return 0
-    if not begun and not args.bags:
-        raise DataError(f"'{directory}' is no investigation; begin one with recordings")
     state = _continued(args, directory) if begun else _begun(args, directory)
     if args.bags:
         state = _round(args, directory, state, args.bags, _changes(args, state))
@@ -153,10 +250,11 @@ def _recorded(args: argparse.Namespace, directory: Path, state: dict[str, Any]) 
 def _begun(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
     from weld_twin_core.errors import DataError
     from weld_twin_nodes.offline.investigation import begin
+    from weld_twin_nodes.offline.measurement_plan import TABLE
 
     if not args.robot:
         raise DataError('an investigation begins with --robot')
-    if directory.exists() and any(directory.iterdir()):
+    if directory.exists() and any(directory.iterdir()) and not (directory / TABLE).exists():
         raise DataError(f"'{directory}' holds something else already; choose another place")
     budget = BUDGET if args.budget is None else args.budget
     if not 0.0 <= budget < 1e6:
@@ -284,18 +382,14 @@ def _write_program(
     args: argparse.Namespace, state: dict[str, Any], made: Path, place: Path
 ) -> None:
     from weld_twin_core.errors import TwinError
-    from weld_twin_msgs_py.programs.languages import LANGUAGES
-    from weld_twin_nodes.cli.commands import export_program
+    from weld_twin_msgs_py.robots import load_robot
 
-    suffix = LANGUAGES[args.controller].extensions[0] if args.controller in LANGUAGES else '.txt'
-    name = f'experiment{suffix}'
-    parser = argparse.ArgumentParser()
-    export_program.add_arguments(parser)
-    words = [str(made / EXPERIMENT), '--robot', state['robot']]
-    words += [word for word in state['options'] if word.partition('=')[0] in CHAIN]
-    words += ['--controller', args.controller, '--out', str(made / name)]
+    words = dict(word.split('=', 1) for word in state['options'])
+    robot = load_robot(state['robot'], *(words.get(option) for option in CHAIN))
     try:
-        lines = export_program.write_program(parser.parse_args(words), made / name, place / name)
+        check_program(args)
+        context = context_of(args, robot, args.controller)
+        lines = _program(args, context, made / EXPERIMENT, place, 'experiment')
     except TwinError as error:
         lines = [f'note: no program was written: {error}']
     print('\n'.join(lines))

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Pose and path accuracy and repeatability by ISO 9283, from poses or paths that are repeated.
+"""Pose and path accuracy and repeatability by ISO 9283.
 
 Finds the poses that the arm stopped at twice or more, and the path that it went twice or more.
 Writes iso9283.json and a page to read (report.html) to the directory.
@@ -22,6 +22,7 @@ from weld_twin_nodes.cli.options import (
     robot_of,
     topics_of,
 )
+from weld_twin_nodes.cli.parsing import Adder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from weld_twin_core.metrics.performance import Performance
     from weld_twin_core.recording import Recording
 
+EXAMPLE = 'weld-twin iso9283 my_cycles --robot ur5 --out accuracy'
 SCHEMA = 'weld_twin/iso9283/1'
 RESULT, PAGE = 'iso9283.json', 'report.html'
 WIDTH = 100
@@ -40,14 +42,11 @@ FAR = 0.1
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('bag', metavar='BAG', help='recording of the cell')
+    add = Adder(parser)
+    add('bag', 'BAG', 'recording of the cell')
     add_robot(parser)
-    parser.add_argument(
-        '--align',
-        default='',
-        metavar='FRAMES',
-        help='frames that are not known, and are fitted: base, tool, or base,tool',
-    )
+    text = 'frames that are not known, and are fitted: base, tool, or base,tool'
+    add('--align', 'FRAMES', text, default='')
     add_output(parser, 'directory for the results')
     add_topics(parser)
 

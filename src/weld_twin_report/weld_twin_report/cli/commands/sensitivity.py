@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Which tolerance to tighten: the paper's sensitivity study and the global one.
+"""Which tolerance to tighten, by how much it moves the tool.
 
 For a robot on a seam, or for the motion of a bag. Writes sensitivity.json, indices, figures with
 their data and a page to read (sensitivity.html) to the directory; run again, it continues where
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from weld_twin_nodes.cli.options import add_output, add_robot, add_topics, robot_of, topics_of
+from weld_twin_nodes.cli.parsing import Adder
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -25,128 +26,61 @@ if TYPE_CHECKING:
 
     from ...sensitivity_report import Setting
 
+EXAMPLE = 'weld-twin sensitivity --robot ur5 --path spline --out study'
+_FRAME = ('X', 'Y', 'Z', 'RX', 'RY', 'RZ')
 _WORK = 'weld_twin_report.sensitivity_report.work'
 """What the processes that work need: they import it while this one gets their tasks ready."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('bag', nargs='?', metavar='BAG', help='study the motion recorded in a bag')
+    add = Adder(parser)
+    add('bag', 'BAG', 'study the motion recorded in a bag', nargs='?')
     add_robot(parser, required=False)
     add_output(parser, 'directory for the results')
-    _add_question(parser.add_argument_group('what is studied'))
-    _add_effort(parser.add_argument_group('how much is run, and where'))
+    _add_question(parser)
+    _add_effort(parser)
     add_topics(parser)
 
 
-def _add_question(group: argparse._ArgumentGroup) -> None:
-    add = group.add_argument
-    add(
-        '--path',
-        metavar='P',
-        default='line',
-        help='path file, or a bundled seam: line, arc, circle, polyline, spline, weave',
-    )
-    add(
-        '--tolerances',
-        metavar='FILE',
-        help='tolerance file (default: typical magnitudes of '
-        'joint_offset, link_length, link_twist, backlash and base_pose)',
-    )
-    add(
-        '--effects-known',
-        metavar='FILE',
-        default='',
-        help='effects file or diagnosis.json; the twin has these effects from the start',
-    )
-    add(
-        '--tool',
-        type=float,
-        nargs=6,
-        metavar=('X', 'Y', 'Z', 'RX', 'RY', 'RZ'),
-        help="tool frame in the flange [m, rotation vector rad], instead of the model's",
-    )
-    _add_seam(group)
-    _add_choice(group)
+def _add_question(parser: argparse.ArgumentParser) -> None:
+    add = Adder(parser, 'what is studied')
+    text = 'path file, or line, arc, circle, polyline, spline, weave (default: {default})'
+    add('--path', 'P', text, default='line')
+    text = 'tolerance file (default: typical sizes of joint_offset, link_length, link_twist, '
+    text += 'backlash and base_pose)'
+    add('--tolerances', 'FILE', text)
+    text = 'effects file or diagnosis.json; the twin has these effects from the start'
+    add('--effects-known', 'FILE', text, default='')
+    text = 'draw figure 6 to 14, posture or recorded, and nothing else; may be given again'
+    add('--figure', 'K', text, many=True)
+    add('--claims', 'measure the claims of the paper')
+    add = Adder(parser, 'of the seam, and of the claims', rare=True)
+    add('--claims-robots', 'R', 'robots of the claims (default: seven builds)', nargs='+')
+    text = "tool frame in the flange [m, rotation vector rad], instead of the model's"
+    add('--tool', *_FRAME, text, type=float)
+    add('--points', 'N', 'path points (default: {default})', type=int, default=200)
+    text = 'weld tolerance across the seam (default: {default})'
+    add('--across', 'M', text, type=float, default=5e-4)
+    text = 'weld tolerance of the stick-out (default: {default})'
+    add('--stickout', 'M', text, type=float, default=1e-3)
+    text = 'direction out of the work, for a recorded motion (default: against the wire)'
+    add('--normal', *_FRAME[:3], text, type=float)
 
 
-def _add_choice(group: argparse._ArgumentGroup) -> None:
-    add = group.add_argument
-    add(
-        '--figure',
-        action='append',
-        default=[],
-        metavar='K',
-        help='draw figure 6 to 14, posture or recorded, and nothing else; may be given again',
-    )
-    add('--claims', action='store_true', help='measure the claims of the paper')
-    add(
-        '--claims-robots',
-        nargs='+',
-        metavar='R',
-        help='robots of the claims (default: seven builds)',
-    )
-
-
-def _add_seam(group: argparse._ArgumentGroup) -> None:
-    add = group.add_argument
-    add('--points', type=int, default=200, metavar='N', help='path points (default: 200)')
-    add(
-        '--across',
-        type=float,
-        default=5e-4,
-        metavar='M',
-        help='weld tolerance across the seam (default: 0.0005)',
-    )
-    add(
-        '--stickout',
-        type=float,
-        default=1e-3,
-        metavar='M',
-        help='weld tolerance of the stick-out (default: 0.001)',
-    )
-    add(
-        '--normal',
-        type=float,
-        nargs=3,
-        metavar=('X', 'Y', 'Z'),
-        help='direction out of the work, for a recorded motion (default: against the wire)',
-    )
-
-
-def _add_effort(group: argparse._ArgumentGroup) -> None:
-    add = group.add_argument
-    add(
-        '--samples',
-        type=int,
-        default=1024,
-        metavar='N',
-        help='Sobol base samples, a power of two (default: 1024)',
-    )
-    add(
-        '--runs',
-        type=int,
-        default=20_000,
-        metavar='N',
-        help='runs of the tolerance stack (default: 20,000)',
-    )
-    add(
-        '--trajectories',
-        type=int,
-        default=50,
-        metavar='N',
-        help='trajectories of the Morris screening (default: 50)',
-    )
-    add(
-        '--placements',
-        type=int,
-        default=32,
-        metavar='N',
-        help='placements tried for the advice (default: 32)',
-    )
-    add('--seed', type=int, default=0, help='seed of all draws (default: 0)')
-    add('--workers', type=int, default=0, metavar='N', help='processes (default: one a core)')
-    add('--scheduler', default='', metavar='ADDRESS', help='Dask scheduler to run on instead')
+def _add_effort(parser: argparse.ArgumentParser) -> None:
+    add = Adder(parser, 'how much is run, and where', rare=True)
+    text = 'Sobol base samples, a power of two (default: {default})'
+    add('--samples', 'N', text, type=int, default=1024)
+    text = 'runs of the tolerance stack (default: {default})'
+    add('--runs', 'N', text, type=int, default=20_000)
+    text = 'trajectories of the Morris screening (default: {default})'
+    add('--trajectories', 'N', text, type=int, default=50)
+    text = 'placements tried for the advice (default: {default})'
+    add('--placements', 'N', text, type=int, default=32)
+    add('--seed', 'N', 'seed of all draws (default: {default})', type=int, default=0)
+    add('--workers', 'N', 'processes (default: one a core)', type=int, default=0)
+    add('--scheduler', 'ADDRESS', 'Dask scheduler to run on instead', default='')
 
 
 def run(args: argparse.Namespace) -> int:

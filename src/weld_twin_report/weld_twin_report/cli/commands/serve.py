@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The diagnosis in a browser: drop a recording, answer what is asked, read the sheet.
+"""The diagnosis in a browser: drop a recording, read on.
 
 Only this machine reaches the server, unless --host says otherwise; whoever comes from elsewhere then
 needs the token, which is in the address that is printed. Recordings and results stay in --dir, and a
@@ -11,6 +11,9 @@ from __future__ import annotations
 
 import argparse
 
+from weld_twin_nodes.cli.parsing import Adder
+
+EXAMPLE = 'weld-twin serve --dir served'
 GIGABYTE = 1_000_000_000
 """Bytes."""
 LAST_PORT = 65_535
@@ -21,39 +24,26 @@ TOKEN = 24
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument(
-        '--dir', default='weld_twin_served', metavar='DIR', help='where uploads and results lie'
-    )
-    parser.add_argument('--port', type=int, default=8765, metavar='N', help='0: any that is free')
-    parser.add_argument(
-        '--host', default='localhost', metavar='HOST', help='0.0.0.0 lets other machines in'
-    )
-    parser.add_argument(
-        '--name',
-        action='append',
-        default=[],
-        metavar='NAME',
-        help='a host name or address that browsers use for this machine; may be given again',
-    )
-    parser.add_argument('--token', default='', help='what visitors need (default: drawn anew)')
-    parser.add_argument('--workers', type=int, default=1, metavar='N', help='side by side')
-    parser.add_argument('--upload', type=float, default=1.0, metavar='GB', help='of one recording')
-    parser.add_argument(
-        '--disk', type=float, default=20.0, metavar='GB', help='of everything that is kept'
-    )
-    parser.add_argument('--memory', type=float, default=6.0, metavar='GB', help='of one diagnosis')
-    parser.add_argument(
-        '--minutes', type=float, default=15.0, metavar='N', help='of one diagnosis'
-    )
-    parser.add_argument(
-        '--db', default='', metavar='URL', help='history of the plant, shown to everybody'
-    )
-    parser.add_argument(
-        '--behind-proxy',
-        action='store_true',
-        help='a proxy on this machine tells in X-Forwarded-For whom it asks for',
-    )
-    parser.add_argument('--live', action='store_true', help='show the verdict of running nodes')
+    add = Adder(parser)
+    text = 'where uploads and results lie (default: {default})'
+    add('--dir', 'DIR', text, default='weld_twin_served')
+    text = '0: any that is free (default: {default})'
+    add('--port', 'N', text, type=int, default=8765)
+    text = '0.0.0.0 lets other machines in (default: {default})'
+    add('--host', 'HOST', text, default='localhost')
+    text = 'a host name or address that browsers use for this machine; may be given again'
+    add('--name', 'NAME', text, many=True, rare=True)
+    add('--token', 'TEXT', 'what visitors need (default: drawn anew)', default='')
+    add('--db', 'URL', 'history of the plant, shown to everybody', default='')
+    add('--live', 'show the verdict of running nodes')
+    add('--behind-proxy', 'a proxy here tells in X-Forwarded-For whom it asks for', rare=True)
+    add = Adder(parser, 'limits', rare=True)
+    add('--workers', 'N', 'side by side (default: {default})', type=int, default=1)
+    add('--upload', 'GB', 'of one recording (default: {default})', type=float, default=1.0)
+    text = 'of everything that is kept (default: {default})'
+    add('--disk', 'GB', text, type=float, default=20.0)
+    add('--memory', 'GB', 'of one diagnosis (default: {default})', type=float, default=6.0)
+    add('--minutes', 'N', 'of one diagnosis (default: {default})', type=float, default=15.0)
 
 
 def run(args: argparse.Namespace) -> int:

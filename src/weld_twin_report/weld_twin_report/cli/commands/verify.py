@@ -1,11 +1,11 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Measure again after a correction: was the promise kept, and which cause did not go away?
+"""Was the promise of a correction kept? Measured again.
 
-Give the recording made after the correction. With --program, the folder of correct-program, the tool
-is held against where the program meant it. Without, the robot itself was mended (zeros mastered,
-constants entered, a gear serviced), and is held against its nominal model. Ends with 0 where the
-promise was kept, with 4 where it was not.
+Says also which cause did not go away. With --program, the folder that correct wrote, the tool is held
+against where the program meant it. Without, the robot itself was mended (zeros mastered, constants
+entered, a gear serviced), and is held against its nominal model. Ends with 0 where the promise was
+kept, with 4 where it was not.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from weld_twin_nodes.cli.options import add_force, add_robot, add_topics, output, topics_of
+from weld_twin_nodes.cli.parsing import Adder
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
     from weld_twin_nodes.offline.verifying import Verification
 
+EXAMPLE = 'weld-twin verify after_bag --model found/diagnosis.json --program better'
 RESULT, PAGE, CORRECTION = 'verification.json', 'report.html', 'correction.json'
 NOT_KEPT = 4
 """Exit code where less was reached than promised."""
@@ -28,25 +30,19 @@ NOT_KEPT = 4
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
-    parser.add_argument('bag', metavar='AFTER_BAG', help='recorded after the correction')
-    parser.add_argument(
-        '--model', required=True, metavar='FILE', help='diagnosis.json that the correction is from'
-    )
-    parser.add_argument(
-        '--program', metavar='DIR', help='folder of correct-program, where a program was corrected'
-    )
+    add = Adder(parser)
+    add('bag', 'AFTER_BAG', 'recorded after the correction')
+    text = 'diagnosis.json that the correction is from'
+    add('--model', 'FILE', text, required=True)
+    text = 'folder that correct wrote, where a program was corrected'
+    add('--program', 'DIR', text)
     add_robot(parser, required=False)
-    parser.add_argument(
-        '--align',
-        default='',
-        metavar='FRAMES',
-        help='frames that were set up anew since the diagnosis, and are fitted: base, tool, or '
-        'base,tool (default: both are as they were)',
-    )
-    parser.add_argument(
-        '--setup', type=int, default=1, metavar='N', help='which recording of the diagnosis'
-    )
-    parser.add_argument('--out', metavar='DIR', help='folder for verification.json and a page')
+    text = 'frames that were set up anew since the diagnosis, and are fitted: base, tool, or '
+    text += 'base,tool (default: both are as they were)'
+    add('--align', 'FRAMES', text, default='')
+    text = 'which recording of the diagnosis (default: {default})'
+    add('--setup', 'N', text, type=int, default=1, rare=True)
+    add('--out', 'DIR', 'folder for verification.json and a page')
     add_force(parser)
     add_topics(parser)
 
@@ -138,6 +134,6 @@ def _correction(folder: str) -> dict[str, Any]:
         content = None
     if not isinstance(content, dict) or not isinstance(content.get('expected'), dict):
         raise DataError(
-            f"'{path}' is no correction; give the folder that weld-twin correct-program --model wrote"
+            f"'{path}' is no correction; give the folder that weld-twin correct --model wrote"
         )
     return content

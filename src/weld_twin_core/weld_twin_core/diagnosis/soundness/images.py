@@ -1,0 +1,211 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Cameras and targets that are not what they were said to be.
+
+Lenses, swapped cameras and mirrored targets show in the images alone: points are not where they
+should be, and are so once the mistake is undone. How large a target is shows only beside the arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from ...arrays import Array
+from ...bundle import adjusted
+from ...cameras import Sightings
+from ...cameras.located import located
+from ...cameras.sightings import Fitted
+from ...errors import DataError
+from .evidence import Case, Finding, mistake
+from .limits import (
+    BEHIND,
+    IMAGE_ALIKE,
+    IMAGE_FAR,
+    IMAGE_UNDONE,
+    LENS_DOUBT,
+    LENS_FAR,
+    TARGET_EXPLAINS,
+    TARGET_SCALE,
+)
+
+LOOKED = 20
+"""Images in which it is looked whether a board is seen from behind."""
+CALIBRATE = 'calibrate the camera, at the focus and zoom that it is used with'
+
+
+def images(case: Case) -> Sequence[Finding]:
+    """Return what is wrong with cameras and targets, by the images and by the arm."""
+    seen = [r.images for r in case.recordings if r.images is not None]
+    found = [finding for one in seen for finding in _by_themselves(one)]
+    if found or not seen:
+        return found
+    said = [
+        Finding('note', f'Points are found within {one.fitted.pixel:.2f} px.')
+        for one in seen
+        if one.fitted is not None
+    ]
+    return [*_beside_the_arm(case), *said]
+
+
+def _by_themselves(seen: Sightings) -> Iterator[Finding]:
+    fitted = seen.fitted
+    if fitted is None:
+        return
+    for k, target in enumerate(seen.targets):
+        if target.facing and _from_behind(seen, k):
+            yield _mistake(
+                'target_mirrored',
+                target.name,
+                f'Board {target.name!r} is seen from behind in every image: its points are '
+                'given, or printed, mirror-wise.',
+                'give its points as the camera sees them, or do not mirror the images',
+            )
+            return
+    far = float(np.abs(fitted.off).max())
+    if fitted.pixel < IMAGE_FAR and far < LENS_DOUBT:
+        return
+    for kind, at, words, remedy, trial in _trials(seen):
+        try:
+            then = adjusted(trial)
+        except DataError:
+            continue
+        if _undone(fitted, Fitted(then.pixel, then.off)):
+            sentence = (
+                f'{words}; undone, points are found within {then.pixel:.2f} px instead of '
+                f'{fitted.pixel:.2f} px, and lenses are as they were calibrated.'
+            )
+            yield _mistake(kind, at, sentence, remedy)
+            return
+    if far >= LENS_FAR:
+        c = int(np.abs(fitted.off).max(axis=1).argmax())
+        yield _mistake(
+            'intrinsics',
+            seen.cameras[c].name,
+            f'The intrinsics of camera {seen.cameras[c].name!r} are not those of its images: they '
+            f'are off by {far:.0f} times what calibrations of one lens differ by.',
+            CALIBRATE,
+        )
+
+
+def _undone(before: Fitted, then: Fitted) -> bool:
+    """Return whether images agree much better with what they were said to be."""
+    if float(np.abs(then.off).max()) > LENS_DOUBT:
+        return False
+    nearer = float((before.off**2).sum() - (then.off**2).sum())
+    return then.pixel < IMAGE_UNDONE * before.pixel or (
+        then.pixel < IMAGE_ALIKE * before.pixel and nearer > LENS_DOUBT**2
+    )
+
+
+def _trials(seen: Sightings) -> Iterator[tuple[str, str, str, str, Sightings]]:
+    """Yield mistakes that images show: kind, place, words, remedy, and the images without it."""
+    for one, other in combinations(range(len(seen.cameras)), 2):
+        cameras = list(seen.cameras)
+        first, second = cameras[one], cameras[other]
+        cameras[one] = replace(first, lens=second.lens, mount=second.mount)
+        cameras[other] = replace(second, lens=first.lens, mount=first.mount)
+        yield (
+            'cameras_swapped',
+            first.name,
+            f'Cameras {first.name!r} and {second.name!r} are swapped',
+            'exchange the two names',
+            replace(seen, cameras=tuple(cameras)),
+        )
+    for k, target in enumerate(seen.targets):
+        targets = list(seen.targets)
+        targets[k] = replace(target, points=target.points * [-1.0, 1.0, 1.0])
+        yield (
+            'target_mirrored',
+            target.name,
+            f'The points of target {target.name!r} are given mirror-wise',
+            'give them in a right-handed frame, as the camera sees them',
+            replace(seen, targets=tuple(targets)),
+        )
+
+
+def _from_behind(seen: Sightings, k: int) -> bool:
+    """Return whether a board shows its back in most images that show it well."""
+    sides = []
+    for image in np.unique(seen.image[seen.target == k])[:LOOKED]:
+        for c, camera in enumerate(seen.cameras):
+            rows = (seen.image == image) & (seen.camera == c) & (seen.target == k)
+            points = seen.targets[k].points[seen.point[rows]]
+            pose = located(camera.lens, points, seen.pixel[rows])
+            if pose is not None:
+                sides.append(float(pose[:3, 2] @ pose[:3, 3]))
+    return bool(sides) and float(np.mean(np.array(sides) < 0.0)) > BEHIND
+
+
+def _beside_the_arm(case: Case) -> Iterator[Finding]:
+    """Report what is measured too large, or too far from the camera, for the way of the arm."""
+    problem = case.problem.thinned(2000).of_frames()
+    scale = problem.unit_scale()
+    parts, _ = problem.frame_columns(problem.features(case.model))
+    left = problem.whitened(problem.residuals(case.model), scale)
+    frames = problem.whitened(parts, scale)
+    basis = (
+        np.linalg.svd(frames.T, full_matrices=False)[0]
+        if frames.size
+        else np.zeros((left.size, 0))
+    )
+    left = left - basis @ (basis.T @ left)
+    for kind, columns in (('target_scale', _larger), ('intrinsics', _farther)):
+        each = [columns(r.images, r.seen.position) for r in problem.recordings]
+        if any(each_ is None for each_ in each):
+            continue
+        rows = [
+            np.concatenate([part.T, np.zeros((c - 3, len(part)))])
+            for part, c in zip(each, problem.rows, strict=True)
+            if part is not None
+        ]
+        column = problem.whitened(rows, scale)
+        column = column - basis @ (basis.T @ column)
+        size = float(column @ column)
+        share = float(column @ left) / size
+        explained = share**2 * size / float(left @ left)
+        if abs(share) > TARGET_SCALE and explained > TARGET_EXPLAINS:
+            yield _too_large(case, kind, share)
+            return
+
+
+def _larger(seen: Sightings | None, position: Array) -> Array | None:
+    return None if seen is None else position
+
+
+def _farther(seen: Sightings | None, position: Array) -> Array | None:
+    """Return the way along the line of sight of the only camera, where it stands still."""
+    if seen is None or len(seen.cameras) > 1 or seen.cameras[0].mount != 'world':
+        return None
+    return position * [0.0, 0.0, 1.0]
+
+
+def _too_large(case: Case, kind: str, share: float) -> Finding:
+    seen = next(r.images for r in case.recordings if r.images is not None)
+    size = f'{100.0 * abs(share):.1f} %'
+    if kind == 'intrinsics':
+        name = seen.cameras[0].name
+        return _mistake(
+            kind,
+            name,
+            f'Camera {name!r} sees everything {size} too {"far" if share > 0.0 else "near"} for '
+            'the way of the arm: its focal length is off by as much.',
+            CALIBRATE,
+        )
+    name = seen.targets[0].name
+    return _mistake(
+        kind,
+        name,
+        f'All that the cameras measure is {size} too {"large" if share > 0.0 else "small"} for '
+        f'the way of the arm: target {name!r} is {"smaller" if share > 0.0 else "larger"} than '
+        'it was said to be.',
+        'measure it with a calliper and give its true size',
+    )
+
+
+def _mistake(kind: str, at: str, sentence: str, remedy: str) -> Finding:
+    return mistake(sentence, kind, (at,), remedy)

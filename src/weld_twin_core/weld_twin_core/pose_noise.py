@@ -1,0 +1,166 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How sure a measured pose is in every direction: a board is worse along the line of sight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arm.rotation import skew
+from .arrays import Array, readonly
+
+ROUNDED = 1e-6
+"""Share by which numbers may differ that were meant to be the same: those of single precision."""
+TINY = 1e-12
+"""Share of the largest variance, each in its own unit, below which one counts as none."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseNoise:
+    """
+    Noise of measured poses or points, told with them.
+
+    Attributes
+    ----------
+    root : array, shape (M, c, c)
+        Makes rows of equal and independent noise of an error (c, M): shift [m], then turn about
+        the axes outside [rad], where poses were measured. Those rows are in metres.
+    typical : float [m]
+        Standard deviation of each of them, if the noise is as told.
+    sigma : array, shape (M,) [m]
+        Of a coordinate of each position, all three joined by their mean square.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from weld_twin_core.pose_noise import PoseNoise
+    >>> board = PoseNoise.of(np.diag([1e-8, 1e-8, 1e-6])[None])
+    >>> print(board.sigma.round(6), (board.root[0] @ [1e-4, 0.0, 1e-3] / board.typical).round(3))
+    [0.000583] [1. 0. 1.]
+
+    """
+
+    root: Array
+    typical: float
+    sigma: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'root', readonly(self.root, (None, None, None), 'root'))
+
+    @classmethod
+    def of(cls, covariance: Array) -> PoseNoise:
+        """
+        Return the noise of covariances.
+
+        Parameters
+        ----------
+        covariance : array, shape (M, 3, 3) or (M, 6, 6) [m^2, rad^2]
+            Positive definite.
+
+        """
+        sigma = np.sqrt(np.trace(covariance[:, :3, :3], axis1=1, axis2=2) / 3.0)
+        typical = float(np.median(sigma))
+        size = np.sqrt(np.einsum('mii->mi', covariance))
+        unit = covariance / (size[:, :, None] * size[:, None, :])
+        strength, ways = np.linalg.eigh(unit)
+        strength = np.maximum(strength, TINY)
+        root = (ways / np.sqrt(strength)[:, None, :]) @ np.swapaxes(ways, 1, 2)
+        return cls(typical * root / size[:, None, :], typical, sigma)
+
+    @property
+    def covariance(self) -> Array:
+        """Return it as covariances, shape (M, c, c) [m^2, rad^2]."""
+        back = np.linalg.inv(self.root) * self.typical
+        return np.asarray(back @ np.swapaxes(back, 1, 2))
+
+    def take(self, index: np.ndarray) -> PoseNoise:
+        """Return that of some samples."""
+        return replace(self, root=self.root[index], sigma=self.sigma[index])
+
+    def moved(self, back: Array) -> PoseNoise:
+        """
+        Return the noise of errors that became others.
+
+        Parameters
+        ----------
+        back : array, shape (M, c, c)
+            From the new errors to those of old.
+
+        """
+        root = self.root @ back
+        inverse = np.linalg.inv(root)[:, :3]
+        sigma = self.typical * np.sqrt((inverse**2).sum(axis=(1, 2)) / 3.0)
+        return PoseNoise(root, self.typical, sigma)
+
+
+@dataclass(frozen=True, eq=False)
+class Common:
+    """
+    Errors that all samples of an instrument share, such as that of a camera's focal length.
+
+    Attributes
+    ----------
+    change : array, shape (M, c, K) [m, rad]
+        What one standard deviation of each makes measured poses too large by.
+    mean : array, shape (K,)
+        How large they are believed to be, in standard deviations.
+
+    """
+
+    change: Array
+    mean: Array
+
+    def __post_init__(self) -> None:
+        mean = readonly(self.mean, (None,), 'common errors')
+        object.__setattr__(self, 'mean', mean)
+        change = readonly(self.change, (None, None, mean.size), 'common errors')
+        object.__setattr__(self, 'change', change)
+
+    def take(self, index: np.ndarray) -> Common:
+        """Return that of some samples."""
+        return replace(self, change=self.change[index])
+
+    def moved(self, change: Array) -> Common:
+        """Return them where errors became others, by matrices of shape (M, c, c)."""
+        return replace(self, change=change @ self.change)
+
+
+def alike(covariance: Array) -> bool:
+    """
+    Return whether covariances, shape (M, 6, 6), are all one, and the same in every direction.
+
+    Such a one tells nothing that measurements do not tell themselves; mostly somebody typed it in.
+    """
+    first = covariance[0]
+    plain = np.diag(np.repeat(first.diagonal()[[0, 3]], 3))
+    same = np.allclose(covariance, first, ROUNDED, 0.0)
+    return bool(same and np.allclose(first, plain, ROUNDED, 0.0))
+
+
+def positive(covariance: Array) -> NDArray[np.bool_]:
+    """Return which of covariances, shape (M, c, c), are finite and positive definite, (M,)."""
+    size = np.sqrt(np.maximum(np.einsum('mii->mi', covariance), 0.0))
+    good = np.isfinite(covariance).all(axis=(1, 2)) & (size > 0.0).all(axis=1)
+    unit = covariance[good] / (size[good][:, :, None] * size[good][:, None, :])
+    good[good] = np.linalg.eigvalsh(0.5 * (unit + np.swapaxes(unit, 1, 2)))[:, 0] > 0.0
+    return good
+
+
+def inverse_error(position: Array, rotation: Array) -> Array:
+    """
+    Return what errors of poses do to the inverse poses, shape (M, 6, 6).
+
+    Parameters
+    ----------
+    position, rotation : array, shapes (M, 3) [m] and (M, 3, 3)
+        The poses that are inverted; errors are shifts and turns about the axes outside.
+
+    """
+    back = np.swapaxes(rotation, 1, 2)
+    out = np.zeros((len(position), 6, 6))
+    out[:, :3, :3] = out[:, 3:, 3:] = -back
+    out[:, :3, 3:] = -back @ skew(position)
+    return out

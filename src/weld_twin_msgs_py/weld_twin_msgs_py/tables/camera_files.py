@@ -1,0 +1,186 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Files that describe cameras (camera_info as ROS writes it) and targets (points, or a board)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.arrays import Array
+from weld_twin_core.cameras import Camera, Lens, Target
+from weld_twin_core.cameras.sightings import PLACED
+from weld_twin_core.errors import DataError
+
+from ..files.yaml_file import read_yaml
+from .cells import read_cells
+from .header import unit_of
+from .unit_guess import METRES, factor
+
+LENSES = ('plumb_bob', 'rational_polynomial')
+"""Models of distortion that are understood; coefficients in the order of OpenCV."""
+BOARDS = ('charuco', 'chessboard')
+"""Boards whose points follow from a few numbers."""
+AXES = ('x', 'y', 'z')
+
+
+def read_camera(name: str, path: Path | str) -> Camera:
+    """
+    Return the camera of a ``camera_info`` file, with `mount: tool` or `mount: world` added.
+
+    Parameters
+    ----------
+    name : str
+        What tables and messages call it.
+    path : Path or str
+        YAML with ``camera_matrix``, ``distortion_model`` and ``distortion_coefficients``.
+
+    Raises
+    ------
+    DataError, ModelError
+        The file cannot be read, or something in it is missing; the message names both.
+
+    """
+    entry = read_yaml(path, 'camera file')
+    try:
+        matrix = _numbers(entry['camera_matrix'], 9)
+        bent = _numbers(entry.get('distortion_coefficients', []), None)
+        model = str(entry.get('distortion_model', LENSES[0]))
+        if model not in LENSES and bent.any():
+            raise DataError(
+                f'distortion_model is {model!r}; only {" and ".join(LENSES)} are understood: '
+                'calibrate with one of them'
+            )
+        lens = Lens(matrix[[0, 4]], matrix[[2, 5]], bent)
+        size = (int(entry.get('image_width', 0)), int(entry.get('image_height', 0)))
+        mount = str(entry.get('mount', 'world'))
+        return Camera(name, lens, mount, size if min(size) > 0 else None)
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise DataError(
+            f"camera file '{path}' is no camera_info: {_missing(error)}; it needs camera_matrix "
+            'with nine numbers under data, and distortion_coefficients'
+        ) from None
+    except DataError as error:
+        raise DataError(f"camera file '{path}': {error}") from None
+
+
+def read_target(name: str, path: Path | str, mount: str | None = None) -> Target:
+    """
+    Return the target of a file.
+
+    Parameters
+    ----------
+    name : str
+    path : Path or str
+        YAML with ``points`` (label to x, y, z, or a list of them) or the numbers of a board
+        (`board_points`), and where they apply ``mount`` and ``sigma``; or a table whose first
+        column is the label, with columns x, y and z.
+    mount : str, optional
+        'tool' or 'world', where the file does not say it.
+
+    Raises
+    ------
+    DataError, ModelError
+        The file cannot be read or understood; the message names it.
+
+    """
+    path = Path(path)
+    if path.suffix.lower() not in ('.yaml', '.yml', '.json'):
+        return _of_table(name, path, mount or 'tool')
+    entry = read_yaml(path, 'target file')
+    try:
+        points = _points(entry)
+        sigma, own = float(entry.get('sigma', PLACED)), str(entry.get('mount', mount or 'tool'))
+        places = np.array([*points.values()], dtype=float)
+        return Target(name, tuple(points), places, own, sigma, facing='board' in entry)
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise DataError(
+            f"target file '{path}' cannot be understood: {_missing(error)}; it needs points, or "
+            f'board: {" | ".join(BOARDS)} with squares: [columns, rows] and square: in metres'
+        ) from None
+    except DataError as error:
+        raise DataError(f"target file '{path}': {error}") from None
+
+
+def read_board(path: Path | str) -> Mapping[str, Any]:
+    """
+    Return the numbers of a board: ``board``, ``squares``, ``square`` and what else the file has.
+
+    Raises
+    ------
+    DataError, ModelError
+        The file cannot be read, or a number is missing.
+
+    """
+    entry = read_yaml(path, 'board file')
+    try:
+        board_points(entry)
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(
+            f"board file '{path}' cannot be understood: {_missing(error)}; it needs "
+            f'board: {" | ".join(BOARDS)}, squares: [columns, rows] and square: in metres'
+        ) from None
+    except DataError as error:
+        raise DataError(f"board file '{path}': {error}") from None
+    return dict(entry)
+
+
+def board_points(entry: Mapping[str, Any]) -> dict[str, Array]:
+    """
+    Return the inner corners of a board in its own frame, by the numbers OpenCV gives them [m].
+
+    Parameters
+    ----------
+    entry : mapping
+        ``board`` (charuco or chessboard), ``squares`` (columns and rows of squares) and
+        ``square`` (their side [m]).
+
+    """
+    if entry['board'] not in BOARDS:
+        raise DataError(f'board is {entry["board"]!r}; a board is {" or ".join(BOARDS)}')
+    columns, rows = (int(count) for count in entry['squares'])
+    side = float(entry['square'])
+    if min(columns, rows) < 3 or not side > 0.0:
+        raise DataError('a board has three squares at least each way, of a positive side [m]')
+    wide = columns - 1
+    return {
+        str(k): np.array([k % wide + 1.0, k // wide + 1.0, 0.0]) * side
+        for k in range(wide * (rows - 1))
+    }
+
+
+def _points(entry: Any) -> dict[str, Any]:
+    if 'board' in entry:
+        return board_points(entry)
+    points = entry['points']
+    pairs = points.items() if isinstance(points, Mapping) else enumerate(points)
+    return {str(label): place for label, place in pairs}
+
+
+def _of_table(name: str, path: Path, mount: str) -> Target:
+    cells = read_cells(path, None, None)
+    columns = {}
+    for column in cells.header:
+        first = column.lower().replace('[', ' ').split()[0] if column.strip() else ''
+        if first in AXES:
+            columns.setdefault(first, column)
+    if len(columns) < len(AXES):
+        raise DataError(f"target file '{path}' needs a column of labels, and columns x, y and z")
+    scales = [factor(METRES, unit_of(columns[a]) or 'm', columns[a], 'a length') for a in AXES]
+    places = cells.stack(tuple(columns[axis] for axis in AXES)) * scales
+    return Target(name, tuple(cells.column(cells.header[0])), places, mount)
+
+
+def _numbers(entry: Any, count: int | None) -> Array:
+    """Return the numbers of a matrix as ROS writes it, or of a plain list."""
+    out = np.array(entry['data'] if isinstance(entry, Mapping) else entry, dtype=float).ravel()
+    if count is not None and out.size != count:
+        raise ValueError(f'{out.size} numbers where {count} belong')
+    return out
+
+
+def _missing(error: Exception) -> str:
+    return f'{error} is missing' if isinstance(error, KeyError) else str(error)

@@ -1,0 +1,78 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Two cells of one machine never share a ROS domain, and none is put among somebody else's nodes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+
+import pytest
+import rclpy
+from rclpy.node import Node
+
+from weld_twin_nodes.harness.ros_domain import DOMAINS, own_domain
+
+pytestmark = pytest.mark.cells
+
+HOLD = """
+import os, sys
+os.getpid = lambda: int(sys.argv[1])
+from weld_twin_nodes.harness.ros_domain import own_domain
+with own_domain() as domain:
+    print(domain, flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def same_start(monkeypatch):
+    """All processes of a test begin to look at one domain, as those do whose numbers are so apart."""
+    number = os.getpid()
+    monkeypatch.setattr(os, 'getpid', lambda: number)
+    return number
+
+
+def test_processes_with_other_folders_for_temporary_files_get_other_domains(same_start, tmp_path):
+    other = subprocess.Popen(
+        [sys.executable, '-c', HOLD, str(same_start)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, 'TMPDIR': str(tmp_path)},
+    )
+    theirs = int(other.stdout.readline())
+    try:
+        assert str(tmp_path) != tempfile.gettempdir()
+        with own_domain() as ours:
+            assert ours != theirs
+    finally:
+        other.kill()
+        other.communicate()
+
+
+def test_a_domain_in_which_somebody_speaks_who_holds_no_lock_is_passed_over(same_start):
+    with own_domain() as free:
+        pass
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=free)
+    stranger = Node('stranger', context=context)
+    try:
+        with own_domain() as ours:
+            assert ours in DOMAINS
+            assert ours != free
+    finally:
+        stranger.destroy_node()
+        context.try_shutdown()
+
+
+def test_a_domain_is_free_again_once_its_holder_is_killed(same_start):
+    command = [sys.executable, '-c', HOLD, str(same_start)]
+    holder = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    theirs = int(holder.stdout.readline())
+    holder.kill()
+    holder.communicate()
+    with own_domain() as ours:
+        assert ours == theirs

@@ -1,0 +1,104 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A change that single measurements hide is noticed in their mean, and noise of any kind is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from weld_twin_nodes.streams.supervision import Promise, Supervision
+
+NOISE = 1e-4
+"""Standard deviation of a measured coordinate [m]."""
+SPREAD = NOISE * np.sqrt(3.0)
+"""The same as a distance [m], as a diagnosis tells it."""
+RATE = 60.0
+"""Measurements a second of a usual tracker."""
+
+
+def noticed(deviations, unsure=5e-6):
+    """Return after how many deviations the model is given up, and why; None where it is not."""
+    watch = Supervision(Promise.of(SPREAD, unsure, 2000))
+    for k, deviation in enumerate(deviations):
+        watch.take(deviation, k / RATE)
+        if why := watch.withdrawn(k / RATE):
+            return k + 1, why
+    return None
+
+
+def white(rng, count):
+    return rng.normal(scale=NOISE, size=(count, 3))
+
+
+def filtered(rng, count):
+    """An instrument that smooths over a tenth of a second, with as much noise as promised."""
+    out, keep = white(rng, count), 0.8
+    for k in range(1, count):
+        out[k] = keep * out[k - 1] + np.sqrt(1.0 - keep**2) * out[k]
+    return out
+
+
+def of_one_camera(rng, count):
+    return white(rng, count) * np.array([0.1, 0.1, 1.72])
+
+
+def with_outliers(rng, count):
+    return white(rng, count) + 0.01 * (rng.random((count, 1)) < 0.02)
+
+
+@pytest.mark.parametrize('kind', [white, filtered, of_one_camera, with_outliers])
+def test_noise_of_any_kind_is_no_change(kind):
+    assert noticed(kind(np.random.default_rng(3), 20_000)) is None
+
+
+@pytest.mark.parametrize('kind', [white, with_outliers])
+def test_a_change_smaller_than_the_noise_is_noticed_in_half_a_minute(kind):
+    changed = kind(np.random.default_rng(4), 30 * int(RATE)) + np.array([0.0, 8e-5, -6e-5])
+    count, why = noticed(changed)
+    assert count <= 30 * RATE
+    assert 'the mean of the last' in why
+
+
+def test_a_large_change_is_noticed_at_once():
+    rng = np.random.default_rng(5)
+    calm = white(rng, 500)
+    count, why = noticed(np.vstack([calm, white(rng, 40) + np.array([5e-4, 0.0, 0.0])]))
+    assert 500 < count <= 520
+    assert 'the last 20 measurements' in why
+
+
+def test_what_the_model_is_not_sure_of_is_no_change():
+    off = white(np.random.default_rng(6), 5_000) + np.array([9e-5, 0.0, 0.0])
+    assert noticed(off, unsure=3e-5) is None
+    assert noticed(off) is not None
+
+
+def test_an_instrument_without_noise_shows_a_small_change_too():
+    count, _ = noticed(np.full((2_000, 3), 5e-5))
+    assert count <= 30 * RATE
+
+
+def test_without_a_promise_nothing_is_held_against_it():
+    watch = Supervision()
+    for k in range(50):
+        watch.take(np.array([1.0, 0.0, 0.0]), k / RATE)
+    assert not watch.withdrawn(50 / RATE)
+    assert 'is lost' in watch.withdrawn(53.0)
+
+
+def test_after_a_loss_the_model_is_used_once_twenty_measurements_bear_it_out():
+    """A load may have been changed meanwhile: the first of them tell nothing yet."""
+    rng = np.random.default_rng(7)
+    for change, used in ((0.0, True), (1e-3, False)):
+        watch = Supervision(Promise.of(SPREAD, 5e-6, 2000))
+        for k in range(60):
+            watch.take(white(rng, 1)[0], k / RATE)
+        assert not watch.withdrawn(60 / RATE)
+        assert 'is lost' in watch.withdrawn(60 / RATE + 3.0)
+        back = 60 / RATE + 4.0
+        watch.pass_over(back)
+        for k in range(20):
+            assert f'was lost: {k} of the 20' in watch.withdrawn(back)
+            watch.take(white(rng, 1)[0] + np.array([change, 0.0, 0.0]), back + k / RATE)
+        assert (not watch.withdrawn(back + 1.0)) is used

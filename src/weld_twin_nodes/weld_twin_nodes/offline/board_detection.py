@@ -1,0 +1,93 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The corners of a board in images, as OpenCV finds them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from weld_twin_core.errors import DataError, ModelError
+
+DICTIONARY = 'DICT_5X5_100'
+"""Markers of a ChArUco board of which nothing is said."""
+MARKED = 0.75
+"""Side of a marker in that of its square, where nothing is said: what OpenCV's samples print."""
+WINDOW = (11, 11)
+"""Half the window [px] in which a corner is refined; less than half a square of boards in use."""
+REFINED = (3, 40, 1e-3)
+"""OpenCV's criteria of an end: a count of steps and a shift [px], whichever comes first."""
+
+Corners = tuple[list[str], np.ndarray]
+"""Labels of the points found, and where, shape (N, 2) [px]."""
+
+
+def detector(board: Mapping[str, Any]) -> Callable[[Path], Corners]:
+    """
+    Return what finds the corners of a board in an image file.
+
+    Parameters
+    ----------
+    board : mapping
+        ``board`` (charuco or chessboard), ``squares`` [columns, rows], ``square`` [m], and of a
+        ChArUco board ``marker`` [m] and ``dictionary``, as OpenCV calls it.
+
+    Raises
+    ------
+    ModelError
+        OpenCV is not installed, or does not know the dictionary.
+    DataError
+        An image cannot be read.
+
+    """
+    try:
+        import cv2  # an extra of its own: few need it, and it weighs 60 MB
+    except ImportError:
+        raise ModelError(
+            "weld-twin detect needs OpenCV: install it with pip install 'weld_twin[camera]'"
+        ) from None
+    columns, rows = (int(count) for count in board['squares'])
+    found = (
+        _chessboard(cv2, columns - 1, rows - 1)
+        if board['board'] == 'chessboard'
+        else _charuco(cv2, columns, rows, board)
+    )
+
+    def corners(path: Path) -> Corners:
+        image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+        if image is None:
+            raise DataError(f"image '{path}' cannot be read; OpenCV reads PNG, JPEG, TIFF and BMP")
+        labels, where = found(image)
+        return [str(label) for label in labels], np.asarray(where, dtype=float).reshape(-1, 2)
+
+    return corners
+
+
+def _charuco(cv2: Any, columns: int, rows: int, board: Mapping[str, Any]) -> Callable[[Any], Any]:
+    name = str(board.get('dictionary', DICTIONARY))
+    if not hasattr(cv2.aruco, name):
+        raise ModelError(f'OpenCV has no dictionary {name!r}; one is {DICTIONARY}')
+    markers = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    side = float(board['square'])
+    marker = float(board.get('marker', MARKED * side))
+    made = cv2.aruco.CharucoBoard((columns, rows), side, marker, markers)
+    finder = cv2.aruco.CharucoDetector(made)
+
+    def find(image: Any) -> Any:
+        where, labels, _, _ = finder.detectBoard(image)
+        return ([], []) if labels is None else (labels.ravel().tolist(), where)
+
+    return find
+
+
+def _chessboard(cv2: Any, wide: int, high: int) -> Callable[[Any], Any]:
+    def find(image: Any) -> Any:
+        seen, where = cv2.findChessboardCorners(image, (wide, high))
+        if not seen:
+            return [], []
+        return range(wide * high), cv2.cornerSubPix(image, where, WINDOW, (-1, -1), REFINED)
+
+    return find

@@ -1,0 +1,224 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What cameras measured, from files to causes.
+
+The arm, the lens and the noise are made here, with formulas of their own: homogeneous matrices of
+Denavit and Hartenberg, and the distortion of the ROS documentation written out.
+"""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from scipy.spatial.transform import Rotation
+
+from weld_twin_msgs_py.bags.writer import BagWriter
+from weld_twin_msgs_py.messages.to_messages import bag_messages
+
+# theta offset, d, a, alpha of an arm that nobody sells
+ROWS = np.array(
+    [
+        [0.0, 0.42, 0.16, -np.pi / 2],
+        [-np.pi / 2, 0.0, 0.58, 0.0],
+        [0.0, 0.0, 0.11, -np.pi / 2],
+        [0.0, 0.61, 0.0, np.pi / 2],
+        [0.0, 0.0, 0.0, -np.pi / 2],
+        [0.0, 0.12, 0.0, 0.0],
+    ]
+)
+NAMES = [f'axis_{k}' for k in range(1, 7)]
+
+
+def flange(q, zeros):
+    """Return the flange at joint angles (M, 6), zeros off by so much, (M, 4, 4)."""
+    out = np.tile(np.eye(4), (len(q), 1, 1))
+    for k, (offset, d, a, alpha) in enumerate(ROWS):
+        angle = q[:, k] + offset + zeros[k]
+        step = np.zeros_like(out)
+        step[:, :3, :3] = (
+            Rotation.from_rotvec(angle[:, None] * [0.0, 0.0, 1.0])
+            * Rotation.from_rotvec([alpha, 0.0, 0.0])
+        ).as_matrix()
+        step[:, :3, 3] = np.stack([a * np.cos(angle), a * np.sin(angle), 0 * angle + d], axis=1)
+        step[:, 3, 3] = 1.0
+        out = out @ step
+    return out
+
+
+def robot_file(folder):
+    joints = [
+        dict(zip(('theta_offset', 'd', 'a', 'alpha'), map(float, row), strict=True), name=name)
+        for name, row in zip(NAMES, ROWS, strict=True)
+    ]
+    path = folder / 'arm.yaml'
+    path.write_text(yaml.safe_dump({'name': 'arm', 'convention': 'standard', 'joints': joints}))
+    return path
+
+
+def board_bag(path, kind, q, poses, covariance):
+    """Write joint states and poses of a board, as one or another type of message."""
+    make = bag_messages()
+    with BagWriter(path, provenance={'static': True}) as bag:
+        for k, (row, pose, own) in enumerate(zip(q, poses, covariance, strict=True)):
+            ns = (k + 1) * 1_000_000_000
+            where = pose[:3, 3], pose[:3, :3]
+            state = make.joint_state(ns, tuple(NAMES), row, None)
+            seen = (
+                make.pose_with_covariance(ns, *where, own, 'camera')
+                if kind == 'sure'
+                else make.pose(ns, *where, 'camera')
+            )
+            bag.write('/joint_states', state, ns)
+            bag.write('/measured/tool_pose', seen, ns)
+
+
+def test_a_board_counts_less_along_the_line_of_sight(tmp_path, weld_twin):
+    rng = np.random.default_rng(8)
+    q = rng.uniform(-0.7, 0.7, (60, 6))
+    zeros = np.array([0.0, 0.0, 1.5e-3, 0.0, 0.0, 0.0])
+    board = flange(q, zeros)
+    sizes = np.array([4e-5, 4e-5, 2.5e-3, 2e-3, 2e-3, 1.5e-4])
+    # The board turns with the tool, and so do the directions in which it is seen well.
+    sight = Rotation.from_rotvec(rng.normal(0.0, 0.3, (60, 3))).as_matrix()
+    turn = np.zeros((60, 6, 6))
+    turn[:, :3, :3] = turn[:, 3:, 3:] = sight
+    error = np.einsum('mij,mj->mi', turn, sizes * rng.normal(size=(60, 6)))
+    covariance = turn @ np.diag(sizes**2) @ np.swapaxes(turn, 1, 2)
+    board[:, :3, :3] = Rotation.from_rotvec(error[:, 3:]).as_matrix() @ board[:, :3, :3]
+    board[:, :3, 3] += error[:, :3]
+    robot, off = robot_file(tmp_path), {}
+    for kind in ('plain', 'sure'):
+        board_bag(tmp_path / kind, kind, q, board, covariance)
+        out = tmp_path / f'{kind} out'
+        weld_twin(
+            'diagnose', tmp_path / kind, '--robot', robot, '--align', 'base,tool', '--out', out
+        )
+        found = json.loads((out / 'diagnosis.json').read_text())
+        told = {(e['effect'], e['joint']): e for e in found['verdict']['effects']}
+        one = told.get(('joint_offset', 'axis_3'))
+        off[kind] = 1.0 if one is None else abs(one['parameters']['offset'] - 1.5e-3)
+    assert off['sure'] < 1e-4
+    assert off['plain'] > 2.0 * off['sure']
+
+
+# fx fy cx cy [px], k1 k2 p1 p2 k3, and where the lens is in the world
+LENSES = {
+    'left': ((2600.0, 2590.0, 1010.0, 770.0), (-0.11, 0.08, 4e-4, -6e-4, 0.0), (-0.55, -0.3)),
+    'right': ((2640.0, 2655.0, 985.0, 760.0), (-0.09, 0.05, -3e-4, 5e-4, 0.0), (0.5, -0.25)),
+}
+BOARD = {'board': 'charuco', 'squares': [8, 6], 'square': 0.025}
+
+
+def corners(side=0.025, wide=7, high=5):
+    """Return the inner corners of the board as OpenCV counts them (35, 3)."""
+    return np.array([[c + 1.0, r + 1.0, 0.0] for r in range(high) for c in range(wide)]) * side
+
+
+def pixels(points, numbers, bent):
+    """Return where points before a camera are seen: the page of ROS's image_pipeline, by hand."""
+    (fx, fy, cx, cy), (k1, k2, p1, p2, k3) = numbers, bent
+    x, y = points[:, 0] / points[:, 2], points[:, 1] / points[:, 2]
+    r2 = x**2 + y**2
+    radial = 1 + k1 * r2 + k2 * r2**2 + k3 * r2**3
+    u = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2)
+    v = y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y
+    return np.stack([fx * u + cx, fy * v + cy], axis=1)
+
+
+def looking_at(place, aim):
+    """Return the pose of a camera at a place whose line of sight meets an aim, image upright."""
+    z = (aim - place) / np.linalg.norm(aim - place)
+    x = np.cross(z, [0.0, 0.0, 1.0])
+    x /= np.linalg.norm(x)
+    out = np.eye(4)
+    out[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    out[:3, 3] = place
+    return out
+
+
+def cell(folder, *, zeros, side=0.025, mirrored=False, names=None, count=40):
+    """Write a table of what two fixed cameras saw of a board on the tool, and its files."""
+    rng = np.random.default_rng(3)
+    middle = np.array([0.2, 0.35, 0.4, 0.3, 0.9, 0.2])
+    q = middle + rng.uniform(-0.45, 0.45, (count, 6))
+    tool = np.eye(4)
+    tool[:3, :3] = Rotation.from_rotvec([0.1, 2.9, 0.3]).as_matrix()
+    tool[:3, 3] = [0.06, -0.05, 0.03]
+    board = flange(q, zeros) @ tool
+    aim = board[:, :3, 3].mean(axis=0)
+    normal = board[:, :3, 2].mean(axis=0) / np.linalg.norm(board[:, :3, 2].mean(axis=0))
+    across = np.cross(normal, [0.0, 0.0, 1.0])
+    points = corners(side) * ([-1.0, 1.0, 1.0] if mirrored else [1.0, 1.0, 1.0])
+    lines = [','.join(('image', 'camera', 'point', 'u [px]', 'v [px]', *NAMES))]
+    for name, (numbers, bent, (aside, up)) in LENSES.items():
+        place = aim - 1.4 * normal + aside * across + [0.0, 0.0, up]
+        eye = np.linalg.inv(looking_at(place, aim))
+        for k, pose in enumerate(eye @ board):
+            there = points @ pose[:3, :3].T + pose[:3, 3]
+            where = pixels(there, numbers, bent)
+            for at, (u, v) in enumerate(where + rng.normal(0.0, 0.15, where.shape)):
+                if 0.0 < u < 2000.0 and 0.0 < v < 1500.0:
+                    own = (names or {}).get(name, name)
+                    angles = (f'{value:.7f}' for value in q[k])
+                    lines.append(','.join((str(k), own, str(at), f'{u:.3f}', f'{v:.3f}', *angles)))
+        info = {
+            'camera_name': name,
+            'camera_matrix': {
+                'rows': 3,
+                'cols': 3,
+                'data': [numbers[0], 0.0, numbers[2], 0.0, numbers[1], numbers[3], 0.0, 0.0, 1.0],
+            },
+            'distortion_model': 'plumb_bob',
+            'distortion_coefficients': {'rows': 1, 'cols': 5, 'data': list(bent)},
+        }
+        (folder / f'{name}.yaml').write_text(yaml.safe_dump(info))
+    (folder / 'board.yaml').write_text(yaml.safe_dump(BOARD))
+    (folder / 'pixels.csv').write_text('\n'.join(lines) + '\n')
+    return robot_file(folder)
+
+
+def diagnosed(folder, robot, weld_twin):
+    """Return what `import` says of the pixels, and the diagnosis."""
+    described = [f'--camera={name}={folder / name}.yaml' for name in LENSES]
+    described.append(f'--target=board={folder / "board.yaml"}')
+    said = weld_twin(
+        'import', folder / 'pixels.csv', '--robot', robot, *described, '--out', folder / 'bag'
+    ).out
+    weld_twin(
+        'diagnose',
+        folder / 'bag',
+        '--robot',
+        robot,
+        '--align',
+        'base,tool',
+        '--out',
+        folder / 'out',
+    )
+    return said, json.loads((folder / 'out' / 'diagnosis.json').read_text())
+
+
+def test_pixels_of_two_cameras_name_the_joint_whose_zero_is_off(tmp_path, weld_twin):
+    robot = cell(tmp_path, zeros=np.array([0.0, 0.0, 2e-3, 0.0, 0.0, 0.0]))
+    said, found = diagnosed(tmp_path, robot, weld_twin)
+    assert '40 of 40 images tell a pose; points are found within 0.1' in said
+    named = [(e['effect'], e['joint']) for e in found['verdict']['effects']]
+    assert named == [('joint_offset', 'axis_3')]
+    assert found['verdict']['effects'][0]['parameters']['offset'] == pytest.approx(2e-3, abs=2e-4)
+    assert (tmp_path / 'out' / 'report.html').is_file()
+
+
+def test_mistakes_with_cameras_are_named(tmp_path, weld_twin):
+    zeros = np.array([0.0, 0.0, 1e-3, 0.0, 0.0, 0.0])
+    for kind, mistake in (
+        ('target_scale', {'side': 0.98 * 0.025}),
+        ('target_mirrored', {'mirrored': True}),
+        ('cameras_swapped', {'names': {'left': 'right', 'right': 'left'}}),
+    ):
+        folder = tmp_path / kind
+        folder.mkdir()
+        robot = cell(folder, zeros=zeros, count=25, **mistake)
+        _, found = diagnosed(folder, robot, weld_twin)
+        assert found['verdict']['status'] == 'unsound'
+        assert [entry['kind'] for entry in found['unsound']] == [kind]

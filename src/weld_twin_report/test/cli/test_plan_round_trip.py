@@ -1,0 +1,98 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A plan's table, filled in as an operator does it, is read back: for arms of every kind."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+import yaml
+
+from weld_twin_core.arm.chain import forward
+from weld_twin_msgs_py.bags import read_recording
+from weld_twin_msgs_py.files.joint_file import read_joint_motion
+from weld_twin_msgs_py.robots import load_robot
+
+TURNS = [
+    (0.0, -1.5708, 0.45),
+    (0.55, 0.0, 0.0),
+    (0.1, -1.5708, 0.0),
+    (0.0, 1.5708, 0.6),
+    (0.0, -1.5708, 0.0),
+    (0.0, 0.0, 0.1),
+]
+"""a, alpha, d of an arm that turns."""
+NAMES = {
+    'a track': ['rail', 's1', 's2', 's3', 's4', 's5', 's6'],
+    'a ram in the middle': ['j1', 'j2', 'j3', 'ram', 'j4', 'j5', 'j6'],
+    'a slide at the end': ['a1', 'a2', 'a3', 'a4', 'a5', 'a6', 'z'],
+    'names that end like units': ['axis_a', 'axis_m', 'axis_mm', 'axis_s', 'axis_deg', 'axis_x'],
+    'names of Yaskawa': [f'joint_{k}_{c}' for k, c in enumerate('slurbt', 1)],
+    'names like formulas': ['=1+1', '@a', '-b', '+c', 'd', 'e'],
+}
+SLIDES = {'a track': 0, 'a ram in the middle': 3, 'a slide at the end': 6}
+
+
+def robot_file(path, kind):
+    rows = [('revolute', *row, 2.9) for row in TURNS]
+    if kind in SLIDES:
+        rows.insert(
+            SLIDES[kind], ('prismatic', 0.0, 1.5708 if SLIDES[kind] == 0 else 0.0, 0.0, 1.5)
+        )
+    keys = ('type', 'a', 'alpha', 'd', 'upper')
+    joints = [
+        {'name': name, **dict(zip(keys, row, strict=True)), 'lower': -row[-1], 'max_velocity': 1.0}
+        for name, row in zip(NAMES[kind], rows, strict=True)
+    ]
+    tool = {'xyz': [0.05, 0.0, 0.2], 'rpy': [0.0, 0.5, 0.0]}
+    base = {'xyz': [0.0, 0.0, 1.0], 'rpy': [0.0, 0.0, 0.0]}
+    told = {'name': 'made', 'convention': 'standard', 'base': base, 'tool': tool, 'joints': joints}
+    path.write_text(yaml.safe_dump(told))
+    return path
+
+
+@pytest.mark.parametrize('kind', NAMES)
+def test_a_table_to_fill_in_comes_back_as_the_postures_planned(weld_twin, tmp_path, kind):
+    file, out = robot_file(tmp_path / 'made.yaml', kind), tmp_path / 'plan'
+    plan = ('investigate', '--robot', file, '--tolerance', 0.5, '--postures', 24)
+    result = weld_twin(*plan, '--out', out)
+    assert result.code == 0, result.err
+    robot = load_robot(file)
+    _, q, _ = read_joint_motion(out / 'stations.yaml', robot)
+    assert len(q) == 24
+    with open(out / 'measurements.csv', newline='') as table:
+        head, *rows = csv.reader(table)
+    assert not [cell for cell in head if cell[0] in '=+-@']
+    seen = 1e3 * forward(robot, q)[:, :3, 3] + np.random.default_rng(2).normal(0.0, 0.03, (24, 3))
+    with open(tmp_path / 'filled.csv', 'w', newline='') as table:
+        write = csv.writer(table, delimiter=';')
+        write.writerow(head)
+        write.writerows([*row[:-3], *p.round(4)] for row, p in zip(rows, seen, strict=True))
+    result = weld_twin('import', tmp_path / 'filled.csv', '--robot', file, '--out', tmp_path / 'b')
+    assert result.code == 0, result.err
+    back = read_recording(tmp_path / 'b', robot)
+    np.testing.assert_allclose(back.joints.q, q, atol=2e-6)
+    np.testing.assert_allclose(back.measured.position, 1e-3 * seen, atol=1e-6)
+
+
+def test_no_program_is_written_for_an_axis_that_its_language_would_turn(weld_twin, tmp_path):
+    file = robot_file(tmp_path / 'made.yaml', 'a track')
+    plan = ('investigate', '--robot', file, '--tolerance', 0.5, '--postures', 24)
+    result = weld_twin(*plan, '--controller', 'rapid', '--out', tmp_path / 'plan')
+    assert result.code == 2 and "'rail' of robot 'made' slides" in result.err
+    assert not (tmp_path / 'plan').exists()
+
+
+@pytest.mark.parametrize(
+    ('words', 'told'),
+    [
+        (('--postures', 8), '8 postures are asked for; a plan has 24 to 500'),
+        (('--postures', 60, '--minutes', 3), '60 postures take '),
+        ((), 'say with --minutes for how long there is time, or how many --postures'),
+    ],
+)
+def test_a_number_of_postures_that_makes_no_plan_is_refused(weld_twin, words, told):
+    result = weld_twin('investigate', '--robot', 'ur5', '--tolerance', 0.3, *words)
+    assert result.code == 2 and told in result.err and len(result.err.splitlines()) == 1

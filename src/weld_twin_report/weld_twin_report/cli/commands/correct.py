@@ -1,0 +1,196 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Correct a robot program, or the joint commands of a bag.
+
+A PROGRAM is read in the language of its maker; the same program with other coordinates, a page
+(report.html) and correction.json go to the directory. Without --model it comes back as it was. Of a
+BAG with nominal joint commands, a bag is written with those that put the real tool on the seam.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from weld_twin_nodes.cli.options import (
+    TOPICS,
+    add_output,
+    add_robot,
+    add_storage,
+    add_topics,
+    output,
+    refuse,
+    robot_of,
+    say_doubts,
+    topics_of,
+)
+from weld_twin_nodes.cli.parsing import Adder
+from weld_twin_nodes.cli.program_options import add_program_options, context_of, quantity, start_of
+
+if TYPE_CHECKING:
+    from weld_twin_msgs_py.programs import Context, Program
+
+EXAMPLE = 'weld-twin correct seam.script --robot ur5 --model found/diagnosis.json --out better'
+RESULT, PAGE = 'correction.json', 'report.html'
+LARGEST = ('2mm', '1deg')
+"""How far a point may be moved unless told: more is no inaccuracy of an arm, but a mistake."""
+OF_PROGRAMS = (
+    *('controller', 'max_correction', 'start', 'temperature', 'setup', 'force', 'tool', 'base'),
+    'pulses_per_degree',
+)
+BAGS = ('.mcap', '.db3')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options."""
+    add = Adder(parser)
+    text = 'program (a .dat is found beside it), or a bag with the nominal joint commands'
+    add('what', 'PROGRAM|BAG', text)
+    add_robot(parser)
+    add('--model', 'FILE', 'diagnosis.json, or an effects file')
+    add_output(parser, 'directory of results; of a bag, the bag to write')
+    add = Adder(parser, 'of a program')
+    text = 'language, where the file does not tell it'
+    add('--controller', 'L', text, default='')
+    text = 'how far a point may be moved (default: 2mm 1deg)'
+    add('--max-correction', 'LENGTH', 'ANGLE', text)
+    text = 'joints before the first move, in degrees (mm for sliding ones)'
+    add('--start', 'A,A,...', text)
+    add('--temperature', 'DEGC', 'of the arm when the program runs', type=float)
+    text = 'which recording of the diagnosis (default: 1)'
+    add('--setup', 'N', text, type=int, rare=True)
+    add_program_options(parser)
+    add_storage(parser)
+    add_topics(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Correct a bag or a program; say what is expected."""
+    what = Path(args.what)
+    if what.is_dir() or what.suffix.lower() in BAGS:
+        refuse(args, OF_PROGRAMS, f"is of a program; '{args.what}' is a bag")
+        return _corrected_bag(args)
+    refuse(args, TOPICS, f"is of a bag; '{args.what}' is none")
+    return _corrected_program(args)
+
+
+def _corrected_bag(args: argparse.Namespace) -> int:
+    """Write the commands and say what they gain by the model, and where it knows too little."""
+    from weld_twin_core.errors import DataError
+    from weld_twin_msgs_py.bags import read_recording
+    from weld_twin_nodes.offline.compensating import compensated, told_trust, write_compensated
+
+    if not args.model:
+        raise DataError('say with --model by which effects the commands are corrected')
+    robot = robot_of(args)
+    robot.refuse_positioner('a compensated motion')
+    recording = read_recording(args.what, robot, topics_of(args))
+    made = compensated(robot, args.model, recording)
+    say_doubts(made.model.twin, args.model)
+    if made.told:
+        print(f'note: {made.told}')
+    robot.check_positions(made.result.motion.q)
+    write_compensated(args.out, made, recording, storage=args.storage)
+    before, after = made.result.rms
+    print(
+        f'{args.out}: by the model the tool is {before * 1e3:.4f} mm RMS off with the nominal '
+        f'commands and {after * 1e3:.4f} mm with these'
+    )
+    print(
+        'this is what the effects in the model do on these commands; the gap of a diagnosis also '
+        'holds noise and whatever it left unexplained'
+    )
+    for sentence in told_trust(made):
+        print(sentence)
+    if made.result.left_out:
+        names = ', '.join(effect.name for effect in made.result.left_out)
+        print(f'joint commands cannot mend {names}')
+    return 0
+
+
+def _corrected_program(args: argparse.Namespace) -> int:
+    """Read, correct, write; say what is expected."""
+    from weld_twin_msgs_py.programs import read_program
+    from weld_twin_msgs_py.programs.languages import language_of
+    from weld_twin_msgs_py.programs.source import read_source
+
+    robot = robot_of(args)
+    robot.refuse_positioner('a corrected program')
+    language = language_of(read_source(args.what), args.what, args.controller)
+    context = context_of(args, robot, language)
+    program = read_program(args.what, context, language)
+    if args.model:
+        return _by_model(args, context, program)
+    with output(args, RESULT) as place:
+        entry = {'schema': 'weld_twin/correction/1', 'program': program.sources[0].name}
+        _write_texts(place, program, [source.text for source in program.sources])
+        _write_entry(place, entry | {'language': language, 'model': None})
+    print(f'{args.out}: {len(program.steps)} moves in {language}, unchanged; no model was given')
+    return 0
+
+
+def _by_model(args: argparse.Namespace, context: Context, program: Program) -> int:
+    from weld_twin_core.twin.program_correction import Caps
+    from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
+    from weld_twin_msgs_py.files.input_files import hashed
+    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_nodes.offline.correcting import (
+        corrected_program,
+        correction_entry,
+        not_told,
+        program_model,
+        way,
+    )
+    from weld_twin_nodes.offline.told_twin import other_readings
+
+    from ...report.correction_page import correction_page, headline
+
+    length, angle = args.max_correction or LARGEST
+    caps = Caps(
+        quantity(length, ('mm', 'm', 'um'), '--max-correction'),
+        quantity(angle, ('deg', 'rad'), '--max-correction'),
+    )
+    robot = context.robot
+    setup = 0 if args.setup is None else args.setup - 1
+    model = program_model(robot, args.model, args.temperature, setup)
+    content = read_diagnosis(args.model) if Path(args.model).suffix.lower() == '.json' else {}
+    made = corrected_program(
+        program, context, model, caps, start_of(args, robot), other_readings(content)
+    )
+    entry = correction_entry(made, robot, caps) | {'way': way(made, model)}
+    entry['notes'] += not_told(content)
+    inputs = [hashed('program', args.what), hashed('model', args.model)]
+    entry['inputs'] = [item.as_dict() for item in inputs]
+    with output(args, RESULT) as place:
+        _write_texts(place, program, made.texts)
+        write_text(place / PAGE, correction_page(entry, inputs))
+        _write_entry(place, entry)
+    print(f'{Path(args.out) / program.sources[0].name}: {headline(entry)}')
+    _tell(entry)
+    print(f'report: {Path(args.out) / PAGE}')
+    return 0
+
+
+def _tell(entry: dict[str, Any]) -> None:
+    """Print what was left, where the model knows nothing, and what else is to be known."""
+    for left in entry['left']:
+        print(f'left as it was: {left["why"]}')
+    outside = [move['where'] for move in entry['moves'] if move['outside']]
+    if outside:
+        print(f'{len(outside)} moves lie outside what the model knows, the first at {outside[0]}')
+    for note in entry['notes']:
+        print(f'note: {note}')
+
+
+def _write_texts(place: Path, program: Program, texts: Sequence[str]) -> None:
+    for source, text in zip(program.sources, texts, strict=True):
+        (place / source.name).write_bytes(text.encode('latin-1'))
+
+
+def _write_entry(place: Path, entry: dict[str, object]) -> None:
+    from weld_twin_msgs_py.files.whole_files import write_text
+
+    write_text(place / RESULT, json.dumps(entry, indent=1, allow_nan=False) + '\n')

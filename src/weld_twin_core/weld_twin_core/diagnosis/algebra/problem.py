@@ -334,7 +334,9 @@ class Problem:
         taken = self.places_taken(scale)
         for k, part in enumerate(parts):
             # Of no columns, as without a frame to fit, the size of a row must be said.
-            rows = self.in_noise(k, part, scale).reshape(*part.shape[:-2], np.prod(part.shape[-2:]))
+            rows = self.in_noise(k, part, scale).reshape(
+                *part.shape[:-2], np.prod(part.shape[-2:])
+            )
             own = taken[k] if taken else None
             if own is not None:
                 ways, left = own

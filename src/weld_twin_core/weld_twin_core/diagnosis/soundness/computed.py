@@ -165,17 +165,14 @@ def _grid(values: Array, steps: Sequence[float]) -> float:
     return 0.0
 
 
-def source(case: Case) -> Sequence[Finding]:
-    """Return a note when moving joint positions carry no trace of an encoder."""
+def source(case: Case) -> Iterator[Finding]:
+    """Yield a note when moving joint positions carry no trace of an encoder."""
     names = [r.name for r in case.recordings if _commanded(r.joints)]
-    if not names:
-        return ()
-    return (
-        note(
+    if names:
+        yield note(
             f'The joint positions of {", ".join(names)} are as smooth as a command: what the '
             'drives make of it (lag, following error) is then part of the gap.'
-        ),
-    )
+        )
 
 
 def _commanded(joints: JointMotion) -> bool:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -180,7 +180,7 @@ class Case:
         return snapshot(self.problem, self.model, self.motions)
 
 
-Checker = Callable[[Case], Sequence[Finding]]
+Checker = Callable[[Case], Iterable[Finding]]
 
 
 def distance(part: Array) -> Array:

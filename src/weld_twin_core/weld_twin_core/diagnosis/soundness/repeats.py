@@ -59,12 +59,8 @@ def _shown(recording: Recording) -> Array:
     return recording.seen.position
 
 
-def repeats(case: Case) -> Sequence[Finding]:
-    """Return recordings given twice, samples given twice, and frozen measurements."""
-    return [*_recordings(case), *_samples(case)]
-
-
-def _recordings(case: Case) -> Iterator[Finding]:
+def repeats(case: Case) -> Iterator[Finding]:
+    """Yield recordings given twice, samples given twice, and frozen measurements."""
     seen = [r.seen.position for r in case.recordings]
     for i, k in combinations(range(len(seen)), 2):
         same = _common(seen[i], seen[k])
@@ -74,9 +70,6 @@ def _recordings(case: Case) -> Iterator[Finding]:
                 f'measurements ({same} of {min(len(seen[i]), len(seen[k]))}); give each '
                 'recording once.'
             )
-
-
-def _samples(case: Case) -> Iterator[Finding]:
     for recording, q in zip(case.recordings, case.motions, strict=True):
         position = recording.seen.position
         still = (np.diff(position, axis=0) == 0.0).all(axis=1)
@@ -120,9 +113,8 @@ MANY = 0.1
 """Share of outliers from which a note becomes a warning."""
 
 
-def outliers(case: Case) -> Sequence[Finding]:
-    """Return how many measurements are far off, and the worst of them."""
-    out = []
+def outliers(case: Case) -> Iterator[Finding]:
+    """Yield how many measurements are far off, and the worst of them."""
     for recording, part in zip(case.recordings, case.residuals, strict=True):
         off = _stations(part) if recording.joints.static else _of_samples(part)
         bad = off > 0.0
@@ -131,15 +123,12 @@ def outliers(case: Case) -> Sequence[Finding]:
         worst = int(off.argmax())
         at = recording.seen.t[worst]
         where = f'station {worst}' if recording.joints.static else f't = {at:.3f} s'
-        out.append(
-            Finding(
-                'warning' if bad.mean() > MANY else 'note',
-                f'{int(bad.sum())} of {off.size} measurements of {recording.name} lie far off '
-                f'their neighbours, the worst by {length(float(off[worst]))} at {where}; they '
-                'lose their weight in every fit.',
-            )
+        yield Finding(
+            'warning' if bad.mean() > MANY else 'note',
+            f'{int(bad.sum())} of {off.size} measurements of {recording.name} lie far off '
+            f'their neighbours, the worst by {length(float(off[worst]))} at {where}; they '
+            'lose their weight in every fit.',
         )
-    return out
 
 
 def _running_median(part: Array) -> Array:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
@@ -160,19 +160,13 @@ FEW = 3.0
 """A lag of fewer samples is left to the fit."""
 
 
-def stamps(case: Case) -> Sequence[Finding]:
-    """Return gaps, jitter and rounding of the joint and measurement stamps."""
-    out: list[Finding] = []
+def stamps(case: Case) -> Iterator[Finding]:
+    """Yield gaps, jitter and rounding of the joint and measurement stamps."""
     for recording in case.recordings:
-        if recording.joints.static:
-            continue
-        for t, what in (
-            (recording.joints.t, 'joint states'),
-            (recording.seen.t, 'measurements'),
-        ):
+        both = (recording.joints.t, 'joint states'), (recording.seen.t, 'measurements')
+        for t, what in () if recording.joints.static else both:
             if t.size >= ENOUGH:
-                out += _stream(t, f'The {what} of {recording.name}')
-    return out
+                yield from _stream(t, f'The {what} of {recording.name}')
 
 
 def _stream(t: Array, name: str) -> Iterator[Finding]:
@@ -221,13 +215,11 @@ def _grid(t: Array) -> float | None:
     return None
 
 
-def clocks(case: Case) -> Sequence[Finding]:
-    """Return how late the measurements of a moving arm are, where that explains the gap."""
-    out: list[Finding] = []
+def clocks(case: Case) -> Iterator[Finding]:
+    """Yield how late the measurements of a moving arm are, where that explains the gap."""
     for k, late in enumerate(case.lags):
         if late is not None:
-            out += _recording(case.recordings[k], late, k)
-    return out
+            yield from _recording(case.recordings[k], late, k)
 
 
 def _recording(recording: Recording, lag: Lag, k: int) -> Iterator[Finding]:

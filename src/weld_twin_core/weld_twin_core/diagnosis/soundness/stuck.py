@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -40,17 +40,13 @@ LONGEST_STEP = 0.3
 """Longest Newton step [rad, m]: farther, the derivative means nothing."""
 
 
-def stuck(case: Case) -> Sequence[Finding]:
-    """Return stretches in which a joint's reading stands still and the tool says it moved."""
-    out: list[Finding] = []
+def stuck(case: Case) -> Iterator[Finding]:
+    """Yield stretches in which a joint's reading stands still and the tool says it moved."""
     for k, recording in enumerate(case.recordings):
-        found = (
-            _whole(recording)
-            or max(_joints(case, k), key=lambda pair: pair[0], default=(0.0, None))[1]
-        )
-        if found is not None:
-            out.append(found)
-    return out
+        if whole := _whole(recording):
+            yield whole
+        elif found := list(_joints(case, k)):
+            yield max(found, key=lambda pair: pair[0])[1]
 
 
 def _whole(recording: Recording) -> Finding | None:

@@ -13,7 +13,11 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
     ],
-    install_requires=['setuptools', 'numpy', 'scipy'],
+    install_requires=[
+        'setuptools',
+        'numpy>=1.25,<3',
+        'scipy>=1.10,<2',
+    ],
     extras_require={'test': ['pytest']},
     zip_safe=False,
     maintainer='weld_twin contributors',

@@ -13,7 +13,16 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
     ],
-    install_requires=['setuptools', 'numpy', 'PyYAML', 'rich', 'matplotlib'],
+    install_requires=[
+        'setuptools',
+        'weld_twin_core>=0.1,<0.2',
+        'weld_twin_msgs_py>=0.1,<0.2',
+        'weld_twin_nodes>=0.1,<0.2',
+        'numpy>=1.25,<3',
+        'PyYAML>=6,<7',
+        'rich>=13,<16',
+        'matplotlib>=3.7,<4',
+    ],
     extras_require={
         'history': ['sqlalchemy'],
         'postgresql': ['psycopg[binary]'],

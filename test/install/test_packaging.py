@@ -12,6 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+import yaml
 
 import weld_twin_core
 
@@ -120,6 +121,33 @@ def imported(package, *, at_once=False):
             elif isinstance(node, ast.ImportFrom) and node.level == 0:
                 out.add(node.module.split('.')[0])
     return frozenset(out)
+
+
+@pytest.mark.parametrize('package', PACKAGES)
+def test_a_wheel_of_one_package_asks_for_all_that_it_imports(package):
+    asked = ast.literal_eval(setup_keywords(package)['install_requires'])
+    ranges = {re.match(r'[\w.-]+', item).group(): item for item in PROJECT['dependencies']}
+    used = imported(package)
+    needed = {
+        text for name, text in ranges.items() if MODULES.get(name, name.replace('-', '_')) in used
+    }
+    minor = weld_twin_core.__version__.rpartition('.')[0]
+    major, _, second = minor.partition('.')
+    beside = {
+        f'{name}>={minor},<{major}.{int(second) + 1}'
+        for name in PACKAGES
+        if name in used and name != package
+    }
+    assert needed | beside <= set(asked)
+    assert set(asked) <= {*ranges.values(), *beside, 'setuptools'}
+
+
+def test_who_cites_the_project_finds_its_version_and_licence():
+    told = yaml.safe_load((ROOT / 'CITATION.cff').read_text())
+    assert (told['cff-version'], told['type']) == ('1.2.0', 'software')
+    assert told['version'] == weld_twin_core.__version__
+    assert told['license'] == 'Apache-2.0'
+    assert [author['name'] for author in told['authors']] == ['weld_twin contributors']
 
 
 @cache

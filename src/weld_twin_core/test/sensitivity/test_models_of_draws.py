@@ -9,7 +9,7 @@ from scipy import stats
 from weld_twin_core.arm import catalog
 from weld_twin_core.effects import associative_scan
 from weld_twin_core.effects.backlash import Backlash
-from weld_twin_core.effects.joint_offset import JointOffset
+from weld_twin_core.effects.geometry import JointOffset
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.motion.paths import default_seam
 from weld_twin_core.sensitivity import (

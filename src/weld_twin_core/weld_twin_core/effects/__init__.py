@@ -16,31 +16,26 @@ Examples
 
 """
 
-from .axis_parallelism import AxisParallelism
 from .backlash import Backlash
-from .base_pose import BasePose
 from .bearing_tilt import BearingTilt
 from .cartesian_compliance import CartesianCompliance
 from .clock_rate import ClockRate
+from .dated import InstrumentKnock, JointSlip, ToolSlip
 from .drift import Drift
 from .effect import Effect, MemoryEffect
 from .frame_curve import FrameCurve
+from .frame_errors import BasePose, ToolPose
 from .friction import Friction
 from .gear_ratio import GearRatio
 from .gear_ratio_by_direction import GearRatioByDirection
+from .geometry import AxisParallelism, JointOffset, LinkLength, LinkOffset, LinkTwist
 from .guide_bend import GuideBend
 from .guide_tilt import GuideTilt
 from .hose_pull import HosePull
 from .hysteresis import Hysteresis
-from .instrument_knock import InstrumentKnock
 from .joint_compliance import JointCompliance
 from .joint_coupling import JointCoupling
 from .joint_curve import JointCurve
-from .joint_offset import JointOffset
-from .joint_slip import JointSlip
-from .link_length import LinkLength
-from .link_offset import LinkOffset
-from .link_twist import LinkTwist
 from .link_warm_up import LinkWarmUp
 from .loaded_play import LoadedPlay
 from .measurement_noise import MeasurementNoise
@@ -56,8 +51,6 @@ from .setup_settling import SetupSettling
 from .setup_step import SetupStep
 from .thermal_growth import ThermalGrowth
 from .time_delay import TimeDelay
-from .tool_pose import ToolPose
-from .tool_slip import ToolSlip
 from .transmission_ripple import TransmissionRipple
 from .vibration import Vibration
 from .view import Parameter, Stage, View

@@ -31,11 +31,17 @@ from ..errors import ModelError
 from .associative_scan import last_true, play
 from .effect import Effect, MemoryEffect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 
 FORMS = ('play', 'reversal', 'coast')
 CLOSED = 1e-5
 """Width [rad] that many small errors start from; less is none."""
+
+RV = (
+    'backlash of 1 to 1.5 arcmin and angle errors of at most 1 arcmin allowed for reducers of '
+    'robots (zhygear.com, analysis-and-control-of-backlash-in-rv-reducers)'
+)
+"""What makers of reducers allow."""
 
 
 @register
@@ -48,11 +54,28 @@ class Backlash(MemoryEffect):
     form: str = 'play'
 
     name = 'backlash'
+    title = 'backlash'
+    entered = "the joint's gear"
+    changes_in_use = True
     demand = 2
     depends_on = 'direction'
     of = 'joint'
     stage = Stage.PLAY
-    parameters = (Parameter('width', 'rad', typical=5e-4, lower=0.0, linear=False),)
+    parameters = (
+        Parameter(
+            'width',
+            'rad',
+            typical=5e-4,
+            lower=0.0,
+            linear=False,
+            range=Plausible(
+                5e-4, 0.0, 2e-2, f'{RV}; range derived: a degree is a gear that is broken'
+            ),
+            sliding=Plausible(
+                5e-5, 0.0, 5e-3, 'derived: nuts have hundredths of a millimetre of play'
+            ),
+        ),
+    )
     options = ('form',)
     needs = frozenset({'order'})
 

@@ -33,7 +33,7 @@ from ..errors import ModelError
 from .base_leans import base_leans
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import turn
 
 
@@ -51,14 +51,36 @@ class BearingTilt(Effect):
     second: Value = ()
 
     name = 'bearing_tilt'
+    title = 'axis wobble'
+    entered = 'program'
     depends_on = 'angle'
     of = 'joint'
     stage = Stage.LINK
     common = False
     by_motion = True
     parameters = (
-        Parameter('lean', 'rad', size=4, typical=2e-4),
-        Parameter('second', 'rad', size=0, typical=2e-4),
+        Parameter(
+            'lean',
+            'rad',
+            size=4,
+            typical=2e-4,
+            range=Plausible.even(
+                2e-4,
+                3e-3,
+                'derived: two hundredths of a millimetre of run-out on a bearing of 0.1 m',
+            ),
+        ),
+        Parameter(
+            'second',
+            'rad',
+            size=0,
+            typical=2e-4,
+            range=Plausible.even(
+                1e-4,
+                1.5e-3,
+                'derived: an oval race leans less than one that is off centre; half of lean',
+            ),
+        ),
     )
 
     def check(self, robot: Robot) -> None:

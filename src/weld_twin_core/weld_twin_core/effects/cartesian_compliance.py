@@ -14,7 +14,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 
@@ -26,11 +26,23 @@ class CartesianCompliance(Effect):
     compliance: Value = (0.0, 0.0, 0.0)
 
     name = 'cartesian_compliance'
+    title = 'compliance at the tool'
+    entered = 'stiffness and of the force at the tool'
     depends_on = 'load'
     place = 'tool'
     of = 'robot'
     stage = Stage.POSE
-    parameters = (Parameter('compliance', 'm/N', size=3, typical=1e-6),)
+    parameters = (
+        Parameter(
+            'compliance',
+            'm/N',
+            size=3,
+            typical=1e-6,
+            range=Plausible(
+                5e-6, -1e-6, 1e-4, 'derived: 10 mm under 100 N is the softest arm that still welds'
+            ),
+        ),
+    )
     needs = frozenset({'wrench'})
 
     def _axis_forces(self, view: View) -> list[Array]:

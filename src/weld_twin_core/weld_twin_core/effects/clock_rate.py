@@ -8,7 +8,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
 
 
@@ -24,12 +24,30 @@ class ClockRate(Effect):
     rate: Value = 0.0
 
     name = 'clock_rate'
+    title = 'clock that runs fast or slow'
+    entered = 'its clocks'
     depends_on = 'time'
     place = 'clock'
     of = 'robot'
     stage = Stage.CLOCK
     common = False
-    parameters = (Parameter('rate', 's/s', typical=1e-5, lower=-0.5, upper=0.5, idealised=0.03),)
+    parameters = (
+        Parameter(
+            'rate',
+            's/s',
+            typical=1e-5,
+            lower=-0.5,
+            upper=0.5,
+            idealised=0.03,
+            range=Plausible.even(
+                2e-5,
+                1e-4,
+                'oscillators are rated to 10 to 20 ppm (doi.org/10.1186/s40462-024-00512-7, table 1), a '
+                'computer gained 14 ppm (ntp.org, NTP-s-sw-clocks-quality); range derived: what '
+                'the checks of the data let pass as a clock',
+            ),
+        ),
+    )
     needs = frozenset({'velocity', 'time'})
 
     def displace(self, view: View) -> Shift:

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Effects whose displacement is a constant: of one channel, or of a frame."""
+"""What constant errors have in common: they displace one channel, or a frame, and never change."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
-from .view import Parameter, Stage, View, single
+from .view import Parameter, Plausible, Stage, View, single
 from .wording import metres, radians
 
 
@@ -47,16 +47,20 @@ class ChannelError(Effect):
         return [single((self.channel, view.robot.index(str(self.site))), np.ones(()), view)]
 
 
+def frame_parameters(xyz: Plausible, rotvec: Plausible) -> tuple[Parameter, ...]:
+    """Return the parameters of an error of a frame, with how large each may be."""
+    return (
+        Parameter('xyz', 'm', size=3, typical=5e-4, range=xyz),
+        Parameter('rotvec', 'rad', size=3, typical=1e-3, range=rotvec),
+    )
+
+
 class FrameError(Effect):
     """A constant error of the base or tool frame: a displacement and a turn."""
 
     channel: ClassVar[str]
     of = 'robot'
     stage = Stage.LINK
-    parameters = (
-        Parameter('xyz', 'm', size=3, typical=5e-4),
-        Parameter('rotvec', 'rad', size=3, typical=1e-3),
-    )
 
     def displace(self, view: View) -> Shift:
         """Return xyz and rotvec on the six components of the frame."""

@@ -10,7 +10,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 
@@ -22,12 +22,27 @@ class Drift(Effect):
     xyz_rate: Value = (0.0, 0.0, 0.0)
 
     name = 'drift'
+    title = 'drift of the frame'
+    entered = 'what the frame stands on, or of the temperature'
     depends_on = 'time'
     place = 'base'
     of = 'robot'
     stage = Stage.POSE
     common = False
-    parameters = (Parameter('xyz_rate', 'm/s', size=3, typical=1e-6),)
+    parameters = (
+        Parameter(
+            'xyz_rate',
+            'm/s',
+            size=3,
+            typical=1e-6,
+            range=Plausible.even(
+                5e-6,
+                1e-4,
+                'derived: 6 mm in a minute is a fixture that falls; trackers drift by tenths of a '
+                'millimetre in two hours (akjournals.com, 606/15/3 p. 60)',
+            ),
+        ),
+    )
     needs = frozenset({'time'})
 
     def displace(self, view: View) -> Shift:

@@ -40,6 +40,8 @@ class FrameCurve(Effect):
     frame: str = 'base'
 
     name = 'frame_curve'
+    title = 'measured motion'
+    entered = 'program'
     depends_on = 'time'
     of = 'robot'
     stage = Stage.LINK

@@ -8,7 +8,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View, single
+from .view import Parameter, Plausible, Stage, Value, View, single
 from .wording import number
 
 
@@ -21,13 +21,27 @@ class GearRatio(Effect):
     scale: Value = 0.0
 
     name = 'gear_ratio'
+    title = 'gear ratio error'
+    entered = 'ratio'
     everywhere = True
     by_motion = True
     demand = 2
     depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT
-    parameters = (Parameter('scale', '-', typical=3e-4),)
+    parameters = (
+        Parameter(
+            'scale',
+            '-',
+            typical=3e-4,
+            range=Plausible.even(
+                1e-3,
+                2e-2,
+                'derived: tooth numbers are exact, what is left is belts and scales of encoders; '
+                'one tooth in fifty is the coarsest wrong ratio',
+            ),
+        ),
+    )
 
     def displace(self, view: View) -> Shift:
         """Return scale * theta on the joint."""

@@ -24,7 +24,7 @@ from ..arrays import Array
 from .associative_scan import last_true, play
 from .effect import Effect, MemoryEffect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
 
 TRAVELS = (3e-5, 3e-4)
@@ -49,14 +49,42 @@ class GearRatioByDirection(MemoryEffect):
     travel: Value = 1e-4
 
     name = 'gear_ratio_by_direction'
+    title = 'gear ratio that differs by direction'
+    entered = "the joint's gear"
     depends_on = 'direction'
     of = 'joint'
     stage = Stage.PLAY
     common = False
     by_motion = True
     parameters = (
-        Parameter('difference', '-', typical=3e-4, idealised=0.05),
-        Parameter('travel', 'rad', typical=1e-4, lower=1e-6, linear=False, idealised=0.3),
+        Parameter(
+            'difference',
+            '-',
+            typical=3e-4,
+            idealised=0.05,
+            range=Plausible.even(
+                1e-3,
+                2e-2,
+                'derived: as gear_ratio; at a radian from zero the flanks are then as far apart '
+                'as the play of a gear that is broken',
+            ),
+        ),
+        Parameter(
+            'travel',
+            'rad',
+            typical=1e-4,
+            lower=1e-6,
+            linear=False,
+            idealised=0.3,
+            range=Plausible(
+                1e-3,
+                1e-6,
+                2e-3,
+                'derived: teeth change flanks as friction builds up; a longer travel is '
+                'a loop of the gear, hysteresis',
+            ),
+            sliding=Plausible(1e-4, 1e-7, 2e-4, 'derived: as the travel of friction'),
+        ),
     )
     needs = frozenset({'order'})
 

@@ -17,7 +17,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .carriage import GuideError, carriage_axes, carried, summed
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
 
 
@@ -30,8 +30,23 @@ class GuideBend(GuideError):
     curvature: Value = (0.0, 0.0)
 
     name = 'guide_bend'
+    title = 'bent guide'
+    entered = 'program'
     stage = Stage.POSE
-    parameters = (Parameter('curvature', '1/m', size=2, typical=2e-4),)
+    parameters = (
+        Parameter(
+            'curvature',
+            '1/m',
+            size=2,
+            typical=2e-4,
+            range=Plausible.even(
+                2e-4,
+                5e-3,
+                'derived: a rail laid to 0.1 mm on a metre; range derived: 2.5 mm on a metre is '
+                'seen by the eye',
+            ),
+        ),
+    )
 
     def displace(self, view: View) -> Shift:
         """Return how the tool moves with the carriage."""

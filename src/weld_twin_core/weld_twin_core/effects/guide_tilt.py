@@ -17,7 +17,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .carriage import GuideError, carriage_axes, carried, summed
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 
@@ -30,8 +30,20 @@ class GuideTilt(GuideError):
     rate: Value = (0.0, 0.0, 0.0)
 
     name = 'guide_tilt'
+    title = 'tilting carriage'
+    entered = 'program'
     stage = Stage.POSE
-    parameters = (Parameter('rate', 'rad/m', size=3, typical=2e-4),)
+    parameters = (
+        Parameter(
+            'rate',
+            'rad/m',
+            size=3,
+            typical=2e-4,
+            range=Plausible.even(
+                2e-4, 5e-3, 'derived: rails laid to 0.1 mm on a metre, half a metre apart'
+            ),
+        ),
+    )
 
     def displace(self, view: View) -> Shift:
         """Return how the tool moves with the carriage."""

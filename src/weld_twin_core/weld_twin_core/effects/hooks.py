@@ -55,6 +55,14 @@ class Hooks(Parametric, ABC):
     """Inputs beyond joint position: velocity, order, time, wrench, load, temperature."""
     cause: ClassVar[bool] = True
     """Whether a diagnosis may name it; noise and the set-up's own motion are nuisance."""
+    title: ClassVar[str] = ''
+    """What people call it; left out, its name with spaces."""
+    entered: ClassVar[str] = ''
+    """Which field of a controller takes a correction of it: 'zero', 'base', 'root', 'tool', 'load',
+    'model' or 'ratio'; 'program' where none does and the points of a program can be corrected. Else
+    what it is a matter of: then there is nothing to enter."""
+    changes_in_use: ClassVar[bool] = False
+    """Whether use changes it: belts are taken off, tools are knocked, gears wear, loads are swapped."""
     set_at_controller: ClassVar[bool] = False
     """Whether a person can set it first: told before others that are the same on any motion."""
     depends_on: ClassVar[str] = 'constant'

@@ -30,7 +30,7 @@ from ..arm.vectors import components, pad
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 
@@ -43,14 +43,36 @@ class HosePull(Effect):
     stiffness: Value = 0.0
 
     name = 'hose_pull'
+    title = 'pull of the hose package'
+    entered = 'program'
     depends_on = 'load'
     place = 'load'
     of = 'robot'
     stage = Stage.LOAD
     common = False
     parameters = (
-        Parameter('force', 'N', size=3, typical=10.0),
-        Parameter('stiffness', 'N/m', typical=10.0),
+        Parameter(
+            'force',
+            'N',
+            size=3,
+            typical=10.0,
+            range=Plausible.even(
+                20.0,
+                200.0,
+                'derived: as much as the load that a payload may be off by, 2 kg; range derived: ten '
+                'times that lifts a small arm',
+            ),
+        ),
+        Parameter(
+            'stiffness',
+            'N/m',
+            typical=10.0,
+            range=Plausible.even(
+                20.0,
+                200.0,
+                'derived: the same pull over a metre of way; a hose that pushes sags instead',
+            ),
+        ),
     )
 
     def displace(self, view: View) -> Shift:

@@ -32,7 +32,7 @@ from ..arrays import Array
 from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, MemoryEffect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 
 SHORTEST, LONGEST = 4e-3, 0.3
 """Travels [rad] that a search considers: shorter is a gap, longer a wrong gear ratio."""
@@ -50,14 +50,50 @@ class Hysteresis(MemoryEffect):
     travel: Value = 0.03
 
     name = 'hysteresis'
+    title = 'hysteresis'
+    entered = "the joint's gear"
+    changes_in_use = True
     depends_on = 'direction'
     of = 'joint'
     stage = Stage.PLAY
     common = False
     by_motion = True
     parameters = (
-        Parameter('amplitude', 'rad', typical=2e-4, lower=0.0, idealised=0.03),
-        Parameter('travel', 'rad', typical=0.03, lower=1e-5, linear=False, idealised=0.3),
+        Parameter(
+            'amplitude',
+            'rad',
+            typical=2e-4,
+            lower=0.0,
+            idealised=0.03,
+            range=Plausible(
+                2e-4,
+                0.0,
+                3e-3,
+                'loops of strain-wave joints are 20 arcsec to 1 arcmin wide at 2 % of their torque '
+                '(robotics.zhinno.com, robot-joint-backlash-explained); range derived: a gear worn out',
+            ),
+            sliding=Plausible(
+                2e-5, 0.0, 1e-3, 'derived: guides and nuts lose hundredths of a millimetre'
+            ),
+        ),
+        Parameter(
+            'travel',
+            'rad',
+            typical=0.03,
+            lower=1e-5,
+            linear=False,
+            idealised=0.3,
+            range=Plausible(
+                0.1,
+                2e-3,
+                0.5,
+                'derived: a shorter loop is a gap, backlash; a longer one a gear ratio that differs by '
+                'direction',
+            ),
+            sliding=Plausible(
+                1e-2, 2e-4, 0.05, 'derived: a shorter loop is a gap, a longer one a wrong scale'
+            ),
+        ),
     )
     needs = frozenset({'order'})
 

@@ -22,7 +22,7 @@ from ..arrays import Array
 from ..errors import DataError, ModelError
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import metres, radians, size
 
 LOAD_OF_EFFORT = {'effort': -1.0, 'effort_reversed': 1.0}
@@ -40,12 +40,29 @@ class JointCompliance(Effect):
     statics: str = 'equilibrium'
 
     name = 'joint_compliance'
+    title = 'compliance'
+    entered = 'program'
+    changes_in_use = True
     everywhere = True
     by_motion = True
     depends_on = 'load'
     of = 'joint'
     stage = Stage.ELASTIC
-    parameters = (Parameter('compliance', 'rad/(N m)', typical=1e-5),)
+    parameters = (
+        Parameter(
+            'compliance',
+            'rad/(N m)',
+            typical=1e-5,
+            range=Plausible(
+                3e-5,
+                -1e-5,
+                3e-4,
+                'derived: 3,000 N m/rad is the softest gear of a small cobot; a little below zero is a '
+                'controller that mends too much',
+            ),
+            sliding=Plausible(1e-6, -1e-7, 1e-4, 'derived: 10 mm under 100 N is the softest axis'),
+        ),
+    )
     needs = frozenset({'load'})
     options = ('statics',)
 

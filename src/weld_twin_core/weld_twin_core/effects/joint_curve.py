@@ -44,6 +44,8 @@ class JointCurve(Effect):
     channel: str = 'q'
 
     name = 'joint_curve'
+    title = 'measured curve'
+    entered = 'program'
     by_motion = True
     of = 'joint'
     stage = Stage.LINK

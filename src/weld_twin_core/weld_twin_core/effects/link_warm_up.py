@@ -21,7 +21,7 @@ from ..arrays import Array
 from ..errors import DataError, ModelError
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 CONSTANTS = (0.15, 0.6, 2.5)
@@ -43,13 +43,41 @@ class LinkWarmUp(Effect):
     follows: Sequence[float] | None = None
 
     name = 'link_warm_up'
+    title = 'warm-up of the link'
+    entered = 'warming up'
     depends_on = 'time'
     of = 'link'
     stage = Stage.LINK
     common = False
     parameters = (
-        Parameter('strain', '-', typical=1e-4, idealised=0.05),
-        Parameter('warming_time', 's', typical=60.0, lower=0.1, linear=False, idealised=0.1),
+        Parameter(
+            'strain',
+            '-',
+            typical=1e-4,
+            idealised=0.05,
+            range=Plausible(
+                2.4e-4,
+                -2.4e-4,
+                1.2e-3,
+                'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K (amesweb.info); range '
+                'derived: beside its motor a link gets 50 K warmer than it was, or 10 K cooler '
+                'where a fan blows',
+            ),
+        ),
+        Parameter(
+            'warming_time',
+            's',
+            typical=60.0,
+            lower=0.1,
+            linear=False,
+            idealised=0.1,
+            range=Plausible(
+                np.inf,
+                1.0,
+                2e4,
+                'derived: no metal warms within a second; beyond five hours it is the hall',
+            ),
+        ),
     )
     options = ('follows',)
     needs = frozenset({'time'})

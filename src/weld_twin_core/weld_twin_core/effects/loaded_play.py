@@ -18,10 +18,11 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
+from .backlash import RV
 from .curve import load
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 
 SHARES = (0.03, 0.15)
 """Torques at which the flank is certain that a search starts from, in the largest load seen."""
@@ -40,12 +41,25 @@ class LoadedPlay(Effect):
     torque: float = 1.0
 
     name = 'loaded_play'
+    title = 'play under load'
+    entered = "the joint's gear"
     depends_on = 'load'
     of = 'joint'
     stage = Stage.LINK
     common = False
     by_motion = True
-    parameters = (Parameter('width', 'rad', typical=5e-4, lower=0.0),)
+    parameters = (
+        Parameter(
+            'width',
+            'rad',
+            typical=5e-4,
+            lower=0.0,
+            range=Plausible(5e-4, 0.0, 2e-2, f'{RV}; see backlash'),
+            sliding=Plausible(
+                5e-5, 0.0, 5e-3, 'derived: nuts have hundredths of a millimetre of play'
+            ),
+        ),
+    )
     options = ('torque',)
     needs = frozenset({'load'})
 

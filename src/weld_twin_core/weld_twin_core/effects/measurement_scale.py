@@ -8,7 +8,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 
@@ -20,12 +20,26 @@ class MeasurementScale(Effect):
     scale: Value = 0.0
 
     name = 'measurement_scale'
+    title = 'scale error of the instrument'
+    entered = 'the scale of the instrument'
     depends_on = 'place'
     place = 'instrument'
     of = 'robot'
     stage = Stage.POSE
     common = False
-    parameters = (Parameter('scale', '-', typical=5e-5),)
+    parameters = (
+        Parameter(
+            'scale',
+            '-',
+            typical=5e-5,
+            range=Plausible.even(
+                1e-4,
+                2e-3,
+                'trackers are within 6 um/m across the beam (user manual of an AT9xx, section 2.8.2); '
+                'range derived: 2 mm/m is a wrong length, not an instrument',
+            ),
+        ),
+    )
 
     def displace(self, view: View) -> Shift:
         """Return scale times position on the pose."""

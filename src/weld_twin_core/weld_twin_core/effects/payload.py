@@ -14,7 +14,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 
@@ -27,14 +27,35 @@ class Payload(Effect):
     com: Value = (0.0, 0.0, 0.0)
 
     name = 'payload'
+    title = 'wrong payload'
+    entered = 'load'
+    changes_in_use = True
     depends_on = 'load'
     place = 'load'
     of = 'robot'
     stage = Stage.LOAD
     common = False
     parameters = (
-        Parameter('mass', 'kg', typical=1.0),
-        Parameter('com', 'm', size=3, typical=0.05, linear=False),
+        Parameter(
+            'mass',
+            'kg',
+            typical=1.0,
+            range=Plausible.even(
+                2.0,
+                np.inf,
+                'derived: see `mass_range`; no arm carries half of what it weighs itself',
+            ),
+        ),
+        Parameter(
+            'com',
+            'm',
+            size=3,
+            typical=0.05,
+            linear=False,
+            range=Plausible.even(
+                0.1, 0.5, 'derived: centres of torches and grippers lie within half a metre'
+            ),
+        ),
     )
 
     def displace(self, view: View) -> Shift:

@@ -25,7 +25,7 @@ from ..arrays import Array
 from .base_leans import base_leans
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 CHANGED = 0.2
@@ -40,12 +40,29 @@ class PedestalTilt(Effect):
     compliance: Value = (0.0, 0.0)
 
     name = 'pedestal_tilt'
+    title = 'leaning pedestal'
+    entered = 'program'
     depends_on = 'load'
     place = 'base'
     of = 'robot'
     stage = Stage.LINK
     common = False
-    parameters = (Parameter('compliance', 'rad/(N m)', size=2, typical=2e-6),)
+    parameters = (
+        Parameter(
+            'compliance',
+            'rad/(N m)',
+            size=2,
+            typical=2e-6,
+            range=Plausible(
+                1e-5,
+                -1e-5,
+                1e-4,
+                'a foundation shall swing above 30 Hz with the arm on it (ABB IRB 4400, 3HAC022032-001, '
+                'p. 39, easymanua.ls): 1e-5 under a small arm of 3 kg m^2 about its foot; range '
+                'derived: at 10 Hz it swings to the eye; see joint_compliance for the lower end',
+            ),
+        ),
+    )
     needs = frozenset({'load'})
 
     def displace(self, view: View) -> Shift:

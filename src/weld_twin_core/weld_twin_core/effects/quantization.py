@@ -14,7 +14,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 
 FINEST, COARSEST = 1e-4, 2e-2
 """Steps that a search considers [rad]."""
@@ -37,13 +37,29 @@ class Quantization(Effect):
     step: Value = 0.0
 
     name = 'quantization'
+    title = 'encoder resolution'
+    entered = 'the encoder'
     by_motion = True
     depends_on = 'angle'
     of = 'joint'
     stage = Stage.JOINT
     common = False
     parameters = (
-        Parameter('step', 'rad', typical=2e-4, lower=0.0, differentiable=False, linear=False),
+        Parameter(
+            'step',
+            'rad',
+            typical=2e-4,
+            lower=0.0,
+            differentiable=False,
+            linear=False,
+            range=Plausible(
+                1e-3,
+                0.0,
+                1e-2,
+                'derived: 12 bits a turn are 1.5 mrad; a centiradian is no encoder',
+            ),
+            sliding=Plausible(1e-5, 0.0, 1e-3, 'derived: a millimetre is no scale'),
+        ),
     )
 
     def displace(self, view: View) -> Shift:

@@ -29,7 +29,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 BEND = 7.86e-4 * 101.325 / 293.15**2
@@ -55,12 +55,28 @@ class Refraction(Effect):
     instrument: Sequence[float] | None = None
 
     name = 'refraction'
+    title = 'bent line of sight'
+    entered = 'warm air bent the line of sight'
     depends_on = 'place'
     place = 'instrument'
     of = 'robot'
     stage = Stage.POSE
     common = False
-    parameters = (Parameter('warming', 'K/m', size=3, typical=1.0),)
+    parameters = (
+        Parameter(
+            'warming',
+            'K/m',
+            size=3,
+            typical=1.0,
+            range=Plausible.even(
+                3.0,
+                30.0,
+                'in still air a line of sight bends by 0.2 mm over 12 m (0.008 in over 40 ft; '
+                'Hamar Laser, Stealth series, appendix D, manualshive.com), 3 K/m; range '
+                'derived: ten times that is air beside a furnace',
+            ),
+        ),
+    )
     options = ('instrument',)
 
     def check(self, robot: Robot) -> None:

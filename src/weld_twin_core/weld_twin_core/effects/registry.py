@@ -17,6 +17,7 @@ from .view import Stage
 
 E = TypeVar('E', bound=Effect)
 REGISTRY: dict[str, type[Effect]] = {}
+"""By name, in the order of names."""
 
 
 def register(effect: type[E]) -> type[E]:
@@ -61,6 +62,8 @@ def register(effect: type[E]) -> type[E]:
             f'effect {effect.name!r} is a spring in a joint; name its parameter compliance'
         )
     REGISTRY[effect.name] = effect
+    for name in sorted(REGISTRY):  # no answer may hang on which file was imported first
+        REGISTRY[name] = REGISTRY.pop(name)
     return effect
 
 

@@ -12,9 +12,9 @@ from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix
 from ..arrays import Array
 from ..errors import ModelError
-from .constant import FrameError
+from .constant import FrameError, frame_parameters
 from .registry import register
-from .view import Value, View
+from .view import Plausible, Value, View
 from .wording import frame
 
 
@@ -27,9 +27,15 @@ class RootPose(FrameError):
     rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'root_pose'
+    title = 'root error of the positioner'
+    entered = 'root'
     depends_on = 'constant'
     place = 'base'
     channel = 'root'
+    parameters = frame_parameters(
+        Plausible.even(5e-3, 0.1, 'derived: a root that was measured by touch, or by hand'),
+        Plausible.even(5e-3, 0.1, 'derived: five millimetres on a metre'),
+    )
 
     def check(self, robot: Robot) -> None:
         """

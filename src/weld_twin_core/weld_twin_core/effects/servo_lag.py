@@ -25,7 +25,7 @@ from ..errors import ModelError
 from .associative_scan import linear
 from .effect import MemoryEffect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
 
 DAMPINGS = (0.3, 0.4, 0.55, 0.75)
@@ -54,10 +54,26 @@ class ServoLag(MemoryEffect):
     damping: float | None = None
 
     name = 'servo_lag'
+    title = 'servo lag'
+    entered = "the drive's gains and feed-forward"
     depends_on = 'speed'
     of = 'joint'
     stage = Stage.SERVO
-    parameters = (Parameter('time_constant', 's', typical=5e-3, lower=0.0, linear=False),)
+    parameters = (
+        Parameter(
+            'time_constant',
+            's',
+            typical=5e-3,
+            lower=0.0,
+            linear=False,
+            range=Plausible(
+                2e-2,
+                0.0,
+                0.3,
+                'derived: the loop of a machine that follows a path closes within 0.3 s',
+            ),
+        ),
+    )
     options = ('damping',)
     needs = frozenset({'velocity', 'time'})
 

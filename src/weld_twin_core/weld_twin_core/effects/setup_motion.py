@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..recording import Recording
+from .dated import Sudden
 from .effect import Effect
 from .setup_settling import SetupSettling
 from .setup_step import SetupStep
-from .sudden import Sudden
 
 
 def of_the_robot(effects: Sequence[Effect]) -> tuple[Effect, ...]:

@@ -19,7 +19,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View, single
+from .view import Parameter, Plausible, Stage, Value, View, single
 from .wording import base_frame
 
 
@@ -34,6 +34,8 @@ class SetupSettling(Effect):
     start: float = 0.0
 
     name = 'setup_settling'
+    title = 'settling set-up'
+    entered = 'how the set-up is held'
     depends_on = 'time'
     place = 'base'
     of = 'robot'
@@ -41,8 +43,20 @@ class SetupSettling(Effect):
     cause = False
     of_setup = True
     parameters = (
-        Parameter('xyz', 'm', size=3, typical=1e-4),
-        Parameter('rotvec', 'rad', size=3, typical=1e-4),
+        Parameter(
+            'xyz',
+            'm',
+            size=3,
+            typical=1e-4,
+            range=Plausible.even(1e-3, 2e-2, 'derived: what a stand creeps while it warms'),
+        ),
+        Parameter(
+            'rotvec',
+            'rad',
+            size=3,
+            typical=1e-4,
+            range=Plausible.even(1e-3, 2e-2, 'derived: a millimetre on a metre'),
+        ),
     )
     options = ('time_constant', 'start')
     needs = frozenset({'time'})

@@ -18,7 +18,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View, single
+from .view import Parameter, Plausible, Stage, Value, View, single
 from .wording import base_frame
 
 TIMES = 40
@@ -35,6 +35,8 @@ class SetupStep(Effect):
     time: float = 0.0
 
     name = 'setup_step'
+    title = 'moved set-up'
+    entered = 'base'
     depends_on = 'time'
     place = 'base'
     of = 'robot'
@@ -42,8 +44,20 @@ class SetupStep(Effect):
     cause = False
     of_setup = True
     parameters = (
-        Parameter('xyz', 'm', size=3, typical=1e-4),
-        Parameter('rotvec', 'rad', size=3, typical=1e-4),
+        Parameter(
+            'xyz',
+            'm',
+            size=3,
+            typical=1e-4,
+            range=Plausible.even(5e-3, 0.1, 'derived: a knock'),
+        ),
+        Parameter(
+            'rotvec',
+            'rad',
+            size=3,
+            typical=1e-4,
+            range=Plausible.even(5e-3, 0.1, 'derived: a knock'),
+        ),
     )
     options = ('time',)
     needs = frozenset({'time'})

@@ -16,7 +16,7 @@ from ..arrays import Array
 from ..errors import DataError, ModelError
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 
@@ -36,11 +36,26 @@ class ThermalGrowth(Effect):
     warmup: Sequence[float] | None = None
 
     name = 'thermal_growth'
+    title = 'thermal growth'
+    entered = 'warming up, or of the temperature in the cell'
     demand = 1
     depends_on = 'temperature'
     of = 'links'
     stage = Stage.LINK
-    parameters = (Parameter('coefficient', '1/K', typical=1.2e-5),)
+    parameters = (
+        Parameter(
+            'coefficient',
+            '1/K',
+            typical=1.2e-5,
+            range=Plausible(
+                2.4e-5,
+                -2.4e-5,
+                7.2e-5,
+                'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K, cast iron by 11e-6 (amesweb.info); '
+                'range derived: an arm may warm up three times as much as the place of the sensor',
+            ),
+        ),
+    )
     options = ('reference', 'links', 'warmup')
     needs = frozenset({'temperature'})
 

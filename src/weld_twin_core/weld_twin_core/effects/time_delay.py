@@ -8,7 +8,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View, single
+from .view import Parameter, Plausible, Stage, Value, View, single
 from .wording import size
 
 
@@ -20,12 +20,25 @@ class TimeDelay(Effect):
     delay: Value = 0.0
 
     name = 'time_delay'
+    title = 'clock delay'
+    entered = 'its clocks'
     everywhere = True
     depends_on = 'speed'
     place = 'clock'
     of = 'robot'
     stage = Stage.CLOCK
-    parameters = (Parameter('delay', 's', typical=5e-3),)
+    parameters = (
+        Parameter(
+            'delay',
+            's',
+            typical=5e-3,
+            range=Plausible.even(
+                2e-2,
+                0.5,
+                'derived: buses and filters take milliseconds; half a second is another clock',
+            ),
+        ),
+    )
     needs = frozenset({'velocity', 'time'})
 
     def displace(self, view: View) -> Shift:

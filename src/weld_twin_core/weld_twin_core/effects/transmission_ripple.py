@@ -14,10 +14,11 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
+from .backlash import RV
 from .effect import Effect
 from .hooks import Waves, highest_order
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
 
 MAX_ORDER = 100
@@ -49,6 +50,8 @@ class TransmissionRipple(Effect):
     phase: Value = 0.0
 
     name = 'transmission_ripple'
+    title = 'transmission ripple'
+    entered = 'program'
     everywhere = True
     by_motion = True
     demand = 1
@@ -57,7 +60,18 @@ class TransmissionRipple(Effect):
     stage = Stage.JOINT
     waves = Waves(dense=MAX_ORDER, highest=HIGHEST_LINE)
     parameters = (
-        Parameter('amplitude', 'rad', size=0, typical=2e-4),
+        Parameter(
+            'amplitude',
+            'rad',
+            size=0,
+            typical=2e-4,
+            range=Plausible.even(
+                2e-4, 3e-3, f'{RV}; range derived: ten times that, a gear that is worn out'
+            ),
+            sliding=Plausible.even(
+                2e-5, 1e-3, 'derived: a turn of a screw repeats within hundredths of a millimetre'
+            ),
+        ),
         Parameter('order', '1/rev', size=0, lower=0.0, differentiable=False, linear=False),
         Parameter('phase', 'rad', size=0, linear=False),
     )

@@ -21,7 +21,7 @@ from ..arrays import Array
 from .associative_scan import linear
 from .effect import Effect, MemoryEffect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 
 FREQUENCIES = np.geomspace(1.0, 40.0, 64)
 """Modes [Hz] that a fit may start from, and"""
@@ -42,15 +42,45 @@ class Vibration(MemoryEffect):
     gain: Value = 0.0
 
     name = 'vibration'
+    title = 'vibration'
+    entered = 'how the motion is planned, and of stiffness'
     depends_on = 'acceleration'
     of = 'joint'
     stage = Stage.SERVO
     parameters = (
-        Parameter('frequency', 'Hz', typical=10.0, lower=1e-3, linear=False, idealised=0.015),
         Parameter(
-            'damping', '-', typical=0.05, lower=0.0, upper=0.999, linear=False, idealised=0.03
+            'frequency',
+            'Hz',
+            typical=10.0,
+            lower=1e-3,
+            linear=False,
+            idealised=0.015,
+            range=Plausible(
+                np.inf, 1.0, 100.0, 'derived: softer is a swing, stiffer does not reach the tool'
+            ),
         ),
-        Parameter('gain', '-', typical=0.3, idealised=0.04),
+        Parameter(
+            'damping',
+            '-',
+            typical=0.05,
+            lower=0.0,
+            upper=0.999,
+            linear=False,
+            idealised=0.03,
+            range=Plausible(
+                np.inf,
+                1e-3,
+                0.7,
+                'derived: steel rings longest at 0.001; beyond 0.7 nothing swings',
+            ),
+        ),
+        Parameter(
+            'gain',
+            '-',
+            typical=0.3,
+            idealised=0.04,
+            range=Plausible.even(1.0, 5.0, 'derived: one is the whole inertia on one spring'),
+        ),
     )
     needs = frozenset({'velocity', 'time'})
 

@@ -47,6 +47,37 @@ class Stage(IntEnum):
 
 
 @dataclass(frozen=True)
+class Plausible:
+    """
+    Spread and range of one parameter, in its own unit.
+
+    Attributes
+    ----------
+    sd : float
+        Standard deviation among machines, and of what people do to them.
+    low, high : float
+        What lies outside is no property of a machine.
+    source : str
+
+    """
+
+    sd: float
+    low: float
+    high: float
+    source: str
+
+    @property
+    def derived(self) -> bool:
+        """Return whether no publication stands behind it."""
+        return self.source.startswith('derived')
+
+    @classmethod
+    def even(cls, sd: float, most: float, source: str) -> Plausible:
+        """Return a range that reaches as far to either side."""
+        return cls(sd, -most, most, source)
+
+
+@dataclass(frozen=True)
 class Parameter:
     """
     One parameter of an effect.
@@ -68,6 +99,10 @@ class Parameter:
     idealised : float
         Share by which an arm's own value differs from the one that fits best, because springs
         harden and modes couple where the formula is ideal.
+    range : Plausible, optional
+        What a machine can have of it; left out, nothing is known.
+    sliding : Plausible, optional
+        The same where its joint slides, in m instead of rad.
 
     Examples
     --------
@@ -88,6 +123,8 @@ class Parameter:
     differentiable: bool = True
     linear: bool = True
     idealised: float = 0.0
+    range: Plausible | None = None
+    sliding: Plausible | None = None
 
 
 @dataclass(frozen=True, eq=False)

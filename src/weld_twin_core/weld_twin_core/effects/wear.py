@@ -17,7 +17,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Stage, Value, View
+from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 SLOWED = (0.0, 0.5)
@@ -36,14 +36,38 @@ class Wear(Effect):
     slowing: Value = 0.0
 
     name = 'wear'
+    title = 'tool wear'
+    entered = 'tool'
     depends_on = 'time'
     place = 'tool'
     of = 'robot'
     stage = Stage.LINK
     common = False
     parameters = (
-        Parameter('rate', 'm/s', typical=1e-6),
-        Parameter('slowing', '1/s', typical=0.01, lower=0.0, linear=False),
+        Parameter(
+            'rate',
+            'm/s',
+            typical=1e-6,
+            range=Plausible.even(
+                2e-6,
+                1e-4,
+                'derived: a tip that loses a millimetre in ten minutes; 6 mm in a minute is cut',
+            ),
+        ),
+        Parameter(
+            'slowing',
+            '1/s',
+            typical=0.01,
+            lower=0.0,
+            linear=False,
+            range=Plausible(
+                0.02,
+                0.0,
+                0.2,
+                'derived: a sharp tip is blunt, and wears half as fast, after a minute or so; '
+                'within some seconds it is chipped, not worn',
+            ),
+        ),
     )
     needs = frozenset({'time'})
 

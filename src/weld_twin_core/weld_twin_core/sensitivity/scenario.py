@@ -12,9 +12,8 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects import Effect
 from ..effects.backlash import Backlash
-from ..effects.base_pose import BasePose
-from ..effects.joint_offset import JointOffset
-from ..effects.link_length import LinkLength
+from ..effects.frame_errors import BasePose
+from ..effects.geometry import JointOffset, LinkLength
 from .seam_study import Study
 from .sweep import DEGREE
 

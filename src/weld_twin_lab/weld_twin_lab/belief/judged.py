@@ -25,6 +25,8 @@ AS_GOOD = 1.05
 CURVES = ('joint_curve', 'frame_curve')
 
 
+FEW = frozenset({'double', 'triple'})
+"""Kinds of cases with two or three causes."""
 LARGE = 0.1
 """Share of the squared gap from which on a cause that is not told is missing, if it is no noise."""
 
@@ -109,9 +111,14 @@ def _with_absorbed(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _right(row: Mapping[str, Any], told: Judged) -> bool:
-    """Return whether an answer is right as a whole, sets held to what they predict."""
-    several = 'shown' in row['truth']
-    right = whole(row['truth'], row['verdict']).right if several else told.right
+    """
+    Return whether an answer is right as a whole, sets held to what they predict.
+
+    Of two or three causes those that do not show may be missing, as of four to six.
+    """
+    right = told.right
+    if 'shown' in row['truth'] and not (right and told.kind in FEW):
+        right = whole(row['truth'], row['verdict']).right
     return right and _sets_hold(row)
 
 

@@ -18,35 +18,24 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
+from ..study import option, options
+
 BUSY = 6
 """Processes beside every second run; with the demo's own, five to a core of a machine with two."""
 TOGETHER = 3
 """Crowded demos that run at once: a harder test than one by one, and a shorter one."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--runs', type=int, default=60, metavar='N', help='demos (default: 60)')
-    parser.add_argument(
-        '--busy', type=int, default=BUSY, metavar='N', help=f'busy processes (default: {BUSY})'
-    )
-    parser.add_argument(
-        '--together',
-        type=int,
-        default=TOGETHER,
-        metavar='K',
-        help=f'crowded demos that run at once (default: {TOGETHER})',
-    )
-    parser.add_argument(
-        '--minutes',
-        type=float,
-        default=float('inf'),
-        metavar='M',
-        help='begin no more demos after this time (default: no limit)',
-    )
-    parser.add_argument(
-        '--go-on', action='store_true', help='add to the demos that the file has, up to --runs'
-    )
+add_arguments = options(
+    option('--runs', 60, 'N', 'demos (default: 60)'),
+    option('--busy', BUSY, 'N', f'busy processes (default: {BUSY})'),
+    option('--together', TOGETHER, 'K', f'crowded demos that run at once (default: {TOGETHER})'),
+    option(
+        '--minutes', float('inf'), 'M', 'begin no more demos after this time (default: no limit)'
+    ),
+    option('--go-on', False, None, 'add to the demos that the file has, up to --runs'),
+    out='',
+)
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:

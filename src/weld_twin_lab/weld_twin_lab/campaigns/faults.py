@@ -17,16 +17,15 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
+from ..study import option, options
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--only', default='', help='faults whose names contain this')
-    parser.add_argument(
-        '--part',
-        default='1/1',
-        metavar='K/N',
-        help='the K-th of N parts; what the file has of other faults is kept',
-    )
+add_arguments = options(
+    option('--only', '', None, 'faults whose names contain this'),
+    option(
+        '--part', '1/1', 'K/N', 'the K-th of N parts; what the file has of other faults is kept'
+    ),
+    out='',
+)
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:

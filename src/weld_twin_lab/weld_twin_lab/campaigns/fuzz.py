@@ -14,18 +14,14 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
+from ..study import option, options
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument(
-        '--cases',
-        type=int,
-        default=5000,
-        metavar='N',
-        help='broken files of each kind (default: 5000)',
-    )
-    parser.add_argument('--seed', type=int, default=1, metavar='S')
-    parser.add_argument('--only', default='', metavar='LIST', help='kinds, comma-separated')
+add_arguments = options(
+    option('--cases', 5000, 'N', 'broken files of each kind (default: 5000)'),
+    option('--seed', 1, 'S', 'decides how they are broken'),
+    option('--only', '', 'LIST', 'kinds, comma-separated'),
+    out='',
+)
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:

@@ -21,33 +21,26 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
+from ..study import option, options
+
 ALLOWED = 1.0
 """Seconds of messages that a kill may cost."""
 RECORDER = 'recorder'
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument(
-        '--times', type=int, default=200, metavar='N', help='kills of the recorder (default: 200)'
-    )
-    parser.add_argument(
-        '--each', type=int, default=40, metavar='N', help='kills of each command (default: 40)'
-    )
-    parser.add_argument(
+add_arguments = options(
+    option('--times', 200, 'N', 'kills of the recorder (default: 200)'),
+    option('--each', 40, 'N', 'kills of each command (default: 40)'),
+    option(
         '--cases',
-        default='',
-        metavar='NAMES',
-        help='what is killed, such as "recorder,diagnose,history add" (default: all)',
-    )
-    parser.add_argument('--seed', type=int, default=1, metavar='S')
-    parser.add_argument(
-        '--longest',
-        type=float,
-        default=3.0,
-        metavar='SECONDS',
-        help='latest moment of a kill of the recorder (default: 3)',
-    )
+        '',
+        'NAMES',
+        'what is killed, such as "recorder,diagnose,history add" (default: all)',
+    ),
+    option('--seed', 1, 'S', 'decides the moments'),
+    option('--longest', 3.0, 'SECONDS', 'latest moment of a kill of the recorder (default: 3)'),
+    out='',
+)
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:

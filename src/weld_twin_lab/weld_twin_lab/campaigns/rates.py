@@ -19,6 +19,8 @@ from typing import Any, NamedTuple
 
 from weld_twin_msgs_py.files import markdown
 
+from ..study import option, options
+
 POSE_RATE = 60.0
 """Poses a second of a tracker."""
 LISTENERS = 2
@@ -40,9 +42,10 @@ CASES = (
 )
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--seconds', type=float, default=60.0, help='length of each case')
+add_arguments = options(
+    option('--seconds', 60.0, None, 'length of each case'),
+    out='',
+)
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:

@@ -17,19 +17,21 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
+from ..study import option, options
+
 WAYS = ('open', 'enforced')
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument(
+add_arguments = options(
+    option(
         '--source',
-        metavar='DIR',
-        help='folder with rmw_cyclonedds and sros2 (branch jazzy), to be built and used',
-    )
-    parser.add_argument(
-        '--work', metavar='DIR', help='where to build it; kept, and used again next time'
-    )
+        None,
+        'DIR',
+        'folder with rmw_cyclonedds and sros2 (branch jazzy), to be built and used',
+    ),
+    option('--work', None, 'DIR', 'where to build it; kept, and used again next time'),
+    out='',
+)
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:

@@ -14,6 +14,8 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
+from ..study import option, options
+
 EVERY = 5.0
 """Seconds between two looks at the processes."""
 WARM = 0.2
@@ -27,11 +29,12 @@ EFFECTS = """
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--minutes', type=float, default=30.0)
-    parser.add_argument('--rate', type=float, default=500.0, help='joint states a second')
-    parser.add_argument('--cores', type=int, default=2, help='cores all nodes share')
+add_arguments = options(
+    option('--minutes', 30.0, None, 'length of the trial (default: 30)'),
+    option('--rate', 500.0, None, 'joint states a second'),
+    option('--cores', 2, None, 'cores all nodes share'),
+    out='',
+)
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:

@@ -9,9 +9,8 @@ predicts is judged at a fourth place, which is never used.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,9 +25,9 @@ from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.hypotheses.library import plain_causes
 from weld_twin_core.recording import Recording
-from weld_twin_msgs_py.files.whole_files import write_text
 
 from ..blind.simulator import require_simulator
+from ..study import Parts
 from .sealed import ARMS
 from .touching import postures_at, touching
 
@@ -160,7 +159,7 @@ def _proposed(
         yield len(q) // len(SPOTS), cell.touched(q, labels, rng)
 
 
-def postures(count: int, out: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+def postures(count: int, part: Parts) -> dict[str, Any]:
     """
     Return which share of the reachable shrink so many postures a place give, in the mean.
 
@@ -168,21 +167,12 @@ def postures(count: int, out: Path, tell: Callable[[str], None]) -> dict[str, An
     ----------
     count : int
         Arms.
-    out : Path
-        Keeps a file per arm; those that are there are not made again.
-    tell : callable
-        Told of every arm.
+    part : Parts
+        Keeps every arm.
 
     """
     require_simulator()
-    out.mkdir(parents=True, exist_ok=True)
-    cases = []
-    for seed in range(count):
-        path = out / f'arm_{seed:03d}.json'
-        if not path.is_file():
-            tell(f'arm {seed}')
-            write_text(path, json.dumps(case(seed), indent=1) + '\n')
-        cases.append(json.loads(path.read_text()))
+    cases = [part(f'arm_{seed:03d}', partial(case, seed)) for seed in range(count)]
     score: dict[str, Any] = {'arms': len(cases)}
     for how in ('random_m', 'proposed_m'):
         shares: dict[str, list[float]] = {}

@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,10 +16,10 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.contacts import Tie, spreads
 from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.recording import Recording
-from weld_twin_msgs_py.files.whole_files import write_text
 
 from ..blind.cause_sizes import draw, scaled, site
 from ..blind.simulator import require_simulator
+from ..study import Parts
 from .touching import postures_at, touching
 
 ARMS = ('ur5', 'ur10', 'kuka_iiwa14', 'franka_panda')
@@ -127,29 +125,19 @@ def _shown(robot: Robot, recording: Recording) -> float:
     return float(np.sqrt((away**2).mean() / 3.0))
 
 
-def sealed(count: int, out: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+def sealed(count: int, part: Parts) -> dict[str, Any]:
     """
     Return how many of some sealed cases were named.
 
     Parameters
     ----------
     count : int
-    out : Path
-        Keeps a file per case; those that are there are not made again.
-    tell : callable
-        Told of every case.
+    part : Parts
+        Keeps every case.
 
     """
     require_simulator()
-    out.mkdir(parents=True, exist_ok=True)
-    cases = []
-    for seed in range(count):
-        path = out / f'case_{seed:04d}.json'
-        if not path.is_file():
-            entry = case(seed)
-            tell(f'case {seed}: {entry["truth"]} {entry["status"]} right={entry["right"]}')
-            write_text(path, json.dumps(entry, indent=1, default=float) + '\n')
-        cases.append(json.loads(path.read_text()))
+    cases = [part(f'case_{seed:04d}', partial(case, seed)) for seed in range(count)]
     seen = [c for c in cases if c['seen'] and c['slacks'] >= SIZE[0]]
     hidden = [c for c in cases if not c['seen']]
     return {

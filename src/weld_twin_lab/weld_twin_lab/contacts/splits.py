@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -19,8 +19,8 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.frames.alignment import refined
 from weld_twin_core.recording import Recording
-from weld_twin_msgs_py.files.whole_files import write_text
 
+from ..study import Parts
 from .data import places_of, robot_of, touches
 
 MOSTLY = 0.5
@@ -126,9 +126,7 @@ def flagged(found: Diagnosis, data: Path, arm: str, judged: Sequence[str]) -> li
     return out
 
 
-def study(
-    data: Path, arms: Sequence[str], out: Path, tell: Callable[[str], None]
-) -> list[dict[str, Any]]:
+def entries_of(data: Path, arms: Sequence[str], part: Parts) -> list[dict[str, Any]]:
     """
     Return every split of some arms: each place left out, and each place alone.
 
@@ -136,23 +134,16 @@ def study(
     ----------
     data : Path
     arms : sequence of str
-    out : Path
-        Keeps a file per split; those that are there are not computed again.
-    tell : callable
-        Told of every split.
+    part : Parts
+        Keeps every split.
 
     """
-    out.mkdir(parents=True, exist_ok=True)
     found = []
     for arm in arms:
         every = places_of(data, arm)
         for place in every:
             rest = [other for other in every if other != place]
             for kind, used, judged in (('without', rest, [place]), ('only', [place], rest)):
-                path = out / f'{arm}_{kind}_{place}.json'
-                if not path.is_file():
-                    tell(f'{arm}, {kind} {place}')
-                    entry = {'kind': kind, **split(data, arm, used, judged)}
-                    write_text(path, json.dumps(entry, indent=1) + '\n')
-                found.append(json.loads(path.read_text()))
+                make = partial(split, data, arm, used, judged)
+                found.append({'kind': kind, **part(f'{arm}_{kind}_{place}', make)})
     return found

@@ -19,10 +19,8 @@ from weld_twin_msgs_py.files.markdown import table
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 
-from ..real_robots.data import tables
 from ..transfer.plain import plain_fit
-from ..transfer.splits import Split, splits
-from ..transfer.study import HOME
+from ..transfer.splits import Split, all_splits
 from .course import Run
 from .open_form import write_case
 
@@ -61,11 +59,9 @@ def arm_cases(ur5: Path, ur10: Path, out: Path) -> dict[str, Array]:
         kept = json.loads((out / MEASURED).read_text(encoding='utf-8'))
         return {name: np.array(rows) for name, rows in kept.items()}
     found: dict[str, Array] = {}
-    for robot, directory in (('ur5', ur5), ('ur10', ur10)):
-        stations = tables(robot, directory)[0].recording
-        for split in splits(robot, stations, HOME[robot]):
-            if split.kind in KINDS:
-                found[split.name] = _written(split, out / split.name)
+    for split in all_splits(ur5, ur10):
+        if split.kind in KINDS:
+            found[split.name] = _written(split, out / split.name)
     content = {name: rows.tolist() for name, rows in found.items()}
     write_text(out / MEASURED, json.dumps(content) + '\n')
     return found

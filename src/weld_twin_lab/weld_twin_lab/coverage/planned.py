@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,13 +19,12 @@ from weld_twin_core.diagnosis.predicting.planned import SPREAD, clear_postures, 
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.posterior import largest_sigma
 from weld_twin_core.twin.twin import Twin
-from weld_twin_msgs_py.files.whole_files import write_text
-from weld_twin_nodes.offline.output_directory import write_owned
 
 from ..blind.simulator import require_simulator
 from ..plant.plant import run
 from ..plant.plant_recording import Command
 from ..plant.tracker import Tracker
+from ..study import Parts, Tell
 
 ARMS = ('ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb1600')
 COUNTS = (16, 24, 40)
@@ -35,7 +33,6 @@ NOISE = 3e-5
 """Of every measured coordinate [m]."""
 TOLERANCE = 2e-4
 """Of the tool [m]; plans are asked how probably it is kept."""
-RESULTS, PARTS = 'plans.json', 'parts'
 UNSEEN = 60
 """Other postures of the region, at which the corrected arm is judged."""
 FRAMES = [
@@ -115,29 +112,29 @@ def _measured(
     return Recording('plan', JointMotion(t, q, static=True), Measurements(t, seen.position))
 
 
-def planned(count: int, out: Path, tell: Callable[[str], None]) -> dict[str, Any]:
+def planned(count: int, part: Parts, tell: Tell) -> list[dict[str, Any]]:
     """
-    Return how plans compare with what came of them.
+    Return what so many plans promised, and what came of them.
 
     Parameters
     ----------
     count : int
-    out : Path
-        Gets plans.json, and keeps a file per plan; those that are there are not made again.
+    part : Parts
+        Keeps every plan.
     tell : callable
-        Told of every plan.
+        Told what came of every plan.
 
     """
     require_simulator()
-    (out / PARTS).mkdir(parents=True, exist_ok=True)
     entries = []
     for seed in range(count):
-        path = out / PARTS / f'plan_{seed:03d}.json'
-        if not path.is_file():
-            write_text(path, json.dumps(carried_out(seed), indent=1) + '\n')
-        entries.append(json.loads(path.read_text()))
+        entries.append(part(f'plan_{seed:03d}', partial(carried_out, seed)))
         tell(' '.join(f'{key} {value}' for key, value in entries[-1].items()))
-    write_owned(out / RESULTS, json.dumps(entries, indent=1) + '\n')
+    return entries
+
+
+def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, float]:
+    """Return how plans compare with what came of them."""
     ratio = [e['kept_sigma_m'] / e['promised_sigma_m'] for e in entries]
     return {
         'plans': len(entries),

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -12,95 +11,51 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_core import __version__
 from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis, diagnose
-from weld_twin_core.errors import DataError, TwinError
+from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.bags import read_recording
-from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots import load_robot
-from weld_twin_nodes.offline.output_directory import write_owned
 
 from ..blind import layout
 from ..blind.diagnosing import diagnosis_of
-from ..real_robots.data import tables
 from ..real_robots.unseen_stations import ALIGN
-from ..transfer.splits import TUNED_ON, Split, splits
+from ..study import Parts
+from ..transfer.splits import TUNED_ON, Split, all_splits
 from .held import held
-from .table import page
 
-RESULTS, TABLE, PARTS = 'coverage.json', 'coverage.md', 'parts'
-SCHEMA = 'weld_twin/coverage/1'
-HOME = {'ur5': 0, 'ur10': 1}
-"""Rows before this one are left out: the UR10's first is its home pose, far from the rest."""
+NAME, PARTS = 'coverage', 'parts'
 UR5_NOISE = 2e-5
 """A GTS3800 is good to 15 um + 6 um/m, a metre or two away [m]."""
-Tell = Callable[[str], None]
 
 
-def study(
-    ur5: Path, ur10: Path, out: Path, cases: Path | None = None, tell: Tell = lambda text: None
-) -> dict[str, Any]:
+def entries_of(ur5: Path, ur10: Path, cases: Path | None, part: Parts) -> list[dict[str, Any]]:
     """
-    Try the regions of all splits, and of sealed cases where there are any, and write the results.
-
-    Each recording's result is kept as soon as it is there; a run that was stopped goes on.
+    Return what the regions of all splits hold, and of sealed cases where there are any.
 
     Parameters
     ----------
     ur5, ur10 : Path
         Directories with the published tables.
-    out : Path
-        Keeps a file per recording.
-    cases : Path, optional
+    cases : Path or None
         Directory with ``cases`` and ``truths`` as ``weld-twin lab blind make`` writes them.
-    tell : callable
-        Told what is being done.
+    part : Parts
+        Keeps every recording's result.
 
     Raises
     ------
     DataError
-        Data are missing or cannot be read, or ``out`` holds something else.
+        Data are missing or cannot be read.
 
     """
-    _refuse_foreign(out)
-    (out / PARTS).mkdir(parents=True, exist_ok=True)
-    entries = []
-    for robot, directory in (('ur5', ur5), ('ur10', ur10)):
-        for split in splits(robot, tables(robot, directory)[0].recording, HOME[robot]):
-            entries.append(_kept(out, split.name, partial(_of_split, split), tell))
+    entries = [part(split.name, partial(_of_split, split)) for split in all_splits(ur5, ur10)]
     if cases is not None:
         for name in _names(cases / 'cases'):
             pair = (cases / 'cases' / name, cases / 'truths' / name)
-            entries.append(_kept(out, name, lambda p=pair: of_case(*p), tell))  # type: ignore[misc]
-    result = {'schema': SCHEMA, 'version': __version__, 'entries': entries}
-    write_owned(out / TABLE, page(entries))
-    text = json.dumps(result, indent=1, allow_nan=False) + '\n'
-    write_owned(out / RESULTS, text)
-    return result
-
-
-def _kept(out: Path, name: str, work: Callable[[], dict[str, Any]], tell: Tell) -> dict[str, Any]:
-    """Return the result of one recording, from its file where there is one."""
-    path = out / PARTS / f'{name}.json'
-    if path.is_file():
-        kept: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-        return kept
-    tell(name)
-    entry = work()
-    write_text(path, json.dumps(entry, indent=1, allow_nan=False) + '\n', overwrite=True)
-    return entry
-
-
-def _refuse_foreign(out: Path) -> None:
-    """Refuse a directory that holds something else."""
-    if not out.exists():
-        return
-    ours = out.is_dir() and all(p.name in (RESULTS, TABLE, PARTS) for p in out.iterdir())
-    if not ours:
-        raise DataError(f"'{out}' holds something else already; choose another place")
+            entries.append(part(name, partial(of_case, *pair)))
+    return entries
 
 
 def _of_split(split: Split) -> dict[str, Any]:

@@ -4,65 +4,50 @@
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
-from weld_twin_core import __version__
 from weld_twin_core.errors import TwinError
-from weld_twin_nodes.offline.output_directory import write_owned
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from ..blind.deck import lots
-from .goals import page, summary
+from ..blind.diagnosing import engine_digest
+from ..study import Tell, head
+from .goals import summary
 
-RESULTS, TABLE, PARTS = 'investigate.json', 'investigate.md', 'parts'
-SCHEMA = 'weld_twin/investigate/2'
+PARTS = 'parts'
 KINDS = ('single', 'double', 'triple')
 """Cases with their causes in the library: of the others no experiment can make anybody sure."""
 MOST_DRAWN = 40
 """Cells drawn for each that is wanted: most are diagnosed rightly from a poor motion."""
 BATCH = 8
 """Cells drawn at a time: a run that has to end in between ends after some, whatever came of them."""
-Tell = Callable[[str], None]
 
 
-def study(
-    out: Path,
-    seed: int,
-    wanted: int,
-    runner: Runner,
-    engine: str,
-    tell: Tell = lambda text: None,
-    *,
-    alone: bool = False,
-    minutes: float = float('inf'),
+def investigated(
+    seed: int, wanted: int, runner: Runner, tell: Tell, *, alone: bool, minutes: float
 ) -> dict[str, Any]:
     """
-    Investigate sealed cells that poor motions leave open, and write the results.
+    Investigate sealed cells that poor motions leave open.
 
     Parameters
     ----------
-    out : Path
     seed : int
         Decides the cells.
     wanted : int
         Cells that poor motions leave open.
     runner : Runner
-        Keeps what came of every cell drawn; a run that was interrupted goes on from there.
-    engine : str
-        Tells the results of one version of the core from those of another.
+        Keeps what came of every cell drawn.
     tell : callable
-        Told what is being done.
+        Told how many were drawn.
     alone : bool
         Leave out what is usual practice.
     minutes : float
-        No further cells are begun after so long; what there is is written.
+        No further cells are begun after so long.
 
     """
-    end = time.monotonic() + 60.0 * minutes
+    end, engine = time.monotonic() + 60.0 * minutes, engine_digest()
     drawn: list[dict[str, Any]] = []
     cases: list[dict[str, Any]] = []
     for tasks in _batches(seed, wanted, engine, alone):
@@ -71,19 +56,14 @@ def study(
         tell(f'{len(drawn)} drawn, {len(cases)} left open at first')
         if len(cases) == wanted or time.monotonic() > end:
             break
-    result = {
-        'schema': SCHEMA,
-        'version': __version__,
-        'engine': engine,
-        'seed': seed,
-        'drawn': drawn.index(cases[-1]) + 1 if len(cases) == wanted else len(drawn),
-        'summary': summary(cases),
-        'cases': cases,
-    }
-    out.mkdir(parents=True, exist_ok=True)
-    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
-    write_owned(out / TABLE, page(result))
-    return result
+    return head(
+        'investigate/2',
+        engine=engine,
+        seed=seed,
+        drawn=drawn.index(cases[-1]) + 1 if len(cases) == wanted else len(drawn),
+        summary=summary(cases),
+        cases=cases,
+    )
 
 
 def _batches(seed: int, wanted: int, engine: str, alone: bool) -> Iterator[list[Task]]:

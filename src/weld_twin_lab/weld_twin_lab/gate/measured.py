@@ -19,8 +19,7 @@ from weld_twin_core.recording import Recording
 
 from ..real_robots.data import tables
 from ..transfer.servo_axis import axis_recording, axis_robot
-from ..transfer.splits import COUNTS, alone, splits
-from ..transfer.study import HOME
+from ..transfer.splits import COUNTS, HOME, alone, splits
 from .mistakes import KINDS, Hidden
 from .sound import Sound
 from .trials import judged, looked

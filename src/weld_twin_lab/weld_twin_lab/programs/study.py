@@ -4,142 +4,62 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from weld_twin_core import __version__
 from weld_twin_msgs_py.files import markdown
-from weld_twin_msgs_py.files.whole_files import write_text
-from weld_twin_nodes.offline.output_directory import write_owned
-from weld_twin_nodes.offline.task_pool import Runner, Task
+from weld_twin_nodes.offline.task_pool import Task
 
-from . import correction_table, urdf_table
+from ..study import Parts, head
 from .broken import fuzz
 from .cells import CELLS
 from .round_trips import round_trips
 
-RESULTS, TABLE, PARTS = 'programs.json', 'programs.md', 'parts'
-CORRECTIONS, CORRECTIONS_TABLE = 'corrections.json', 'corrections.md'
-URDF_ARMS, URDF_TABLE = 'urdf_arms.json', 'urdf_arms.md'
-SCHEMA = 'weld_twin/programs/1'
-MADE = Path('test/programs/made')
-"""Programs as users have them, from the top of the source tree; left out where there are none."""
-Tell = Callable[[str], None]
+PARTS = 'parts'
 
 
-def study(
-    out: Path,
-    drawn: int,
-    broken: int,
-    made: Path = MADE,
-    tell: Tell = lambda text: None,
-) -> dict[str, Any]:
+def read(drawn: int, broken: int, made: Path, part: Parts) -> dict[str, Any]:
     """
-    Try every language that was not tried yet, and write the results.
+    Return how every language is read.
 
     Parameters
     ----------
-    out : Path
-        Keeps a file for every part; a run that was interrupted goes on from there.
     drawn, broken : int
         Programs of each language.
     made : Path
         Folder of programs as users have them.
-    tell : callable
-        Told what is being done.
+    part : Parts
+        Keeps every language.
 
     """
-    (out / PARTS).mkdir(parents=True, exist_ok=True)
     trips, fuzzed = [], []
     for language in CELLS:
         trip = partial(round_trips, language, drawn)
-        trips.append(_kept(out, f'round_trips_{language}', trip, tell))
+        trips.append(part(f'round_trips_{language}', trip))
         trial = partial(fuzz, language, broken, _whole(language, made))
-        fuzzed.append(_kept(out, f'fuzz_{language}', trial, tell))
-    result = {
-        'schema': SCHEMA,
-        'version': __version__,
-        'round_trips': trips,
-        'fuzz': fuzzed,
-    }
-    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
-    write_owned(out / TABLE, summary(result))
-    return result
+        fuzzed.append(part(f'fuzz_{language}', trial))
+    return head('programs/1', round_trips=trips, fuzz=fuzzed)
 
 
-def corrections(
-    out: Path, seed: int, seams: int, runner: Runner, engine: str, languages: Sequence[str]
-) -> dict[str, Any]:
-    """
-    Correct sealed seams, let the plant run them, and write the results.
-
-    Parameters
-    ----------
-    out : Path
-    seed : int
-        Decides the seams.
-    seams : int
-        Of each language.
-    runner : Runner
-        Keeps what came of every seam; a run that was interrupted goes on from there.
-    engine : str
-        Tells the results of one version of the core from those of another.
-    languages : sequence of str
-
-    """
-    tasks = [
+def seams(seed: int, count: int, engine: str) -> list[Task]:
+    """Return the correction of so many sealed seams of each language, language by language."""
+    return [
         Task(corrected, (language, seed, k, engine), f'{language} {k}')
-        for k in range(seams)
-        for language in languages
+        for language in CELLS
+        for k in range(count)
     ]
-    cases = sorted(runner.run(tasks), key=lambda case: list(CELLS).index(case['language']))
-    result = {
-        'schema': SCHEMA,
-        'version': __version__,
-        'engine': engine,
-        'seed': seed,
-        'totals': correction_table.totals(cases),
-        'cases': cases,
-    }
-    out.mkdir(parents=True, exist_ok=True)
-    write_owned(out / CORRECTIONS, json.dumps(result, indent=1) + '\n')
-    write_owned(out / CORRECTIONS_TABLE, correction_table.page(result))
-    return result
 
 
-def urdf_arms(out: Path, seed: int, arms: int, runner: Runner, engine: str) -> dict[str, Any]:
-    """
-    Take arms that are given as URDFs all the way, and write the results.
+def urdf_arms(seed: int, count: int, engine: str) -> list[Task]:
+    """Return the ways of so many arms that are given as URDFs."""
+    return [Task(of_urdf, (seed, k, engine), f'arm {k}') for k in range(count)]
 
-    Parameters
-    ----------
-    out : Path
-    seed : int
-        Decides the arms.
-    arms : int
-    runner : Runner
-        Keeps what came of every arm; a run that was interrupted goes on from there.
-    engine : str
-        Tells the results of one version of the core from those of another.
 
-    """
-    tasks = [Task(of_urdf, (seed, k, engine), f'arm {k}') for k in range(arms)]
-    cases = runner.run(tasks)
-    result = {
-        'schema': SCHEMA,
-        'version': __version__,
-        'engine': engine,
-        'seed': seed,
-        'totals': urdf_table.totals(cases),
-        'cases': cases,
-    }
-    out.mkdir(parents=True, exist_ok=True)
-    write_text(out / URDF_ARMS, json.dumps(result, indent=1) + '\n', overwrite=True)
-    write_text(out / URDF_TABLE, urdf_table.page(result), overwrite=True)
-    return result
+def head_of(seed: int, engine: str, totals: Any, cases: Sequence[Any]) -> dict[str, Any]:
+    """Return the results of sealed cases."""
+    return head('programs/1', engine=engine, seed=seed, totals=totals, cases=cases)
 
 
 def of_urdf(seed: int, number: int, engine: str) -> dict[str, Any]:
@@ -191,15 +111,6 @@ def _whole(language: str, made: Path) -> list[list[str]]:
         files = [path, *([path.with_suffix('.dat')] if language == 'krl' else [])]
         out.append([file.read_bytes().decode('latin-1') for file in files])
     return out
-
-
-def _kept(out: Path, name: str, make: Callable[[], dict[str, Any]], tell: Tell) -> dict[str, Any]:
-    path = out / PARTS / f'{name}.json'
-    if not path.exists():
-        tell(name)
-        write_text(path, json.dumps(make(), indent=1) + '\n')
-    entry: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-    return entry
 
 
 def summary(result: dict[str, Any]) -> str:

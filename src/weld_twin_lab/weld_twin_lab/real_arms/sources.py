@@ -10,7 +10,7 @@ a maker publishes no masses of its links, round figures from the arm's weight st
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 from ..contacts.data import places_of, robot_of, touches
 from ..real_robots.data import tables
 from ..transfer.servo_axis import axis_recording, axis_robot
+from ..transfer.splits import HOME, alone
 
 HALF_PI = float(np.pi / 2.0)
 """A right angle [rad]."""
@@ -37,8 +38,6 @@ POINTS_HZ = 10.0
 """Rate at which the tracker of the swinging UR5 measures."""
 FIRST_POINT = -0.063
 """Time of its first point on the joints' clock [s], as published."""
-HOME = {'ur5_laser_tracker': 0, 'ur10_laser_tracker': 1}
-"""Rows before this one are left out: the UR10's first is its home pose, far from the rest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,18 +66,8 @@ def tracked(data: Path, name: str) -> Source:
     robot = name.partition('_')[0]
     recording = tables(robot, data / name)[0].recording
     assert recording.measured is not None
-    first = HOME[name]
-    motion = recording.joints
-    joints = JointMotion(motion.t[first:], motion.q[first:], None, motion.static)
-    rows = np.arange(first, recording.measured.t.size)
-    one = Recording(
-        name,
-        joints,
-        recording.measured.take(rows),
-        temperature=recording.temperature,
-        epoch_ns=recording.epoch_ns,
-    )
-    return Source(catalog.load(robot), one)
+    rows = np.arange(HOME[robot], recording.measured.t.size)
+    return Source(catalog.load(robot), replace(alone(recording, rows), name=name))
 
 
 def servo(data: Path) -> Source:

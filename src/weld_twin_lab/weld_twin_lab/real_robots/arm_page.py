@@ -9,11 +9,12 @@ from collections.abc import Sequence
 
 from weld_twin_core import __version__
 from weld_twin_nodes.wording.quantities import millimetres, milliradians, percent
+from weld_twin_report.report.answer import Answer
 from weld_twin_report.report.cause_list import causes_section
 from weld_twin_report.report.footing import checks_section
 from weld_twin_report.report.gap_location import where_section
-from weld_twin_report.report.headline import opening
 from weld_twin_report.report.html import Child, Html, document, section, table, tag
+from weld_twin_report.report.opening import opening
 from weld_twin_report.report.shrinking import shrink_section
 
 from .data import Source
@@ -46,16 +47,16 @@ def robot_page(robot: str, sources: Sequence[Source], judged: Sequence[Judged]) 
 
     """
     main = judged[-1]
-    diagnosis = main.diagnosis
+    diagnosis, answer = main.diagnosis, Answer(main.diagnosis)
     body = tag(
         'main',
         tag('header', tag('p', f'{robot.upper()} under a laser tracker', class_='kind')),
-        opening(diagnosis),
+        opening(answer),
         _held_out(judged),
         _advice(main),
         _maps(main),
-        where_section(diagnosis),
-        causes_section(diagnosis),
+        where_section(answer),
+        causes_section(answer),
         _ripple(main),
         _blind(main),
         shrink_section(diagnosis),

@@ -23,7 +23,7 @@ RESULTS = 'results.json'
 SPLITS = {'ur5': ur5_splits, 'ur10': ur10_splits}
 
 
-def study(
+def judged_arms(
     ur5: Path, ur10: Path, out: Path, tell: Callable[[str], None] = lambda text: None
 ) -> dict[str, Any]:
     """

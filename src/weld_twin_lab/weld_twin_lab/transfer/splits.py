@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from scipy.spatial import cKDTree
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion, Recording
+
+from ..real_robots.data import tables
 
 Rows = NDArray[Any]
 """Row numbers."""
@@ -32,6 +35,8 @@ OCTANTS = (0, 2, 5, 7)
 """Octants about the middle of the workspace that are fitted on: two pairs of opposite ones."""
 FIRST = 0.2
 """Share of the recording that is fitted on where the first part has to predict the rest."""
+HOME = {'ur5': 0, 'ur10': 1}
+"""Rows before this one are left out: the UR10's first is its home pose, far from the rest."""
 TUNED_ON = ('n15', 'n60', 'wrist_10deg', 'still_2', 'octant_0', 'odd')
 """
 Kinds of splits, of the UR5 alone, that thresholds of the diagnosis were looked at on.
@@ -62,6 +67,25 @@ class Split:
     train: Recording
     inside: Recording | None
     outside: Recording | None
+
+
+def all_splits(ur5: Path, ur10: Path) -> Iterator[Split]:
+    """
+    Yield the splits of both measured arms.
+
+    Parameters
+    ----------
+    ur5, ur10 : Path
+        Directories with the published tables.
+
+    Raises
+    ------
+    DataError
+        A table is missing or cannot be read.
+
+    """
+    for robot, directory in (('ur5', ur5), ('ur10', ur10)):
+        yield from splits(robot, tables(robot, directory)[0].recording, HOME[robot])
 
 
 def splits(robot: str, table: Recording, first: int = 0) -> Iterator[Split]:

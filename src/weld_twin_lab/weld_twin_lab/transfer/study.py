@@ -4,101 +4,39 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from weld_twin_core import __version__
-from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.files.whole_files import write_text
-from weld_twin_nodes.offline.output_directory import write_owned
-
-from ..real_robots.data import tables
-from .goals import Measure, measures
+from ..study import Parts
 from .judging import judge
 from .servo_axis import judge_axis
-from .splits import Split, splits
-from .tables import axis_table, goal_table, split_table
+from .splits import all_splits
 
-RESULTS, TABLE, PARTS = 'transfer.json', 'transfer.md', 'splits'
-SCHEMA = 'weld_twin/transfer/1'
-HOME = {'ur5': 0, 'ur10': 1}
-"""Rows before this one are left out: the UR10's first is its home pose, far from the rest."""
-Tell = Callable[[str], None]
+NAME, PARTS = 'transfer', 'splits'
 
 
-def study(
-    ur5: Path, ur10: Path, emps: Path, out: Path, only: str = '', tell: Tell = lambda text: None
-) -> dict[str, Any]:
+def entries_of(ur5: Path, ur10: Path, emps: Path, only: str, part: Parts) -> list[dict[str, Any]]:
     """
-    Judge every split that has not been judged yet, and write the results.
+    Return what came of every split.
 
     Parameters
     ----------
     ur5, ur10, emps : Path
         Directories with the published data.
-    out : Path
-        Keeps a file per split; an interrupted run goes on from there.
     only : str
         Part of the names of the splits to run; all when empty.
-    tell : callable
-        Told what is being done.
+    part : Parts
+        Keeps every split.
 
     Raises
     ------
     DataError
-        Data are missing, or ``out`` holds something else.
+        Data are missing.
 
     """
-    _refuse_foreign(out)
-    (out / PARTS).mkdir(parents=True, exist_ok=True)
-    entries = []
-    for split in _all(ur5, ur10):
-        if only in split.name:
-            entries.append(_kept(out, split.name, lambda s=split: judge(s), tell))  # type: ignore[misc]
+    chosen = [split for split in all_splits(ur5, ur10) if only in split.name]
+    entries = [part(split.name, partial(judge, split)) for split in chosen]
     if only in 'servo_axis':
-        entries.append(_kept(out, 'servo_axis', lambda: judge_axis(emps), tell))
-    found = measures(entries)
-    result = {
-        'schema': SCHEMA,
-        'version': __version__,
-        'measures': [m._asdict() for m in found],
-        'splits': entries,
-    }
-    write_owned(out / TABLE, page(entries, found))
-    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
-    return result
-
-
-def page(entries: Sequence[dict[str, Any]], found: Sequence[Measure]) -> str:
-    """Return both tables, and that of the servo axis."""
-    parts = [goal_table(found), split_table(entries)]
-    parts += [axis_table(e) for e in entries if e['kind'] == 'servo_axis']
-    return '\n'.join(parts)
-
-
-def _all(ur5: Path, ur10: Path) -> Iterator[Split]:
-    for robot, directory in (('ur5', ur5), ('ur10', ur10)):
-        yield from splits(robot, tables(robot, directory)[0].recording, HOME[robot])
-
-
-def _kept(out: Path, name: str, work: Callable[[], dict[str, Any]], tell: Tell) -> dict[str, Any]:
-    """Return the result of one split, from its file where there is one."""
-    path = out / PARTS / f'{name}.json'
-    if path.is_file():
-        kept: dict[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-        return kept
-    tell(name)
-    entry = work()
-    write_text(path, json.dumps(entry, indent=1) + '\n', overwrite=True)
-    return entry
-
-
-def _refuse_foreign(out: Path) -> None:
-    """Refuse a directory that holds something else."""
-    if not out.exists():
-        return
-    ours = out.is_dir() and all(p.name in (RESULTS, TABLE, PARTS) for p in out.iterdir())
-    if not ours:
-        raise DataError(f"'{out}' holds something else already; choose another place")
+        entries.append(part('servo_axis', partial(judge_axis, emps)))
+    return entries

@@ -29,6 +29,13 @@ HEADS = (
 )
 
 
+def page(entries: Sequence[dict[str, Any]], found: Sequence[Measure]) -> str:
+    """Return both tables, and that of the servo axis."""
+    parts = [goal_table(found), split_table(entries)]
+    parts += [axis_table(e) for e in entries if e['kind'] == 'servo_axis']
+    return '\n'.join(parts)
+
+
 def goal_table(measures: Sequence[Measure]) -> str:
     """Return one line per measure."""
     rows = [(m.what, m.goal, m.got, REACHED[m.reached]) for m in measures]

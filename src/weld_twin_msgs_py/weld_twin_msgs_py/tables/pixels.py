@@ -64,6 +64,9 @@ def read_pixels(
 
     """
     options = options or TableOptions()
+    if not cameras or not targets:
+        lacking = '--target' if cameras else '--camera'
+        raise DataError(f"pixels of table '{path}' need {lacking} NAME=FILE beside the other")
     cells = read_cells(path, options.delimiter, options.decimal)
     said = list(cells.said)
     columns = _columns(cells, options)

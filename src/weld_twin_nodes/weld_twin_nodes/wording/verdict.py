@@ -14,8 +14,8 @@ from .mending import advised, left_with
 from .quantities import STAYS, both_angles, millimetres, odds, percent, turns_only
 from .switches import switches
 from .words import (
-    CAUSES,
     HALF,
+    called,
     carries_curves,
     cause,
     cause_words,
@@ -79,7 +79,7 @@ def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
 
 def _families(diagnosis: Diagnosis) -> str:
     counts = Counter(found.effect.name for found in diagnosis.effects)
-    return listed([f'{CAUSES.get(name, name)} ({n})' for name, n in counts.most_common(2)])
+    return listed([f'{called(name)} ({n})' for name, n in counts.most_common(2)])
 
 
 def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:

@@ -9,51 +9,8 @@ from collections.abc import Callable, Iterable, Sequence
 
 from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
 from weld_twin_core.diagnosis.result import Cause, Diagnosis, Found, Site
+from weld_twin_core.effects import REGISTRY
 
-CAUSES = {
-    'joint_offset': 'zero offset',
-    'link_length': 'link length error',
-    'link_offset': 'link offset error',
-    'link_twist': 'link twist error',
-    'axis_parallelism': 'axis parallelism error',
-    'base_pose': 'base pose error',
-    'tool_pose': 'tool pose error',
-    'root_pose': 'root error of the positioner',
-    'guide_bend': 'bent guide',
-    'guide_tilt': 'tilting carriage',
-    'gear_ratio': 'gear ratio error',
-    'gear_ratio_by_direction': 'gear ratio that differs by direction',
-    'transmission_ripple': 'transmission ripple',
-    'joint_coupling': 'coupling',
-    'backlash': 'backlash',
-    'hysteresis': 'hysteresis',
-    'friction': 'friction',
-    'loaded_play': 'play under load',
-    'bearing_tilt': 'axis wobble',
-    'wear': 'tool wear',
-    'joint_compliance': 'compliance',
-    'cartesian_compliance': 'compliance at the tool',
-    'payload': 'wrong payload',
-    'servo_lag': 'servo lag',
-    'time_delay': 'clock delay',
-    'clock_rate': 'clock that runs fast or slow',
-    'thermal_growth': 'thermal growth',
-    'link_warm_up': 'warm-up of the link',
-    'drift': 'drift of the frame',
-    'vibration': 'vibration',
-    'quantization': 'encoder resolution',
-    'measurement_scale': 'scale error of the instrument',
-    'pedestal_tilt': 'leaning pedestal',
-    'hose_pull': 'pull of the hose package',
-    'refraction': 'bent line of sight',
-    'setup_step': 'moved set-up',
-    'setup_settling': 'settling set-up',
-    'joint_slip': 'slip',
-    'tool_slip': 'slipped tool or reflector',
-    'instrument_knock': 'knocked instrument or base',
-    'joint_curve': 'measured curve',
-    'frame_curve': 'measured motion',
-}
 _PARAMETERS = {
     'da': 'length off by',
     'dd': 'offset off by',
@@ -104,8 +61,8 @@ DEPENDENCES = {
 }
 CURVES = ('joint_curve', 'frame_curve')
 """What stands where nothing has a name."""
-_EFFECT = re.compile(rf'\b({"|".join(name for name in CAUSES if "_" in name)})\b')
-"""Names as files have them, which a sentence may bring along."""
+_NAME = re.compile(r'\b[a-z]+(?:_[a-z]+)+\b')
+"""Names as files have them, of effects among others, which a sentence may bring along."""
 HALF = 0.5
 """Probability from which one name is enough."""
 _OPEN = 3
@@ -116,8 +73,13 @@ _NAMED = 3
 
 def cause(effect: str, joint: str | None) -> str:
     """Return an effect at its place as people say it."""
-    name = CAUSES.get(effect, effect.replace('_', ' '))
-    return f'{name} of {joint}' if joint else name
+    return f'{called(effect)} of {joint}' if joint else called(effect)
+
+
+def called(effect: str) -> str:
+    """Return an effect as people call it."""
+    kind = REGISTRY.get(effect)
+    return (kind.title if kind else '') or effect.replace('_', ' ')
 
 
 def found_name(found: Found) -> str:
@@ -134,7 +96,7 @@ def in_words(reason: str, sites: Iterable[Site]) -> str:
     """Return a sentence about sites with their names as people say them."""
     for site in sorted(sites, key=lambda s: -len(str(s))):
         reason = reason.replace(str(site), site_name(site))
-    reason = _EFFECT.sub(lambda found: CAUSES[found[0]], reason)
+    reason = _NAME.sub(lambda m: called(m[0]) if m[0] in REGISTRY else m[0], reason)
     return f'{reason[:1].upper()}{reason[1:].rstrip(".")}.'
 
 
@@ -295,7 +257,7 @@ def untried_in_short(diagnosis: Diagnosis) -> str:
 
 def not_to_be_tried(diagnosis: Diagnosis) -> list[str]:
     """Return the effects, in words, that were asked to be left out."""
-    return [CAUSES.get(n, n) for n, why in diagnosis.absent.items() if why == EXCLUDED]
+    return [called(n) for n, why in diagnosis.absent.items() if why == EXCLUDED]
 
 
 def mended(diagnosis: Diagnosis) -> tuple[str, ...]:

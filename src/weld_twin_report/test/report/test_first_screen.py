@@ -17,6 +17,7 @@ from weld_twin_nodes.wording.mending import left_with
 from weld_twin_nodes.wording.quantities import in_short, short_rows
 from weld_twin_report.report import report_page
 from weld_twin_report.report.acceptance import Demand
+from weld_twin_report.report.answer import Answer
 from weld_twin_report.report.controllers import correction
 from weld_twin_report.report.curve_plot import furthest
 from weld_twin_report.report.diagnosis_page import Sheet
@@ -98,7 +99,7 @@ def test_a_measurement_is_told_by_what_it_parts(one, other, told):
     sides = [[{'effect': e, 'joint': at, 'at': at, 'on': on}] for e, at, on in (one, other)]
     wanted = {'between': sides, 'reason': 'by 22 standard deviations', 'promise': 0.48}
     assert parts_what(wanted) == told
-    page = plain(next_section(replace(CIRCLE, next_experiment=wanted)))
+    page = plain(next_section(Answer(replace(CIRCLE, next_experiment=wanted))))
     assert (
         told in page
         and 'Chance that it decides 48 %' in page

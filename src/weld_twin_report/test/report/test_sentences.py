@@ -21,8 +21,9 @@ from weld_twin_nodes.wording.quantities import (
     uncertain,
 )
 from weld_twin_nodes.wording.verdict import verdict
-from weld_twin_nodes.wording.words import CAUSES, cause, in_words, listed
+from weld_twin_nodes.wording.words import cause, in_words, listed
 from weld_twin_report.report import print_summary
+from weld_twin_report.report.answer import Answer
 from weld_twin_report.report.footing import next_section
 from weld_twin_report.report.to_do import worth_doing
 
@@ -75,7 +76,8 @@ def test_a_value_has_as_many_digits_as_its_error_allows(value, std, text):
 
 
 def test_every_effect_of_the_library_has_a_name_in_words():
-    assert set(REGISTRY) - {'measurement_noise'} == set(CAUSES)
+    titled = {name for name, effect in REGISTRY.items() if effect.title}
+    assert titled == set(REGISTRY) - {'measurement_noise'}
 
 
 def test_an_effect_of_the_user_is_named_by_its_own_name():
@@ -167,7 +169,7 @@ def test_a_measurement_that_leaves_the_open_question_open_says_so(other, told):
     zero = {'effect': 'joint_offset', 'joint': 'joint_a1'}
     site = {'effect': other, 'joint': None if other == 'base_pose' else 'joint_a1'}
     wanted = {'sentence': 'Run the path.', 'between': [[zero], [site]]}
-    page = next_section(replace(case, next_experiment=wanted))
+    page = next_section(Answer(replace(case, next_experiment=wanted)))
     assert ('not made to tell whether it is zero offset of joint_a1 or base pose' in page) is told
 
 

@@ -21,7 +21,7 @@ from weld_twin_nodes.wording.quantities import counted
 from weld_twin_nodes.wording.verdict import verdict
 from weld_twin_report.report import report_page
 from weld_twin_report.report.acceptance import Demand
-from weld_twin_report.report.belief import belief_of
+from weld_twin_report.report.answer import Answer
 from weld_twin_report.report.controllers import correction
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 from weld_twin_report.report.diagnosis_page import Sheet
@@ -279,7 +279,7 @@ def test_a_named_cause_whose_mending_alone_makes_it_worse_is_to_be_mended_with_t
 def test_a_cause_has_one_figure_of_belief_and_no_part_is_less_sure_than_the_whole():
     cause = replace(PLAY.causes[0], name=((Site('backlash', 'elbow_joint'), 0.76),))
     case = replace(PLAY, causes=(cause,), confidence=0.96)
-    assert belief_of(case, cause) == 0.96
+    assert Answer(case).causes[0].belief == 0.96
     card = report_page(case)
     card = card[card.index('class="cards"') :]
     card = card[card.index('How sure') : card.index('<dt>By how much')]

@@ -18,7 +18,7 @@ from ..history.database import Database
 from ..history.entry import Entry
 from ..history.runs import NEWEST, Run, Runs
 from ..report.charts import Axis
-from ..report.html import Child, Html, document, section, table, tag
+from ..report.html import Child, Figure, Html, document, figures, section, sentences, table, tag
 from .control_chart import control_chart
 
 CHARTS = 8
@@ -111,20 +111,13 @@ def _figures(entries: Sequence[Entry]) -> Html:
     """Return the newest diagnosis in figures."""
     last = entries[-1]
     sure = '' if last.confidence is None else f'{odds(last.confidence)} sure'
-    cells = [
+    cells: list[Figure] = [
         ('Verdict', last.status, sure),
         ('Gap', millimetres(last.gap_m), 'without what was found'),
         ('Left', millimetres(last.unexplained_m), 'with it'),
         ('Recorded', str(last.at.date()), causes_of(last.effects)),
     ]
-    return tag(
-        'dl',
-        *(
-            tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
-            for name, value, note in cells
-        ),
-        class_='figures',
-    )
+    return figures(cells)
 
 
 def causes_of(effects: Sequence[Mapping[str, Any]], most: int = 3) -> str:
@@ -137,9 +130,9 @@ def causes_of(effects: Sequence[Mapping[str, Any]], most: int = 3) -> str:
 def _changed(changes: Sequence[Mapping[str, Any]]) -> Html | None:
     if not changes:
         return None
-    said = [tag('li', str(each['sentence']).capitalize()) for each in changes]
+    said = sentences(str(each['sentence']).capitalize() for each in changes)
     lead = 'More than chance does in a year of weekly looks. The surest comes first.'
-    return section('What changed', tag('ul', *said, class_='sentences'), id_='changed', lead=lead)
+    return section('What changed', said, id_='changed', lead=lead)
 
 
 def _charts(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> Html | None:

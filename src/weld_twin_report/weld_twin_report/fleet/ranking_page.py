@@ -11,7 +11,7 @@ from weld_twin_nodes.wording.quantities import counted, millimetres
 
 from ..history.database import Database
 from ..history.runs import Run, Runs
-from ..report.html import Child, Html, document, section, table, tag
+from ..report.html import Child, Figure, Html, document, figures, section, table, tag
 from .cell_page import STYLE, causes_of, troubles_section
 
 ROWS = 500
@@ -79,20 +79,13 @@ def _headline(rows: Sequence[Mapping[str, Any]]) -> str:
 def _figures(rows: Sequence[Mapping[str, Any]], troubles: Sequence[Run]) -> Html:
     changed = sum(bool(row['changes']) for row in rows)
     unknown = sum(row['status'] == 'unknown' for row in rows)
-    cells = [
+    cells: list[Figure] = [
         ('Cells', str(len(rows)), 'with a diagnosis'),
         ('Changed', str(changed), 'by more than chance'),
         ('Unknown', str(unknown), 'something is left that nothing explains'),
         ('No verdict', str(len(troubles)), 'recordings: unsound, refused or failed'),
     ]
-    return tag(
-        'dl',
-        *(
-            tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
-            for name, value, note in cells
-        ),
-        class_='figures',
-    )
+    return figures(cells)
 
 
 def _cells(rows: Sequence[Mapping[str, Any]], link: Callable[[str], str]) -> Html:

@@ -10,27 +10,13 @@ import numpy as np
 
 from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
+from weld_twin_core.effects import REGISTRY
 from weld_twin_core.history import Change, Observation, changes
 
 from .entry import Entry
 
 DAY = 86_400.0
 """Seconds."""
-IN_USE = (
-    'joint_offset',
-    'tool_pose',
-    'tool',
-    'backlash',
-    'friction',
-    'hysteresis',
-    'joint_compliance',
-    'payload',
-    'link_length',
-)
-"""
-Effects that use changes: motors and belts are taken off, tools are knocked, gears wear, loads are
-swapped, links grow with the warmth. Angles between axes and ratios of gears stay as they were made.
-"""
 
 
 def observations(entries: Sequence[Entry]) -> list[Observation]:
@@ -63,9 +49,10 @@ def named(entries: Sequence[Entry]) -> set[str]:
 
 
 def likely(entries: Sequence[Entry]) -> set[str]:
-    """Return the coordinates that use can change."""
+    """Return the coordinates that use can change; those of the tool are told by axis."""
+    in_use = {'tool', *(name for name, effect in REGISTRY.items() if effect.changes_in_use)}
     names = {name for entry in entries for name in entry.names}
-    return {name for name in names if name.replace('.', ' ').split(' ')[0] in IN_USE}
+    return {name for name in names if name.replace('.', ' ').split(' ')[0] in in_use}
 
 
 def changed(entries: Sequence[Entry], seen: Sequence[Observation]) -> tuple[Change, ...]:

@@ -1,34 +1,38 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Which effect: what was found, what else was considered, what cannot be told apart."""
+"""Which effect: what was found, what else was considered, what cannot be told apart, what changed."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from weld_twin_core.diagnosis.result import Candidate, Diagnosis
+from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.effects import REGISTRY
-from weld_twin_nodes.wording.quantities import MISSING, change, millimetres, parameter_rows
+from weld_twin_nodes.wording.quantities import MISSING, millimetres
 from weld_twin_nodes.wording.words import (
     carries_curves,
     cause,
-    found_name,
     in_words,
     listed,
     open_sets,
     parameter_word,
     same_words,
-    site_name,
 )
 
-from .family_table import families_table
-from .html import Child, Html, bars, joined, section, table, tag
-from .untried import reason_and_joints, untried, weighed
+from .answer import Answer
+from .html import Html, bars, joined, section, sentences, table, tag
+from .untried import reason_and_joints, untried
 
 _CANDIDATES = 6
 """Hypotheses shown for a cause."""
 _SLOTS = 6
 """Places of which rivals are listed."""
+_KINDS = (
+    'A kind is named where data that were not fitted get worse without it by a tenth or '
+    'more in the median part left out, and better in none; all other kinds that are '
+    'needed and the frames are fitted anew each time. Exchangeable: the other kinds take '
+    'its place. Every member and order is in effects.yaml.'
+)
 _INSTEAD = (
     'No effect is named. These come nearest; figures and pictures are with the curves on the cards '
     'above.'
@@ -43,10 +47,6 @@ _RIVALS = (
     'stands on the card.'
 )
 _BARS = 'All bars have one scale: what would be left of the gap; a full bar is all of it.'
-_ALIKE = 1.5
-"""Ratio of probabilities below which two candidates are told as alike."""
-_HARDLY = 1000.0
-"""Ratio of probabilities that is told at most."""
 _ABOVE = 1.5
 """Ratio to the noise floor above which what remains is not at its level."""
 _NONE = (
@@ -62,47 +62,67 @@ _ENOUGH = (
 )
 
 
-def causes_section(diagnosis: Diagnosis) -> Html:
+def causes_section(answer: Answer) -> Html:
     """Return parameters, candidates and equivalence sets."""
+    diagnosis = answer.diagnosis
     return section(
         'Which effect',
-        _found(diagnosis),
-        _candidates(diagnosis),
-        _sets(diagnosis),
+        _found(answer),
+        _candidates(answer),
+        _sets(answer),
         _absent(diagnosis),
         id_='causes',
     )
 
 
-def _found(diagnosis: Diagnosis) -> Html | None:
-    if not diagnosis.effects:
-        return None if diagnosis.model.found else tag('p', 'No effect was found.')
-    if diagnosis.families:
-        return families_table(diagnosis)
-    heads = ['Effect', 'Parameter', 'Value ± standard error']
-    rows: list[list[Child]] = []
-    for found in diagnosis.effects:
-        for k, (name, value) in enumerate(
-            parameter_rows(found.effect, found.std, diagnosis.model.robot)
-        ):
-            rows.append([found_name(found) if k == 0 else '', parameter_word(name), value])
-    return joined([tag('h3', 'Effects found'), table(heads, rows, 'effects')])
-
-
-def _candidates(diagnosis: Diagnosis) -> Html | None:
-    """Return the hypotheses for every cause, the most probable first."""
-    candidates = weighed(diagnosis)
-    if not candidates:
+def changed_section(answer: Answer) -> Html | None:
+    """Return what the later recordings have that the first has not; None where it was not asked."""
+    changed = answer.changed
+    if changed is None:
         return None
-    groups = slots(candidates)
+    told = tag('p', answer.nothing_changed)
+    return section(
+        'What changed between the recordings',
+        table(changed.heads, changed.rows, 'changed') if changed.rows else told,
+        id_='changed',
+        lead=f'Against {answer.diagnosis.recordings[0].name}; the causes above are what all have in '
+        'common.',
+    )
+
+
+def _found(answer: Answer) -> Html | None:
+    if not answer.found:
+        return None if answer.diagnosis.model.found else tag('p', 'No effect was found.')
     parts: list[Html] = []
-    for slot in groups[:_SLOTS]:
-        best = slot[0].probability
-        rows = [_candidate(diagnosis, c, best) for c in slot[:_CANDIDATES]]
-        parts.append(bars(rows, 'wide'))
-    more = len(candidates) - sum(len(s[:_CANDIDATES]) for s in groups[:_SLOTS])
+    for k, (title, heads, rows) in enumerate(answer.found):
+        if not answer.diagnosis.families:
+            rows = [[name, parameter_word(parameter), *rest] for name, parameter, *rest in rows]
+        parts += [tag('h3', title), table(heads, rows, '' if k else 'effects')]
+    if answer.diagnosis.families:
+        parts.insert(2, tag('p', _KINDS, class_='note'))
+    return joined(parts)
+
+
+def _candidates(answer: Answer) -> Html | None:
+    """Return the hypotheses for every cause, the most probable first."""
+    diagnosis, groups = answer.diagnosis, answer.rivals
+    if not groups:
+        return None
+    named = bool(diagnosis.effects)
+    parts = [
+        bars(
+            [
+                # What only stands in is not compared.
+                (r.name, r.length, f'{r.likely} · ' * named + f'leaves {r.left} ({r.change})')
+                for r in group[:_CANDIDATES]
+            ],
+            'wide',
+        )
+        for group in groups[:_SLOTS]
+    ]
+    more = sum(map(len, groups)) - sum(len(g[:_CANDIDATES]) for g in groups[:_SLOTS])
     note = tag('p', f'{more} more in diagnosis.json.', class_='note') if more > 0 else None
-    if not diagnosis.effects:
+    if not named:
         title = 'What fits best, though no cause is named'
         lead = _INSTEAD if carries_curves(diagnosis) else _STAND_IN
     else:
@@ -112,72 +132,25 @@ def _candidates(diagnosis: Diagnosis) -> Html | None:
     return joined([tag('h3', title), told, *parts, note])
 
 
-def _candidate(diagnosis: Diagnosis, c: Candidate, best: float) -> tuple[str, float, str]:
-    """Return label, length and text of a bar; what only stands in is not compared."""
-    left = f'leaves {millimetres(c.rms_after_m)} ({change(c.shrink)})'
-    told = f'{rivalry(c, best)} · {left}' if diagnosis.effects else left
-    return site_name(c.site), 1.0 - c.shrink, told
-
-
-def rivalry(candidate: Candidate, best: float) -> str:
-    """Return how likely a candidate is against the likeliest: how sure that is stands elsewhere."""
-    times = best / max(candidate.probability, 1e-12)
-    if times == 1.0:
-        return 'the likeliest'
-    if times < _ALIKE:
-        return 'as likely'
-    if times > _HARDLY:
-        return f'more than {_HARDLY:.0f} times less likely'
-    return f'{times:.2g} times less likely' if times < 10.0 else f'{times:.0f} times less likely'
-
-
-def slots(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
-    """Return the hypotheses cause by cause: within one, probabilities do not rise."""
-    out: list[list[Candidate]] = []
-    for c in candidates:
-        if out and c.probability <= out[-1][-1].probability:
-            out[-1].append(c)
-        else:
-            out.append([c])
-    return out
-
-
-def _sets(diagnosis: Diagnosis) -> Html | None:
+def _sets(answer: Answer) -> Html | None:
+    diagnosis = answer.diagnosis
     if not diagnosis.effects:
         return None
-    sets = open_sets(diagnosis)
-    title = tag('h3', 'What these data cannot tell apart')
-    if not sets and diagnosis.families:
-        shared = [tag('li', in_words(reason, ())) for reason in diagnosis.reasons]
-        return joined([title, tag('ul', *shared, class_='sentences')])
-    if not sets and diagnosis.same:
-        told = [tag('li', text) for text in same_words(diagnosis)]
-        return joined([title, tag('ul', *told, class_='sentences')])
-    if not sets:
-        return joined(
-            [
-                title,
-                tag('p', f'{_NONE[bool(untried(diagnosis))]} {untried(diagnosis)}'.rstrip()),
-            ]
+    every = {site for group in open_sets(diagnosis) for site in group}
+    reasons = sentences(in_words(reason, every) for reason in diagnosis.reasons)
+    if answer.open:
+        guess = sentences(
+            f'{names}: naming one of them would be a guess.' for names in answer.open
         )
-    items = [
-        tag(
-            'li',
-            f'{listed([site_name(site) for site in group], "or")}: '
-            'naming one of them would be a guess.',
-        )
-        for group in sets
-    ]
-    every = {site for group in sets for site in group}
-    reasons = [tag('li', in_words(reason, every)) for reason in diagnosis.reasons]
-    return joined(
-        [
-            title,
-            tag('ul', *items, class_='sentences'),
-            tag('p', 'Why:') if reasons else None,
-            tag('ul', *reasons, class_='sentences'),
-        ]
-    )
+        told = [guess, *([tag('p', 'Why:'), reasons] if diagnosis.reasons else [])]
+    elif diagnosis.families:
+        told = [reasons]
+    elif diagnosis.same:
+        told = [sentences(same_words(diagnosis))]
+    else:
+        none = f'{_NONE[bool(untried(diagnosis))]} {untried(diagnosis)}'
+        told = [tag('p', none.rstrip())]
+    return joined([tag('h3', 'What these data cannot tell apart'), *told])
 
 
 def _absent(diagnosis: Diagnosis) -> Html | None:
@@ -238,5 +211,4 @@ def _with(diagnosis: Diagnosis) -> str:
 
 
 def _dependent(structure: Sequence[str]) -> Html:
-    items = [tag('li', line) for line in structure] or [tag('li', MISSING)]
-    return tag('ul', *items, class_='sentences')
+    return sentences(structure or [MISSING])

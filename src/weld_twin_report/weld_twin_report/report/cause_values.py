@@ -4,19 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.result import Cause, Diagnosis
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.frame_curve import FrameCurve
-from weld_twin_core.effects.joint_curve import JointCurve
 from weld_twin_core.effects.servo_lag import ServoLag
 from weld_twin_nodes.wording.quantities import DEGREES, in_short, millimetres, short_rows, turned
-from weld_twin_nodes.wording.words import CURVES, parameter_word, unnamed
-from weld_twin_nodes.wording.words import cause as named
+from weld_twin_nodes.wording.words import CURVES, parameter_word
 
-from .curve_plot import furthest, furthest_frame
+from .curve_plot import furthest, furthest_frame, furthest_off
 
 _SHARES = ('scale', 'ratio', 'difference')
 """Parameters of joints that are a share of an angle."""
@@ -24,24 +24,13 @@ _QUARTER = 90.0
 """Degrees that such a share is told of."""
 
 
-def effects_of(diagnosis: Diagnosis, cause: Cause) -> list[Effect]:
-    """
-    Return the effects in the twin that stand for a cause.
-
-    Of a cause without a name only curves do: what imitates it says nothing of it.
-    """
-    found = diagnosis.model.found
-    held = [found[m] for m in cause.members if m < len(found)]
-    return [effect for effect in held if effect.name in CURVES] if unnamed(cause) else held
-
-
-def values(diagnosis: Diagnosis, cause: Cause) -> list[str]:
-    """Return how far off a cause is, the most telling first; nothing where it is not known."""
+def values(diagnosis: Diagnosis, cause: Cause, effects: Sequence[Effect]) -> list[str]:
+    """Return how far off the effects of a cause are, the most telling first."""
     errors = {(f.effect.name, f.effect.site): f.std for f in diagnosis.effects}
     curve, rows = furthest_off(diagnosis, cause), []
     if curve is not None:
         rows.append(f'off by {furthest(curve[1])}')
-    for effect in effects_of(diagnosis, cause):
+    for effect in effects:
         if isinstance(effect, FrameCurve):
             rows.append(f'moves by {furthest_frame(effect)}')
         if effect.name in CURVES:
@@ -66,12 +55,6 @@ def _in_a_quarter(effect: Effect, robot: Robot) -> list[str]:
     return [f'off by {in_short(_QUARTER * float(share), None, 1.0, "°")} in every 90°']
 
 
-def one_of(diagnosis: Diagnosis, cause: Cause) -> str:
-    """Return the name of the effect whose values are told, of those that fit alike."""
-    first = effects_of(diagnosis, cause)[0]
-    return named(first.name, first.site)
-
-
 def _trail(diagnosis: Diagnosis, lag: ServoLag) -> str:
     """Return how far a joint trails its command where the recordings move it fastest."""
     robot = diagnosis.model.robot
@@ -84,20 +67,3 @@ def _trail(diagnosis: Diagnosis, lag: ServoLag) -> str:
             f'{lag.joint} trails by {millimetres(trail)} at its fastest ({1e3 * fastest:.0f} mm/s)'
         )
     return f'{lag.joint} trails by {turned(trail)} at its fastest ({DEGREES * fastest:.0f} °/s)'
-
-
-def furthest_off(diagnosis: Diagnosis, cause: Cause) -> tuple[int, JointCurve] | None:
-    """Return which curve is furthest off of those that stand for a cause; a constant only alone."""
-    found = diagnosis.model.found
-    curves = {
-        m: effect
-        for m in cause.members
-        if m < len(found) and isinstance(effect := found[m], JointCurve)
-    }
-    if not curves:
-        return None
-
-    def rank(item: tuple[int, JointCurve]) -> tuple[bool, float]:
-        return item[1].over != 'constant', float(np.abs(item[1].values).max())
-
-    return max(curves.items(), key=rank)

@@ -16,21 +16,6 @@ BRANDS = {
     'yaskawa': 'Yaskawa',
 }
 """By the start of a robot's name, as the bundled models and most URDFs have it."""
-_KINDS = {
-    'joint_offset': 'zero',
-    'joint_slip': 'zero',
-    'base_pose': 'base',
-    'setup_step': 'base',
-    'root_pose': 'root',
-    'tool_pose': 'tool',
-    'tool_slip': 'tool',
-    'wear': 'tool',
-    'payload': 'load',
-    'link_length': 'model',
-    'link_offset': 'model',
-    'link_twist': 'model',
-    'axis_parallelism': 'model',
-}
 _PROGRAM = (
     'The controller has no field for it: correct the points of the program (weld-twin correct).'
 )
@@ -90,8 +75,6 @@ _PLACES = {
 """Menus as they are usually called. docs/sheet.md tells which names were found where."""
 _BY_MODEL = ('ur',)
 """Makers whose controllers keep an error of a zero in their model: the readings stay as they are."""
-_GEARED = ('gear_ratio', 'joint_coupling')
-"""Errors that some controllers have a field for."""
 _RATIO = (
     'Where the controller has a field for ratios of gears; else correct the points of the program '
     '(weld-twin correct).'
@@ -138,11 +121,11 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
         Tells which joints slide; left out, all turn.
 
     """
-    kind = _KINDS.get(effect.name)
-    if kind is None and effect.name not in _BY_PROGRAM:
-        return f'Nothing to enter: {_MATTERS.get(effect.name, _OWN)}.'
-    if effect.name in _GEARED:
+    kind = effect.entered
+    if kind == 'ratio':
         return _RATIO
+    if kind not in _ANYWHERE and kind != 'program':
+        return f'Nothing to enter: {_instead(effect)}.'
     sliding = (
         robot is not None
         and effect.site in robot.joint_names
@@ -150,17 +133,26 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
     )
     off = _off(effect, sliding)
     # The makers' fields of a zero are angles; what a slide's count is not known.
-    if kind is not None and (brand is None or (sliding and kind == 'zero')):
+    if kind in _ANYWHERE and (brand is None or (sliding and kind == 'zero')):
         told = _ANYWHERE[kind].format(**off)
         return told + (
             '.' if brand else '; --controller with the name of its maker tells the menu.'
         )
-    place = _PLACES.get((str(brand), str(kind)))
+    place = _PLACES.get((str(brand), kind))
     if place is None:
         return _PROGRAM
     check = _CHECK if kind == 'zero' and brand not in _BY_MODEL else ''
     place = f'{place} {check}'.format(**off).rstrip()
     return f'{place} {UNCHECKED}' if ' > ' in place else place
+
+
+def _instead(effect: Effect) -> str:
+    """Return what an error is a matter of where a controller has nothing to enter for it."""
+    if not effect.entered:
+        return 'no field of a controller is known for it'
+    if effect.place in ('instrument', 'clock'):
+        return f'the robot is not at fault, but how it was recorded: {effect.entered}'
+    return f'a matter of {effect.entered}'
 
 
 def gearing(effect: Effect) -> str:
@@ -185,43 +177,3 @@ def _off(effect: Effect, sliding: bool) -> dict[str, str]:
         'radians': radians,
         'radians_back': radians_back,
     }
-
-
-_BY_PROGRAM = (
-    'gear_ratio',
-    'transmission_ripple',
-    'joint_coupling',
-    'joint_compliance',
-    'bearing_tilt',
-    'pedestal_tilt',
-    'guide_bend',
-    'guide_tilt',
-    'hose_pull',
-    'joint_curve',
-    'frame_curve',
-)
-"""Errors of the arm that programs can be corrected for and that controllers have no field for."""
-_GEAR = "a matter of the joint's gear"
-_RECORDING = 'the robot is not at fault, but how it was recorded'
-_MATTERS = {
-    'backlash': _GEAR,
-    'hysteresis': _GEAR,
-    'gear_ratio_by_direction': _GEAR,
-    'loaded_play': _GEAR,
-    'friction': "a matter of the joint's gear, bearings and grease",
-    'servo_lag': "a matter of the drive's gains and feed-forward",
-    'vibration': 'a matter of how the motion is planned, and of stiffness',
-    'quantization': 'a matter of the encoder',
-    'cartesian_compliance': 'a matter of stiffness and of the force at the tool',
-    'thermal_growth': 'a matter of warming up, or of the temperature in the cell',
-    'link_warm_up': 'a matter of warming up',
-    'drift': 'a matter of what the frame stands on, or of the temperature',
-    'setup_settling': 'a matter of how the set-up is held',
-    'time_delay': f'{_RECORDING}: its clocks',
-    'clock_rate': f'{_RECORDING}: its clocks',
-    'measurement_scale': f'{_RECORDING}: the scale of the instrument',
-    'refraction': f'{_RECORDING}: warm air bent the line of sight',
-    'instrument_knock': f'{_RECORDING}: the instrument or the base was knocked',
-}
-"""What a cause is a matter of where a controller has nothing to enter for it."""
-_OWN = 'no field of a controller is known for it'

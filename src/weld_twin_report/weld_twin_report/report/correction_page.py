@@ -10,7 +10,7 @@ from typing import Any
 from weld_twin_msgs_py.files.input_files import InputFile
 
 from .footing import inputs_section
-from .html import Html, document, section, table, tag
+from .html import Figure, Html, document, figures, main, section, sentences, table, tag
 
 ROWS = 500
 """Moves in the table of the page at most; correction.json has them all."""
@@ -28,14 +28,11 @@ def correction_page(entry: Mapping[str, Any], inputs: Sequence[InputFile] = ()) 
 
     """
     title = f'{entry["program"]} · {entry["robot"]}'
-    body = tag(
-        'main',
-        tag(
-            'header',
-            tag('p', 'Corrected program ', tag('b', entry['language']), class_='kind'),
-            tag('p', title, class_='subject'),
-        ),
-        tag('section', tag('h1', headline(entry)), _figures(entry), id_='verdict'),
+    body = main(
+        ('Corrected program ', entry['language']),
+        title,
+        headline(entry),
+        _figures(entry),
         _first_run(entry),
         _left(entry),
         _outside(entry),
@@ -69,7 +66,7 @@ def _rms(accuracy: Mapping[str, Any]) -> str:
 
 def _figures(entry: Mapping[str, Any]) -> Html:
     moved = [move for move in entry['moves'] if move['corrected']]
-    cells = []
+    cells: list[Figure] = []
     for key, name in (('before', 'Before'), ('after', 'After')):
         value = entry['expected'][key]
         if value is not None:
@@ -80,14 +77,7 @@ def _figures(entry: Mapping[str, Any]) -> Html:
     cells.append(
         ('Moved', f'{most * 1e3:.3f} mm', f'at most, and turned by {_degrees(turn)} at most')
     )
-    return tag(
-        'dl',
-        *(
-            tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
-            for name, value, note in cells
-        ),
-        class_='figures',
-    )
+    return figures(cells)
 
 
 def _span(accuracy: Mapping[str, Any]) -> str:
@@ -188,5 +178,5 @@ def _degrees(turn: float) -> str:
 def _notes(entry: Mapping[str, Any]) -> Html | None:
     if not entry['notes']:
         return None
-    items = [tag('li', f'{text[:1].upper()}{text[1:]}.') for text in entry['notes']]
-    return section('What was assumed', tag('ul', *items, class_='sentences'), id_='notes')
+    told = sentences(f'{text[:1].upper()}{text[1:]}.' for text in entry['notes'])
+    return section('What was assumed', told, id_='notes')

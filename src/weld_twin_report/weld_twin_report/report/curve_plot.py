@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.result import Cause, Diagnosis
 from weld_twin_core.effects.curve import basis
 from weld_twin_core.effects.frame_curve import FrameCurve
 from weld_twin_core.effects.joint_curve import JointCurve
@@ -33,19 +34,19 @@ _AXES = {
 _VALUES = {'d': (1e3, 'mm'), 'a': (1e3, 'mm')}
 
 
-def curve_figure(curve: JointCurve, covariance: Array | None, joint: int) -> Html:
+def curve_figure(diagnosis: Diagnosis, m: int, curve: JointCurve) -> Html:
     """
-    Return a figure of a curve over what it runs over.
+    Return a figure of a curve over what it runs over; over its angle, the cursor follows the instant.
 
     Parameters
     ----------
+    diagnosis : Diagnosis
+    m : int
+        Which of the effects found it is; their covariance makes the band.
     curve : JointCurve
-    covariance : array, shape (K, K), optional
-        Of its values; without it there is no band.
-    joint : int
-        Number of its joint: over its angle, the cursor follows the instant looked at.
 
     """
+    covariance = _spread(diagnosis, m)
     x, weights, y = _sampled(curve)
     band = np.zeros_like(y)
     if covariance is not None:
@@ -62,8 +63,39 @@ def curve_figure(curve: JointCurve, covariance: Array | None, joint: int) -> Htm
         [Line('off by', middle), Line('not off', 0.0 * middle, 'soft', dashed=True)],
         (label, Axis('off by', unit)),
         band=(middle - half, middle + half),
-        joint=joint if curve.over == 'angle' else None,
+        joint=diagnosis.model.robot.index(curve.joint) if curve.over == 'angle' else None,
     )
+
+
+def _spread(diagnosis: Diagnosis, m: int) -> Array | None:
+    """Return the covariance of the coordinates of a found effect, None where it is not known."""
+    effect, posterior = diagnosis.model.found[m], diagnosis.posterior
+    if posterior is None:
+        return None
+    what = posterior.directions
+    starts = what.frame_count + np.concatenate([[0], np.cumsum(what.sizes)]).astype(int)
+    for k, other in enumerate(what.effects):
+        if (other.name, other.site, other.key) == (effect.name, effect.site, effect.key):
+            rows = slice(starts[k], starts[k + 1])
+            return np.asarray(posterior.covariance[rows, rows])
+    return None
+
+
+def furthest_off(diagnosis: Diagnosis, cause: Cause) -> tuple[int, JointCurve] | None:
+    """Return which curve is furthest off of those that stand for a cause; a constant only alone."""
+    found = diagnosis.model.found
+    curves = {
+        m: effect
+        for m in cause.members
+        if m < len(found) and isinstance(effect := found[m], JointCurve)
+    }
+    if not curves:
+        return None
+
+    def rank(item: tuple[int, JointCurve]) -> tuple[bool, float]:
+        return item[1].over != 'constant', float(np.abs(item[1].values).max())
+
+    return max(curves.items(), key=rank)
 
 
 def furthest(curve: JointCurve) -> str:

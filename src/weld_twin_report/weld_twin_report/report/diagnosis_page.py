@@ -11,7 +11,6 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.metrics.conformity import Rule
 from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_nodes.wording.quantities import counted
-from weld_twin_nodes.wording.words import status_word
 
 from .acceptance import (
     Demand,
@@ -23,18 +22,18 @@ from .acceptance import (
     rule_data,
     rule_of,
 )
+from .answer import Answer
 from .cause_cards import causes_cards
-from .cause_list import causes_section
-from .changed_section import changed_section
+from .cause_list import causes_section, changed_section
 from .charts import embedded
 from .circle_plot import circle_data, circles_section
 from .contact_clouds import contacts_section
 from .controllers import brand_of
 from .footing import checks_section, inputs_section, next_section
 from .gap_location import where_section
-from .headline import header, opening
 from .html import Html, document, joined, own_file, tag
 from .joint_names import renamed
+from .opening import header, opening
 from .page_data import page_data
 from .printed import printed_section
 from .seam_view import left_out, seam_section
@@ -80,23 +79,23 @@ def report_page(
     """
     sheet = sheet or Sheet()
     rule = rule_of(diagnosis, sheet.demand)
-    sound = diagnosis.status != 'unsound'
-    judged = _judged(diagnosis, rule) if sound else None
     brand = sheet.brand or brand_of(diagnosis.model.robot.name)
+    answer = Answer(diagnosis, rule, brand)
+    judged = _judged(diagnosis, rule) if answer.sound else None
     body = joined(
         [
-            header(diagnosis),
-            opening(diagnosis, judged, rule if sound else None, brand),
-            *(_causes(diagnosis, sheet, rule, brand) if sound else ()),
+            header(answer),
+            opening(answer, judged),
+            *(_causes(answer, sheet.demand) if answer.sound else ()),
             checks_section(diagnosis),
-            _engineers(diagnosis) if sound else None,
-            printed_section(diagnosis, inputs, judged),
+            _engineers(answer) if answer.sound else None,
+            printed_section(answer, inputs, judged),
         ]
     )
-    title = f'{status_word(diagnosis)} · {diagnosis.model.robot.name} · diagnosis'
+    title = f'{answer.status} · {diagnosis.model.robot.name} · diagnosis'
     foot = tag('div', inputs_section(inputs), class_='detail')
     main = tag('main', Html(renamed(body, sheet.joints)), foot)
-    if not sound:
+    if not answer.sound:
         return document(title, main)
     data = {
         **page_data(diagnosis),
@@ -109,28 +108,27 @@ def report_page(
     return document(title, main, told, charts=True, scripts=scripts)
 
 
-def _causes(
-    diagnosis: Diagnosis, sheet: Sheet, rule: Rule, brand: str | None
-) -> tuple[Html | None, ...]:
+def _causes(answer: Answer, demand: Demand) -> tuple[Html | None, ...]:
     """Return what causes the gap, whether it passes, where it lies, and what to measure next."""
+    diagnosis = answer.diagnosis
     return (
-        acceptance_section(diagnosis, sheet.demand),
-        causes_cards(diagnosis, brand, rule),
+        acceptance_section(diagnosis, demand),
+        causes_cards(answer),
         seam_section(diagnosis) if diagnosis.contacts is None else contacts_section(diagnosis),
         circles_section(diagnosis),
-        where_section(diagnosis),
-        next_section(diagnosis),
+        where_section(answer),
+        next_section(answer),
     )
 
 
-def _engineers(diagnosis: Diagnosis) -> Html:
+def _engineers(answer: Answer) -> Html:
     """Return rivals, changes and the way the gap shrinks: whom the answer is enough need none of it."""
     return tag(
         'details',
         tag('summary', 'For engineers: what else it could be, and how far each effect shrinks it'),
-        causes_section(diagnosis),
-        changed_section(diagnosis),
-        shrink_section(diagnosis),
+        causes_section(answer),
+        changed_section(answer),
+        shrink_section(answer.diagnosis),
         class_='detail',
     )
 

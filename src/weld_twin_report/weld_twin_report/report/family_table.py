@@ -13,8 +13,6 @@ from weld_twin_core.effects.transmission_ripple import TransmissionRipple
 from weld_twin_nodes.wording.quantities import millimetres, turned
 from weld_twin_nodes.wording.words import cause, site_name
 
-from .html import Html, joined, table, tag
-
 _LARGEST = 3
 """Joints of a kind told, those first that need it most."""
 _LINES = 3
@@ -73,24 +71,3 @@ def ripple_rows(diagnosis: Diagnosis) -> list[list[str]]:
 
 FAMILY_HEADS = ('Kind', 'Accounts for', 'Error without it', 'Needed at', 'Would do as well')
 RIPPLE_HEADS = ('Joint', 'Ripple, RMS', 'Strongest orders per turn')
-
-
-def families_table(diagnosis: Diagnosis) -> Html:
-    """Return the kinds found, and the ripple of every joint."""
-    rows = ripple_rows(diagnosis)
-    return joined(
-        [
-            tag('h3', 'Errors found, by kind'),
-            table(FAMILY_HEADS, family_rows(diagnosis.families), 'effects'),
-            tag(
-                'p',
-                'A kind is named where data that were not fitted get worse without it by a tenth or '
-                'more in the median part left out, and better in none; all other kinds that are '
-                'needed and the frames are fitted anew each time. Exchangeable: the other kinds take '
-                'its place. Every member and order is in effects.yaml.',
-                class_='note',
-            ),
-            tag('h3', 'Transmission ripple by joint') if rows else None,
-            table(RIPPLE_HEADS, rows) if rows else None,
-        ]
-    )

@@ -19,10 +19,10 @@ from weld_twin_nodes.wording.words import (
     listed,
     open_sets,
     place_name,
-    site_name,
 )
 
-from .html import Child, Html, joined, section, table, tag
+from .answer import Answer
+from .html import Child, Html, joined, pairs, section, table, tag
 from .to_do import made_for, minutes
 from .untried import untried
 
@@ -41,17 +41,18 @@ _ORDER = {'unsound': 0, 'warning': 1, 'note': 2, 'ok': 3}
 """What needs attention comes first."""
 
 
-def next_section(diagnosis: Diagnosis) -> Html:
+def next_section(answer: Answer) -> Html:
     """Return the measurement that would decide, or that none is needed."""
+    diagnosis = answer.diagnosis
     wanted = diagnosis.next_experiment
     if wanted is not None:
         sure = diagnosis.status == 'identified'
         content = joined([
             tag('p', _SURER) if sure else None,
             _wanted(wanted, _sites(diagnosis)),
-            *_left_open(diagnosis, wanted),
+            *_left_open(answer, wanted),
         ])  # fmt: skip
-    elif diagnosis.status == 'unknown' or open_sets(diagnosis):
+    elif diagnosis.status == 'unknown' or answer.open:
         content = tag('p', 'No measurement that would decide has been found.')
     else:
         text = f'{_ENOUGH[bool(untried(diagnosis))]} {untried(diagnosis)}'.rstrip()
@@ -89,11 +90,15 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
     elif wanted.get('expected_separation_sigma'):
         sigma = f'{wanted["expected_separation_sigma"]:.0f}'
         rest['tells them apart by'] = f'{sigma} standard deviations, as far as can be foreseen'
-    lines = [tag('p', in_words(wanted['sentence'], sites))] if wanted.get('sentence') else []
+    parts = [tag('p', in_words(wanted['sentence'], sites))] if wanted.get('sentence') else []
     why = parts_what(wanted) or (in_words(wanted['reason'], sites) if wanted.get('reason') else '')
-    lines += [tag('p', why, class_='note')] if why else []
-    entries = _entries(rest)
-    return joined([*lines, tag('dl', *entries, class_='pairs') if entries else None])
+    parts += [tag('p', why, class_='note')] if why else []
+    entries = [
+        (key.replace('_', ' ').capitalize(), _plain(value))
+        for key, value in rest.items()
+        if value not in (None, '') and not _is_bulk(value)
+    ]
+    return joined([*parts, pairs(entries) if entries else None])
 
 
 def parts_what(wanted: Mapping[str, Any]) -> str:
@@ -125,24 +130,15 @@ def _side(item: Mapping[str, Any], same: bool) -> str:
     return f'{at} that {depending(str(item.get("on")))}' if same else at
 
 
-def _left_open(diagnosis: Diagnosis, wanted: dict[str, Any]) -> list[Html]:
+def _left_open(answer: Answer, wanted: dict[str, Any]) -> list[Html]:
     """Return which open questions a measurement is not made for: motion may never part them."""
-    out = []
-    for group in open_sets(diagnosis):
-        if not made_for(wanted, group):
-            names = listed([site_name(site) for site in group], 'or')
-            told = f'It is not made to tell whether it is {names}: see what to do first.'
-            out.append(tag('p', told, class_='note'))
-    return out
-
-
-def _entries(mapping: dict[str, Any]) -> list[Html]:
-    out = []
-    for key, value in mapping.items():
-        if value in (None, '') or _is_bulk(value):
-            continue
-        out += [tag('dt', key.replace('_', ' ').capitalize()), tag('dd', _plain(value))]
-    return out
+    told = 'It is not made to tell whether it is {}: see what to do first.'
+    sets = zip(open_sets(answer.diagnosis), answer.open, strict=True)
+    return [
+        tag('p', told.format(names), class_='note')
+        for group, names in sets
+        if not made_for(wanted, group)
+    ]
 
 
 def _is_bulk(value: Any) -> bool:

@@ -8,15 +8,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from weld_twin_core.diagnosis.result import Cause, Diagnosis
+from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.effects import REGISTRY
 from weld_twin_nodes.wording.quantities import millimetres, percent, seconds
-from weld_twin_nodes.wording.switches import alternatives, as_it_is
+from weld_twin_nodes.wording.switches import as_it_is
 from weld_twin_nodes.wording.words import DEPENDENCES, HALF, REGIMES, likely, listed, place_name
 
+from .answer import Answer
+from .cause_answer import CauseAnswer
 from .directions import components, sides_words, worst
 from .html import Html, bars, joined, section, tag
-from .remainder import SEEN, places, remainder
+from .remainder import SEEN
 from .seam_view import at_rest, seen_at
 
 _FRAMED = (
@@ -38,73 +40,74 @@ _VISIBLE = 0.005
 """Share below which a cell of the map stays empty: it would read 0."""
 
 
-def where_section(diagnosis: Diagnosis) -> Html:
+def where_section(answer: Answer) -> Html:
     """Return where the causes lie, the same shares as theirs, and the map of each by itself."""
+    diagnosis = answer.diagnosis
     parts = [_part('By direction', _directions(diagnosis))]
     if diagnosis.status != 'none':
         parts[:0] = [
-            _part('By place', bars(_places(diagnosis))),
-            _part('By what it depends on', bars(_dependences(diagnosis))),
+            _part('By place', bars(_places(answer))),
+            _part('By what it depends on', bars(_dependences(answer))),
         ]
     return section(
         'Where it lies',
         tag('div', *parts, class_='columns'),
-        tag('p', _whole(diagnosis), class_='note'),
+        tag('p', _whole(answer), class_='note'),
         _stretches(diagnosis),
         tag('div', _by_itself(diagnosis), class_='detail'),
         id_='where',
     )
 
 
-def _places(diagnosis: Diagnosis) -> list[tuple[str, float, str]]:
+def _places(answer: Answer) -> list[tuple[str, float, str]]:
     """Return the shares of the causes by place, then what is left and the noise."""
-    if not diagnosis.causes:
-        return [(name, share, percent(share)) for name, share in diagnosis.where.joints]
-    return _summed([(_at(diagnosis, c), c.share, place_name) for c in diagnosis.causes], diagnosis)
+    if not answer.causes:
+        where = answer.diagnosis.where
+        return [(name, share, percent(share)) for name, share in where.joints]
+    return _summed(answer, _at, place_name)
 
 
-def _at(diagnosis: Diagnosis, cause: Cause) -> Sequence[tuple[str, float]]:
+def _at(told: CauseAnswer) -> Sequence[tuple[str, float]]:
     """Return the places of a cause; where several causes fit alike, theirs, and none is surer."""
-    alike = alternatives(diagnosis, cause)
-    own = [site.joint or getattr(REGISTRY.get(site.effect), 'place', None) for site in alike]
+    own = [site.joint or getattr(REGISTRY.get(site.effect), 'place', None) for site in told.alike]
     places = list(dict.fromkeys(place for place in own if place not in (None, 'joint')))
-    return [(place, HALF / len(places)) for place in places] or cause.place
+    return [(place, HALF / len(places)) for place in places] or told.cause.place
 
 
-def _dependences(diagnosis: Diagnosis) -> list[tuple[str, float, str]]:
-    if not diagnosis.causes:
+def _dependences(answer: Answer) -> list[tuple[str, float, str]]:
+    diagnosis = answer.diagnosis
+    if not answer.causes:
         regimes = sorted(diagnosis.where.regimes.items(), key=lambda item: -item[1])
         return [(REGIMES.get(name, name), share, percent(share)) for name, share in regimes]
     words = {**DEPENDENCES, 'constant': 'constant'}
-    return _summed(
-        [(_on(diagnosis, c), c.share, lambda on: words.get(on, on)) for c in diagnosis.causes],
-        diagnosis,
-    )
+    return _summed(answer, _on, lambda on: words.get(on, on))
 
 
-def _on(diagnosis: Diagnosis, cause: Cause) -> Sequence[tuple[str, float]]:
+def _on(told: CauseAnswer) -> Sequence[tuple[str, float]]:
     """Return what a cause depends on; where several causes fit alike, what each of them does."""
-    effects = [REGISTRY.get(site.effect) for site in alternatives(diagnosis, cause)]
+    effects = [REGISTRY.get(site.effect) for site in told.alike]
     on = list(dict.fromkeys(effect.depends_on for effect in effects if effect is not None))
-    return [(each, HALF / len(on)) for each in on] if len(on) > 1 else cause.dependence
+    return [(each, HALF / len(on)) for each in on] if len(on) > 1 else told.cause.dependence
 
 
 def _summed(
-    told: Sequence[tuple[Sequence[tuple[str, float]], float, Callable[[str], str]]],
-    diagnosis: Diagnosis,
+    answer: Answer,
+    beliefs: Callable[[CauseAnswer], Sequence[tuple[str, float]]],
+    word: Callable[[str], str],
 ) -> list[tuple[str, float, str]]:
     """Return shares by what is most probable of each cause; with the rest they make a whole."""
     sums: dict[str, float] = {}
-    for beliefs, share, word in told:
-        name = likely(beliefs, word) or 'not found'
-        sums[name] = sums.get(name, 0.0) + share
+    for told in answer.causes:
+        name = likely(beliefs(told), word) or 'not found'
+        sums[name] = sums.get(name, 0.0) + told.cause.share
     rows = sorted(sums.items(), key=lambda item: -item[1])
-    rows = [row for row in rows if row[1] >= SEEN] + list(remainder(diagnosis))
-    return [(name, share, percent(share, places(diagnosis))) for name, share in rows]
+    rows = [row for row in rows if row[1] >= SEEN] + list(answer.remainder)
+    return [(name, share, answer.percent(share)) for name, share in rows]
 
 
-def _whole(diagnosis: Diagnosis) -> str:
+def _whole(answer: Answer) -> str:
     """Return why what is found explains less than the whole."""
+    diagnosis = answer.diagnosis
     if diagnosis.status == 'none':
         return 'All of it is at the level of the noise, so it lies nowhere in particular.'
     if not diagnosis.causes:
@@ -112,11 +115,11 @@ def _whole(diagnosis: Diagnosis) -> str:
     shares = [cause.share for cause in diagnosis.causes if not cause.rest]
     left = [cause.share for cause in diagnosis.causes if cause.rest]
     told, left = sum(shares or left), left if shares else []
-    rows = [*(('without a name', share) for share in left), *remainder(diagnosis)]
-    rest = [f'{percent(share, places(diagnosis))} is {name}' for name, share in rows]
+    rows = [*(('without a name', share) for share in left), *answer.remainder]
+    rest = [f'{answer.percent(share)} is {name}' for name, share in rows]
     held = 'The causes explain' if diagnosis.effects else 'The places found hold'
     return (
-        f'{held} {percent(told, places(diagnosis))} of the squared gap; '
+        f'{held} {answer.percent(told)} of the squared gap; '
         f'{listed(rest)}. So a place can be certain and still hold less than the whole.'
     )
 

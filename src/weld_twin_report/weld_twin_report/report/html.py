@@ -83,6 +83,61 @@ def bars(rows: Iterable[tuple[str, float, str]], class_: str = '') -> Html:
     return tag('ul', *out, class_=f'bars {class_}'.strip())
 
 
+Figure = tuple[str, Child, Child]
+"""What is asked, the answer, and what stands behind it."""
+
+
+def figures(cells: Iterable[Figure]) -> Html:
+    """Return the few large figures at the top of a page."""
+    told = [
+        tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
+        for name, value, note in cells
+    ]
+    return tag('dl', *told, class_='figures')
+
+
+def pairs(rows: Iterable[tuple[str, Child]]) -> Html:
+    """Return heads and what belongs to each; what is empty is left out."""
+    told = [part for head, text in rows if text for part in (tag('dt', head), tag('dd', text))]
+    return tag('dl', *told, class_='pairs')
+
+
+def sentences(texts: Iterable[Child]) -> Html:
+    """Return sentences below each other as a list."""
+    return tag('ul', *(tag('li', text) for text in texts), class_='sentences')
+
+
+def lines(texts: Iterable[Child]) -> Html | None:
+    """Return texts below each other in a cell; None without any."""
+    told = [tag('span', text) for text in texts]
+    return tag('span', *told, class_='lines') if told else None
+
+
+def main(
+    kind: tuple[str, str], subject: str, headline: str, cells: Html, *sections: Child
+) -> Html:
+    """
+    Return the frame of a page: what it is of, its headline and figures, and its sections.
+
+    Parameters
+    ----------
+    kind : tuple of two str
+        What sort of page it is, the second part in bold.
+    subject : str
+        What it is of.
+    headline : str
+    cells : Html
+        The figures.
+    *sections : str or None
+
+    """
+    bold = tag('b', kind[1]) if kind[1] else None
+    head = tag(
+        'header', tag('p', kind[0], bold, class_='kind'), tag('p', subject, class_='subject')
+    )
+    return tag('main', head, tag('section', tag('h1', headline), cells, id_='verdict'), *sections)
+
+
 POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 """What a page may load: nothing but its own style; a page that needs more says so."""
 

@@ -13,7 +13,7 @@ from weld_twin_nodes.offline.investigation import foreseen
 from weld_twin_nodes.wording.quantities import odds
 from weld_twin_nodes.wording.words import cause, in_words, listed, place_name
 
-from .html import Child, Html, bars, document, section, tag
+from .html import Child, Figure, Html, bars, document, figures, main, section, tag
 
 SHOWN = 5
 """Hypotheses that a round shows at most; further ones have little probability left."""
@@ -41,14 +41,11 @@ def investigation_page(state: Mapping[str, Any]) -> str:
         The content of investigation.json.
 
     """
-    body = tag(
-        'main',
-        tag(
-            'header',
-            tag('p', 'Investigation ', tag('b', str(state['state'])), class_='kind'),
-            tag('p', str(state['robot']), class_='subject'),
-        ),
-        tag('section', tag('h1', headline(state)), _figures(state), id_='verdict'),
+    body = main(
+        ('Investigation ', str(state['state'])),
+        str(state['robot']),
+        headline(state),
+        _figures(state),
         section(
             'The way there',
             _tree(state),
@@ -79,7 +76,7 @@ def _figures(state: Mapping[str, Any]) -> Html:
     told = 'experiments decided what they were to decide'
     if foreseen:
         told += f'; {sum(foreseen):.1f} were foreseen'
-    cells = [
+    cells: list[Figure] = [
         ('Belief', str(last['status']), '' if sure is None else f'{odds(sure)} sure'),
         (
             'Minutes',
@@ -88,14 +85,7 @@ def _figures(state: Mapping[str, Any]) -> Html:
         ),
         ('Decided', f'{sum(bool(a["decided"]) for a in judged)} of {len(judged)}', told),
     ]
-    return tag(
-        'dl',
-        *(
-            tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
-            for name, value, note in cells
-        ),
-        class_='figures',
-    )
+    return figures(cells)
 
 
 def _tree(state: Mapping[str, Any]) -> Html:

@@ -11,10 +11,10 @@ from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_nodes.wording.quantities import millimetres
 
+from .answer import recorded_at
 from .charts import Axis, Line, chart
 from .footing import inputs_section
-from .headline import recorded_at
-from .html import Html, document, section, table, tag
+from .html import Figure, Html, document, figures, main, pairs, section, sentences, table
 from .performance_table import MEANINGS, POSE_HEADS, path_row, pose_rows, sentence
 
 
@@ -40,19 +40,16 @@ def performance_page(
 
     """
     subject = [robot, recording.name, recorded_at([recording])]
-    body = tag(
-        'main',
-        tag(
-            'header',
-            tag('p', 'Positional accuracy ', tag('b', 'ISO 9283'), class_='kind'),
-            tag('p', ' · '.join(part for part in subject if part), class_='subject'),
-        ),
-        tag('section', tag('h1', sentence(found)), _figures(found), id_='verdict'),
+    body = main(
+        ('Positional accuracy ', 'ISO 9283'),
+        ' · '.join(part for part in subject if part),
+        sentence(found),
+        _figures(found),
         _poses(found),
         None if found.path is None else _path(found.path),
         _told('What the standard asks for beyond this', found.lacking, 'lacking'),
         _told('How it was measured', [*notes, *recording.notes], 'notes'),
-        _meanings(),
+        section('What the letters mean', pairs(MEANINGS), id_='meanings'),
         inputs_section(inputs),
     )
     return document(f'ISO 9283 · {robot} · {recording.name}', body, charts=True)
@@ -60,7 +57,7 @@ def performance_page(
 
 def _figures(found: Performance) -> Html:
     poses = [pose.performance for pose in found.poses]
-    cells = []
+    cells: list[Figure] = []
     if poses:
         count = f'{len(poses)} pose{"s"[: len(poses) > 1]}'
         cells += [
@@ -71,14 +68,7 @@ def _figures(found: Performance) -> Html:
         f = found.path.performance
         of = f'of {f.cycles} cycles of the path'
         cells += [('AT', millimetres(f.at_m), of), ('RT', millimetres(f.rt_m), of)]
-    return tag(
-        'dl',
-        *(
-            tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
-            for name, value, note in cells
-        ),
-        class_='figures',
-    )
+    return figures(cells)
 
 
 def _poses(found: Performance) -> Html | None:
@@ -112,13 +102,7 @@ def _path(path: PathTest) -> Html:
     )
 
 
-def _told(title: str, sentences: Sequence[str], name: str) -> Html | None:
-    if not sentences:
+def _told(title: str, texts: Sequence[str], name: str) -> Html | None:
+    if not texts:
         return None
-    items = [tag('li', f'{text[:1].upper()}{text[1:]}.') for text in sentences]
-    return section(title, tag('ul', *items, class_='sentences'), id_=name)
-
-
-def _meanings() -> Html:
-    pairs = [part for name, text in MEANINGS for part in (tag('dt', name), tag('dd', text))]
-    return section('What the letters mean', tag('dl', *pairs, class_='pairs'), id_='meanings')
+    return section(title, sentences(f'{t[:1].upper()}{t[1:]}.' for t in texts), id_=name)

@@ -10,10 +10,11 @@ from pathlib import PurePath
 from weld_twin_core import __version__
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_msgs_py.files.input_files import InputFile
-from weld_twin_nodes.wording.words import listed, open_sets, passed, site_name, status_word
+from weld_twin_nodes.wording.words import passed
 
+from .answer import Answer
 from .footing import measured_next
-from .html import Child, Html, tag
+from .html import Child, Html, pairs, tag
 
 _SHORT = 12
 """Digits of a hash that tell files apart on paper; the page has all."""
@@ -23,22 +24,20 @@ _FINDINGS = 3
 """Checks told on paper, the gravest; the page has all."""
 
 
-def printed_section(
-    diagnosis: Diagnosis, inputs: Sequence[InputFile], judged: Html | None
-) -> Html:
+def printed_section(answer: Answer, inputs: Sequence[InputFile], judged: Html | None) -> Html:
     """Return what only a print shows, with the lines to sign on: a side may part from the other."""
+    diagnosis = answer.diagnosis
     rows: list[tuple[str, Child]] = [
         ('Data', _data(diagnosis)),
-        ('Cannot be told apart', _alike(diagnosis)),
+        ('Cannot be told apart', '; '.join(answer.open)),
         ('Measure next', measured_next(diagnosis)),
         ('Made from', _files(inputs)),
     ]
-    pairs = [part for head, text in rows if text for part in (tag('dt', head), tag('dd', text))]
     lines = [tag('span', text) for text in ('Checked by', 'Date', 'Signature')]
-    status = tag('span', status_word(diagnosis), class_=f'status {diagnosis.status}')
+    status = tag('span', answer.status, class_=f'status {diagnosis.status}')
     return tag(
         'section',
-        tag('dl', *pairs, class_='pairs'),
+        pairs(rows),
         tag('div', status, judged),
         tag('p', *lines, class_='signatures'),
         class_='printed',
@@ -54,11 +53,6 @@ def _data(diagnosis: Diagnosis) -> str:
     if len(open_ones) > _FINDINGS:
         told.append(f'{len(open_ones) - _FINDINGS} more are on the page.')
     return ' '.join([f'{passed(fine, len(diagnosis.checks)).capitalize()}.', *told])
-
-
-def _alike(diagnosis: Diagnosis) -> str | None:
-    told = [listed([site_name(site) for site in group], 'or') for group in open_sets(diagnosis)]
-    return '; '.join(told) or None
 
 
 def _files(inputs: Sequence[InputFile]) -> Html:

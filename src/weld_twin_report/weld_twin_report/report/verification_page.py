@@ -11,11 +11,11 @@ import numpy as np
 from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_nodes.offline.verifying import Left, Promise, Verification
 from weld_twin_nodes.wording.quantities import millimetres
-from weld_twin_nodes.wording.words import CAUSES, cause, listed
+from weld_twin_nodes.wording.words import called, cause, listed
 
 from .charts import Axis, Line, chart
 from .footing import inputs_section
-from .html import Html, document, section, table, tag
+from .html import Html, document, figures, main, section, table, tag
 
 _STATES = {
     'gone': 'went away',
@@ -70,7 +70,7 @@ def _name(left: Left) -> str:
     if len(left.sites) == 1:
         return cause(left.sites[0].effect, left.sites[0].joint)
     kind = left.sites[0].effect
-    return f'{CAUSES.get(kind, kind)} of {listed([str(site.joint) for site in left.sites])}'
+    return f'{called(kind)} of {listed([str(site.joint) for site in left.sites])}'
 
 
 def _share(left: Left) -> str:
@@ -89,14 +89,11 @@ def verification_page(found: Verification, robot: str, inputs: Sequence[InputFil
 
     """
     title = f'{found.program} · {robot}' if found.program else robot
-    body = tag(
-        'main',
-        tag(
-            'header',
-            tag('p', 'After the correction', class_='kind'),
-            tag('p', title, class_='subject'),
-        ),
-        tag('section', tag('h1', headline(found)), _figures(found), id_='verdict'),
+    body = main(
+        ('After the correction', ''),
+        title,
+        headline(found),
+        _figures(found),
         *(tag('p', note, class_='warn') for note in found.notes),
         _causes(found),
         _drawn(found),
@@ -117,14 +114,7 @@ def _figures(found: Verification) -> Html:
         ('Measured', millimetres(found.measured_m), noise),
         ('Kept', 'yes' if found.kept else 'no', f'{found.samples} measurements'),
     )
-    return tag(
-        'dl',
-        *(
-            tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
-            for name, value, note in cells
-        ),
-        class_='figures',
-    )
+    return figures(cells)
 
 
 def _causes(found: Verification) -> Html | None:

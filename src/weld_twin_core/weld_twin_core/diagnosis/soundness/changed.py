@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arm.rotation import rotation_vector
 from ...arrays import Array
-from ...effects.tool_pose import ToolPose
+from ...effects.frame_errors import ToolPose
 from ..algebra.problem import Change, Model
 from .evidence import Case, Finding, mistake, note, warning
 from .lengths import falls, instant, length, listed

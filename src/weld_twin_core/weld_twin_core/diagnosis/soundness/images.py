@@ -154,23 +154,24 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
         else np.zeros((left.size, 0))
     )
     left = left - basis @ (basis.T @ left)
+    told: list[tuple[float, float, str]] = []
     for kind, columns in (('target_scale', _larger), ('intrinsics', _farther)):
         each = [columns(r.images, r.seen.position) for r in problem.recordings]
-        if any(each_ is None for each_ in each):
-            continue
         rows = [
             np.concatenate([part.T, np.zeros((c - 3, len(part)))])
             for part, c in zip(each, problem.rows, strict=True)
             if part is not None
         ]
+        if len(rows) < len(each):
+            continue
         column = problem.whitened(rows, scale)
         column = column - basis @ (basis.T @ column)
         size = float(column @ column)
         share = float(column @ left) / size
-        explained = share**2 * size / float(left @ left)
-        if abs(share) > TARGET_SCALE and explained > TARGET_EXPLAINS:
-            yield _too_large(case, kind, share)
-            return
+        told.append((share**2 * size / float(left @ left), share, kind))
+    explained, share, kind = max(told, default=(0.0, 0.0, ''))
+    if abs(share) > TARGET_SCALE and explained > TARGET_EXPLAINS:
+        yield _too_large(case, kind, share)
 
 
 def _larger(seen: Sightings | None, position: Array) -> Array | None:

@@ -14,16 +14,12 @@ import numpy as np
 from ...arm.robot import Robot
 from ...arm.rotation import rotation_vector
 from ...arrays import Array
-from ...effects.base_pose import BasePose
 from ...effects.constant import ChannelError
 from ...effects.effect import Effect
+from ...effects.frame_errors import BasePose, ToolPose
+from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
 from ...effects.joint_compliance import JointCompliance
-from ...effects.joint_offset import JointOffset
-from ...effects.link_length import LinkLength
-from ...effects.link_offset import LinkOffset
-from ...effects.link_twist import LinkTwist
 from ...effects.plausible import plausible
-from ...effects.tool_pose import ToolPose
 from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem
 from .evidence import Case, Finding, mistake

@@ -18,10 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
+from ...effects.dated import InstrumentKnock, JointSlip, ToolSlip
 from ...effects.effect import Effect
-from ...effects.instrument_knock import InstrumentKnock
-from ...effects.joint_slip import JointSlip
-from ...effects.tool_slip import ToolSlip
 from ...recording import Recording
 from ..algebra.problem import Problem
 from .base_change import CONSTANTS, Change, Rest, other_shapes, smooth_shapes

@@ -13,10 +13,7 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
-from ...effects.joint_offset import JointOffset
-from ...effects.link_length import LinkLength
-from ...effects.link_offset import LinkOffset
-from ...effects.link_twist import LinkTwist
+from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
 from ...recording import JointMotion, Measurements, Recording
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale

@@ -326,9 +326,18 @@ class Unseen:
         return np.array([told[part].max(initial=0.0) for part in self.parts])
 
     def squares(self, residual: Array) -> Array:
-        """Return the squared position error of every trusted sample, shape (samples,) [m^2]."""
-        rows = self.problem.measured_rows(residual, self.scale)
-        return np.concatenate([(part[:, :3] ** 2).sum(axis=1) for part in self._trusted(rows)])
+        """
+        Return the squared position error of every trusted sample, shape (samples,) [m^2].
+
+        Where an instrument tells how sure its poses are, a pose counts in each direction by that:
+        the error of three coordinates that are as sure as the usual one.
+        """
+        out = []
+        for root, part in zip(self.problem.roots, self.problem.by_sample(residual), strict=True):
+            rows = part[:, :3] if root is None else part * np.sqrt(3.0 / part.shape[1])
+            out.append((rows**2).sum(axis=1) * self.scale.position**2)
+        weights = self._trusted(list(self.scale.weights))
+        return np.concatenate(self._trusted(out)) / np.concatenate(weights)
 
     def rms(self, residual: Array) -> float:
         """Return the RMS position error over trusted samples, [m]."""

@@ -12,8 +12,8 @@ from scipy.stats import spearmanr
 from ...arm.chain import jacobian
 from ...arrays import Array
 from ...effects import Effect
-from ...effects.base_pose import BasePose
-from ...effects.joint_offset import JointOffset
+from ...effects.frame_errors import BasePose
+from ...effects.geometry import JointOffset
 from ...motion.planned_motion import plan
 from ...motion.profiles import Constant
 from ...twin.twin import Twin

@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays import Array
 from ...effects import Effect
 from ...effects.backlash import Backlash
-from ...effects.joint_offset import JointOffset
+from ...effects.geometry import JointOffset
 from ...effects.servo_lag import ServoLag
 from ..local import arc_weights
 from ..scenario import spread_of_passes

@@ -7,43 +7,42 @@ Refuses to run where the truths could be read. Stopped, it goes on where it was 
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
-from .job_options import add_pool, runner_of
+from ...study import DONE, REQUIRED, Study, option, options, study
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('cases', metavar='DIR', help='cases made by blind make')
-    parser.add_argument('--out', required=True, metavar='DIR', help='where the verdicts go')
-    parser.add_argument(
+add_arguments = options(
+    option('cases', REQUIRED, 'DIR', 'cases made by blind make'),
+    option(
         '--allow-readable',
-        action='store_true',
-        help='go on although truths lie within reach; the score tells',
-    )
-    parser.add_argument(
+        False,
+        None,
+        'go on although truths lie within reach; the score tells',
+    ),
+    option(
         '--without-holdout',
-        action='store_true',
-        help='judge the shrink on stretches of the training recording',
-    )
-    add_pool(parser)
+        False,
+        None,
+        'judge the shrink on stretches of the training recording',
+    ),
+    out='where the verdicts go',
+    pool=True,
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Diagnose and say how many verdicts there are."""
-    from ...blind import layout
     from ...blind.diagnosing import diagnose_cases
 
-    out = Path(args.out)
-    with runner_of(args, out / layout.DONE, 'diagnosing') as runner:
+    args = study.args
+    with study.runner('diagnosing', study.out / DONE) as runner:
         verdicts = diagnose_cases(
             Path(args.cases),
-            out,
+            study.out,
             runner,
             allow_readable=args.allow_readable,
             with_holdout=not args.without_holdout,
         )
     failed = sum(verdict['error'] is not None for verdict in verdicts)
     print(f'{len(verdicts) - failed} verdicts, {failed} cases could not be diagnosed')
-    return 0

@@ -7,35 +7,38 @@ Prints the seal, a hash over all cases and truths; publish it before anybody dia
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
-from .job_options import add_draw, add_pool, kinds_of, runner_of, spans_of
+from ...study import DONE, REQUIRED, Study, option, options, study
+from .draw_options import DRAW, kinds_of, spans_of
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add_draw(parser)
-    parser.add_argument('--out', required=True, metavar='DIR', help='where the recordings go')
-    parser.add_argument(
+add_arguments = options(
+    *DRAW,
+    option(
         '--truths',
-        required=True,
-        metavar='DIR',
-        help='where the truths go; keep it where a diagnosis cannot read',
-    )
-    add_pool(parser)
+        REQUIRED,
+        'DIR',
+        'where the truths go; keep it where a diagnosis cannot read',
+    ),
+    out='where the recordings go',
+    pool=True,
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Make the cases and print the seal."""
+    made(study, study.out, Path(study.args.truths))
+
+
+def made(study: Study, cases: Path, truths: Path) -> None:
+    """Make the cases that the options ask for, and print their seal."""
     from ...blind.simulator import require_simulator
 
     require_simulator()
-    from ...blind import layout
     from ...blind.making import make
 
-    cases, truths = Path(args.out), Path(args.truths)
-    with runner_of(args, truths / layout.DONE, 'making cases') as runner:
+    args = study.args
+    with study.runner('making cases', truths / DONE) as runner:
         sealed = make(cases, truths, args.seed, args.count, runner, kinds_of(args), spans_of(args))
-    print(f'seal {sealed}')
-    return 0
+    print(f'seal {sealed}', flush=True)

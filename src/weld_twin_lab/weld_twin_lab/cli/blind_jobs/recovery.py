@@ -7,62 +7,43 @@ Writes recovery.json and recovery.md. Stopped, it goes on where it was when run 
 
 from __future__ import annotations
 
-import argparse
-import json
 from pathlib import Path
 
-from .job_options import add_pool, runner_of
+from ...study import REQUIRED, Study, listed, option, options, study
 
-RESULT, TABLE, STORE = 'recovery.json', 'recovery.md', 'done'
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--seed', type=int, required=True, metavar='S')
-    parser.add_argument('--out', required=True, metavar='DIR', help='where the table goes')
-    parser.add_argument(
-        '--robots',
-        default='',
-        metavar='LIST',
-        help='comma-separated (default: one of each kind of arm)',
-    )
-    parser.add_argument(
-        '--families', default='', metavar='LIST', help='only these, comma-separated (default: all)'
-    )
-    parser.add_argument(
+add_arguments = options(
+    option('--seed', REQUIRED, 'S', 'decides the cases', type=int),
+    option('--robots', '', 'LIST', 'comma-separated (default: one of each kind of arm)'),
+    option('--families', '', 'LIST', 'only these, comma-separated (default: all)'),
+    option(
         '--sizes',
-        default='0.5,1,3,10',
-        metavar='LIST',
-        help='effect RMS over noise, comma-separated (default: 0.5,1,3,10)',
-    )
-    parser.add_argument(
-        '--motion', default='free', metavar='NAME', help='free, seams or stations (default: free)'
-    )
-    parser.add_argument(
-        '--store',
-        default='',
-        metavar='DIR',
-        help='where single results are kept (default: inside --out)',
-    )
-    add_pool(parser)
+        '0.5,1,3,10',
+        'LIST',
+        'effect RMS over noise, comma-separated (default: 0.5,1,3,10)',
+    ),
+    option('--motion', 'free', 'NAME', 'free, seams or stations (default: free)'),
+    option('--store', '', 'DIR', 'where single results are kept (default: inside --out)'),
+    out='where the table goes',
+    pool=True,
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Run what is not done yet, write the table and print it."""
     from ...blind.simulator import require_simulator
 
     require_simulator()
     from weld_twin_core import __version__
-    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...blind.cause_sizes import FAMILIES
     from ...blind.diagnosing import engine_digest
     from ...blind.recovering import ARMS, recover
     from ...blind.recovery_table import summary, table
 
-    out = Path(args.out)
-    arms, families = _listed(args.robots) or ARMS, _listed(args.families) or FAMILIES
-    with runner_of(args, Path(args.store) if args.store else out / STORE, 'recovering') as runner:
+    args = study.args
+    arms, families = listed(args.robots) or ARMS, listed(args.families) or FAMILIES
+    with study.runner('recovering', Path(args.store) if args.store else None) as runner:
         rows = recover(runner, args.seed, arms, families, _numbers(args.sizes), args.motion)
     made = {
         'seed': args.seed,
@@ -76,15 +57,7 @@ def run(args: argparse.Namespace) -> int:
         'sums': summary(rows),
         'cases': rows,
     }
-    write_owned(out / RESULT, json.dumps(content, indent=1) + '\n')
-    text = table(rows, made)
-    write_owned(out / TABLE, text)
-    print(text, end='')
-    return 0
-
-
-def _listed(text: str) -> tuple[str, ...]:
-    return tuple(part.strip() for part in text.split(',') if part.strip())
+    study.write('recovery', content, table(rows, made))
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -100,7 +73,7 @@ def _numbers(text: str) -> tuple[float, ...]:
     from weld_twin_core.errors import DataError
 
     try:
-        sizes = tuple(map(float, _listed(text)))
+        sizes = tuple(map(float, listed(text)))
     except ValueError:
         sizes = ()
     if not sizes or not all(0.0 < size < 1e3 for size in sizes):

@@ -7,44 +7,33 @@ Exits with 2 when a case, a truth or the list of them is not what was sealed.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from ...study import DONE, REQUIRED, Study, option, options, study
+from .draw_options import REASONS
 
 if TYPE_CHECKING:
     from ...blind.measures import Measure
     from ...blind.scoring import Score
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('cases', metavar='DIR', help='cases made by blind make')
-    parser.add_argument('--truths', required=True, metavar='DIR')
-    parser.add_argument(
-        '--results', required=True, metavar='DIR', help='verdicts of blind diagnose'
-    )
-    parser.add_argument(
-        '--seal',
-        default='',
-        metavar='HASH',
-        help='the seal as it was printed before the diagnosis',
-    )
-    parser.add_argument(
-        '--reasons',
-        default='',
-        metavar='FILE',
-        help='YAML file of case names and why they went wrong',
-    )
-    parser.add_argument(
-        '--out', required=True, metavar='DIR', help='where score.json and score.html go'
-    )
+add_arguments = options(
+    option('cases', REQUIRED, 'DIR', 'cases made by blind make'),
+    option('--truths', REQUIRED, 'DIR', 'their truths'),
+    option('--results', REQUIRED, 'DIR', 'verdicts of blind diagnose'),
+    option('--seal', '', 'HASH', 'the seal as it was printed before the diagnosis'),
+    REASONS,
+    out='where score.json and score.html go',
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Score, write, and print the measures."""
     from ...blind.score_files import read_reasons, write_score
     from ...blind.scoring import score
 
+    args = study.args
     result = score(
         Path(args.cases),
         Path(args.truths),
@@ -52,9 +41,24 @@ def run(args: argparse.Namespace) -> int:
         seal_given=args.seal,
         reasons=read_reasons(args.reasons),
     )
-    write_score(Path(args.out), result)
+    write_score(study.out, result)
     print_score(result)
-    return 0
+
+
+def diagnosed_and_scored(study: Study, reasons: str = '', *, with_holdout: bool = True) -> None:
+    """Diagnose cases whose truths lie beside them, score, write, and print the measures."""
+    from ...blind import layout
+    from ...blind.diagnosing import diagnose_cases
+    from ...blind.score_files import read_reasons, write_score
+    from ...blind.scoring import score
+
+    cases, truths, results = (study.out / name for name in ('cases', 'truths', 'verdicts'))
+    with study.runner('diagnosing', results / DONE) as runner:
+        diagnose_cases(cases, results, runner, allow_readable=True, with_holdout=with_holdout)
+    result = score(cases, truths, results, reasons=read_reasons(reasons))
+    write_score(study.out, result)
+    print_score(result)
+    print(f'report: {study.out / layout.PAGE}')
 
 
 def print_score(result: Score) -> None:

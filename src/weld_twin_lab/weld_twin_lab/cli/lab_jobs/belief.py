@@ -12,74 +12,60 @@ when run again.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
-from ..blind_jobs.job_options import add_pool, runner_of
+from ...study import Study, option, options, study
 
-LEARNED, JUDGED, STORE = 'cases.jsonl.gz', 'held_out.jsonl.gz', 'done'
+LEARNED, JUDGED = 'cases.jsonl.gz', 'held_out.jsonl.gz'
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument(
-        '--cases', type=int, default=0, metavar='N', help='cases to learn from (default: 0)'
-    )
-    parser.add_argument('--seed', type=int, default=1, metavar='S', help='their seed')
-    parser.add_argument(
-        '--held-out', type=int, default=0, metavar='N', help='cases to judge on (default: 0)'
-    )
-    parser.add_argument('--held-out-seed', type=int, default=2, metavar='S', help='their seed')
-    parser.add_argument(
+add_arguments = options(
+    option('--cases', 0, 'N', 'cases to learn from (default: 0)'),
+    option('--seed', 1, 'S', 'their seed'),
+    option('--held-out', 0, 'N', 'cases to judge on (default: 0)'),
+    option('--held-out-seed', 2, 'S', 'their seed'),
+    option(
         '--mix',
+        'usual',
+        None,
+        'cases of the usual mix, or cells with one to six causes (default: usual)',
         choices=('usual', 'several'),
-        default='usual',
-        help='cases of the usual mix, or cells with one to six causes (default: usual)',
-    )
-    parser.add_argument(
-        '--learn-from', nargs='*', default=[], metavar='TABLE', help='tables kept from other runs'
-    )
-    parser.add_argument(
-        '--judge-on', nargs='*', default=[], metavar='TABLE', help='tables kept from other runs'
-    )
-    parser.add_argument(
-        '--risk',
-        type=float,
-        default=0.002,
-        metavar='P',
-        help='probability that an answer may be sure and wrong (default: 0.002)',
-    )
-    add_pool(parser)
-    parser.add_argument('--out', required=True, metavar='DIR', help='where everything goes')
+    ),
+    option('--learn-from', [], 'TABLE', 'tables kept from other runs', nargs='*'),
+    option('--judge-on', [], 'TABLE', 'tables kept from other runs', nargs='*'),
+    option(
+        '--risk', 0.002, 'P', 'probability that an answer may be sure and wrong (default: 0.002)'
+    ),
+    out='where everything goes',
+    pool=True,
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Make what is not made yet, fit, judge, write and print the page."""
     from weld_twin_core.errors import DataError
 
-    from ...belief import study
     from ...belief.rows import read_rows, write_rows
+    from ...belief.study import fit, rows_of, write
     from ...blind.simulator import require_simulator
 
+    args = study.args
     if args.cases or args.held_out:
         require_simulator()
     if args.seed == args.held_out_seed:
         raise DataError(
             '--seed and --held-out-seed must differ: a case is learned from or judged on'
         )
-    out = Path(args.out)
     taught = [row for table in args.learn_from for row in read_rows(Path(table))]
     tried = [row for table in args.judge_on for row in read_rows(Path(table))]
-    with runner_of(args, out / STORE, 'diagnosing') as runner:
-        taught += study.rows_of(args.seed, args.cases, runner, args.mix)
-        tried += study.rows_of(args.held_out_seed, args.held_out, runner, args.mix)
+    with study.runner('diagnosing') as runner:
+        taught += rows_of(args.seed, args.cases, runner, args.mix)
+        tried += rows_of(args.held_out_seed, args.held_out, runner, args.mix)
     _refuse_shared(taught, tried)
-    write_rows(out / LEARNED, taught)
+    write_rows(study.out / LEARNED, taught)
     if tried:
-        write_rows(out / JUDGED, tried)
-    content = study.fit(taught, args.risk)
-    print(study.write(out, content, tried, taught), end='')
-    return 0
+        write_rows(study.out / JUDGED, tried)
+    print(write(study.out, fit(taught, args.risk), tried, taught), end='')
 
 
 def _refuse_shared(taught: list[dict[str, object]], tried: list[dict[str, object]]) -> None:

@@ -8,49 +8,35 @@ time. Writes beliefs.json and beliefs.md. Stopped, it goes on where it was when 
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
-from ..blind_jobs.job_options import add_pool, runner_of
+from ...study import REQUIRED, Study, listed, option, options, study
 
-RESULT, TABLE, STORE = 'beliefs.json', 'beliefs.md', 'done'
 REFITTED = 10
 """Cases diagnosed anew for numbers that act before the verdict: some 10 minutes of one core."""
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('cases', metavar='DIR', help='cases made by blind make')
-    parser.add_argument('--truths', required=True, metavar='DIR')
-    parser.add_argument(
+add_arguments = options(
+    option('cases', REQUIRED, 'DIR', 'cases made by blind make'),
+    option('--truths', REQUIRED, 'DIR', 'their truths'),
+    option(
         '--refit',
-        type=int,
-        default=REFITTED,
-        metavar='N',
-        help=f'cases to diagnose anew where a number acts before the verdict (default: {REFITTED})',
-    )
-    parser.add_argument(
-        '--only', default='', metavar='LIST', help='only these numbers, comma-separated'
-    )
-    add_pool(parser)
-    parser.add_argument('--out', required=True, metavar='DIR', help='where the table goes')
+        REFITTED,
+        'N',
+        f'cases to diagnose anew where a number acts before the verdict (default: {REFITTED})',
+    ),
+    option('--only', '', 'LIST', 'only these numbers, comma-separated'),
+    out='where the table goes',
+    pool=True,
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Move every number, write the table and print it."""
-    import json
-
-    from weld_twin_nodes.offline.output_directory import write_owned
-
-    from ...blind.belief_study import study
+    from ...blind.belief_study import study as moved
     from ...blind.belief_table import table
 
-    out = Path(args.out)
-    only = [name for name in args.only.split(',') if name]
-    with runner_of(args, out / STORE, 'deciding') as runner:
-        result = study(Path(args.cases), Path(args.truths), runner, args.refit, only)
-    text = table(result)
-    write_owned(out / RESULT, json.dumps(result, indent=1) + '\n')
-    write_owned(out / TABLE, text)
-    print(text, end='')
-    return 0
+    args = study.args
+    with study.runner('deciding') as runner:
+        result = moved(Path(args.cases), Path(args.truths), runner, args.refit, listed(args.only))
+    study.write('beliefs', result, table(result))

@@ -8,26 +8,26 @@ a question, with what they are worth on cells that they were not learned from.
 
 from __future__ import annotations
 
-import argparse
 import json
 from pathlib import Path
 
+from ...study import REQUIRED, Study, option, options, study
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument(
-        'tables', nargs='+', metavar='TABLE', help='investigate.json of cells to learn from'
-    )
+add_arguments = options(
+    option('tables', REQUIRED, 'TABLE', 'investigate.json of cells to learn from', nargs='+'),
+    out='',
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Learn, and print the page."""
     from weld_twin_core.errors import DataError
 
     from ...experiments.closing_weights import heard, page
 
     cases = []
-    for table in map(Path, args.tables):
+    for table in map(Path, study.args.tables):
         try:
             cases += json.loads(table.read_text(encoding='utf-8'))['cases']
         except (OSError, ValueError, KeyError, TypeError) as error:
@@ -36,4 +36,3 @@ def run(args: argparse.Namespace) -> int:
     if not len(all_.right):
         raise DataError('none of the cells has two diagnoses of the same round; give other tables')
     print(page(all_), end='')
-    return 0

@@ -9,67 +9,46 @@ run that was interrupted goes on where it stopped.
 
 from __future__ import annotations
 
-import argparse
+import json
 from pathlib import Path
 
+from ...study import REQUIRED, Study, listed, option, options, study
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--data', required=True, metavar='DIR', help='holds panda_1, kuka_14, ...')
-    parser.add_argument(
-        '--arms', default='', metavar='A,B', help='panda_1, panda_2, kuka_14; all when left out'
-    )
-    parser.add_argument(
-        '--sealed',
-        type=int,
-        default=0,
-        metavar='N',
-        help='also make and open N cases of the plant',
-    )
-    parser.add_argument(
-        '--postures',
-        type=int,
-        default=0,
-        metavar='N',
-        help='also ask on N arms of the plant how many postures a place needs',
-    )
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
+add_arguments = options(
+    option('--data', REQUIRED, 'DIR', 'holds panda_1, kuka_14, ...'),
+    option('--arms', '', 'A,B', 'panda_1, panda_2, kuka_14; all when left out'),
+    option('--sealed', 0, 'N', 'also make and open N cases of the plant'),
+    option(
+        '--postures', 0, 'N', 'also ask on N arms of the plant how many postures a place needs'
+    ),
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Judge every split and print the table."""
-    import json
-    import sys
-
     from weld_twin_core.errors import DataError
-    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...contacts.data import ARMS
-    from ...contacts.splits import study
+    from ...contacts.splits import entries_of
     from ...contacts.table import summary, table
 
-    def tell(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
-    arms = [name.strip() for name in args.arms.split(',') if name.strip()] or list(ARMS)
+    args = study.args
+    arms = listed(args.arms) or list(ARMS)
     for name in arms:
         if name not in ARMS:
             raise DataError(f'--arms: there is no arm {name!r}; they are {", ".join(ARMS)}')
-    out = Path(args.out)
-    entries = study(Path(args.data), arms, out / 'splits', tell)
-    write_owned(out / 'contacts.json', json.dumps(summary(entries), indent=1) + '\n')
-    write_owned(out / 'contacts.md', table(entries))
-    print(table(entries), end='')
+    entries = entries_of(Path(args.data), arms, study.parts('splits'))
+    study.write('contacts', summary(entries), table(entries))
     if args.sealed:
         from ...contacts.sealed import sealed
 
-        score = sealed(args.sealed, out / 'sealed', tell)
-        write_owned(out / 'sealed.json', json.dumps(score, indent=1) + '\n')
+        score = sealed(args.sealed, study.parts('sealed'))
+        study.write('sealed', score)
         print(', '.join(f'{key} {value}' for key, value in score.items()))
     if args.postures:
         from ...contacts.postures import postures
 
-        needed = postures(args.postures, out / 'postures', tell)
-        write_owned(out / 'postures.json', json.dumps(needed, indent=1) + '\n')
+        needed = postures(args.postures, study.parts('postures'))
+        study.write('postures', needed)
         print(json.dumps(needed))
-    return 0

@@ -9,35 +9,32 @@ that was interrupted goes on where it stopped.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
+from ...study import REQUIRED, Study, option, options, study
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--ur5', required=True, metavar='DIR', help='holds grid.csv')
-    parser.add_argument(
-        '--ur10', required=True, metavar='DIR', help='holds series_c_random_poses.csv'
-    )
-    parser.add_argument(
+add_arguments = options(
+    option('--ur5', REQUIRED, 'DIR', 'holds grid.csv'),
+    option('--ur10', REQUIRED, 'DIR', 'holds series_c_random_poses.csv'),
+    option(
         '--cases',
-        metavar='DIR',
-        help='sealed cases: holds cases and truths, as weld-twin lab blind make writes them',
-    )
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
+        None,
+        'DIR',
+        'sealed cases: holds cases and truths, as weld-twin lab blind make writes them',
+    ),
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Try all regions and print what they hold."""
-    import sys
+    from ...coverage.study import NAME, PARTS, entries_of
+    from ...coverage.table import page, summary_table
+    from ...study import head
 
-    from ...coverage.study import study
-    from ...coverage.table import summary_table
-
-    def tell(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
+    args = study.args
+    study.refuse_foreign(f'{NAME}.json', f'{NAME}.md', PARTS)
     cases = None if args.cases is None else Path(args.cases)
-    result = study(Path(args.ur5), Path(args.ur10), Path(args.out), cases, tell)
-    print(summary_table(result['entries']))
-    return 0
+    entries = entries_of(Path(args.ur5), Path(args.ur10), cases, study.parts(PARTS))
+    study.write(NAME, head('coverage/1', entries=entries), page(entries), say=False)
+    print(summary_table(entries))

@@ -8,20 +8,18 @@ degrees, repeats, shuffled rows. Writes one JSON file; exits with 1 when a draw 
 
 from __future__ import annotations
 
-import argparse
+from ...study import Study, option, options, study
 
-FAILED = 1
-"""Exit code when a diagnosis was worse than it may be."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--count', type=int, default=3000, metavar='N', help='default: 3000')
-    parser.add_argument('--seed', type=int, default=0, metavar='S', help='first draw')
-    parser.add_argument('--out', required=True, metavar='FILE', help='JSON file to write')
+add_arguments = options(
+    option('--count', 3000, 'N', 'default: 3000'),
+    option('--seed', 0, 'S', 'first draw'),
+    out='JSON file to write',
+    of='FILE',
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> bool:
     """Draw, diagnose, and say what went wrong."""
     import json
     import warnings
@@ -31,6 +29,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ...transfer.degenerate import drawn, tried
 
+    args = study.args
     counts: Counter[str] = Counter()
     bad = []
     with warnings.catch_warnings():
@@ -49,6 +48,6 @@ def run(args: argparse.Namespace) -> int:
         'statuses': dict(counts),
         'bad': bad,
     }
-    write_owned(args.out, json.dumps(result, indent=1) + '\n')
+    write_owned(study.out, json.dumps(result, indent=1) + '\n')
     print(', '.join(f'{name} {number}' for name, number in sorted(counts.items())))
-    return FAILED if bad else 0
+    return not bad

@@ -9,23 +9,24 @@ stations with efforts, with its page, as weld-twin diagnose writes it.
 
 from __future__ import annotations
 
-import argparse
-import sys
+from weld_twin_nodes.cli.options import add_output, add_robot
+
+from ...study import REQUIRED, Study, option, options, study
 
 PAGE = 'efforts.md'
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    from weld_twin_nodes.cli.options import add_output, add_robot
+add_arguments = options(
+    option('table', REQUIRED, 'TABLE', 'stations with measured poses and efforts'),
+    add_robot,
+    option('--folds', 5, 'N', 'stretches (default: 5)'),
+    lambda parser: add_output(parser, 'where table and page go'),
+    out='',
+)
 
-    parser.add_argument('table', metavar='TABLE', help='stations with measured poses and efforts')
-    add_robot(parser)
-    parser.add_argument('--folds', type=int, default=5, metavar='N', help='stretches (default: 5)')
-    add_output(parser, 'where table and page go')
 
-
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Judge every stretch, diagnose the whole, write table and page, print the table."""
     from weld_twin_core.diagnosis import diagnose
     from weld_twin_core.errors import ModelError
@@ -38,15 +39,14 @@ def run(args: argparse.Namespace) -> int:
     from ...real_arms.by_effort import folds, table
     from ...real_robots.unseen_stations import ALIGN
 
+    args = study.args
     if args.folds < 2:
         raise ModelError(f'--folds {args.folds}: give two stretches or more')
     robot = robot_of(args)
     recording = read_table(args.table, robot).recording
     with output(args, RESULT) as place:
-        done = folds(recording, robot, args.folds, lambda text: print(text, file=sys.stderr))
-        page = table(recording.name, done)
+        page = table(recording.name, folds(recording, robot, args.folds, study.tell))
         write_text(place / PAGE, page)
         whole = diagnose(recording, robot, align=ALIGN)
         write_results(place, whole, [hashed('recording', args.table)], given_urdf(args))
     print(page, end='')
-    return 0

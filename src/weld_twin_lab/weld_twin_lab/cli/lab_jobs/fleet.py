@@ -8,18 +8,13 @@ Parts that are done are not run again, so a job that was interrupted goes on. Th
 
 from __future__ import annotations
 
-import argparse
-import json
-import sys
 from collections import Counter
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-RESULT, TABLE = 'fleet.json', 'fleet.md'
-MISSED = 1
-"""Exit code where rows differ, something was lost, or two workers are not fast enough."""
+from ...study import DONE, Study, option, options, study
+
 SPEED = 1.8
 """Two workers beside one, at least."""
 MANY, PAPER_CORES = 100_000, 200
@@ -27,64 +22,44 @@ MANY, PAPER_CORES = 100_000, 200
 WORKERS = {'one': 1, 'two': 2, 'cluster': 2}
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument(
-        '--out', required=True, metavar='DIR', help='recordings, databases, result'
-    )
-    parser.add_argument('--recordings', type=int, default=300, metavar='N', help='0: no timing')
-    parser.add_argument('--kills', type=int, default=50, metavar='N', help='0: no kills')
-    parser.add_argument(
-        '--kill-recordings', type=int, default=30, metavar='N', help='of the run that is killed'
-    )
-    parser.add_argument('--no-cluster', action='store_true')
+add_arguments = options(
+    option('--recordings', 300, 'N', '0: no timing'),
+    option('--kills', 50, 'N', '0: no kills'),
+    option('--kill-recordings', 30, 'N', 'of the run that is killed'),
+    option('--no-cluster', False, None, 'leave the cluster out'),
+    out='recordings, databases, result',
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> bool:
     """Run what is not done yet, compare, write the results, print the table."""
-    from weld_twin_nodes.offline.output_directory import write_owned
-
     from ...fleet.run_pages import fleet_page
 
-    out = Path(args.out)
-    (out / 'done').mkdir(parents=True, exist_ok=True)
+    args = study.args
     result: dict[str, Any] = {}
     if args.recordings:
-        result['speed'] = _speed(out, args.recordings, not args.no_cluster)
+        result['speed'] = _speed(study, args.recordings, not args.no_cluster)
     if args.kills:
-        result['kills'] = _kills(out, args.kill_recordings, args.kills)
-    text = fleet_page(result)
-    write_owned(out / RESULT, json.dumps(result, indent=1) + '\n')
-    write_owned(out / TABLE, text)
-    print(text)
+        result['kills'] = _kills(study, args.kill_recordings, args.kills)
+    study.write('fleet', result, fleet_page(result))
     speed, kills = result.get('speed', {}), result.get('kills', {})
     fine = speed.get('differing_rows', 0) == 0 and kills.get('lost_or_rewritten', 0) == 0
     fast = min(speed.get('times_one_worker', {'': SPEED}).values()) >= SPEED
-    return 0 if fine and fast and kills.get('differing_rows', 0) == 0 else MISSED
+    return bool(fine and fast and kills.get('differing_rows', 0) == 0)
 
 
-def _once(out: Path, name: str, work: Callable[[], Any]) -> Any:
-    """Return what a part came to: what was kept of it, so that an interrupted job goes on."""
-    from weld_twin_msgs_py.files.whole_files import write_text
-
-    file = out / 'done' / f'{name}.json'
-    if not file.exists():
-        print(f'{name} ...', file=sys.stderr, flush=True)
-        write_text(file, json.dumps(work()) + '\n', overwrite=True)
-    return json.loads(file.read_text(encoding='utf-8'))
-
-
-def _speed(out: Path, count: int, with_cluster: bool) -> dict[str, Any]:
+def _speed(study: Study, count: int, with_cluster: bool) -> dict[str, Any]:
     from ...fleet.fleet_runs import costs, rows, same
     from ...fleet.made_list import make_list
 
-    print(f'making {count} recordings ...', file=sys.stderr, flush=True)
+    out, part = study.out, study.parts(DONE)
+    study.tell(f'making {count} recordings ...')
     listed = make_list(out / 'recordings', count)
     names = ['one', 'two', *(['cluster'] * with_cluster)]
     files = {name: out / f'{name}_{count}.db' for name in names}
     took = {
-        name: _once(out, f'{name}_{count}', partial(_part, name, listed, files[name]))
-        for name in names
+        name: part(f'{name}_{count}', partial(_part, name, listed, files[name])) for name in names
     }
     found = {name: rows(str(file)) for name, file in files.items()}
     first, last, memory = costs(str(files['one']))
@@ -112,12 +87,10 @@ def _part(name: str, listed: Path, file: Path) -> float:
         return timed(listed, str(file), '--scheduler', address)
 
 
-def _kills(out: Path, count: int, times: int) -> dict[str, Any]:
+def _kills(study: Study, count: int, times: int) -> Any:
     from ...fleet.fleet_runs import kills
     from ...fleet.made_list import make_list
 
+    out = study.out
     listed = make_list(out / 'recordings', count)
-    done: dict[str, Any] = _once(
-        out, f'kills_{times}_{count}', lambda: kills(listed, out, times, seed=1)
-    )
-    return done
+    return study.parts(DONE)(f'kills_{times}_{count}', lambda: kills(listed, out, times, seed=1))

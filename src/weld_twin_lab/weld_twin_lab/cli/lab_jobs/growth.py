@@ -8,35 +8,16 @@ growth.png; takes two minutes of processor time.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
+from ...study import Study, option, options, study
+
+add_arguments = options(option('--only', [], 'TEXT', 'what grows, by part of its name', nargs='+'))
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
-    parser.add_argument(
-        '--only', nargs='+', default=[], metavar='TEXT', help='what grows, by part of its name'
-    )
-
-
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Measure all sizes, draw them, and print the table."""
-    import json
-    import sys
-
-    from weld_twin_nodes.offline.output_directory import write_owned
-
     from ...benchmark.growing_page import draw, measured, page
 
-    def tell(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
-    out = Path(args.out)
-    out.mkdir(parents=True, exist_ok=True)
-    found = measured(args.only, tell)
-    write_owned(out / 'growth.json', json.dumps(found, indent=1) + '\n')
-    write_owned(out / 'growth.md', page(found))
-    draw(found, out / 'growth.png')
-    print(page(found), end='')
-    return 0
+    found = measured(study.args.only, study.tell)
+    study.write('growth', found, page(found))
+    draw(found, study.out / 'growth.png')

@@ -11,53 +11,31 @@ where it stopped, and one with --minutes writes what there is after so long.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
+from ...study import Study, option, options, study
 
-from ..blind_jobs.job_options import add_pool, runner_of
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
-    parser.add_argument('--seed', type=int, default=1, metavar='N', help='decides the cells')
-    parser.add_argument(
-        '--cells', type=int, default=120, metavar='N', help='cells that are left open at first'
-    )
-    parser.add_argument(
-        '--alone', action='store_true', help='leave out what the minutes come to otherwise'
-    )
-    parser.add_argument(
+add_arguments = options(
+    option('--seed', 1, 'N', 'decides the cells'),
+    option('--cells', 120, 'N', 'cells that are left open at first'),
+    option('--alone', False, None, 'leave out what the minutes come to otherwise'),
+    option(
         '--minutes',
-        type=float,
-        default=float('inf'),
-        metavar='M',
-        help='begin no further cells after so many minutes, and write what there is',
-    )
-    add_pool(parser)
+        float('inf'),
+        'M',
+        'begin no further cells after so many minutes, and write what there is',
+    ),
+    pool=True,
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Investigate what is not done yet, and print the tables."""
-    import sys
+    from ...experiments.goals import page
+    from ...experiments.study import PARTS, investigated
 
-    from ...blind.diagnosing import engine_digest
-    from ...experiments.study import PARTS, TABLE, study
-
-    def tell(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
-    out = Path(args.out)
-    with runner_of(args, out / PARTS, 'investigating') as runner:
-        study(
-            out,
-            args.seed,
-            args.cells,
-            runner,
-            engine_digest(),
-            tell,
-            alone=args.alone,
-            minutes=args.minutes,
+    args = study.args
+    with study.runner('investigating', study.out / PARTS) as runner:
+        result = investigated(
+            args.seed, args.cells, runner, study.tell, alone=args.alone, minutes=args.minutes
         )
-    print((out / TABLE).read_text(encoding='utf-8'))
-    return 0
+    study.write('investigate', result, page(result))

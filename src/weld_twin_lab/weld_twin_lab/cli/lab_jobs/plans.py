@@ -7,25 +7,16 @@ Writes plans.json; a run that was interrupted goes on where it stopped.
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
+from ...study import Study, option, options, study
+
+add_arguments = options(option('--plans', 24, 'N', 'how many (24)'))
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--plans', type=int, default=24, metavar='N', help='how many (24)')
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
-
-
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Carry the plans out and print what came of them."""
-    import sys
+    from ...coverage.planned import planned, summary
 
-    from ...coverage.planned import planned
-
-    def tell(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
-    score = planned(args.plans, Path(args.out), tell)
-    print(', '.join(f'{key} {value:.3g}' for key, value in score.items()))
-    return 0
+    entries = planned(study.args.plans, study.parts('parts'), study.tell)
+    study.write('plans', entries)
+    print(', '.join(f'{key} {value:.3g}' for key, value in summary(entries).items()))

@@ -13,85 +13,54 @@ words.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
-from typing import Any
 
-from ..blind_jobs.job_options import add_pool, runner_of
+from ...study import Study, option, options, study
 
-MISSED = 1
-"""Exit code where a program was read wrongly, or a broken one was not met with words."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
-    parser.add_argument('--drawn', type=int, default=200, metavar='N', help='programs a language')
-    parser.add_argument(
-        '--broken', type=int, default=2000, metavar='N', help='broken programs a language'
-    )
-    parser.add_argument(
+add_arguments = options(
+    option('--drawn', 200, 'N', 'programs a language'),
+    option('--broken', 2000, 'N', 'broken programs a language'),
+    option(
         '--seams',
-        type=int,
-        default=1,
-        metavar='N',
-        help='sealed seams a language that the plant runs before and after (default: 1)',
-    )
-    parser.add_argument(
-        '--urdf-arms',
-        type=int,
-        default=0,
-        metavar='N',
-        help='arms given as URDFs that go all the way (default: 0)',
-    )
-    parser.add_argument('--seed', type=int, default=1, metavar='N', help='decides the seams')
-    parser.add_argument(
-        '--made', default='test/programs/made', metavar='DIR', help='programs as users have them'
-    )
-    add_pool(parser)
+        1,
+        'N',
+        'sealed seams a language that the plant runs before and after (default: 1)',
+    ),
+    option('--urdf-arms', 0, 'N', 'arms given as URDFs that go all the way (default: 0)'),
+    option('--seed', 1, 'N', 'decides the seams'),
+    option('--made', 'test/programs/made', 'DIR', 'programs as users have them'),
+    pool=True,
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> bool:
     """Try what is not tried yet, and print the tables."""
     from ...blind.diagnosing import engine_digest
-    from ...programs.cells import CELLS
-    from ...programs.correction_table import page
-    from ...programs.study import PARTS, corrections
+    from ...programs import correction_table, urdf_table
+    from ...programs.study import PARTS, head_of, seams, urdf_arms
 
-    missed = _read(args) if args.drawn or args.broken else 0
-    if args.seams:
-        out = Path(args.out)
-        with runner_of(args, out / PARTS, 'correcting') as runner:
-            found = corrections(out, args.seed, args.seams, runner, engine_digest(), list(CELLS))
-        print(page(found))
-    if args.urdf_arms:
-        _given_as_urdfs(args)
-    return missed
-
-
-def _given_as_urdfs(args: argparse.Namespace) -> None:
-    """Take arms that are given as URDFs all the way, and print what they add up to."""
-    from ...blind.diagnosing import engine_digest
-    from ...programs.study import PARTS, urdf_arms
-    from ...programs.urdf_table import page
-
-    out = Path(args.out)
-    with runner_of(args, out / PARTS, 'arms') as runner:
-        print(page(urdf_arms(out, args.seed, args.urdf_arms, runner, engine_digest())))
+    args, engine = study.args, engine_digest()
+    right = _read(study) if args.drawn or args.broken else True
+    for name, tasks, table in (
+        ('corrections', seams(args.seed, args.seams, engine), correction_table),
+        ('urdf_arms', urdf_arms(args.seed, args.urdf_arms, engine), urdf_table),
+    ):
+        if tasks:
+            cases = study.tasks(tasks, name, study.out / PARTS)
+            result = head_of(args.seed, engine, table.totals(cases), cases)
+            study.write(name, result, table.page(result))
+    return right
 
 
-def _read(args: argparse.Namespace) -> int:
+def _read(study: Study) -> bool:
     """Read what is drawn and what is broken, and return whether all went well."""
-    import sys
+    from ...programs.study import PARTS, read, summary
 
-    from ...programs.study import study, summary
-
-    def tell(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
-    result: dict[str, Any] = study(Path(args.out), args.drawn, args.broken, Path(args.made), tell)
-    print(summary(result))
+    args = study.args
+    result = read(args.drawn, args.broken, Path(args.made), study.parts(PARTS))
+    study.write('programs', result, summary(result))
     wrong = [line for part in ('round_trips', 'fuzz') for e in result[part] for line in e['wrong']]
     for line in wrong:
-        print(line, file=sys.stderr)
-    return MISSED if wrong else 0
+        study.tell(line)
+    return not wrong

@@ -9,48 +9,31 @@ goes on where it was when run again.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
-from ..blind_jobs.job_options import add_pool, runner_of
+from ...study import DONE, REQUIRED, Study, option, options, study
 
-RESULTS, PAGE, STORE = 'real_arms.json', 'real_arms.md', 'done'
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument(
-        '--data', required=True, metavar='DIR', help='holds ur5_laser_tracker, emps, mukca, ...'
-    )
-    parser.add_argument(
-        '--only', default='', metavar='TEXT', help='only rows whose names contain this'
-    )
-    add_pool(parser)
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
+add_arguments = options(
+    option('--data', REQUIRED, 'DIR', 'holds ur5_laser_tracker, emps, mukca, ...'),
+    option('--only', '', 'TEXT', 'only rows whose names contain this'),
+    pool=True,
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Judge what is not judged yet, write and print the table."""
-    import json
-
     from weld_twin_core.errors import DataError
-    from weld_twin_nodes.offline.output_directory import write_owned
     from weld_twin_nodes.offline.task_pool import Task
 
     from ...blind.diagnosing import engine_digest
     from ...real_arms.rows import plans
     from ...real_arms.study import judged, summary, table
 
-    out, data = Path(args.out), Path(args.data)
+    data = Path(study.args.data)
     if not data.is_dir():
         raise DataError(f"'{data}' is no directory; --data names the parent of the recordings")
-    names = [plan.name for plan in plans() if args.only in plan.name]
+    names = [plan.name for plan in plans() if study.args.only in plan.name]
     tasks = [Task(judged, (str(data), name), name) for name in names]
-    with runner_of(args, out / STORE / engine_digest()[:8], 'diagnosing') as runner:
-        entries = list(runner.run(tasks))
-    told = table(entries)
-    result = {'summary': summary(entries), 'rows': entries}
-    write_owned(out / RESULTS, json.dumps(result, indent=1) + '\n')
-    write_owned(out / PAGE, told)
-    print(told, end='')
-    return 0
+    entries = study.tasks(tasks, 'diagnosing', study.out / DONE / engine_digest()[:8])
+    study.write('real_arms', {'summary': summary(entries), 'rows': entries}, table(entries))

@@ -11,19 +11,16 @@ from __future__ import annotations
 
 import argparse
 
+from ...campaigns import security
+from ...study import options
+
 CAMPAIGN = 'security'
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    from ...campaigns.security import add_arguments as add_own
-
-    add_own(parser)
-    parser.add_argument('--out', required=True, metavar='FILE', help='JSON file to write')
+add_arguments = options(security.add_arguments, out='JSON file to write', of='FILE')
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the campaign of this name."""
-    from ..campaign import run as run_campaign
+    from .campaign import run as run_campaign
 
     return run_campaign(argparse.Namespace(**vars(args), campaign=CAMPAIGN))

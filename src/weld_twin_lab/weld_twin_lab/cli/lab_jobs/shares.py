@@ -9,34 +9,32 @@ again.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
-from ..blind_jobs.job_options import add_pool, runner_of
+from ...study import Study, option, options, study
 
-TABLE, STORE = 'shares.jsonl', 'done'
+TABLE = 'shares.jsonl'
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('tables', nargs='*', metavar='TABLE', help='tables kept from other runs')
-    parser.add_argument(
-        '--cases', type=int, default=0, metavar='N', help='look at the first N cases of a seed'
-    )
-    parser.add_argument('--seed', type=int, default=1, metavar='S', help='their seed')
-    parser.add_argument(
+add_arguments = options(
+    option('tables', [], 'TABLE', 'tables kept from other runs', nargs='*'),
+    option('--cases', 0, 'N', 'look at the first N cases of a seed'),
+    option('--seed', 1, 'S', 'their seed'),
+    option(
         '--causes',
+        [1, 2, 3],
+        'K',
+        'only cases with so many causes (default: 1 2 3)',
         type=int,
         nargs='+',
-        default=[1, 2, 3],
-        metavar='K',
-        help='only cases with so many causes (default: 1 2 3)',
-    )
-    add_pool(parser)
-    parser.add_argument('--out', metavar='DIR', help=f'where {TABLE} goes; needed with --cases')
+    ),
+    option('--out', None, 'DIR', f'where {TABLE} goes; needed with --cases'),
+    out='',
+    pool=True,
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Make what is not made yet, count and print."""
     from weld_twin_core.errors import DataError
 
@@ -45,15 +43,14 @@ def run(args: argparse.Namespace) -> int:
     from ...belief.share_trial import rows_of
     from ...blind.simulator import require_simulator
 
+    args = study.args
     if bool(args.cases) is not bool(args.out) or not (args.cases or args.tables):
         raise DataError('give tables to read, or --cases with --out, or both')
     rows = [row for table in args.tables for row in read_rows(Path(table))]
     if args.cases:
         require_simulator()
-        out = Path(args.out)
-        with runner_of(args, out / STORE, 'diagnosing') as runner:
+        with study.runner('diagnosing') as runner:
             made = rows_of(args.seed, args.cases, runner, args.causes)
-        write_rows(out / TABLE, made)
+        write_rows(study.out / TABLE, made)
         rows += made
     print(cover_table(told_and_true(rows)), end='')
-    return 0

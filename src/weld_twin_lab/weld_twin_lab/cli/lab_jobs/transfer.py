@@ -9,39 +9,32 @@ on where it stopped. Remove the directory to begin anew. Exits with 1 when a goa
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
-MISSED = 1
-"""Exit code when a measure was not reached."""
+from ...study import REQUIRED, Study, option, options, study
+
+add_arguments = options(
+    option('--ur5', REQUIRED, 'DIR', 'holds grid.csv, random.csv'),
+    option('--ur10', REQUIRED, 'DIR', 'holds series_c_random_poses.csv'),
+    option('--emps', REQUIRED, 'DIR', 'holds DATA_EMPS.mat'),
+    option('--only', '', 'TEXT', 'only splits whose names contain this'),
+)
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--ur5', required=True, metavar='DIR', help='holds grid.csv, random.csv')
-    parser.add_argument(
-        '--ur10', required=True, metavar='DIR', help='holds series_c_random_poses.csv'
-    )
-    parser.add_argument('--emps', required=True, metavar='DIR', help='holds DATA_EMPS.mat')
-    parser.add_argument('--out', required=True, metavar='DIR', help='where results go')
-    parser.add_argument(
-        '--only', default='', metavar='TEXT', help='only splits whose names contain this'
-    )
-
-
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> bool:
     """Judge what is not judged yet, and print the goals."""
-    import sys
-
+    from ...study import head
     from ...transfer.goals import measures
-    from ...transfer.study import study
-    from ...transfer.tables import goal_table
+    from ...transfer.study import NAME, PARTS, entries_of
+    from ...transfer.tables import goal_table, page
 
-    def tell(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
-    ur5, ur10, emps, out = (Path(place) for place in (args.ur5, args.ur10, args.emps, args.out))
-    result = study(ur5, ur10, emps, out, args.only, tell)
-    found = measures(result['splits'])
+    args = study.args
+    study.refuse_foreign(f'{NAME}.json', f'{NAME}.md', PARTS)
+    ur5, ur10, emps = (Path(place) for place in (args.ur5, args.ur10, args.emps))
+    entries = entries_of(ur5, ur10, emps, args.only, study.parts(PARTS))
+    found = measures(entries)
+    result = head('transfer/1', measures=[m._asdict() for m in found], splits=entries)
+    study.write(NAME, result, page(entries, found), say=False)
     print(goal_table(found))
-    return 0 if all(m.reached is not False for m in found) else MISSED
+    return all(m.reached is not False for m in found)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import html
-import json
 import re
 import subprocess
 import sys
@@ -24,12 +23,11 @@ from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
+from ...study import Study, option, options, study
+
 if TYPE_CHECKING:
     from ...fleet.users import Person
 
-RESULT, TABLE = 'users.json', 'users.md'
-MISSED = 1
-"""Exit code where somebody waited too long, or a malicious file was taken."""
 LONGEST = 120
 """Signs of a refusal in the table."""
 ONE, MANY = 1.5, 1.2
@@ -39,41 +37,34 @@ BESIDE = 2.0
 one who waits longest."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('bag', metavar='BAG', nargs='?', help='the recording that is dropped')
-    parser.add_argument('--robot', metavar='R', default='', help='its robot, a bundled one')
-    parser.add_argument('--out', required=True, metavar='DIR', help='directory for the results')
-    parser.add_argument('--users', type=int, default=20, metavar='N')
-    parser.add_argument(
-        '--hostile', type=int, default=200, metavar='N', help='connections in bad faith; 0: none'
-    )
-    parser.add_argument(
-        '--chromium', action='store_true', help='users have Chromium, not a plain client'
-    )
+add_arguments = options(
+    option('bag', None, 'BAG', 'the recording that is dropped', nargs='?'),
+    option('--robot', '', 'R', 'its robot, a bundled one'),
+    option('--users', 20, 'N', 'who wait at once (default: 20)'),
+    option('--hostile', 200, 'N', 'connections in bad faith; 0: none'),
+    option('--chromium', False, None, 'users have Chromium, not a plain client'),
+    out='directory for the results',
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> bool:
     """Measure, write the results, print the table."""
     from weld_twin_core.errors import DataError
-    from weld_twin_nodes.offline.output_directory import write_owned
 
     from ...fleet.run_pages import users_page
 
+    args = study.args
     if args.bag and not args.robot:
         raise DataError('--robot names the robot of the recording')
     with tempfile.TemporaryDirectory(prefix='users-') as place:
         result = _measured(args, Path(place))
-    out = Path(args.out)
-    out.mkdir(parents=True, exist_ok=True)
-    write_owned(out / RESULT, json.dumps(result, indent=1) + '\n')
-    write_owned(out / TABLE, users_page(result))
-    print(users_page(result))
+    study.write('users', result, users_page(result))
     fine = result['one_user_times_command'] <= ONE and result['times_serial_work'] <= MANY
     refused = all(said.startswith('refused') for said in result['malicious'].values())
     beside = result.get('hostile')
     held = beside is None or (beside['times'] <= BESIDE and beside['sheets'] == args.users)
-    return 0 if fine and refused and held and result['sheets'] == args.users else MISSED
+    return fine and refused and held and result['sheets'] == args.users
 
 
 def _measured(args: argparse.Namespace, place: Path) -> dict[str, Any]:

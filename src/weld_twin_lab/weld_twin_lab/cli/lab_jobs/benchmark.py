@@ -9,11 +9,12 @@ hold on a busy machine too. Writes benchmark.json, a table (benchmark.md) and ho
 
 from __future__ import annotations
 
-import argparse
 import os
 
 from weld_twin_nodes.cli.options import add_output, output
 from weld_twin_nodes.offline.environment import THREADS
+
+from ...study import Study, option, options, study
 
 ONE_THREAD = {
     **dict.fromkeys(THREADS, '1'),
@@ -22,19 +23,20 @@ ONE_THREAD = {
 }
 """Read by the libraries when they are imported."""
 
+add_arguments = options(
+    lambda parser: add_output(parser, 'where results go'),
+    option('--quick', False, None, 'small sizes, to see that it runs'),
+    out='',
+)
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add_output(parser, 'where results go')
-    parser.add_argument('--quick', action='store_true', help='small sizes, to see that it runs')
 
-
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Run the benchmark; print results as they come."""
     os.environ.update(ONE_THREAD)
 
-    from ..benchmark.all_races import FULL, QUICK, benchmark
+    from ...benchmark.all_races import FULL, QUICK, benchmark
 
-    with output(args, 'benchmark.json') as folder:
-        benchmark(folder, QUICK if args.quick else FULL, lambda line: print(line, flush=True))
-    return 0
+    sizes = QUICK if study.args.quick else FULL
+    with output(study.args, 'benchmark.json') as folder:
+        benchmark(folder, sizes, lambda line: print(line, flush=True))

@@ -10,21 +10,24 @@ from __future__ import annotations
 
 import argparse
 from importlib import import_module
+from types import ModuleType
 
 from weld_twin_nodes.cli.options import add_command
 
 JOBS = ('make', 'diagnose', 'score', 'run', 'semi-real', 'recovery')
 
 
+def _job(name: str) -> ModuleType:
+    return import_module(f'weld_twin_lab.cli.blind_jobs.{name.replace("-", "_")}')
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the jobs, each with its options."""
-    jobs = parser.add_subparsers(required=True, metavar='JOB', dest='job')
+    places = parser.add_subparsers(required=True, metavar='JOB', dest='job')
     for name in JOBS:
-        module = import_module(f'weld_twin_lab.cli.blind_jobs.{name.replace("-", "_")}')
-        add_command(jobs, name, module)
+        add_command(places, name, _job(name))
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the job."""
-    module = import_module(f'weld_twin_lab.cli.blind_jobs.{args.job.replace("-", "_")}')
-    return int(module.run(args))
+    return int(_job(args.job).run(args))

@@ -1,25 +1,14 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a fitter asks first, on the first screen: how far off, may we weld, what, how sure, what then."""
+"""The first screen: the verdict, and what a fitter asks first: how far off, may we weld, what to do."""
 
 from __future__ import annotations
 
-import re
-
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_core.metrics.conformity import Rule
-from weld_twin_nodes.offline.where_it_holds import elsewhere, left_open, which_file
-from weld_twin_nodes.wording.mending import (
-    advised,
-    correctable,
-    curve_fault,
-    left_with,
-    left_without,
-    thought_mended,
-)
+from weld_twin_nodes.wording.mending import advised, left_with, thought_mended
 from weld_twin_nodes.wording.quantities import (
     counted,
-    ends_to,
     left_of,
     millimetres,
     odds,
@@ -27,30 +16,27 @@ from weld_twin_nodes.wording.quantities import (
     small_turn,
     turns_only,
 )
-from weld_twin_nodes.wording.switches import alternatives, as_it_is, cause_name, switches
+from weld_twin_nodes.wording.switches import as_it_is, switches
 from weld_twin_nodes.wording.words import (
     leading,
     likely,
     listed,
     not_to_be_tried,
     passed,
-    unnamed,
     untried_in_short,
 )
 
 from .acceptance import largest, mark
-from .belief import belief_lines, together
-from .cause_values import effects_of, one_of, values
-from .controllers import UNCHECKED, UNNAMED, correction
+from .answer import Answer
+from .cause_answer import CauseAnswer
 from .directions import components, sides_words, worst
-from .html import Child, Html, joined, tag
-from .remainder import places
+from .html import Child, Figure, Html, joined, lines, pairs, tag
+from .html import figures as drawn
 from .seam_view import at_rest, instant, left_out
+from .warned import warned
 
 _CAUSES = 4
 """Causes in the table; the cards have more."""
-_RADIANS = re.compile(r' \([^)]*mrad\)')
-_SENTENCE = re.compile(r'(?<=\.) (?=[A-Z])')
 _VALUES = 2
 """Values of a cause in the table; its card has more."""
 _SURE_OF = {
@@ -60,8 +46,6 @@ _SURE_OF = {
 }
 _APART = '\N{NO-BREAK SPACE}\N{NO-BREAK SPACE}'
 """Between a size and the verdict on it."""
-_WIDER = 2.0
-"""Ratio of the error elsewhere in the reach to that where it was measured from which it is a warning."""
 _HEADS = (
     *('Cause', 'Share of the gap', 'By how much', 'How sure'),
     *('If only this is mended', 'Where to enter it'),
@@ -99,22 +83,71 @@ WORDS = (
 )
 """Words of the page that not everybody has, each told once."""
 
-Figure = tuple[str, Child, Child]
-"""What is asked, the answer, and what stands behind it."""
+
+def header(answer: Answer) -> Html:
+    """Return what was diagnosed."""
+    kind = tag('p', 'Positional accuracy ', tag('b', 'diagnosis'), class_='kind')
+    return tag('header', kind, tag('p', answer.subject, class_='subject'))
 
 
-def figures(diagnosis: Diagnosis, rule: Rule | None) -> Html:
+def opening(answer: Answer, judged: Html | None = None) -> Html:
+    """Return status, verdict, how it is judged, figures, actions and the causes in a table."""
+    first, second = answer.verdict
+    told = (figures, _holds, _actions, causes_table, _words) if answer.sound else ()
+    return tag(
+        'section',
+        tag('p', answer.status, class_=f'status {answer.diagnosis.status}'),
+        judged,
+        tag('h1', first),
+        tag('p', second, class_='second'),
+        _mended(answer),
+        *(part(answer) for part in told),
+        id_='verdict',
+    )
+
+
+def _mended(answer: Answer) -> Html | None:
+    """Return what was wrong with the data and undone; all that follows stands on it."""
+    if not answer.mended:
+        return None
+    items = tag('ul', *(tag('li', sentence) for sentence in answer.mended))
+    return tag('div', tag('h2', 'Mended before the diagnosis'), items, class_='actions mended')
+
+
+def _actions(answer: Answer) -> Html | None:
+    if not answer.to_do:
+        return None
+    items = tag('ol', *(tag('li', *warned(action)) for action in answer.to_do))
+    title = 'What to do, in this order' if len(answer.to_do) > 1 else 'What to do'
+    return tag('div', tag('h2', title), items, class_='actions')
+
+
+def _holds(answer: Answer) -> Html | None:
+    holds = answer.holds
+    if holds is None:
+        return None
+    told = ' '.join(filter(None, [holds.elsewhere, holds.file, *holds.open]))
+    return tag('p', told, class_='warn' if holds.wide else 'note')
+
+
+def _words(_: Answer) -> Html:
+    """Return what the words of the page mean, folded."""
+    return tag(
+        'details',
+        tag('summary', 'What the words on this page mean'),
+        pairs(WORDS),
+        class_='detail',
+    )
+
+
+def figures(answer: Answer) -> Html:
     """Return the figures that answer what is asked first."""
-    rows = [_off(diagnosis), _worst(diagnosis), _pass(diagnosis, rule), _left(diagnosis)]
+    diagnosis = answer.diagnosis
+    rows = [_off(diagnosis), _worst(diagnosis), _pass(diagnosis, answer.rule), _left(diagnosis)]
     if diagnosis.status in _SURE_OF:
-        told = f'{_SURE_OF[diagnosis.status]}{together(diagnosis)}{_among(diagnosis)}'
+        told = f'{_SURE_OF[diagnosis.status]}{answer.together}{_among(diagnosis)}'
         rows.append(('How sure', odds(diagnosis.confidence), told))
-    rows.append(_data(diagnosis))
-    cells = [
-        tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
-        for name, value, note in filter(None, rows)
-    ]
-    return tag('dl', *cells, class_='figures')
+    return drawn(filter(None, [*rows, _data(answer)]))
 
 
 def _off(diagnosis: Diagnosis) -> Figure:
@@ -208,8 +241,9 @@ def _among(diagnosis: Diagnosis) -> str:
     return f'; {untried_in_short(diagnosis)}, as asked'
 
 
-def _data(diagnosis: Diagnosis) -> Figure | None:
+def _data(answer: Answer) -> Figure | None:
     """Return how the checks of the data came out."""
+    diagnosis = answer.diagnosis
     checks = diagnosis.checks
     if not checks:
         return None
@@ -222,29 +256,30 @@ def _data(diagnosis: Diagnosis) -> Figure | None:
     out, every = left_out(diagnosis)
     if out:
         told.append(f'{out} of {counted(every, "sample")} left out')
-    told += _instrument(diagnosis)
+    told += _instrument(answer)
     word = 'yes, see the notes' if told else 'yes'
     word = 'see the warnings' if counts['warning'] else word
     words = f'{passed(fine, len(checks))}{"; " if told else ""}{"; ".join(told)}. '
     return 'Were the data good', word, joined([words, tag('a', 'Which', href='#checks')])
 
 
-def _instrument(diagnosis: Diagnosis) -> list[str]:
+def _instrument(answer: Answer) -> list[str]:
     """Return which cause sits with what measured, and how much of the gap that makes."""
     return [
-        f'but cause {k + 1}, {percent(cause.share, places(diagnosis))} of the gap, sits at '
-        f'{likely(cause.place)}'
-        for k, cause in enumerate(diagnosis.causes[:_CAUSES])
-        if {at for at, _ in leading(cause.place)} & {'instrument', 'clock'}
+        f'but cause {k}, {answer.percent(told.cause.share)} of the gap, sits at '
+        f'{likely(told.cause.place)}'
+        for k, told in enumerate(answer.causes[:_CAUSES], 1)
+        if {at for at, _ in leading(told.cause.place)} & {'instrument', 'clock'}
     ]
 
 
-def causes_table(diagnosis: Diagnosis, brand: str | None, rule: Rule | None) -> Html | None:
+def causes_table(answer: Answer) -> Html | None:
     """Return one row for each cause, as on its card; None without any."""
-    causes = diagnosis.causes[:_CAUSES]
+    diagnosis, rule = answer.diagnosis, answer.rule
+    causes = answer.causes[:_CAUSES]
     if not causes or rule is None or diagnosis.contacts is not None or diagnosis.families:
         return None
-    rows = [_row(diagnosis, k, brand, rule) for k in range(len(causes))]
+    rows = [_row(answer, told, rule) for told in causes]
     if len(switches(diagnosis)) > 1:
         rows.append(_together(diagnosis, rule))
     top = tag('tr', *(tag('th', head, scope='col') for head in _HEADS))
@@ -256,55 +291,30 @@ def causes_table(diagnosis: Diagnosis, brand: str | None, rule: Rule | None) -> 
     )
 
 
-def _row(diagnosis: Diagnosis, k: int, brand: str | None, rule: Rule) -> Html:
-    cause = diagnosis.causes[k]
-    name = cause_name(diagnosis, cause)
-    value, ends = ends_to(places(diagnosis), cause.share, *cause.share_ci90)
-    sure = belief_lines(diagnosis, cause)
-    # Radians stand on the card.
-    off = [_RADIANS.sub('', told) for told in values(diagnosis, cause)[:_VALUES]]
-    if alternatives(diagnosis, cause) and off:
-        off = [f'should it be {one_of(diagnosis, cause)}:', *off]
+def _row(answer: Answer, told: CauseAnswer, rule: Rule) -> Html:
+    value, ends = answer.share_of(told)
+    left = told.left
     cells: list[Child] = [
         joined([tag('b', value), f' ({ends})']),
-        _lines(off) or 'open',
-        _lines(sure) or 'not judged',
-        _alone(diagnosis, k, rule) or 'cannot be told: nothing that was tried stands for it',
-        _enter(diagnosis, k, brand),
+        lines(told.off_in_short(_VALUES)) or 'open',
+        lines(told.sure) or 'not judged',
+        'cannot be told: nothing that was tried stands for it'
+        if left is None
+        else _left_over(left.rms_after, left.largest_after, rule),
+        told.where_to_enter,
     ]
-    first = tag('a', f'{k + 1}. {name[:1].upper()}{name[1:]}', href=f'#cause-{k + 1}')
-    pairs = zip(_HEADS[1:], cells, strict=True)
+    first = tag('a', f'{told.k + 1}. {told.name}', href=f'#cause-{told.k + 1}')
+    with_heads = zip(_HEADS[1:], cells, strict=True)
     return tag(
         'tr',
         tag('th', first, scope='row'),
-        *(tag('td', cell, data_head=head) for head, cell in pairs),
+        *(tag('td', cell, data_head=head) for head, cell in with_heads),
     )
-
-
-def _lines(told: list[str]) -> Html | None:
-    return tag('span', *(tag('span', text) for text in told), class_='lines') if told else None
-
-
-def _alone(diagnosis: Diagnosis, k: int, rule: Rule) -> Html | None:
-    left = left_without(diagnosis, k)
-    return None if left is None else _left_over(left.rms_after, left.largest_after, rule)
 
 
 def _left_over(rms: float, most: float, rule: Rule) -> Html:
     told = [f'{millimetres(rms)} RMS, {millimetres(most)} at most', mark(rule, most, _APART)]
     return joined(told)
-
-
-def _enter(diagnosis: Diagnosis, k: int, brand: str | None) -> str:
-    """Return where the controller takes it, without the way through its menus, which the card has."""
-    cause = diagnosis.causes[k]
-    found = effects_of(diagnosis, cause)
-    if curve_fault(diagnosis, k) or not found:
-        return 'nothing yet'
-    if alternatives(diagnosis, cause):
-        return 'nothing before it is known which it is'
-    told = UNNAMED if unnamed(cause) else correction(found[0], brand, diagnosis.model.robot)
-    return _SENTENCE.split(told.removesuffix(UNCHECKED).rstrip())[0]
 
 
 def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
@@ -330,26 +340,3 @@ def _more(diagnosis: Diagnosis) -> Html:
         name, at = ('Does it pass', 'acceptance') if every else ('What if', 'seam')
         told += ['With only two of them mended: see ', tag('a', name, href=f'#{at}'), '. ']
     return joined([*told, 'A click on a cause leads to its card.'])
-
-
-def holds(diagnosis: Diagnosis) -> Html | None:
-    """Return where what is said holds, how wide it is beyond, and what the data left open."""
-    posterior = diagnosis.posterior
-    if posterior is None:
-        return None
-    rest = left_open(posterior)
-    wide = rest or posterior.anywhere_m > _WIDER * posterior.recorded_m
-    file = which_file(diagnosis.model.alone)
-    sentences = [elsewhere(posterior, correctable(diagnosis)), *([file] if file else []), *rest]
-    return tag('p', ' '.join(sentences), class_='warn' if wide else 'note')
-
-
-def words_told() -> Html:
-    """Return what the words of the page mean, folded."""
-    pairs = [part for word, told in WORDS for part in (tag('dt', word), tag('dd', told))]
-    return tag(
-        'details',
-        tag('summary', 'What the words on this page mean'),
-        tag('dl', *pairs, class_='pairs'),
-        class_='detail',
-    )

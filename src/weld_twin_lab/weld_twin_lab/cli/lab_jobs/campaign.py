@@ -20,7 +20,7 @@ FAILED = 1
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the campaigns, each with its options."""
-    from .. import campaigns
+    from ... import campaigns
 
     jobs = parser.add_subparsers(required=True, metavar='CAMPAIGN', dest='campaign')
     for name in campaigns.names():
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the campaign, write its result, and say whether it passed."""
-    from ..campaigns.keeping.result_file import refuse_foreign, write_result
+    from ...campaigns.keeping.result_file import refuse_foreign, write_result
 
     refuse_foreign(args.out, args.campaign)
     module = import_module(f'weld_twin_lab.campaigns.{args.campaign}')

@@ -8,37 +8,31 @@ results.json, a page per robot (ur5.html, ur10.html) and every diagnosis.
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 
 from weld_twin_nodes.cli.options import add_output, output
 
+from ...study import REQUIRED, Study, option, options, study
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--ur5', required=True, metavar='DIR', help='holds grid.csv, random.csv')
-    parser.add_argument(
-        '--ur10', required=True, metavar='DIR', help='holds series_c_random_poses.csv'
-    )
-    add_output(parser, 'where results go')
+add_arguments = options(
+    option('--ur5', REQUIRED, 'DIR', 'holds grid.csv, random.csv'),
+    option('--ur10', REQUIRED, 'DIR', 'holds series_c_random_poses.csv'),
+    lambda parser: add_output(parser, 'where results go'),
+    out='',
+)
 
 
-def run(args: argparse.Namespace) -> int:
+@study
+def run(study: Study) -> None:
     """Diagnose, judge, write, and print one line for each split."""
-    import sys
+    from ...real_robots.arm_study import RESULTS, judged_arms
 
-    from ..real_robots.arm_study import RESULTS, study
-
-    def tell(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
-    with output(args, RESULTS) as place:
-        results = study(Path(args.ur5), Path(args.ur10), place, tell)
-    for robot in results['robots'].values():
+    with output(study.args, RESULTS) as place:
+        robots = judged_arms(Path(study.args.ur5), Path(study.args.ur10), place, study.tell)
+    for robot in robots['robots'].values():
         for name, split in robot['splits'].items():
             got = split['got']
             print(
                 f'{name}: mean {got["mean_m"] * 1e3:.4f} mm, max {got["max_m"] * 1e3:.4f} mm, '
                 f'goal {"reached" if split["reached"] else "missed"}'
             )
-    return 0

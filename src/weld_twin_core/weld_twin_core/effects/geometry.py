@@ -1,0 +1,172 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Constant errors of the geometry: a joint's zero, and the numbers of a Denavit-Hartenberg row.
+
+The formulas are those of the paper: theta -> theta + offset (eq. II.iii.a), a -> a + da (eq. II.iii.b),
+alpha -> alpha + dalpha (eq. II.iii.c), d -> d + dd; beta is Hayati's turn about y for axes that are
+nearly parallel (IEEE CDC 1983).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..arm.robot import Robot
+from .constant import ChannelError
+from .registry import register
+from .view import Parameter, Plausible, Stage, Value
+from .wording import stands, to_mend
+
+URS = (
+    'controller calibrations of a UR3 (github.com/MyRobotLab/pyrobotlab issue 145) and of a UR5 '
+    '(github.com/UniversalRobots/Universal_Robots_ROS_Driver issue 457): rows between axes that '
+    'are not parallel'
+)
+"""Where errors of links were read."""
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class JointOffset(ChannelError):
+    """A constant encoder or mastering error of one joint."""
+
+    joint: str
+    offset: Value = 0.0
+
+    name = 'joint_offset'
+    title = 'zero offset'
+    entered = 'zero'
+    changes_in_use = True
+    everywhere = True
+    set_at_controller = True
+    of = 'joint'
+    stage = Stage.JOINT
+    channel = 'q'
+    parameters = (
+        Parameter(
+            'offset',
+            'rad',
+            typical=5e-4,
+            range=Plausible.even(
+                5e-3,
+                0.13,
+                'a mastering 16 degrees of the motor off is 0.2 degrees (3.5 mrad) of the joint; arms '
+                'mastered on wrong marks were 5 to 7 degrees off (industrialmonitordirect.com, KR16 '
+                'mastering deviation and KR3 mastering error)',
+            ),
+            sliding=Plausible.even(5e-3, 0.1, 'derived: a reference switch, by hand'),
+        ),
+    )
+
+    def remedy(self, robot: Robot) -> str:
+        """Return what to mend, in words; see `Hooks.remedy`."""
+        joint, offset = str(self.site), self.plain('offset')
+        sliding = bool(robot.prismatic[robot.index(joint)])
+        return f'{stands(joint, offset, sliding=sliding)} {to_mend(offset, sliding=sliding)}'
+
+
+class LinkError(ChannelError):
+    """A constant error of one number of one DH row."""
+
+    entered = 'model'
+    everywhere = True
+    of = 'link'
+    stage = Stage.LINK
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class LinkLength(LinkError):
+    """A wrong length of the common normal of one DH row."""
+
+    joint: str
+    da: Value = 0.0
+
+    name = 'link_length'
+    title = 'link length error'
+    changes_in_use = True
+    channel = 'a'
+    parameters = (
+        Parameter(
+            'da',
+            'm',
+            typical=2e-4,
+            range=Plausible.even(
+                5e-4,
+                1e-2,
+                f'{URS}: 0.02 to 0.28 mm; range derived: beyond a centimetre it is another arm',
+            ),
+        ),
+    )
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class LinkOffset(LinkError):
+    """A wrong offset along the axis of one DH row."""
+
+    joint: str
+    dd: Value = 0.0
+
+    name = 'link_offset'
+    title = 'link offset error'
+    channel = 'd'
+    parameters = (
+        Parameter(
+            'dd',
+            'm',
+            typical=2e-4,
+            range=Plausible.even(
+                5e-4,
+                1e-2,
+                f'{URS}: 0.09 to 0.32 mm; range derived: beyond a centimetre it is another arm',
+            ),
+        ),
+    )
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class LinkTwist(LinkError):
+    """A wrong angle between the axes of one DH row."""
+
+    joint: str
+    dalpha: Value = 0.0
+
+    name = 'link_twist'
+    title = 'link twist error'
+    channel = 'alpha'
+    off = 'the axes are twisted by'
+    parameters = (
+        Parameter(
+            'dalpha',
+            'rad',
+            typical=5e-4,
+            range=Plausible.even(2e-3, 2e-2, f'{URS}: 0.4 to 3.9 mrad'),
+        ),
+    )
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class AxisParallelism(LinkError):
+    """The tilt that alpha cannot express where two axes are nearly parallel."""
+
+    joint: str
+    dbeta: Value = 0.0
+
+    name = 'axis_parallelism'
+    title = 'axis parallelism error'
+    channel = 'beta'
+    off = 'the axes are out of parallel by'
+    parameters = (
+        Parameter(
+            'dbeta',
+            'rad',
+            typical=5e-4,
+            range=Plausible.even(
+                2e-3, 2e-2, 'derived: a tilt of the same kind as link_twist, of the same size'
+            ),
+        ),
+    )

@@ -1,0 +1,212 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One way to run a study: its options, its parts and tasks, what is kept of them, and how it ends.
+
+A study is a subcommand: a module with a docstring, whose first line is the short help, and::
+
+    add_arguments = options(option('--cases', 40, 'N', 'how many (default: 40)'))
+
+    @study
+    def run(study: Study) -> bool | None: ...
+
+What is slow to import is imported inside. Parts and tasks are kept in the folder of the study as soon
+as they are there, so that one that was stopped goes on.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from weld_twin_core import __version__
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_nodes.cli.options import add_pool
+from weld_twin_nodes.offline.output_directory import write_owned
+
+if TYPE_CHECKING:
+    from weld_twin_nodes.offline.task_pool import Runner, Task
+
+MISSED = 1
+"""Exit code where a goal was not met."""
+DONE = 'done'
+"""Folder of what is kept of the tasks of a study."""
+REQUIRED: Any = ...
+"""Default of an option that must be given."""
+Tell = Callable[[str], None]
+"""Told what is being done."""
+Add = Callable[[argparse.ArgumentParser], None]
+
+
+def option(flag: str, default: Any, metavar: Any, text: str, **more: Any) -> Add:
+    """Return what adds an option; numbers are read as their default is, a False is a switch."""
+    keywords: dict[str, Any] = {'help': text, **more}
+    if default is False:
+        keywords['action'] = 'store_true'
+    else:
+        keywords['metavar'] = metavar
+    if default is REQUIRED:
+        keywords |= {'required': True} if flag.startswith('-') else {}
+    elif default is not False:
+        keywords['default'] = default
+        if isinstance(default, int | float):
+            keywords['type'] = type(default)
+
+    def add(parser: argparse.ArgumentParser) -> None:
+        parser.add_argument(flag, **keywords)
+
+    return add
+
+
+def options(*rows: Add, out: str = 'where results go', of: str = 'DIR', pool: bool = False) -> Add:
+    """
+    Return what adds the options of a study.
+
+    Parameters
+    ----------
+    *rows : callable
+        As `option` returns them.
+    out, of : str
+        What ``--out`` says; it must be given. An empty text adds none.
+    pool : bool
+        Whether tasks run on several cores or on a cluster.
+
+    """
+    last = option('--out', REQUIRED, of, out)
+    every = [*rows, *([add_pool] * pool), *([last] * bool(out))]
+
+    def add_arguments(parser: argparse.ArgumentParser) -> None:
+        for add in every:
+            add(parser)
+
+    return add_arguments
+
+
+def listed(text: str) -> list[str]:
+    """Return what stands between commas."""
+    return [part.strip() for part in text.split(',') if part.strip()]
+
+
+class Parts:
+    """
+    The parts of a study, a file each.
+
+    Parameters
+    ----------
+    folder : Path
+        Made where it is not there.
+    tell : callable
+        Told the name of each part that is made.
+
+    """
+
+    def __init__(self, folder: Path, tell: Tell = lambda text: None) -> None:
+        self._folder, self._tell = folder, tell
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def __call__(self, name: str, make: Callable[[], Any]) -> Any:
+        """Return one part, from its file where there is one; else made, and kept."""
+        path = self._folder / f'{name}.json'
+        if not path.is_file():
+            self._tell(name)
+            write_text(path, json.dumps(make(), indent=1, default=float) + '\n')
+        return json.loads(path.read_text(encoding='utf-8'))
+
+
+class Study:
+    """
+    A study that runs.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        Its options.
+
+    Attributes
+    ----------
+    out : Path
+        Its folder, or its file.
+
+    """
+
+    def __init__(self, args: argparse.Namespace) -> None:
+        self.args = args
+        self.out = Path(args.out or '')
+
+    @staticmethod
+    def tell(text: str) -> None:
+        """Tell on stderr what is being done."""
+        print(text, file=sys.stderr, flush=True)
+
+    def parts(self, folder: str) -> Parts:
+        """Return its parts, made one after the other and kept in a folder of it."""
+        return Parts(self.out / folder, self.tell)
+
+    @contextmanager
+    def runner(self, what: str, store: Path | None = None) -> Iterator[Runner]:
+        """Yield what runs tasks, shows how far they are, and keeps what came of them."""
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+        from weld_twin_nodes.offline.task_pool import Runner, pool_of
+
+        console = Console(stderr=True)
+        columns = ('{task.description}', BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+            bar = progress.add_task(what, total=None)
+
+            def tell(done: int, total: int, label: str) -> None:
+                progress.update(bar, completed=done, total=total)
+
+            pool = pool_of(self.args.scheduler, self.args.workers)
+            with Runner(pool, store or self.out / DONE, tell) as runner:
+                yield runner
+
+    def tasks(self, tasks: Sequence[Task], what: str, store: Path | None = None) -> list[Any]:
+        """Return what came of tasks, in their order."""
+        with self.runner(what, store) as runner:
+            return runner.run(tasks)
+
+    def write(
+        self, name: str, result: Any = None, page: str | None = None, *, say: bool = True
+    ) -> None:
+        """Write the results as NAME.json, and their page as NAME.md; print the page, or not."""
+        if result is not None:
+            write_owned(self.out / f'{name}.json', json.dumps(result, indent=1) + '\n')
+        if page is not None:
+            write_owned(self.out / f'{name}.md', page)
+            print(page if say else '', end='')
+
+    def refuse_foreign(self, *ours: str) -> None:
+        """
+        Refuse a folder that holds something else than this study.
+
+        Raises
+        ------
+        DataError
+            It holds another name than ``ours``, or is no folder.
+
+        """
+        out = self.out
+        if out.exists() and not (out.is_dir() and all(p.name in ours for p in out.iterdir())):
+            raise DataError(f"'{out}' holds something else already; choose another place")
+
+
+def head(schema: str, **more: Any) -> dict[str, Any]:
+    """Return what the results of a study begin with: what they are and what made them."""
+    return {'schema': f'weld_twin/{schema}', 'version': __version__, **more}
+
+
+def study(run: Callable[[Study], bool | None]) -> Callable[[argparse.Namespace], int]:
+    """Return the subcommand of a study; one that returns False has missed a goal."""
+
+    def command(args: argparse.Namespace) -> int:
+        return MISSED if run(Study(args)) is False else 0
+
+    return command

@@ -1,0 +1,283 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What is said of a diagnosis: page, terminal and print draw it.
+
+What more than one of them says, or more than one place of the page, is said here, of a single cause
+in `cause_answer`. What one section alone says stands with that section.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from functools import cached_property
+from typing import NamedTuple
+
+from weld_twin_core.diagnosis.result import NAMING, Candidate, Diagnosis
+from weld_twin_core.metrics.conformity import Rule
+from weld_twin_core.recording import Recording
+from weld_twin_nodes.offline.where_it_holds import elsewhere, left_open, which_file
+from weld_twin_nodes.wording.mending import correctable
+from weld_twin_nodes.wording.quantities import (
+    change,
+    ends_to,
+    millimetres,
+    odds,
+    parameter_rows,
+    percent,
+)
+from weld_twin_nodes.wording.verdict import verdict
+from weld_twin_nodes.wording.words import (
+    called,
+    cause,
+    found_name,
+    listed,
+    mended,
+    open_sets,
+    site_name,
+    status_word,
+)
+
+from .cause_answer import CauseAnswer
+from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows
+from .remainder import places, remainder
+from .to_do import worth_doing
+from .untried import weighed
+
+_FIRST_REAL_STAMP = 10**18
+"""Stamps [ns] before 2001 count from something else than the epoch."""
+_WIDER = 2.0
+"""Ratio of the error elsewhere in the reach to that where it was measured from which it is a warning."""
+_ALIKE = 1.5
+"""Ratio of probabilities below which two candidates are told as alike."""
+_HARDLY = 1000.0
+"""Ratio of probabilities that is told at most."""
+_TOLD = 4
+"""Causes whose figures are told beside that of the whole."""
+_DIFFERS = 0.005
+"""Probability by which a part is surer than the whole, so that both read differently."""
+
+
+class Table(NamedTuple):
+    """A table as the page has it; the terminal writes its heads small."""
+
+    title: str
+    heads: Sequence[str]
+    rows: list[list[str]]
+
+
+class Rival(NamedTuple):
+    """A hypothesis: how likely it is against the likeliest, and what it leaves of the gap."""
+
+    name: str
+    likely: str
+    left: str
+    change: str
+    length: float
+    """What it leaves, as a part of the gap."""
+
+
+class Holds(NamedTuple):
+    """Where what is said holds, which file holds it, what the data left open; and whether to warn."""
+
+    elsewhere: str
+    file: str
+    open: list[str]
+    wide: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """
+    What is said of a diagnosis.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis
+    rule : Rule, optional
+        How the largest deviation is judged.
+    brand : str, optional
+        Whose controller it is, as `controllers.BRANDS` has it.
+
+    """
+
+    diagnosis: Diagnosis
+    rule: Rule | None = None
+    brand: str | None = None
+
+    @property
+    def sound(self) -> bool:
+        """Tell whether data and set-up are sound; nothing is said of causes else."""
+        return self.diagnosis.status != 'unsound'
+
+    @property
+    def subject(self) -> str:
+        """Return what was diagnosed."""
+        recordings = self.diagnosis.recordings
+        names = ', '.join(recording.name for recording in recordings)
+        parts = [self.diagnosis.model.robot.name, names, recorded_at(recordings)]
+        return ' · '.join(part for part in parts if part)
+
+    @property
+    def status(self) -> str:
+        """Return the status in words."""
+        return status_word(self.diagnosis)
+
+    @cached_property
+    def verdict(self) -> tuple[str, str]:
+        """Return the cause, and what knowing it brings."""
+        return verdict(self.diagnosis)
+
+    @property
+    def mended(self) -> tuple[str, ...]:
+        """Return what was wrong with the data and undone; all that follows stands on it."""
+        return mended(self.diagnosis)
+
+    @cached_property
+    def to_do(self) -> list[str]:
+        """Return what to do, in this order."""
+        return worth_doing(self.diagnosis, self.rule)
+
+    @cached_property
+    def causes(self) -> tuple[CauseAnswer, ...]:
+        """Return what is said of each cause."""
+        count = len(self.diagnosis.causes)
+        return tuple(CauseAnswer(self.diagnosis, k, self.brand) for k in range(count))
+
+    @cached_property
+    def holds(self) -> Holds | None:
+        """Return where what is said holds, how wide it is beyond, and what the data left open."""
+        posterior = self.diagnosis.posterior
+        if posterior is None:
+            return None
+        return Holds(
+            elsewhere(posterior, correctable(self.diagnosis)),
+            which_file(self.diagnosis.model.alone),
+            rest := left_open(posterior),
+            bool(rest) or posterior.anywhere_m > _WIDER * posterior.recorded_m,
+        )
+
+    @property
+    def together(self) -> str:
+        """Return why the verdict as a whole is less sure than its causes; nothing where it is not."""
+        whole = self.diagnosis
+        if whole.status not in NAMING or whole.families:
+            return ''
+        sure = [c.belief for c in self.causes if c.cause.name and c.belief is not None]
+        if not sure or max(sure) < whole.confidence + _DIFFERS:
+            return ''
+        told = ', '.join(odds(p) for p in sure[:_TOLD])
+        if len(sure) == 1:
+            return f'. The cause alone, others or none beside it: {told}'
+        return f'. All at once is less likely than each alone: {told}'
+
+    # Shares of the squared gap: everywhere as finely as the finest of them needs.
+
+    @cached_property
+    def _places(self) -> int:
+        return places(self.diagnosis)
+
+    def percent(self, share: float) -> str:
+        """Return a share as all of this answer are told."""
+        return percent(share, self._places)
+
+    def share_of(self, told: CauseAnswer) -> tuple[str, str]:
+        """Return the share of a cause and the ends of its interval."""
+        return ends_to(self._places, told.cause.share, *told.cause.share_ci90)
+
+    @cached_property
+    def remainder(self) -> tuple[tuple[str, float], ...]:
+        """Return what the causes do not hold."""
+        return remainder(self.diagnosis)
+
+    # What was found, and what else was weighed.
+
+    @cached_property
+    def found(self) -> list[Table]:
+        """Return the effects with their parameters, or the kinds of many small errors."""
+        whole = self.diagnosis
+        if whole.families:
+            kinds = Table('Errors found, by kind', FAMILY_HEADS, family_rows(whole.families))
+            ripple = Table('Transmission ripple by joint', RIPPLE_HEADS, ripple_rows(whole))
+            return [kinds, *([ripple] if ripple.rows else [])]
+        rows = []
+        for found in whole.effects:
+            values = parameter_rows(found.effect, found.std, whole.model.robot)
+            names = [found_name(found), *[''] * len(values)]
+            rows += [[name, *row] for name, row in zip(names, values, strict=False)]
+        heads = ('Effect', 'Parameter', 'Value ± standard error')
+        return [Table('Effects found', heads, rows)] if rows else []
+
+    @cached_property
+    def rivals(self) -> list[list[Rival]]:
+        """Return the hypotheses cause by cause: within one, probabilities do not rise."""
+        groups: list[list[Candidate]] = []
+        for c in weighed(self.diagnosis):
+            if groups and c.probability <= groups[-1][-1].probability:
+                groups[-1].append(c)
+            else:
+                groups.append([c])
+        return [[_rival(c, group[0].probability) for c in group] for group in groups]
+
+    @cached_property
+    def open(self) -> list[str]:
+        """Return what these data cannot tell apart: the names of each set."""
+        sets = open_sets(self.diagnosis)
+        return [listed([site_name(site) for site in group], 'or') for group in sets]
+
+    @cached_property
+    def changed(self) -> Table | None:
+        """Return what changed between the recordings, and by how much; None where it was not asked."""
+        whole = self.diagnosis
+        if not whole.may_change or len(whole.recordings) < 2:
+            return None
+        rows = [
+            [
+                whole.recordings[item.recording].name,
+                cause(item.effect.name, item.effect.site),
+                *row,
+            ]
+            for item in whole.changed
+            for row in parameter_rows(item.effect, item.std, whole.model.robot)
+        ]
+        title = f'changed since {whole.recordings[0].name}'
+        return Table(title, ('Recording', 'Changed', 'Parameter', 'By'), rows)
+
+    @property
+    def nothing_changed(self) -> str:
+        """Return that nothing was seen to change, of what."""
+        names = listed([called(name) for name in self.diagnosis.may_change], 'or')
+        return f'No {names} was seen to change between the recordings.'
+
+
+def recorded_at(recordings: Sequence[Recording]) -> str:
+    """Return when the first of the recordings was made; nothing where the stamps do not tell."""
+    stamps = [r.epoch_ns for r in recordings if r.epoch_ns > _FIRST_REAL_STAMP]
+    if not stamps:
+        return ''
+    when = datetime.fromtimestamp(min(stamps) * 1e-9, tz=timezone.utc)
+    return f'recorded {when:%Y-%m-%d %H:%M} UTC'
+
+
+def _rival(candidate: Candidate, best: float) -> Rival:
+    return Rival(
+        site_name(candidate.site),
+        _against(candidate.probability, best),
+        millimetres(candidate.rms_after_m),
+        change(candidate.shrink),
+        1.0 - candidate.shrink,
+    )
+
+
+def _against(probability: float, best: float) -> str:
+    """Return how likely a candidate is against the likeliest: how sure that is stands elsewhere."""
+    times = best / max(probability, 1e-12)
+    if times == 1.0:
+        return 'the likeliest'
+    if times < _ALIKE:
+        return 'as likely'
+    if times > _HARDLY:
+        return f'more than {_HARDLY:.0f} times less likely'
+    return f'{times:.2g} times less likely' if times < 10.0 else f'{times:.0f} times less likely'

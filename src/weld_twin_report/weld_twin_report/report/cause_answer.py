@@ -1,0 +1,333 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is said of one cause, wherever it is said: card, table of causes, terminal."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from weld_twin_core.diagnosis.advice import actions
+from weld_twin_core.diagnosis.result import NAMING, Cause, Diagnosis, Site
+from weld_twin_core.effects.effect import Effect
+from weld_twin_nodes.wording.mending import (
+    Left,
+    against,
+    curve_fault,
+    left_without,
+    look_at,
+    taken_by_curve,
+    warning,
+)
+from weld_twin_nodes.wording.quantities import millimetres, odds, with_ends
+from weld_twin_nodes.wording.switches import alternatives, as_it_is, cause_name, trusted
+from weld_twin_nodes.wording.words import (
+    CURVES,
+    DEPENDENCES,
+    cause,
+    depending,
+    leading,
+    likely,
+    place_name,
+    same_words,
+    site_name,
+    unnamed,
+)
+
+from .cause_values import values
+from .controllers import BRANDS, UNCHECKED, UNNAMED, correction, gearing
+from .directions import components, rms_words, sides_words
+from .seam_view import seen_at
+from .to_do import TOGETHER
+
+LEVEL_HEADS = ('Share of the gap', 'Where', 'Depends on', 'Name')
+_LISTED = 3
+"""Places, dependences or names told of a level."""
+_ACTIONS = 4
+"""Effects of a cause whose remedies are told; effects.yaml has all."""
+_LATE = {'servo_lag', 'time_delay'}
+"""Causes that read otherwise where the joints were commanded, not measured."""
+_SOURCE = 'source of the joints'
+"""Name of the check that tells so."""
+_BY_CURVE = 'That is with programs corrected by the curve.'
+_SHORT = ' That curve follows only part of what happens here, so it takes off less than the share.'
+_RADIANS = re.compile(r' \([^)]*mrad\)')
+_SENTENCE = re.compile(r'(?<=\.) (?=[A-Z])')
+
+
+@dataclass(frozen=True, eq=False)
+class CauseAnswer:
+    """
+    What is said of one cause.
+
+    Attributes
+    ----------
+    diagnosis : Diagnosis
+    k : int
+        The cause, counted from 0.
+    brand : str, optional
+        Whose controller it is, as `controllers.BRANDS` has it.
+
+    """
+
+    diagnosis: Diagnosis
+    k: int
+    brand: str | None = None
+
+    @cached_property
+    def cause(self) -> Cause:
+        """Return what is known of it."""
+        return self.diagnosis.causes[self.k]
+
+    @cached_property
+    def name(self) -> str:
+        """Return it as a heading."""
+        told = cause_name(self.diagnosis, self.cause)
+        return f'{told[:1].upper()}{told[1:]}'
+
+    @cached_property
+    def effects(self) -> list[Effect]:
+        """
+        Return the effects in the twin that stand for it.
+
+        Of a cause without a name only curves do: what imitates it says nothing of it.
+        """
+        found = self.diagnosis.model.found
+        held = [found[m] for m in self.cause.members if m < len(found)]
+        return [e for e in held if e.name in CURVES] if unnamed(self.cause) else held
+
+    @cached_property
+    def alike(self) -> tuple[Site, ...]:
+        """Return what these data cannot tell apart; nothing where its name is settled."""
+        return alternatives(self.diagnosis, self.cause)
+
+    @property
+    def _should_it_be(self) -> str:
+        """Return which of those that fit alike the values and remedies are told of."""
+        return f'hould it be {cause(self.effects[0].name, self.effects[0].site)}:'
+
+    # How sure it is.
+
+    @cached_property
+    def belief(self) -> float | None:
+        """
+        Return how sure it is: its name, one of its names that fit alike, or its place.
+
+        Who believes the whole verdict believes each part of it: a part is never told as less sure.
+        None where nothing is believed of it.
+        """
+        named = {site: p for site, p in self.cause.name if site.effect not in CURVES}
+        if not named:
+            place = self.cause.place
+            return sum(p for _, p in leading(place)) if place else None
+        if self.diagnosis.families:
+            return self.cause.probability
+        own = sum(named.get(s, 0.0) for s in self.alike) if self.alike else max(named.values())
+        whole = self.diagnosis.confidence if self.diagnosis.status in NAMING else 0.0
+        return min(max(own, whole), 1.0)
+
+    @cached_property
+    def sure(self) -> list[str]:
+        """Return how sure it is, a sentence each; the first has the figure."""
+        if self.belief is None:
+            return []
+        sure, named = odds(self.belief), [s for s, _ in self.cause.name if s.effect not in CURVES]
+        if not named:
+            return [f'{sure} that it sits at {likely(self.cause.place)}.', *self._on]
+        if self.alike:
+            return [f'{sure} that it is one of these; which of them is open.']
+        if self.diagnosis.families and len(named) > 1:
+            return [f'{sure} that these are there.']
+        return [f'{sure} that it is {cause_name(self.diagnosis, self.cause)}.']
+
+    @property
+    def _on(self) -> list[str]:
+        if not self.cause.dependence:
+            return ['What it depends on was not found.']
+        told = leading(self.cause.dependence)
+        on = depending(*(name for name, _ in told))
+        return [f'{odds(sum(p for _, p in told))} that it {on}; what it is, is open.']
+
+    @cached_property
+    def levels(self) -> str:
+        """Return what is believed of place, dependence and name, each by itself."""
+        at = str(self.cause.place[0][0]) if self.cause.place else ''
+        told = {
+            'Place': [(place_name(a), p) for a, p in self.cause.place],
+            'Depends on': [(DEPENDENCES.get(on, on), p) for on, p in self.cause.dependence],
+            # The place stands there already; other joints stand with their names.
+            'Name': [
+                (cause(s.effect, None) if s.joint == at else site_name(s), p)
+                for s, p in self.cause.name
+                if s.effect not in CURVES
+            ],
+        }
+        each = '. '.join(
+            f'{head}: {", ".join(f"{name} {odds(p)}" for name, p in items[:_LISTED])}'
+            for head, items in told.items()
+            if items
+        )
+        return f'{each}. Learned for each level by itself.' if each else ''
+
+    @cached_property
+    def row(self) -> list[str]:
+        """Return share, place, dependence and name, each with its odds, as `LEVEL_HEADS` has it."""
+        value, ends = with_ends(self.cause.share, *self.cause.share_ci90)
+        levels = (
+            [(place_name(at), p) for at, p in self.cause.place],
+            [(DEPENDENCES.get(on, on), p) for on, p in self.cause.dependence],
+            [(site_name(site), p) for site, p in self.cause.name if site.effect not in CURVES],
+        )
+        told = [', '.join(f'{n} ({odds(p)})' for n, p in items[:_LISTED]) for items in levels]
+        told[-1] = 'none that was tried' if unnamed(self.cause) else told[-1]
+        return [f'{value} ({ends})', *told]
+
+    # How large it is, and what is left without it.
+
+    @cached_property
+    def off_by(self) -> list[str]:
+        """Return by how much it is off, the most telling first; of those that fit alike, of one."""
+        told = values(self.diagnosis, self.cause, self.effects)
+        return [f's{self._should_it_be}', *told] if self.alike and told else told
+
+    def off_in_short(self, most: int) -> list[str]:
+        """Return the most telling of them, without radians, which the card has."""
+        return [_RADIANS.sub('', text) for text in self.off_by[: most + bool(self.alike)]]
+
+    @cached_property
+    def moved(self) -> list[np.ndarray]:
+        """Return how it moves the tool at every stamp, (M, 3) [m], for each recording where known."""
+        told = self.diagnosis.contributions
+        if told is None or self.diagnosis.contacts is not None:
+            return []
+        return [parts[self.k] for parts in told.parts]
+
+    @cached_property
+    def own_square(self) -> float:
+        """Return how far it moves the tool by itself, as a part of the squared gap."""
+        runs = range(len(self.moved))
+        good = [trusted(self.diagnosis, run) for run in runs]
+        own = sum(float((self.moved[run][good[run]] ** 2).sum()) for run in runs)
+        whole = sum(float((as_it_is(self.diagnosis, r)[good[r]] ** 2).sum()) for r in runs)
+        return own / max(whole, 1e-300)
+
+    @cached_property
+    def most(self) -> tuple[int, np.ndarray, np.ndarray] | None:
+        """Return the recording where it moves the tool most, its samples and how far [m]."""
+        best: tuple[int, np.ndarray, np.ndarray] | None = None
+        for run, part in enumerate(self.moved if self.cause.members else []):
+            size = np.linalg.norm(part, axis=1)
+            good = np.flatnonzero(trusted(self.diagnosis, run))
+            if good.size and (best is None or size[good].max() > best[2].max()):
+                best = run, good, size[good]
+        return best
+
+    @cached_property
+    def moves(self) -> tuple[str, str] | None:
+        """Return how far it moves the tool and to which side, and how much of it goes which way."""
+        if self.most is None:
+            return None
+        run, good, size = self.most
+        peak = int(np.argmax(size))
+        worst = int(good[peak])
+        text = (
+            f'moves the tool by {millimetres(float(np.sqrt((size**2).mean())))} RMS, at most '
+            f'{seen_at(self.diagnosis, run, worst, float(size[peak]))}'
+        )
+        parts = components(self.diagnosis, run, self.moved[run])
+        if parts is None:
+            return f'{text}.', ''
+        sides = sides_words(parts[worst])
+        return f'{text} ({sides}).' if sides else f'{text}.', f' RMS {rms_words(parts[good])}.'
+
+    @cached_property
+    def left(self) -> Left | None:
+        """Return what is left with it alone mended; None where it cannot be thought away."""
+        return left_without(self.diagnosis, self.k)
+
+    @cached_property
+    def mended(self) -> tuple[str, str] | None:
+        """Return what mending it alone does to the gap, and what mended means without a name."""
+        if self.left is None:
+            return None
+        rms, rms_after, largest, largest_after = map(millimetres, self.left)
+        told = (
+            f'RMS {"falls" if self.left.rms_after < self.left.rms else "rises"} from '
+            f'{rms} to {rms_after}, the largest '
+            f'{"grows" if self.left.grows else "goes"} from {largest} to {largest_after}'
+        )
+        if not unnamed(self.cause):
+            return told, ''
+        short = taken_by_curve(self.diagnosis, self.k) is not None
+        return told, f' {_BY_CURVE}{_SHORT * short}'
+
+    # What to do about it.
+
+    @property
+    def stands_on(self) -> str | None:
+        """Return what was noted of the joints, where it is a matter of command and arm."""
+        names = {effect.name for effect in self.effects} | {s.effect for s, _ in self.cause.name}
+        if not names & _LATE:
+            return None
+        checks = self.diagnosis.checks
+        return (
+            ' '.join(c.sentence for c in checks if c.name == _SOURCE and c.level != 'ok') or None
+        )
+
+    @cached_property
+    def to_do(self) -> list[str]:
+        """Return what to do about it, a sentence or two each."""
+        effects, model = self.effects[:_ACTIONS], self.diagnosis.model
+        if self.diagnosis.families and len(effects) > 1:
+            return [TOGETHER]
+        if unnamed(self.cause):
+            told = look_at(self.diagnosis, self.k)
+        elif not effects:
+            return ['Measure as told under "What to measure next".']
+        else:
+            twins = same_words(self.diagnosis, *(Site(e.name, e.site) for e in effects))
+            ways = filter(None, [*dict.fromkeys(map(gearing, effects)), self._warning])
+            told = [*dict.fromkeys(actions(effects, model.robot, model.mends)), *twins, *ways]
+        if effects and self.alike:
+            return [f'Which of them it is must be measured first. S{self._should_it_be}', *told]
+        return told
+
+    @property
+    def _warning(self) -> str:
+        return warning(self.diagnosis, self.k)
+
+    @property
+    def _correction(self) -> str:
+        robot = self.diagnosis.model.robot
+        return UNNAMED if unnamed(self.cause) else correction(self.effects[0], self.brand, robot)
+
+    @property
+    def at_the_controller(self) -> tuple[str, str]:
+        """Return whose controller it is, and where that takes a correction."""
+        head = f'At the {BRANDS[self.brand]} controller' if self.brand else 'At the controller'
+        if not self.effects:
+            return head, 'Nothing can be entered before the cause is known.'
+        fault = curve_fault(self.diagnosis, self.k)
+        if fault:
+            return head, f'Nothing is to be entered: the curve {fault}.'
+        others = against(self.diagnosis) if unnamed(self.cause) else ''
+        told = self._correction
+        if others:
+            # A correction is made without the curves that are advised against.
+            model = 'Its model is a copy of diagnosis.json'
+            told += f' {model} without the entries of {others} under found.'
+        if self.alike:
+            told = f'Nothing before it is known which it is. S{self._should_it_be} {told}'
+        return head, told
+
+    @property
+    def where_to_enter(self) -> str:
+        """Return where the controller takes it, without the way through its menus."""
+        if curve_fault(self.diagnosis, self.k) or not self.effects:
+            return 'nothing yet'
+        if self.alike:
+            return 'nothing before it is known which it is'
+        return _SENTENCE.split(self._correction.removesuffix(UNCHECKED).rstrip())[0]

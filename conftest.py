@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What holds for the tests of every package, and which of them run side by side."""
 
+import fcntl
 import gc
 import os
 import shutil
 import sys
 from functools import cache
+from pathlib import Path
 
 import pytest
 
@@ -33,7 +35,7 @@ def pytest_collection_modifyitems(items):
     """
     Put the tests that start nodes first, which wait more than they work; then files with slow ones.
 
-    So that nothing that takes long is begun last.
+    So that nothing that takes long is begun last. The folders come as pyproject.toml lists them.
     """
     slow = {item.path for item in items if item.get_closest_marker('slow')}
     items.sort(key=lambda item: (item.get_closest_marker(CELLS) is None, item.path not in slow))
@@ -87,6 +89,37 @@ def pytest_xdist_make_scheduler(config, log):
             return f'{CELLS} {any(part in file for part in FIRST_LINE)}'
 
     return ByFile(config, log)
+
+
+@pytest.fixture(scope='session')
+def once(tmp_path_factory):
+    """Return a function that makes a folder, by its name, once for all processes of a test run."""
+    place = tmp_path_factory.getbasetemp()
+    place = (place.parent if 'PYTEST_XDIST_WORKER' in os.environ else place) / 'once'
+    place.mkdir(exist_ok=True)
+
+    def made(name, make):
+        with open(place / f'{name}.lock', 'w') as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)  # the others wait, or have it
+            if not (place / name).exists():
+                make(place / f'{name}.half')
+                (place / f'{name}.half').rename(place / name)
+        return place / name
+
+    return made
+
+
+@pytest.fixture(scope='session')
+def elbow_found(once):
+    """Return the folder of a diagnosis of the example bag; who changes it copies it first."""
+    from weld_twin_nodes.cli.in_process import weld_twin
+
+    def diagnosed(out):
+        bag = Path(__file__).parent / 'bags/elbow_play'
+        said = weld_twin('diagnose', bag, '--robot', 'ur5', '--out', out)
+        assert said.code == 0, said.err
+
+    return once('elbow_found', diagnosed)
 
 
 BROWSERS = ('chromium', 'chromium-browser', 'google-chrome')

@@ -54,6 +54,7 @@ extensions = [
     'sphinx_design',
     'command_reference',
     'node_reference',
+    'range_table',
     'score_tables',
 ]
 

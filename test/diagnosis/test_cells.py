@@ -133,12 +133,145 @@ def test_a_spring_of_the_tilt_is_told_and_the_urdf_is_given_back(tmp_path, robot
     assert off == pytest.approx(1.5e-3, rel=0.1)
 
 
-def test_programs_refuse_a_positioner_in_one_sentence(tmp_path, robot_file, capfd):
+def test_programs_without_external_axes_refuse_a_positioner_in_one_sentence(
+    tmp_path, robot_file, capfd
+):
     (tmp_path / 'p.script').write_text('def p():\nend\n', encoding='utf-8')
     words = ('correct', tmp_path / 'p.script', '--robot', robot_file)
     assert commanded(*words, '--out', tmp_path / 'o') == 2
     said = capfd.readouterr().err
-    assert said.startswith('weld-twin: a corrected program is not there yet for a workpiece that')
+    assert said.startswith('weld-twin: external axes of urscript are not known here')
     assert '(turn, tilt)' in said
     assert said.count('\n') == 1
     assert not (tmp_path / 'o').exists()
+
+
+MISTAKES = {
+    'E1 in mm where m belong': ('units', 'rail'),
+    'E1 in m, read as mm': ('units', 'rail'),
+    'another fixture': ('wrong_fixture', 'base'),
+}
+FIXTURE = {'xyz': [-0.03, 0.12, 0.05], 'quat_xyzw': [0.0, 0.28, 0.0, 0.96]}
+"""What the robot file has of the workpiece, while another one was on the table."""
+
+
+@pytest.mark.parametrize('mistake', MISTAKES)
+def test_a_mistake_of_a_cell_has_its_name(tmp_path, mistake):
+    zero = {'effect': 'joint_offset', 'joint': 'u', 'offset': -8e-4}
+    table_of(tmp_path, [zero], [], seed=41)
+    table, cell = tmp_path / 'cell.csv', ROBOT | {'workpiece': TABLE}
+    if mistake == 'another fixture':
+        cell['workpiece'] = TABLE | {'tool': FIXTURE}
+    rows = list(csv.reader(table.open(encoding='utf-8')))
+    if mistake == 'E1 in m, read as mm':
+        rows[1:] = [[*row[:3], str(float(row[3]) * 1e-3), *row[4:]] for row in rows[1:]]
+    if mistake == 'E1 in mm where m belong':
+        rows[0][3] = 'rail [m]'
+    with table.open('w', encoding='utf-8') as file:
+        csv.writer(file).writerows(rows)
+    robot, bag, out = tmp_path / 'cell.yaml', tmp_path / 'bag', tmp_path / 'found'
+    robot.write_text(yaml.safe_dump(cell), encoding='utf-8')
+    assert commanded('import', table, '--robot', robot, '--out', bag) == 0
+    assert commanded('diagnose', bag, '--robot', robot, '--out', out) == 3
+    (told,) = json.loads((out / 'diagnosis.json').read_text(encoding='utf-8'))['unsound']
+    assert (told['kind'], told['at']) == (MISTAKES[mistake][0], [MISTAKES[mistake][1]])
+    if mistake == 'another fixture':
+        numbers = re.findall(r'-?\d+\.\d+', told['remedy'])
+        wanted = TABLE['tool']['xyz'] + TABLE['tool']['quat_xyzw']
+        np.testing.assert_allclose([float(v) for v in numbers], wanted, atol=3e-3)
+
+
+def test_a_positioner_that_stands_centimetres_elsewhere_is_no_other_robot(tmp_path, robot_file):
+    table_of(tmp_path, [], [], seed=42)
+    table = TABLE | {'base': TABLE['base'] | {'xyz': [1.43, 0.18, 0.71]}}
+    robot_file.write_text(yaml.safe_dump(ROBOT | {'workpiece': table}), encoding='utf-8')
+    found = diagnosed(tmp_path, robot_file)
+    assert ('root_pose', None) in set().union(*names(found))
+    (root,) = [e for e in found['verdict']['effects'] if e['effect'] == 'root_pose']
+    rows = Rotation.from_quat(ROBOT['base']['quat_xyzw']).inv()
+    wanted = rows.apply([-0.03, 0.02, -0.01])
+    np.testing.assert_allclose(root['parameters']['xyz'], wanted, atol=3e-4)
+
+
+def test_zeros_on_both_sides_are_not_told_as_a_root_for_sure(tmp_path, robot_file):
+    """A track and a tilt whose zeros are off look together like a positioner that stands elsewhere."""
+    slid = {'effect': 'joint_offset', 'joint': 'rail', 'offset': 9e-4}
+    zero = {'effect': 'joint_offset', 'joint': 'tilt', 'offset': 1.4e-3}
+    table_of(tmp_path, [slid], [zero], seed=43)
+    found = diagnosed(tmp_path, robot_file)
+    told = set().union(*names(found))
+    assert {('joint_offset', 'rail'), ('joint_offset', 'tilt')} <= told
+    assert found['verdict']['status'] == 'ambiguous'
+
+
+def arm(prefix, base):
+    """Return an arm of four joints that turn, under names of its own."""
+    joints = [joint | {'name': f'{prefix}{k}'} for k, joint in enumerate(ROBOT['joints'][1:], 1)]
+    return {'base': base, 'joints': joints, 'tool': ROBOT['tool']}
+
+
+ARMS = {
+    'left': arm('left_', {'xyz': [1.5, 0.1, 0.0], 'quat_xyzw': [0.0, 0.0, 1.0, 0.0]}),
+    'right': arm('right_', {'xyz': [0.0, 0.0, 0.0], 'quat_xyzw': [0.0, 0.0, 0.0, 1.0]}),
+}
+
+
+def hand(one, q, off):
+    """Return where an arm's tool is, from plain matrices, shape (N, 4, 4)."""
+
+    def placed(xyz, turn):
+        out = np.zeros((*turn.as_matrix().shape[:-2], 4, 4))
+        out[..., :3, :3], out[..., :3, 3], out[..., 3, 3] = turn.as_matrix(), xyz, 1.0
+        return out
+
+    pose = placed(one['base']['xyz'], Rotation.from_quat(one['base']['quat_xyzw']))
+    for row, value in zip(one['joints'], q.T, strict=True):
+        about = (value + off.get(row['name'], 0.0))[:, None] * [0.0, 0.0, 1.0]
+        turned = placed([0.0, 0.0, row.get('d', 0.0)], Rotation.from_rotvec(about))
+        twist = Rotation.from_rotvec([row.get('alpha', 0.0), 0.0, 0.0])
+        pose = pose @ turned @ placed([row.get('a', 0.0), 0.0, 0.0], twist)
+    return pose @ placed(one['tool']['xyz'], Rotation.identity())
+
+
+def joined(goal, off, rng):
+    """Return postures in which the real ball of the right arm is at a place in the left hand."""
+    middle = np.array([0.0, -0.8, 0.9, 0.0] * 2)
+    q = middle + rng.uniform(-1.0, 1.0, (len(goal), 8)) * [0.8, 0.4, 0.5, 1.5] * 2
+
+    def away(q):
+        left, right = hand(ARMS['left'], q[:, :4], off), hand(ARMS['right'], q[:, 4:], off)
+        return np.einsum('nji,nj->ni', left[:, :3, :3], right[:, :3, 3] - left[:, :3, 3]) - goal
+
+    for _ in range(30):
+        slope = np.stack([(away(q + 1e-6 * e) - away(q)) / 1e-6 for e in np.eye(8)], axis=-1)
+        step = np.einsum('nij,nj->ni', np.linalg.pinv(slope), -away(q))
+        q = q + step * np.minimum(1.0, 0.3 / np.abs(step).max(axis=1, keepdims=True).clip(1e-9))
+    return q[np.abs(away(q)).max(axis=1) < 1e-9]
+
+
+def test_two_arms_calibrate_each_other_by_a_ball_in_sockets(tmp_path):
+    rng = np.random.default_rng(51)
+    off = {'right_3': 1.3e-3, 'left_2': -9e-4}
+    places = {'one': [0.0, 0.0, 0.12], 'two': [0.06, 0.0, 0.12], 'three': [0.0, 0.07, 0.14]}
+    rows = []
+    for label, place in places.items():
+        q = joined(np.tile(place, (60, 1)), off, rng)[:24]
+        rows += [[*np.degrees(one + rng.normal(scale=1e-5, size=8)), label] for one in q]
+    heads = [f'{joint["name"]} [deg]' for one in ARMS.values() for joint in one['joints']]
+    with (tmp_path / 'touches.csv').open('w', encoding='utf-8') as file:
+        csv.writer(file).writerows([[*heads, 'contact'], *rows])
+    artefact, robot = tmp_path / 'sockets.yaml', tmp_path / 'pair.yaml'
+    ties = [{'between': ['one', 'two'], 'value': 0.06, 'sigma': 5e-5}]
+    sockets = {label: {'kind': 'point'} for label in places}
+    artefact.write_text(yaml.safe_dump({'contacts': sockets, 'distances': ties}))
+    robot.write_text(yaml.safe_dump(ARMS['right'] | {'workpiece': ARMS['left']}))
+    words = ('import', tmp_path / 'touches.csv', '--contacts', artefact, '--robot', robot)
+    assert commanded(*words, '--out', tmp_path / 'bag') == 0
+    words = ('diagnose', tmp_path / 'bag', '--robot', robot, '--align', 'tool')
+    assert commanded(*words, '--out', tmp_path / 'found') == 0
+    found = json.loads((tmp_path / 'found' / 'diagnosis.json').read_text(encoding='utf-8'))
+    for joint, offset in off.items():
+        assert any(('joint_offset', joint) in one for one in names(found))
+        told = [e for e in found['verdict']['effects'] if e['joint'] == joint]
+        assert [e['parameters']['offset'] for e in told] == [pytest.approx(offset, rel=0.1)]
+    assert len(found['verdict']['effects']) == len(off)

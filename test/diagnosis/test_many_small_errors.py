@@ -11,7 +11,7 @@ from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.many.shrinkage import groups
-from weld_twin_core.diagnosis.many.wave_lines import Waves, with_lines
+from weld_twin_core.diagnosis.many.small_errors import Waves, with_lines
 from weld_twin_core.diagnosis.many.weighed_families import weighed_families
 from weld_twin_core.diagnosis.unseen.leftover_structure import Structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen

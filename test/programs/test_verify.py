@@ -188,3 +188,73 @@ def test_a_promise_counts_what_a_fitted_base_hides_of_the_arm(cell, tmp_path):
     true = np.sqrt((apart**2).mean())
     after = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']['after']
     assert after['rms_ci90_same_setup_m'][1] < true < after['rms_ci90_m'][1]
+
+
+def off_the_path(folder):
+    """Return how far the real tool is from the path that was meant, at its worst [m]."""
+    texts = [
+        [(place / name).read_bytes().decode('latin-1') for name in FILES]
+        for place in (MADE, folder)
+    ]
+    meant, run = (driven(ARM, readers.krl(text), NEAR, 0.05) for text in texts)
+    real = np.array([tool_pose(ROBOT, q, TOOL, OFF)[:3, 3] for q in run.joints[::5]])
+    way = np.diff(meant.tool, axis=0)
+    off = real[:, None] - meant.tool[:-1]
+    share = (off * way).sum(axis=2) / np.maximum((way**2).sum(axis=1), 1e-18)
+    return np.linalg.norm(off - np.clip(share, 0, 1)[..., None] * way, axis=2).min(axis=1).max()
+
+
+@pytest.mark.parametrize(('size', 'decided'), [(2e-2, 'as kept'), (2e-6, 'as not kept')])
+def test_a_tolerance_is_decided_by_how_sure_the_correction_is(size, decided, cell, tmp_path):
+    said = weld_twin(
+        *('correct', MADE / FILES[0], '--robot', cell / 'robot.yaml'),
+        *('--model', cell / 'found' / 'diagnosis.json', '--out', tmp_path / 'out'),
+        *('--tolerance', f'{size * 1e3:g}mm'),
+    )
+    assert said.code == 0, said.err
+    assert f'it counts {decided}' in said.out
+    assert f'it counts {decided}' in (tmp_path / 'out' / 'report.html').read_text()
+    told = json.loads((tmp_path / 'out' / 'correction.json').read_text())['tolerance']
+    assert off_the_path(tmp_path / 'out') < told['after']['sure_within_m'] < 2e-2
+    if decided == 'as not kept':
+        assert off_the_path(MADE) > size and told['before']['decision'] == 'not kept'
+        assert told['postures_more'] is None and 'No number of postures' in said.out
+
+
+def test_a_tolerance_needs_a_model_that_says_how_sure_it_is(cell, tmp_path):
+    (tmp_path / 'zero.yaml').write_text(
+        '[{effect: joint_offset, joint: joint_a2, offset: 8e-4}]\n'
+    )
+    words = ('correct', MADE / FILES[0], '--robot', cell / 'robot.yaml')
+    model = ('--model', tmp_path / 'zero.yaml', '--out', tmp_path / 'out')
+    said = weld_twin(*words, *model, '--tolerance', '0.3mm')
+    assert said.code == 2 and 'diagnosis.json' in said.err and said.err.count('\n') == 1
+    assert not (tmp_path / 'out').exists()
+
+
+def plan_more(cell, *words, postures=12):
+    return weld_twin(
+        *('investigate', '--robot', cell / 'robot.yaml', '--tolerance', 0.02),
+        *('--model', cell / 'found' / 'diagnosis.json', '--postures', postures, *words),
+    )
+
+
+def test_a_plan_promises_in_a_region_what_the_diagnosis_warns_of(cell):
+    posterior = json.loads((cell / 'found' / 'diagnosis.json').read_text())['posterior']
+    said = plan_more(cell)
+    assert said.code == 0, said.err
+    assert f'be off by {posterior["sigma_anywhere_m"] * 1e3:.2g} mm elsewhere' in said.out
+    point = 1e3 * tool_pose(ROBOT, NEAR, TOOL, 0.0 * OFF)[:3, 3]
+    corners = (','.join(f'{v:.0f}' for v in point + side) for side in (-80.0, 80.0))
+    for region in (MADE / FILES[0], cell / 'before', ':'.join(corners)):
+        said = plan_more(cell, '--region', region)
+        assert said.code == 0, said.err
+        rows = [line.split() for line in said.out.splitlines() if line.split()[0].isdigit()]
+        left = [float(row[2]) for row in rows if row[1].replace('.', '').isdigit()]
+        assert left[-1] <= left[0] < 1e3 * posterior['sigma_anywhere_m']
+
+
+@pytest.mark.parametrize('region', ['nowhere', '1,2,3', '0,0,0:-1,1,1', '90000,0,0:91000,1,1'])
+def test_a_region_that_is_none_is_refused_in_a_sentence(region, cell):
+    said = plan_more(cell, '--region', region)
+    assert said.code == 2 and said.err.count('\n') == 1 and 'region' in said.err

@@ -143,18 +143,7 @@ class _State:
             pixel[which], by_point[which], by_lens[which] = lens.derivatives(ahead[which])
         by_there = by_point @ back
         by_at = by_there @ turn
-        arm = there - tool[:, :3, 3]
-        of_tool = np.concatenate(
-            [
-                np.where(forth[:, None, None], by_there, -by_at),
-                np.where(
-                    forth[:, None, None],
-                    -by_there @ skew(arm),
-                    by_at @ skew(at - tool[:, :3, 3]),
-                ),
-            ],
-            axis=2,
-        )
+        of_tool = _of_tool(forth, by_there, by_at, there - tool[:, :3, 3], at - tool[:, :3, 3])
         of_eye = np.concatenate([-by_there, by_there @ skew(away)], axis=2)
         of_target = np.concatenate([by_at, -by_at @ skew(own)], axis=2)
         of_corner = by_at @ target[:, :3, :3]
@@ -268,12 +257,12 @@ class _Point:
         """Return the place a damped step away."""
         own = self.reduced
         held = own.normal + np.diag(1.0 + damping * np.diag(own.normal))
-        step = np.linalg.solve(held, own.rest - self.state.unknowns)
+        step = np.asarray(np.linalg.solve(held, own.rest - self.state.unknowns), dtype=float)
         square = _swap(own.roots) @ own.roots
         each = np.einsum('mii->mi', square)
         square = square + damping * each[:, :, None] * np.eye(6)
         right = _times(_swap(own.roots), own.right - own.shared @ step)
-        tool = np.linalg.solve(square, right[..., None])[..., 0]
+        tool = _solved(square, right)
         return _Point.at(self.state.moved(step, tool), self.weight)
 
 
@@ -428,9 +417,9 @@ def _told(point: _Point, noise: float) -> Adjusted:
     moved = own.shared @ unit
     _, strength, kept = np.linalg.svd(moved.reshape(-1, moved.shape[2]), full_matrices=False)
     kept = kept[strength > SHOWN]
-    pose = _stepped(state.tool, np.linalg.solve(own.roots, own.right[..., None])[..., 0])
+    pose = _stepped(state.tool, _solved(own.roots, own.right))
     change = np.linalg.solve(own.roots, moved @ kept.T)
-    said = PoseNoise.of(np.linalg.inv(_swap(own.roots) @ own.roots))
+    said = PoseNoise.of(np.asarray(np.linalg.inv(_swap(own.roots) @ own.roots), dtype=float))
     measured = Measurements(
         state.seen.t,
         pose[:, :3, 3],
@@ -443,8 +432,22 @@ def _told(point: _Point, noise: float) -> Adjusted:
     return Adjusted(measured, state.lenses, off, noise)
 
 
+def _of_tool(
+    forth: NDArray[np.bool_], by_there: Array, by_at: Array, there: Array, at: Array
+) -> Array:
+    """Return the change with the tool, (N, 2, 6), of points forth by its pose or back by it."""
+    ahead = np.concatenate([by_there, -by_there @ skew(there)], axis=2)
+    back = np.concatenate([-by_at, by_at @ skew(at)], axis=2)
+    return np.where(forth[:, None, None], ahead, back)
+
+
 def _times(matrix: Array, vector: Array) -> Array:
     return np.asarray((matrix @ vector[..., None])[..., 0])
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    """Return what every matrix (M, c, c) makes the right-hand side (M, c) of, (M, c)."""
+    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0], dtype=float)
 
 
 def _swap(matrix: Array) -> Array:

@@ -26,10 +26,11 @@ class PoseNoise:
     Attributes
     ----------
     root : array, shape (M, c, c)
-        Makes rows of equal and independent noise of an error (c, M): shift [m], then turn about
-        the axes outside [rad], where poses were measured. Those rows are in metres.
-    typical : float [m]
-        Standard deviation of each of them, if the noise is as told.
+        Makes independent rows of an error (c, M): shift [m], then turn about the axes outside
+        [rad], where poses were measured. Shifts among each other are equally sure then, and so
+        are turns; which of the two are surer, a fit finds out.
+    typical : array, shape (c,) [m, rad]
+        Standard deviation of each row, if the noise is as told.
     sigma : array, shape (M,) [m]
         Of a coordinate of each position, all three joined by their mean square.
 
@@ -44,7 +45,7 @@ class PoseNoise:
     """
 
     root: Array
-    typical: float
+    typical: Array
     sigma: Array
 
     def __post_init__(self) -> None:
@@ -61,14 +62,16 @@ class PoseNoise:
             Positive definite.
 
         """
-        sigma = np.sqrt(np.trace(covariance[:, :3, :3], axis1=1, axis2=2) / 3.0)
-        typical = float(np.median(sigma))
-        size = np.sqrt(np.einsum('mii->mi', covariance))
+        variance = np.einsum('mii->mi', covariance)
+        each = variance.reshape(len(variance), -1, 3).mean(axis=2)
+        typical = np.repeat(np.median(np.sqrt(each), axis=0), 3)
+        size = np.sqrt(variance)
         unit = covariance / (size[:, :, None] * size[:, None, :])
         strength, ways = np.linalg.eigh(unit)
         strength = np.maximum(strength, TINY)
         root = (ways / np.sqrt(strength)[:, None, :]) @ np.swapaxes(ways, 1, 2)
-        return cls(typical * root / size[:, None, :], typical, sigma)
+        root = typical[:, None] * root / size[:, None, :]
+        return cls(root, typical, np.sqrt(each[:, 0]))
 
     @property
     def covariance(self) -> Array:
@@ -91,9 +94,8 @@ class PoseNoise:
 
         """
         root = self.root @ back
-        inverse = np.linalg.inv(root)[:, :3]
-        sigma = self.typical * np.sqrt((inverse**2).sum(axis=(1, 2)) / 3.0)
-        return PoseNoise(root, self.typical, sigma)
+        spread = np.linalg.inv(root)[:, :3] * self.typical
+        return PoseNoise(root, self.typical, np.sqrt((spread**2).sum(axis=(1, 2)) / 3.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +145,7 @@ def alike(covariance: Array) -> bool:
 def positive(covariance: Array) -> NDArray[np.bool_]:
     """Return which of covariances, shape (M, c, c), are finite and positive definite, (M,)."""
     size = np.sqrt(np.maximum(np.einsum('mii->mi', covariance), 0.0))
-    good = np.isfinite(covariance).all(axis=(1, 2)) & (size > 0.0).all(axis=1)
+    good: NDArray[np.bool_] = np.isfinite(covariance).all(axis=(1, 2)) & (size > 0.0).all(axis=1)
     unit = covariance[good] / (size[good][:, :, None] * size[good][:, None, :])
     good[good] = np.linalg.eigvalsh(0.5 * (unit + np.swapaxes(unit, 1, 2)))[:, 0] > 0.0
     return good

@@ -228,7 +228,8 @@ class Measurements:
         turn = np.swapaxes(self.rotation, -1, -2)
         position = -(turn @ self.position[..., None])[..., 0]
         change = inverse_error(self.position, self.rotation)
-        noise = None if self.noise is None else self.noise.moved(np.linalg.inv(change))
+        back = np.asarray(np.linalg.inv(change), dtype=float)
+        noise = None if self.noise is None else self.noise.moved(back)
         common = None if self.common is None else self.common.moved(change)
         sigma = self.sigma if noise is None else noise.sigma
         return Measurements(self.t, position, turn, sigma, noise, common)

@@ -2,13 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a machine can have: every parameter has a range with a source, and files may narrow it."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.effects import REGISTRY, effects_from_list
-from weld_twin_core.effects.plausible import TABLE, beyond, mass_range, plausible, ranges, spreads
+from weld_twin_core.effects import (
+    REGISTRY,
+    Effect,
+    Parameter,
+    Plausible,
+    Stage,
+    effects_from_list,
+    register,
+)
+from weld_twin_core.effects.payload import mass_range
+from weld_twin_core.effects.plausible import TABLE, beyond, plausible, ranges, spreads
 from weld_twin_core.errors import ModelError
 
 UR5 = catalog.load('ur5')
@@ -99,3 +110,38 @@ def test_a_robot_file_that_makes_no_sense_is_refused(limits, said):
     content = UR5.to_mapping() | {'plausible': {'backlash': {'width': limits}}}
     with pytest.raises(ModelError, match=said):
         Robot.from_mapping(content)
+
+
+def test_an_effect_of_ones_own_says_how_large_it_may_be():
+    @register
+    @dataclass(frozen=True, eq=False)
+    class Sag(Effect):
+        joint: str
+        sag: float = 0.0
+        name, of, stage = 'own_sag', 'joint', Stage.JOINT
+        parameters = (
+            Parameter(
+                'sag',
+                'rad',
+                typical=1e-4,
+                range=Plausible(1e-4, -1e-5, 1e-3, 'derived: it hangs down'),
+                sliding=Plausible(1e-5, 0.0, 1e-4, 'derived: it hangs down'),
+            ),
+        )
+
+        def displace(self, view):
+            return {('q', view.robot.index(self.joint)): self.number('sag')}
+
+    try:
+        assert spreads(UR5, Sag('elbow_joint')) == [1e-4]
+        assert beyond(UR5, Sag('elbow_joint', 2e-3)) == [('sag', 2e-3, 1e-3)]
+        assert beyond(UR5, Sag('elbow_joint', 5e-4)) == []
+        axis = Robot.from_mapping({'joints': [{'name': 'z', 'type': 'prismatic'}]})
+        assert beyond(axis, Sag('z', 5e-4)) == [('sag', 5e-4, 1e-4)]
+    finally:
+        REGISTRY.pop('own_sag')
+
+
+def test_names_and_not_files_decide_the_order_of_effects():
+    names = [name for name, kind in REGISTRY.items() if kind.__module__.startswith('weld_twin')]
+    assert names == sorted(names)

@@ -14,6 +14,7 @@ from weld_twin_core.effects import REGISTRY
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.domain import Domain
+from weld_twin_core.twin.features import Features
 from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior, pose_covariances
 from weld_twin_core.twin.twin import Twin
 
@@ -160,4 +161,34 @@ def test_a_covariance_that_cannot_be_is_refused():
     with pytest.raises(DataError, match='not symmetric'):
         posterior(robot, what, np.triu(np.ones((6, 6))))
     with pytest.raises(DataError, match='negative variance'):
-        _ = posterior(robot, what, np.ones((6, 6)) - 0.5 * np.eye(6)).spread
+        _ = posterior(robot, what, np.ones((6, 6)) - 0.5 * np.eye(6)).factor
+
+
+def test_drawn_models_have_the_covariance_told_and_are_off_alike_along_a_path():
+    robot = load('ur5')
+    effects = (REGISTRY['joint_offset'](robot.joint_names[1], 1e-3),)
+    what = Directions(('base', 'tool'), 1, effects)
+    rng = np.random.default_rng(0)
+    half = rng.normal(size=(what.count, what.count)) * 3e-4
+    rest = Discrepancy(2e-4, 3e-4, np.full(6, 1e-4), np.full(6, 2e-4), 0.1)
+    known = posterior(robot, what, half @ half.T, 2e-4 * rng.normal(size=what.count), rest)
+    recording = motion(robot)
+    seen = Features(Twin(robot, effects), recording, recording.joints.t)
+    off = known.drawn(seen, count=20_000)
+    sampled = np.einsum('mdi,mdj->mij', off, off) / off.shape[1]
+    told = known.pose_covariance(seen)[:, :3, :3]
+    for mine, theirs in zip(told, sampled, strict=True):
+        size = np.sqrt(np.diag(mine))
+        assert np.abs((mine - theirs) / np.outer(size, size)).max() < 0.04
+    # A path that comes back to a posture comes back to what each model is off by there.
+    back = Recording(
+        'back', JointMotion(np.arange(10.0), np.tile(recording.joints.q, (2, 1)), None, True)
+    )
+    again = known.drawn(Features(Twin(robot, effects), back, back.joints.t))
+    np.testing.assert_allclose(again[:5], again[5:], atol=1e-12)
+    # Where no frame is fitted to it, the arm's own errors alone count.
+    frames = np.zeros((what.count, what.count))
+    frames[:12, :12] = 1e-6 * np.eye(12)
+    of_frames = posterior(robot, what, frames)
+    assert np.abs(of_frames.drawn(seen, framed=False)).max() == 0.0
+    assert np.abs(of_frames.drawn(seen)).max() > 1e-3

@@ -228,7 +228,7 @@ class Robot:
         if not self.behind:
             raise ModelError(f'robot {self.name!r} has no joints between workpiece and foot')
         still = np.eye(4)
-        first = self._rows(
+        first = self.part(
             range(self.behind)[::-1],
             T_world_base=still,
             T_flange_tool=np.linalg.inv(self.T_world_base),
@@ -236,7 +236,7 @@ class Robot:
             payload_mass=0.0,
             controller=None,
         )
-        return first, self._rows(range(self.behind, self.n), T_world_base=self.T_root_base)
+        return first, self.part(range(self.behind, self.n), T_world_base=self.T_root_base)
 
     def index(self, joint: str) -> int:
         """
@@ -295,8 +295,18 @@ class Robot:
             return self.with_frames(base=T_world_origin)
         return self.with_frames(base=T_world_origin @ np.linalg.inv(self.T_base_origin))
 
-    def _rows(self, which: Sequence[int], **changes: Any) -> Robot:
-        """Return some of the rows as a robot alone."""
+    def part(self, which: Sequence[int], **changes: Any) -> Robot:
+        """
+        Return some of the rows as a robot alone.
+
+        Parameters
+        ----------
+        which : sequence of int
+            Rows in the order of the new chain, counted from 0.
+        changes : keyword arguments
+            Attributes that are other than this robot's.
+
+        """
         keys = _PER_ROW if self.mass is None else (*_PER_ROW, 'mass', 'com')
         rows = {key: getattr(self, key)[list(which)] for key in keys}
         names = tuple(self.joint_names[k] for k in which)

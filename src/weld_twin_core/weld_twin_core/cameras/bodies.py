@@ -113,7 +113,7 @@ def _views(seen: Sightings) -> list[View]:
         if seen.cameras[c].mount == 'world':
             out.append(View(image, c, body, pose))
         else:
-            out.append(View(image, body, c, np.linalg.inv(pose)))
+            out.append(View(image, body, c, np.asarray(np.linalg.inv(pose), float)))
     return out
 
 

@@ -126,7 +126,7 @@ class Lens:
             flat = flat + step
             if np.abs(step).max(initial=0.0) < SETTLED:
                 break
-        return flat
+        return np.asarray(flat)
 
     def turned(self, size: Array, *, clockwise: bool) -> Lens:
         """

@@ -37,6 +37,7 @@ MISTAKES = (
     'stamps_in_bursts',
     'computed',
     'camera_inverted',
+    'wrong_fixture',
     'intrinsics',
     'target_scale',
     'target_mirrored',

@@ -53,7 +53,7 @@ from .thermal_growth import ThermalGrowth
 from .time_delay import TimeDelay
 from .transmission_ripple import TransmissionRipple
 from .vibration import Vibration
-from .view import Parameter, Stage, View
+from .view import Parameter, Plausible, Stage, View
 from .wear import Wear
 
 __all__ = [
@@ -91,6 +91,7 @@ __all__ = [
     'Parameter',
     'Payload',
     'PedestalTilt',
+    'Plausible',
     'Quantization',
     'Refraction',
     'RootPose',

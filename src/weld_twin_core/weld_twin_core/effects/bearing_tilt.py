@@ -31,6 +31,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .base_leans import base_leans
+from .carriage import summed
 from .effect import Effect
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -120,12 +121,9 @@ class BearingTilt(Effect):
 
     def displace(self, view: View) -> Shift:
         """Return the lean of the frame before the joint."""
-        out: dict[Channel, Array] = {}
-        for name, times in self._waves():
-            for k, part in enumerate(self._parts(view, times)):
-                for channel, value in part.items():
-                    out[channel] = out.get(channel, 0.0) + self.number(name, k) * value
-        return out
+        waves = list(self._waves())
+        values = [self.number(name, k) for name, _ in waves for k in range(4)]
+        return summed(values, [part for _, n in waves for part in self._parts(view, n)])
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return the waves."""
@@ -176,21 +174,9 @@ class BearingTilt(Effect):
         return out if np.size(self.second) else {k: v for k, v in out.items() if k != 'second'}
 
     @classmethod
-    def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: an axis that slides does not turn.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on.
-
-        """
-        if joint is not None and view.robot.prismatic[view.robot.index(joint)]:
-            return 'a joint that slides has no bearing that turns with it'
-        return super().applicable(view, joint)
+    def fits(cls, robot: Robot, joint: str | None) -> bool:
+        """Return whether the joint turns."""
+        return joint is not None and not robot.prismatic[robot.index(joint)]
 
     def remedy(self, robot: Robot) -> str:
         """Return what to mend, in words; see `Hooks.remedy`."""

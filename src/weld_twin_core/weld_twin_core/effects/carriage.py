@@ -12,7 +12,6 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arm.vectors import components, cross, pad
 from ..arrays import Array
-from ..errors import ModelError
 from .effect import Effect
 from .view import View
 
@@ -24,43 +23,7 @@ class GuideError(Effect):
     depends_on = 'angle'
     by_motion = True
     common = False
-
-    def check(self, robot: Robot) -> None:
-        """
-        Refuse an effect this robot cannot have.
-
-        Parameters
-        ----------
-        robot : Robot
-
-        Raises
-        ------
-        ModelError
-            As of every effect, or its joint turns.
-
-        """
-        super().check(robot)
-        if not self.on_slide(robot):
-            raise ModelError(f'{self.name} is of a joint that slides, and {self.site!r} turns')
-
-    @classmethod
-    def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: the robot may have no such thing.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on.
-
-        """
-        return (
-            super().applicable(view, joint)
-            if cls.fits(view.robot, joint)
-            else 'a joint that turns has no guide'
-        )
+    lacking = 'is of a joint that slides, and {site!r} turns'
 
     @classmethod
     def fits(cls, robot: Robot, joint: str | None) -> bool:

@@ -112,11 +112,6 @@ class Effect(Hooks, ABC):
                 slope[channel[1], j] = (value - low[channel]) / (2.0 * JOINT_STEP)
         return slope
 
-    @classmethod
-    def fits(cls, robot: Robot, joint: str | None) -> bool:
-        """Return whether a robot, or one of its joints, has what this can be an error of."""
-        return True
-
     def on_slide(self, robot: Robot) -> bool:
         """Return whether it displaces a joint that slides: m where its parameters say rad."""
         at = self.site if self.of == 'joint' else None
@@ -157,7 +152,8 @@ class Effect(Hooks, ABC):
         Raises
         ------
         ModelError
-            Unknown joint, wrong length, not a number, or outside the bounds.
+            Unknown joint, wrong length, not a number, outside the bounds, or the robot has no such
+            part.
 
         """
         if self.of in ('joint', 'link'):
@@ -165,6 +161,10 @@ class Effect(Hooks, ABC):
                 raise ModelError(f'{self.name} needs a joint')
             robot.index(self.site)
         self.check_values()
+        if self.lacking and not self.fits(robot, self.site):
+            raise ModelError(
+                f'{self.name} {self.lacking.format(site=self.site, robot=robot.name)}'
+            )
 
 
 class MemoryEffect(Effect):

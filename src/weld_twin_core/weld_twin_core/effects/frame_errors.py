@@ -10,12 +10,12 @@ import numpy as np
 
 from ..arm.controller_lookup import controller_frames
 from ..arm.robot import Robot
-from ..arm.rotation import rotation_matrix
+from ..arm.rotation import rotation_matrix, transform
 from ..arrays import Array
 from .constant import FrameError, frame_parameters
 from .registry import register
 from .view import Plausible, Value
-from .wording import base_frame, frame
+from .wording import base_frame, frame, placed
 
 
 @register
@@ -39,10 +39,22 @@ class BasePose(FrameError):
 
     def remedy(self, robot: Robot) -> str:
         """Return what to mend, in words; see `Hooks.remedy`."""
+        if robot.behind:
+            return self._on_the_workpiece(robot)
         moved = base_frame(_of_the_origin(self.vector(), robot))
         return (
             f'Correct the base frame by {moved}. If it was right when it was measured, the arm has '
             'moved: check the bolts of its foot.'
+        )
+
+    def _on_the_workpiece(self, robot: Robot) -> str:
+        """Return the same of a cell, where poses are measured in a frame that a positioner moves."""
+        now, step = robot.T_world_base, self.vector()
+        new = transform(rotation_matrix(step[3:]) @ now[:3, :3], now[:3, 3] + step[:3])
+        return (
+            'Correct the frame on the workpiece: on the positioner it lies at '
+            f'{placed(np.linalg.inv(new))} in place of {placed(np.linalg.inv(now))}. If it was right '
+            'when it was measured, the fixture has moved, or another one is there.'
         )
 
 

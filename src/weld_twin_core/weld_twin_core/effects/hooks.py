@@ -153,9 +153,20 @@ class Hooks(Parametric, ABC):
 
     # The search ---------------------------------------------------------------------------------
 
+    lacking: ClassVar[str] = ''
+    """What is wrong where it does not fit, after its name; ``robot`` and ``site`` are theirs. Without,
+    it is only not looked for there."""
+
+    @classmethod
+    def fits(cls, robot: Robot, joint: str | None) -> bool:
+        """Return whether a robot, or one of its joints, has what this can be an error of."""
+        return True
+
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
         """Return why the data cannot show this effect at all, or None when they can."""
+        if not cls.fits(view.robot, joint):
+            return 'the robot has no part there that it could be an error of'
         if 'velocity' in cls.needs and view.static:
             return 'static stations carry no velocity'
         if 'wrench' in cls.needs and view.wrench is None:

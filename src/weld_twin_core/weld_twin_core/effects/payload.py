@@ -17,6 +17,23 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
+OWN_WEIGHT = 0.5
+"""Share of its own weight that no arm carries; those of welding carry a tenth to a third."""
+BELOW = 0.05
+"""Share of an arm's own weight by which published masses of its links are off."""
+UNSTATED_MASS = 20.0
+"""Load [kg] taken as most where an arm's own masses are not known."""
+
+
+def mass_range(robot: Robot) -> tuple[float, float]:
+    """
+    Return how much less and more than declared a payload can weigh, [kg].
+
+    A load cannot weigh less than nothing, and no arm carries half of what it weighs itself.
+    """
+    own = UNSTATED_MASS / OWN_WEIGHT if robot.mass is None else float(robot.mass.sum())
+    return -robot.payload_mass - BELOW * own, OWN_WEIGHT * own - robot.payload_mass
+
 
 @register
 @dataclass(frozen=True, eq=False)
@@ -40,10 +57,12 @@ class Payload(Effect):
             'mass',
             'kg',
             typical=1.0,
-            range=Plausible.even(
+            range=Plausible(
                 2.0,
+                -np.inf,
                 np.inf,
                 'derived: see `mass_range`; no arm carries half of what it weighs itself',
+                by_robot=mass_range,
             ),
         ),
         Parameter(

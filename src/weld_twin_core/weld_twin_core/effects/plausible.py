@@ -33,12 +33,6 @@ TABLE: dict[tuple[str, str], Plausible] = {
 """By bundled effect and parameter."""
 UNKNOWN = Plausible(np.inf, -np.inf, np.inf, 'derived: nothing is known')
 """What is plausible where an effect does not say."""
-OWN_WEIGHT = 0.5
-"""Share of its own weight that no arm carries; those of welding carry a tenth to a third."""
-BELOW = 0.05
-"""Share of an arm's own weight by which published masses of its links are off."""
-UNSTATED_MASS = 20.0
-"""Load [kg] taken as most where an arm's own masses are not known."""
 
 
 def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = None) -> Plausible:
@@ -63,20 +57,10 @@ def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = Non
     found = (each and each.range) or UNKNOWN
     if each and each.sliding and joint is not None and robot.prismatic[robot.index(joint)]:
         found = each.sliding
-    if (effect, parameter) == ('payload', 'mass'):
-        low, high = mass_range(robot)
+    if found.by_robot is not None:
+        low, high = found.by_robot(robot)
         found = replace(found, low=low, high=high)
     return _narrowed(found, robot.plausible.get(effect, {}).get(parameter))
-
-
-def mass_range(robot: Robot) -> tuple[float, float]:
-    """
-    Return how much less and more than declared a payload can weigh, [kg].
-
-    A load cannot weigh less than nothing, and no arm carries half of what it weighs itself.
-    """
-    own = UNSTATED_MASS / OWN_WEIGHT if robot.mass is None else float(robot.mass.sum())
-    return -robot.payload_mass - BELOW * own, OWN_WEIGHT * own - robot.payload_mass
 
 
 def spreads(robot: Robot, effect: Effect) -> Array:

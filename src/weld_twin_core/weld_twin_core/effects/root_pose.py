@@ -11,11 +11,10 @@ import numpy as np
 from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix
 from ..arrays import Array
-from ..errors import ModelError
 from .constant import FrameError, frame_parameters
 from .registry import register
-from .view import Plausible, Value, View
-from .wording import frame
+from .view import Plausible, Value
+from .wording import frame, placed
 
 
 @register
@@ -32,75 +31,47 @@ class RootPose(FrameError):
     depends_on = 'constant'
     place = 'base'
     channel = 'root'
+    lacking = 'is of a positioner, and robot {robot!r} has none; use base_pose'
     parameters = frame_parameters(
         Plausible.even(5e-3, 0.1, 'derived: a root that was measured by touch, or by hand'),
         Plausible.even(5e-3, 0.1, 'derived: five millimetres on a metre'),
     )
-
-    def check(self, robot: Robot) -> None:
-        """
-        Refuse an effect this robot cannot have.
-
-        Parameters
-        ----------
-        robot : Robot
-
-        Raises
-        ------
-        ModelError
-            As of every effect, or no positioner is there.
-
-        """
-        super().check(robot)
-        if not robot.behind:
-            raise ModelError(
-                f'{self.name} is of a positioner, and robot {robot.name!r} has none; use base_pose'
-            )
-
-    @classmethod
-    def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: the robot may have no such thing.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on.
-
-        """
-        return (
-            super().applicable(view, joint)
-            if cls.fits(view.robot, joint)
-            else 'there is no positioner'
-        )
 
     @classmethod
     def fits(cls, robot: Robot, joint: str | None) -> bool:
         """Return whether there is a positioner."""
         return robot.behind > 0
 
+    def stands(self, robot: Robot, base: Array) -> tuple[Array, Array]:
+        """
+        Return where the positioner's rows begin, as the robot file has it and as it is.
+
+        Parameters
+        ----------
+        robot : Robot
+        base : array, shape (4, 4) [m]
+            The base that it is told in, in the frame where the robot's own rows begin.
+
+        Returns
+        -------
+        array, array
+            ``T_base_root``, shape (4, 4) [m].
+
+        """
+        now, step = np.linalg.inv(robot.T_root_base), self.vector()
+        new = now.copy()
+        new[:3, :3] = rotation_matrix(step[3:]) @ now[:3, :3]
+        new[:3, 3] += step[:3]
+        there = np.linalg.inv(base)
+        return np.asarray(there @ now), np.asarray(there @ new)
+
     def remedy(self, robot: Robot) -> str:
         """Return what to mend, in words; see `Hooks.remedy`."""
         rows = robot.T_base_foot
         step = (self.vector().reshape(2, 3) @ rows[:3, :3]).ravel()
-        now = np.asarray(np.linalg.inv(robot.T_root_base @ rows))
-        new = np.eye(4)
-        new[:3, :3] = rotation_matrix(step[3:]) @ now[:3, :3]
-        new[:3, 3] = now[:3, 3] + step[:3]
+        now, new = self.stands(robot, rows)
         moved = frame(step, 'of the base', 'of the positioner')
         return (
             f'Correct the root frame of the positioner by {moved}: in the base of the robot it '
-            f'stands at {_placed(new)} in place of {_placed(now)}.'
+            f'stands at {placed(new)} in place of {placed(now)}.'
         )
-
-
-def _placed(pose: Array) -> str:
-    """Return a frame as controllers take it: mm, and turns about fixed x, y and z in degrees."""
-    place = ', '.join(f'{value * 1e3:.3f}' for value in pose[:3, 3])
-    yaw = np.arctan2(pose[1, 0], pose[0, 0])
-    pitch = np.arctan2(-pose[2, 0], np.hypot(pose[0, 0], pose[1, 0]))
-    roll = np.arctan2(pose[2, 1], pose[2, 2])
-    angles = ', '.join(f'{np.degrees(value):.4f}' for value in (roll, pitch, yaw))
-    return f'x, y, z = ({place}) mm, turned by ({angles}) deg about them'

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
@@ -58,6 +59,15 @@ class Plausible:
     low, high : float
         What lies outside is no property of a machine.
     source : str
+        A publication that was read, or an argument that starts with 'derived'.
+    by_robot : callable, optional
+        Returns low and high on a robot, where they hang on it.
+
+    Examples
+    --------
+    >>> import weld_twin_core as wt
+    >>> wt.effects.Plausible.even(2e-3, 2e-2, 'derived: ten times its spread').low
+    -0.02
 
     """
 
@@ -65,6 +75,7 @@ class Plausible:
     low: float
     high: float
     source: str
+    by_robot: Callable[[Robot], tuple[float, float]] | None = None
 
     @property
     def derived(self) -> bool:

@@ -92,6 +92,16 @@ def base_frame(step: Array) -> str:
     return frame(step, 'of the measuring frame', 'of the base')
 
 
+def placed(pose: Array) -> str:
+    """Return a frame as controllers take it: mm, and turns about fixed x, y and z in degrees."""
+    place = ', '.join(f'{value * 1e3:.3f}' for value in pose[:3, 3])
+    yaw = np.arctan2(pose[1, 0], pose[0, 0])
+    pitch = np.arctan2(-pose[2, 0], np.hypot(pose[0, 0], pose[1, 0]))
+    roll = np.arctan2(pose[2, 1], pose[2, 2])
+    angles = ', '.join(f'{np.degrees(value):.4f}' for value in (roll, pitch, yaw))
+    return f'x, y, z = ({place}) mm, turned by ({angles}) deg about them'
+
+
 def further(offset: float, *, sliding: bool = False) -> str:
     """
     Return how much further than its reading a joint stands, to follow the reading in a sum.

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from ..arm.chain import frames
 from ..arm.robot import Robot
@@ -15,7 +16,7 @@ from ..arm.rotation import rotation_vector
 from ..arrays import Array
 from ..errors import PathError
 from ..recording import JointMotion
-from .inverse import PathSolution, solve_path
+from .inverse import CarriedArm, PathSolution, rest
 from .inverse.newton import chain_jacobian, least_step, polish, pose_error
 from .paths import Path, SeamFrames, Torch
 from .profiles import Profile, Timing, named
@@ -106,6 +107,7 @@ def plan(
     torch: Torch | None = None,
     fit: bool = False,
     seed: Array | None = None,
+    told: Array | None = None,
     most_samples: int = MOST_SAMPLES,
 ) -> Plan:
     """
@@ -127,6 +129,9 @@ def plan(
         Slow the motion down until it is within the joint limits, instead of refusing it.
     seed : array, shape (n,), optional
         Joint positions near which the motion begins.
+    told : array, shape (K, m) [rad or m], optional
+        Positions of the first joints of the chain, those of a positioner among them, at places spread
+        evenly along the seam; one row where they stand still. Left out, a positioner stands at zero.
     most_samples : int
         How many the motion may have: near a singular posture ``fit`` may slow it down endlessly.
 
@@ -150,7 +155,7 @@ def plan(
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
         raise PathError(f'the sample rate must be positive, got {rate_hz!r} Hz')
     law = named(profile) if isinstance(profile, str) else profile
-    line = _JointLine(robot, path, torch or Torch(), seed)
+    line = _JointLine(robot, path, torch or Torch(), seed, told)
     slowed, dt = 1.0, 1.0 / rate_hz
     for _ in range(20):
         timing = _slowed(law.sample(path.length, dt / slowed, most_samples), slowed)
@@ -191,37 +196,59 @@ def _report(
 class _JointLine:
     """Joint positions as a function of arc length: the same place gives the same posture."""
 
-    def __init__(self, robot: Robot, path: Path, torch: Torch, seed: Array | None) -> None:
-        self.robot, self.path, self.torch = robot, path, torch
+    def __init__(
+        self, robot: Robot, path: Path, torch: Torch, seed: Array | None, told: Array | None
+    ) -> None:
+        told = rest(robot)[None] if told is None else np.atleast_2d(told)
+        self.carried = CarriedArm(robot, told.shape[1])
+        self.robot, self.path, self.torch = self.carried.arm, path, torch
+        self._told = _along(told, path.length)
         self._first = path.sample(np.zeros(1))
         count = int(np.ceil(path.length / min(path.length / 256.0, path.detail / 24.0)))
         grid = np.linspace(0.0, path.length, count + 1)
-        self.solution: PathSolution = solve_path(robot, self.poses(grid), seed)
+        self.solution: PathSolution = self.carried.solve_path(
+            self.poses(grid), self._told(grid), seed
+        )
         self._spline = CubicSpline(grid, self.solution.q)
 
     def poses(self, s: Array) -> Array:
         """Return tool poses, shape (N, 4, 4), at arc lengths."""
         return self.torch.poses(self.path.sample(s), self._first)
 
+    def _seen(self, s: Array) -> Array:
+        """Return the same as the arm's base sees them."""
+        return self.carried.seen(self.poses(s), self._told(s))
+
     def motion(self, timing: Timing) -> tuple[JointMotion, float]:
         """Return the motion and its largest error of closure."""
-        poses = self.poses(timing.s)
+        poses = self._seen(timing.s)
         q, _ = polish(self.robot, self._spline(timing.s), poses)
         rate = self._spline(timing.s, 1)
         jacobian = chain_jacobian(self.robot, frames(self.robot, q))
         missing = self._twist(timing.s) - (jacobian @ rate[..., None])[..., 0]
-        velocity = (rate + least_step(jacobian, missing)) * timing.sd[:, None]
+        rate = rate + least_step(jacobian, missing)
         # Rounded, so that a joint at rest is at rest and not reversing within the last digit.
         q = q.round(12)
         residual = float(np.abs(pose_error(frames(self.robot, q), poses)).max())
+        velocity = self.carried.whole(self._told(timing.s, 1), rate) * timing.sd[:, None]
+        q = self.carried.whole(self._told(timing.s), q)
         return JointMotion(timing.t, q, velocity.round(9)), residual
 
     def _twist(self, s: Array) -> Array:
         """Return d(pose)/ds, shape (N, 6), by central differences."""
-        before, after = self.poses(s - _DIFFERENCE), self.poses(s + _DIFFERENCE)
+        before, after = self._seen(s - _DIFFERENCE), self._seen(s + _DIFFERENCE)
         turn = rotation_vector(after[:, :3, :3] @ np.swapaxes(before[:, :3, :3], -1, -2))
         change = np.concatenate([after[:, :3, 3] - before[:, :3, 3], turn], axis=1)
         return change / (2.0 * _DIFFERENCE)
+
+
+def _along(told: Array, length: float) -> Callable[..., Array]:
+    """Return positions and, of order 1, their slopes at arc lengths, without overshoot between."""
+    if len(told) == 1:
+        return lambda s, order=0: np.broadcast_to(
+            told[0] * (order == 0), (*s.shape, told.shape[1])
+        )
+    return PchipInterpolator(np.linspace(0.0, length, len(told)), told)
 
 
 def _slowed(timing: Timing, factor: float) -> Timing:

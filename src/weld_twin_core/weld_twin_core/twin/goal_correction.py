@@ -24,6 +24,8 @@ from ..effects.effect import Effect, Stage
 from ..errors import DataError
 from ..recording import JointMotion, Recording
 from .compensation import commandable, compensate
+from .drawn import Drawn
+from .features import Features
 from .goal_motion import Course, Goal, course, fine_times
 from .posterior import pose_covariances
 from .program_accuracy import likely_rms
@@ -332,7 +334,7 @@ class _Work:
         real[:, :3, 3], real[:, :3, :3] = position[-way.t.size :], rotation[-way.t.size :]
         return missing(forward(self.model.robot, self.meant.q), real)
 
-    def _covariances(self, *, framed: bool = True) -> Array | None:
+    def _covariances(self) -> Array | None:
         """Return how sure the model is at some places of the goal, shape (P, 6, 6)."""
         if self.model.posterior is None:
             return None
@@ -342,7 +344,6 @@ class _Work:
             self._recording(self.meant),
             self.meant.t[self._places],
             self.model.setup,
-            framed=framed,
         )
 
     @property
@@ -352,11 +353,16 @@ class _Work:
 
     def _bound(self, after: Array) -> float | None:
         """Return the RMS distance that is told not to be exceeded [m]."""
-        sure = [self._covariances(framed=framed) for framed in (True, False)]
+        posterior = self.model.posterior
+        if posterior is None:
+            return None
+        seen = Features(self.real, self._recording(self.meant), self.meant.t[self._places])
+        same, own = (
+            posterior.drawn(seen, self.model.setup, framed=framed) for framed in (True, False)
+        )
         # Where joints turn around more is left than beside, and few places would miss that.
         near = np.searchsorted(self._places, np.arange(len(after))).clip(max=self._places.size - 1)
-        found = [likely_rms(after, c[near], HOLDS) for c in sure if c is not None]
-        return max(found) if found else None
+        return likely_rms(after, Drawn(near, same, own), HOLDS)
 
     def _added(self, found: Goal, at: Array) -> Array:
         """Return what a corrected goal adds to the pose at stamps, shape (N, 6), seen from the base."""

@@ -14,7 +14,7 @@ was recorded.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -31,6 +31,10 @@ from .expected_effort import with_expected_effort
 from .features import Features
 from .twin import Twin
 
+DRAWS = 400
+"""Models drawn: enough for the 5th and 95th of a hundred to be steady within a few per cent."""
+SEED = 0
+"""Of the draws: every promise is made of the same models."""
 CHUNK = 2000
 """Samples at once; a hundred coordinates of so many poses take some ten megabytes."""
 SETTLED = 1e-13
@@ -184,13 +188,25 @@ class Discrepancy:
             How far every joint is from where it was recorded.
 
         """
-        apart = np.minimum(beyond.T / self.reach, 1.0)
-        size = np.hypot(self.gears[:, None], self.curves[:, None] * apart)
-        moved = joint_columns * size[:, None]
+        everywhere, gears = self.sizes(beyond)
+        moved = joint_columns * gears[:, None]
         out = np.einsum('nim,njm->mij', moved, moved)
-        own = np.repeat([self.position, self.orientation], 3) ** 2
-        out[:, np.arange(6), np.arange(6)] += own
+        out[:, np.arange(6), np.arange(6)] += everywhere**2
         return np.asarray(out)
+
+    def sizes(self, beyond: Array) -> tuple[Array, Array]:
+        """
+        Return standard deviations at the tool, shape (1, 6), and in every joint, shape (n, M).
+
+        Parameters
+        ----------
+        beyond : array, shape (M, n)
+            How far every joint is from where it was recorded.
+
+        """
+        apart = np.minimum(beyond.T / self.reach, 1.0)
+        own = np.repeat([self.position, self.orientation], 3)
+        return own[None], np.hypot(self.gears[:, None], self.curves[:, None] * apart)
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,12 +253,9 @@ class Posterior:
         object.__setattr__(self, 'covariance', covariance)
 
     @cached_property
-    def spread(self) -> Array:
+    def factor(self) -> Array:
         """
-        Return a factor S, shape (P, R), with S S' the second moment about the fitted model.
-
-        The last column is the mean: a model that is not the middle of what is allowed is off by
-        that much too.
+        Return a factor S, shape (P, R), with S S' the covariance.
 
         Raises
         ------
@@ -258,10 +271,9 @@ class Posterior:
         if values.min(initial=0.0) < -1e-6 * most:
             raise DataError('the posterior covariance has a negative variance')
         live = values > SETTLED * most
-        factor = size[:, None] * vectors[:, live] * np.sqrt(values[live])
-        return np.column_stack([factor, self.mean])
+        return np.asarray(size[:, None] * vectors[:, live] * np.sqrt(values[live]))
 
-    def pose_covariance(self, features: Features, setup: int = 0, *, framed: bool = True) -> Array:
+    def pose_covariance(self, features: Features, setup: int = 0) -> Array:
         """
         Return the covariance of the true pose about the twin's, shape (M, 6, 6).
 
@@ -274,16 +286,94 @@ class Posterior:
             There is no such base frame.
 
         """
+        moved, rest = self._ways(features, setup)
+        return np.asarray(np.einsum('rim,rjm->mij', moved, moved, optimize=True) + rest)
+
+    def position_ways(self, features: Features, setup: int = 0) -> tuple[Array, Array]:
+        """
+        Return in which ways positions may be off, and the covariance of what no parameter explains.
+
+        Returns
+        -------
+        tuple of array
+            One column for each independent way, of one standard deviation, shape (M, 3, R) [m]: what
+            more measurements would take away. The rest, shape (M, 3, 3) [m^2].
+
+        """
+        moved, rest = self._ways(features, setup)
+        return moved[:, :3].transpose(2, 1, 0), rest[:, :3, :3]
+
+    def _ways(self, features: Features, setup: int) -> tuple[Array, Array]:
+        # A model that is not the middle of what is allowed is off by that much too.
+        ways = np.column_stack([self.factor, self.mean])
+        moved = np.tensordot(ways, self._columns(features, setup), axes=(0, 0))
+        return moved, self.discrepancy.covariance(*_levers(self.domain, features))
+
+    def after(self, features: Features, noise: float) -> Posterior:
+        """
+        Return how sure a model will be once its poses were measured too, and it was fitted anew.
+
+        Parameters
+        ----------
+        features : Features
+            Of the stations, in the set-up that was recorded.
+        noise : float [m]
+            Standard deviation of a measured coordinate.
+
+        """
+        columns = self._columns(features, 0)[:, :3].transpose(0, 2, 1)
+        own = self.discrepancy.covariance(*_levers(self.domain, features))[:, :3, :3]
+        count = own.shape[0]
+        rest = np.zeros((count, 3, count, 3))
+        rest[np.arange(count), :, np.arange(count), :] = own + noise**2 * np.eye(3)
+        rows = columns.reshape(self.directions.count, 3 * count)
+        # The middle of what is allowed is where the next fit will be.
+        moment = self.covariance + np.outer(self.mean, self.mean)
+        gain = moment @ rows
+        seen = rows.T @ gain + rest.reshape(3 * count, 3 * count)
+        left = moment - gain @ np.linalg.solve(seen, gain.T)
+        return replace(self, mean=np.zeros_like(self.mean), covariance=0.5 * (left + left.T))
+
+    def drawn(
+        self, features: Features, setup: int = 0, *, framed: bool = True, count: int = DRAWS
+    ) -> Array:
+        """
+        Return by how much the true position is off the twin's, shape (M, count, 3) [m].
+
+        Under as many models as are drawn, the same ones for every motion: each is off alike over a
+        path, as far as what it is off by shows there alike. Their second moment is that of
+        `pose_covariance`. ``framed`` counts what was measured, with the frames that were fitted to it;
+        without, the arm counts between its own base and flange, which such frames hide.
+
+        Raises
+        ------
+        ModelError
+            There is no such base frame.
+
+        """
+        unit = np.random.default_rng(SEED).standard_normal
+        own, joints = unit((count, 3)), unit((count, features.twin.robot.n))
+        steps = self.mean + unit((count, self.factor.shape[1])) @ self.factor.T
+        columns = self._columns(features, setup, framed=framed)[:, :3]
+        levers, beyond = _levers(self.domain, features)
+        everywhere, gears = self.discrepancy.sizes(beyond)
+        return np.asarray(
+            np.tensordot(columns, steps, axes=(0, 1)).transpose(1, 2, 0)
+            + np.tensordot(levers[:, :3] * gears[:, None], joints, axes=(0, 1)).transpose(1, 2, 0)
+            + everywhere[:, None, :3] * own
+        )
+
+    def _columns(self, features: Features, setup: int, *, framed: bool = True) -> Array:
         if 'base' in self.directions.frames and not 0 <= setup < self.directions.setups:
             raise ModelError(f'the posterior has no base frame {setup}')
-        columns = self.directions.columns(features, setup, framed=framed)
-        moved = np.tensordot(self.spread, columns, axes=(0, 0))
-        out = np.einsum('rim,rjm->mij', moved, moved, optimize=True)
-        joints = [features.column(('q', i)) for i in range(features.twin.robot.n)]
-        q, _ = features.recording.joints.at(features.at)
-        return np.asarray(
-            out + self.discrepancy.covariance(np.stack(joints), self.domain.beyond(q))
-        )
+        return self.directions.columns(features, setup, framed=framed)
+
+
+def _levers(domain: Domain, features: Features) -> tuple[Array, Array]:
+    """Return d pose / d joint, shape (n, 6, M), and how far joints are from where recorded, (M, n)."""
+    joints = [features.column(('q', i)) for i in range(features.twin.robot.n)]
+    q, _ = features.recording.joints.at(features.at)
+    return np.stack(joints), domain.beyond(q)
 
 
 def pose_covariances(
@@ -292,8 +382,6 @@ def pose_covariances(
     recording: Recording,
     at: Array,
     setup: int = 0,
-    *,
-    framed: bool = True,
 ) -> Array:
     """
     Return `Posterior.pose_covariance` of a long motion, shape (M, 6, 6), in pieces.
@@ -307,14 +395,10 @@ def pose_covariances(
     at : array, shape (M,) [s]
     setup : int
         Which base frame of the posterior.
-    framed : bool
-        Of what was measured, with the frames that were fitted to it; else of the arm between its
-        own base and flange, which such frames hide.
 
     """
     parts = [
-        posterior.pose_covariance(Features(twin, recording, piece), setup, framed=framed)
-        for piece in _pieces(at)
+        posterior.pose_covariance(Features(twin, recording, piece), setup) for piece in _pieces(at)
     ]
     return np.concatenate([np.zeros((0, 6, 6)), *parts])
 

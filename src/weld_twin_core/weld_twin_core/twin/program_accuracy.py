@@ -8,14 +8,17 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array
+from .drawn import Drawn
 from .program_correction import ProgramCorrection
 
-DRAWS = 400
-"""Enough for the 5th and 95th of a hundred to be steady within a few per cent."""
 SPAN = (5.0, 95.0)
 """Percentiles between which nine of ten draws lie."""
+SURE = 0.95
+"""Probability from which on a tolerance counts as kept, or as not kept: what a guard band of ISO 14253-1
+leaves to chance, five in a hundred."""
 
 
 class Accuracy(NamedTuple):
@@ -29,11 +32,12 @@ class Accuracy(NamedTuple):
     worst : float
         By the model's own prediction.
     low, high : float or None
-        Nine of ten models that the recordings allow have their RMS between these; None where the
-        model says nothing of how sure it is.
+        Nine of ten models that the recordings allow have their RMS between these, in the set-up
+        recorded and in the robot's own base; None where the model says nothing of how sure it is.
     same : (float, float) or None
-        The same in the set-up that was recorded. Frames that were fitted to a recording take up
-        much of an arm's errors there, which are seen again where the robot's own base counts.
+        The same in the set-up that was recorded.
+    worsts : array, shape (2, D), optional [m]
+        Largest distance under every model drawn, in the set-up recorded and in the robot's own base.
 
     """
 
@@ -42,35 +46,67 @@ class Accuracy(NamedTuple):
     low: float | None = None
     high: float | None = None
     same: tuple[float, float] | None = None
+    worsts: Array | None = None
+
+    def within(self, tolerance: float) -> float | None:
+        """Return the probability that the tool stays within a tolerance [m] all the way."""
+        if self.worsts is None:
+            return None
+        return float((self.worsts <= tolerance).mean(axis=1).min())
+
+    @property
+    def sure_within(self) -> float | None:
+        """Return the least tolerance [m] that is kept all the way with `SURE` probability."""
+        if self.worsts is None:
+            return None
+        return float(np.quantile(self.worsts, SURE, axis=1).max())
 
 
-def accuracy(gaps: Sequence[Array], covariances: Sequence[Array | None]) -> Accuracy | None:
+def conforms(probability: float) -> str:
+    """
+    Return 'kept', 'not kept' or 'open' as ISO 14253-1 decides with a probability of conformity.
+
+    Within the guard band neither conformity nor the contrary is proven.
+    """
+    if probability >= SURE:
+        return 'kept'
+    return 'not kept' if probability <= 1.0 - SURE else 'open'
+
+
+def accuracy(gaps: Sequence[Array], drawn: Sequence[Drawn | None]) -> Accuracy | None:
     """
     Return the accuracy over samples, or None without any.
-
-    A model that is off is off alike over a seam, so one draw is the same at every sample.
 
     Parameters
     ----------
     gaps : sequence of array, each of shape (N, 6) [m, rad]
         What is missing by the model.
-    covariances : sequence of array or None, each of shape (N, 6, 6)
+    drawn : sequence of Drawn or None
+        Of the same samples.
 
     """
     gap = np.concatenate([np.zeros((0, 3)), *(g[:, :3] for g in gaps)])
     if not len(gap):
         return None
     rms, worst = _rms(gap), float(np.linalg.norm(gap, axis=1).max())
-    if any(c is None for c in covariances):
+    known = [d for d in drawn if d is not None]
+    if len(known) < len(drawn):
         return Accuracy(rms, worst)
-    factor = np.concatenate([_root(c[:, :3, :3]) for c in covariances if c is not None])
-    low, high = np.percentile(_drawn_rms(gap, factor), SPAN)
+    pairs = [(g[:, :3], d) for g, d in zip(gaps, known, strict=True)]
+    same = _drawn([(g, d.near, d.same) for g, d in pairs])
+    own = _drawn([(g, d.near, d.own) for g, d in pairs])
+    ends = np.percentile([same[0], own[0]], SPAN, axis=1)
     return Accuracy(
-        float(np.hypot(rms, _rms(factor.reshape(-1, 9)))), worst, float(low), float(high)
+        float(np.sqrt((same[0] ** 2).mean())),
+        worst,
+        float(ends[0].min()),
+        float(ends[1].max()),
+        (float(ends[0, 0]), float(ends[1, 0])),
+        np.stack([same[1], own[1]]),
     )
 
 
-def likely_rms(gap: Array, covariances: Array, share: float) -> float:
+def likely_rms(gap: Array, drawn: Drawn, share: float) -> float:
     """
     Return the RMS distance [m] that stays within for a share of the models the recordings allow.
 
@@ -78,18 +114,26 @@ def likely_rms(gap: Array, covariances: Array, share: float) -> float:
     ----------
     gap : array, shape (N, 6) [m, rad]
         What is missing by the model.
-    covariances : array, shape (N, 6, 6)
+    drawn : Drawn
+        Of the same samples.
     share : float
         Between 0 and 1.
 
     """
-    return float(np.quantile(_drawn_rms(gap[:, :3], _root(covariances[:, :3, :3])), share))
+    found = [_drawn([(gap[:, :3], drawn.near, off)])[0] for off in (drawn.same, drawn.own)]
+    return float(np.quantile(found, share, axis=1).max())
 
 
-def _drawn_rms(gap: Array, factor: Array) -> list[float]:
-    """Return the RMS distance under drawn models, each off alike at all samples."""
-    drawn = np.random.default_rng(0).standard_normal((DRAWS, 3))
-    return [_rms(gap + factor @ z) for z in drawn]
+def _drawn(parts: Sequence[tuple[Array, NDArray[np.int_], Array]]) -> tuple[Array, Array]:
+    """Return RMS and largest distance under every model drawn, shape (D,) each [m]."""
+    squares = np.concatenate(
+        [
+            [((gap - off[near, k]) ** 2).sum(axis=1) for k in range(off.shape[1])]
+            for gap, near, off in parts
+        ],
+        axis=1,
+    )
+    return np.sqrt(squares.mean(axis=1)), np.sqrt(squares.max(axis=1))
 
 
 def along_seams(found: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | None]:
@@ -102,29 +146,14 @@ def along_seams(found: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | N
     ]
     if not any(keep.any() for keep in chosen):
         chosen = [_ends(piece.motion.t.size, piece.ends) for piece in found.travel.pieces]
-    sure, own = (
-        [None if c is None else c[keep] for c, keep in zip(each, chosen, strict=True)]
-        for each in (found.covariances, found.of_the_arm)
-    )
+    drawn = [
+        None if d is None else d.where(keep) for d, keep in zip(found.drawn, chosen, strict=True)
+    ]
     before, after = (
-        _widened(
-            *(
-                accuracy([g[keep] for g, keep in zip(gaps, chosen, strict=True)], each)
-                for each in (sure, own)
-            )
-        )
+        accuracy([g[keep] for g, keep in zip(gaps, chosen, strict=True)], drawn)
         for gaps in (found.before, found.after)
     )
     return before, after
-
-
-def _widened(same: Accuracy | None, own: Accuracy | None) -> Accuracy | None:
-    """Return an accuracy whose interval holds in the set-up recorded and in the robot's own base."""
-    if same is None or own is None or same.low is None or same.high is None:
-        return same
-    assert own.low is not None and own.high is not None
-    low, high = min(same.low, own.low), max(same.high, own.high)
-    return same._replace(low=low, high=high, same=(same.low, same.high))
 
 
 def _ends(count: int, ends: np.ndarray) -> np.ndarray:
@@ -135,10 +164,3 @@ def _ends(count: int, ends: np.ndarray) -> np.ndarray:
 
 def _rms(gap: Array) -> float:
     return float(np.sqrt((gap**2).sum(axis=1).mean()))
-
-
-def _root(covariance: Array) -> Array:
-    """Return symmetric square roots, shape (N, 3, 3)."""
-    values, vectors = np.linalg.eigh(covariance)
-    size = np.sqrt(np.maximum(values, 0.0))
-    return np.asarray((vectors * size[:, None, :]) @ np.swapaxes(vectors, -1, -2))

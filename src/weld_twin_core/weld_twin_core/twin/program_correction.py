@@ -29,6 +29,7 @@ from ..motion.inverse.newton import chain_jacobian, least_step
 from ..motion.programs import MoveProgram, Piece, Travel, Use, travel
 from ..motion.programs.repeated import repeated, unrelenting
 from ..recording import JointMotion
+from .drawn import Drawn
 from .posterior import largest_sigma
 from .program_model import ProgramModel, missing
 from .trust import trust
@@ -107,8 +108,7 @@ class ProgramCorrection:
         What is missing to the real tool at every sample of every piece.
     covariances : tuple of array or None, each of shape (N, 6, 6)
         In the set-up that was recorded.
-    of_the_arm : tuple of array or None, each of shape (N, 6, 6)
-        Between the robot's own base and flange; the same where no frames were fitted.
+    drawn : tuple of Drawn or None
     results : tuple of MoveResult
         One for every move, in the order of the program.
 
@@ -122,7 +122,7 @@ class ProgramCorrection:
     before: tuple[Array, ...]
     after: tuple[Array, ...]
     covariances: tuple[Array | None, ...]
-    of_the_arm: tuple[Array | None, ...]
+    drawn: tuple[Drawn | None, ...]
     results: tuple[MoveResult, ...]
 
 
@@ -323,14 +323,14 @@ class _Work(NamedTuple):
         self, moved: MoveProgram, left: dict[int, str], calm: dict[int, str]
     ) -> ProgramCorrection:
         """Return everything that is told of the correction."""
-        before, after, sure, own = [], [], [], []
+        before, after, sure, drawn = [], [], [], []
         for piece in self.travel.pieces:
             aim = self.model.wanted(piece)
             motion = repeated(self.model.robot, moved, piece)
             before.append(missing(aim, self.model.real(piece, piece.motion)))
             after.append(missing(aim, self.model.real(piece, motion)))
             sure.append(self.model.covariances(piece, piece.motion))
-            own.append(self.model.covariances(piece, piece.motion, framed=False))
+            drawn.append(self.model.drawn(piece, piece.motion))
         return ProgramCorrection(
             moved,
             self.travel,
@@ -340,7 +340,7 @@ class _Work(NamedTuple):
             tuple(before),
             tuple(after),
             tuple(sure),
-            tuple(own),
+            tuple(drawn),
             self._results(moved, before, after, sure),
         )
 
@@ -391,7 +391,9 @@ def _collect(
             if point.ndim == 1:
                 arm = model.arm(move.tool)
                 jacobian = chain_jacobian(arm, frames(arm, motion.q[at]))
-                step = least_step(jacobian, gap[at], SINGULAR)
+                step = np.zeros(arm.n)  # external axes go where they went
+                own = slice(moved.external, None)
+                step[own] = least_step(jacobian[:, own], gap[at], SINGULAR)
             else:
                 step = _own(moved.place(use), use, point, gap[at])
             steps.setdefault(use.point, []).append(step)

@@ -6,8 +6,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arm.chain import forward
 from ..arm.robot import Robot
@@ -18,6 +20,8 @@ from ..motion.programs import Move, Piece
 from ..recording import JointMotion, Recording, Signal
 from .compensation import commandable
 from .domain import Domain, Outside
+from .drawn import Drawn, places
+from .features import Features
 from .posterior import Posterior, pose_covariances
 from .twin import Twin
 
@@ -102,27 +106,35 @@ class ProgramModel:
 
         return self._by_tool(piece, poses)
 
-    def covariances(
-        self, piece: Piece, motion: JointMotion, *, framed: bool = True
-    ) -> Array | None:
-        """
-        Return how sure the real poses are, shape (N, 6, 6), turned into the robot's base.
-
-        With the frames that were fitted, that is where the recording was made; without, it is where
-        the robot's own base counts.
-        """
+    def covariances(self, piece: Piece, motion: JointMotion) -> Array | None:
+        """Return how sure the real poses are where it was recorded, (N, 6, 6), seen from the base."""
         if self.posterior is None:
             return None
         posterior, recording = self.posterior, self.recording(motion)
         turn = np.kron(np.eye(2), self.robot.T_world_base[:3, :3].T)
 
         def sureness(tool: Array) -> Array:
-            found = pose_covariances(
-                posterior, self.twin(tool), recording, motion.t, self.setup, framed=framed
-            )
+            found = pose_covariances(posterior, self.twin(tool), recording, motion.t, self.setup)
             return np.asarray(turn @ found @ turn.T)
 
         return self._by_tool(piece, sureness)
+
+    def drawn(self, piece: Piece, motion: JointMotion) -> Drawn | None:
+        """Return by how much the tool may be off the model's along a motion, seen from the base."""
+        if self.posterior is None:
+            return None
+        posterior, recording = self.posterior, self.recording(motion)
+        at, near = places(motion.t.size)
+
+        def off(tool: Array, framed: bool) -> Array:
+            seen = Features(self.twin(tool), recording, motion.t[at])
+            found = posterior.drawn(seen, self.setup, framed=framed)
+            return np.asarray(found @ self.robot.T_world_base[:3, :3])
+
+        same, own = (
+            self._by_tool(piece, partial(off, framed=framed), at) for framed in (True, False)
+        )
+        return Drawn(near, same, own)
 
     def outside(self, motion: JointMotion) -> list[Outside]:
         """Return the stretches of a motion outside what was recorded."""
@@ -148,12 +160,14 @@ class ProgramModel:
         return plain if self.temperature is None else plain.at_temperature(self.temperature)
 
     @staticmethod
-    def _by_tool(piece: Piece, of: Callable[[Array], Array]) -> Array:
-        """Return values at every sample, each worked out with the tool of its move."""
+    def _by_tool(
+        piece: Piece, of: Callable[[Array], Array], at: NDArray[np.int_] | slice = slice(None)
+    ) -> Array:
+        """Return values at samples, each worked out with the tool of its move."""
         keys = [np.ascontiguousarray(move.tool).tobytes() for move in piece.moves]
         out: Array | None = None
         for key in dict.fromkeys(keys):
-            chosen = np.array([k == key for k in keys])[piece.move]
+            chosen = np.array([k == key for k in keys])[piece.move[at]]
             values = of(_tool(piece.moves, keys, key))
             out = values if out is None else out
             out[chosen] = values[chosen]

@@ -6,7 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_lab.coverage.held import inside_region
+from weld_twin_lab.coverage.oracle import oracle_sigma
 from weld_twin_lab.coverage.table import page, summaries
 
 
@@ -48,3 +51,26 @@ def test_the_table_tells_parts_apart():
     assert inside['held_of_all_poses'] == 0.6
     assert outside['held'] == 0.9
     assert '| b | unknown | outside | 10 | 90% |' in page(entries)
+
+
+def test_one_who_knows_the_cause_is_as_sure_as_its_mean_is():
+    robot = Robot.from_mapping(
+        {'name': 'one', 'joints': [{'name': 'j', 'a': 0.8, 'alpha': 0.0, 'd': 0.0}]}
+    )
+    rng = np.random.default_rng(3)
+    count, noise, off = 25, 2e-5, 1e-3
+    q = rng.uniform(-2.0, 2.0, (count, 1))
+    seen = 0.8 * np.column_stack([np.cos(q + off), np.sin(q + off), 0.0 * q])
+    seen += rng.normal(scale=noise, size=seen.shape)
+    t = np.arange(float(count))
+    train = Recording('train', JointMotion(t, q, static=True), Measurements(t, seen))
+    truth = {
+        'causes': [{'effect': 'joint_offset', 'joint': 'j', 'offset': off}],
+        'align': [],
+        'sigma_m': noise,
+    }
+    # Every station shows the zero by the same lever that it moves the tool with.
+    sigma = oracle_sigma(robot, (), truth, (train, train), t)
+    assert abs(sigma / (noise / np.sqrt(count)) - 1.0) < 1e-6
+    truth['causes'] = [{'effect': 'no formula of ours', 'joint': 'j'}]
+    assert oracle_sigma(robot, (), truth, (train, train), t) is None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from weld_twin_lab.programs.cells import CELLS, robots_of
-from weld_twin_lab.programs.correction_table import counted, page, totals
+from weld_twin_lab.programs.correction_table import counted, kept, page, totals
 from weld_twin_lab.programs.path_accuracy import path_accuracy
 
 
@@ -41,6 +41,21 @@ def test_the_table_tells_languages_apart_and_names_the_worsened_seam():
     text = page({'seed': 1, 'totals': found, 'cases': cases})
     assert text.count('corrected, worse than before') == 1
     assert '| the model is less sure | 1 |' in text
+
+
+def test_promises_that_hold_and_that_do_not_are_counted():
+    told = {'ci90_m': [1e-5, 3e-5], 'sure_within_m': 5e-5}
+    cases = [seam(2e-5), seam(4e-5), seam(6e-5), seam(2e-5, 'left')]
+    for case in cases[:3]:
+        case['promised'] = {'after': told}
+    assert kept(cases) == {
+        'after': {
+            'seams': 3.0,
+            'held': pytest.approx(1 / 3),
+            'within': pytest.approx(2 / 3),
+            'width_m': pytest.approx(2e-5),
+        }
+    }
 
 
 @pytest.mark.parametrize('language', CELLS)

@@ -16,7 +16,7 @@ from weld_twin_core.diagnosis.result import NAMING
 
 from ..blind.judging import Judged, answers_of, judge
 from .levels_of_truth import alike_by_structure, levels_of, numbers
-from .whole import whole
+from .whole import FEW, whole
 
 AS_WELL = 0.05
 """Share of the noise by which a member of a set may leave more than the cause at work does."""
@@ -25,8 +25,6 @@ AS_GOOD = 1.05
 CURVES = ('joint_curve', 'frame_curve')
 
 
-FEW = frozenset({'double', 'triple'})
-"""Kinds of cases with two or three causes."""
 LARGE = 0.1
 """Share of the squared gap from which on a cause that is not told is missing, if it is no noise."""
 

@@ -27,7 +27,7 @@ FOLDS = 8
 """Parts of the cases that take turns in being unseen."""
 ENDS = (0.005, 0.995)
 """Quantiles of a feature between which it counts: beyond, single cases would decide."""
-RISK, CAUSE_RISK = 0.002, 0.01
+RISK, CAUSE_RISK = 0.0025, 0.01
 """Probability that an answer is sure and wrong, and that a cause told as sure is wrong."""
 OF_TODAY = 1.0
 """Weight of a case from which on the engine at hand diagnosed it. What is sure of causes is read off

@@ -19,13 +19,13 @@ from weld_twin_core.recording import Recording
 from ..blind import layout
 from ..blind.achieved import aligned_on, counted, gap_on
 from ..blind.blind_cell import Take, as_recording, record
-from ..blind.cause_sizes import SIZES
 from ..blind.diagnosing import engine_digest
 from ..blind.displacement import rms
 from ..blind.making import Case, truth_of
 from .mix import drawn
 from .several import several
 from .visible import shown
+from .whole import FEW
 
 USUAL, SEVERAL = 'usual', 'several'
 """Mixes of cases."""
@@ -49,15 +49,9 @@ def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
     except Exception as error:
         return {'name': name, 'error': f'not drawn: {error}'}
     row = {'poor': poor, **row_of(name, case, held_out=held_out)}
-    if mix == SEVERAL or _act_together(case):
+    if mix == SEVERAL or row['truth']['kind'] in FEW:
         row['truth']['shown'] = shown(case)
     return row
-
-
-def _act_together(case: Case) -> bool:
-    """Return whether several causes act that the library holds: of these some may not show."""
-    known = SIZES.keys() - set(case.excluded)
-    return len(case.causes) > 1 and all(cause['effect'] in known for cause in case.causes)
 
 
 def _drawn(seed: int, number: int, mix: str) -> tuple[Case, str, bool]:

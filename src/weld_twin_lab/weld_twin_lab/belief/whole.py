@@ -15,6 +15,8 @@ from .levels_of_truth import alike_by_structure
 
 VISIBLE = 25.0
 """Rise of chi-square without a cause from which on it shows: five standard deviations."""
+FEW = frozenset({'double', 'triple'})
+"""Kinds of cases with two or three causes."""
 WIDEST = 3
 """Members of a set that still counts as a name."""
 

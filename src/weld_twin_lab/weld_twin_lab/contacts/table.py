@@ -4,18 +4,27 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from weld_twin_msgs_py.files import markdown
+
 HEADER = (
-    '| arm | places | spread before [mm] | after, each place left out [mm] | per axis [mm] | '
-    'worst place [mm] | sockets [mm] | status | one place only: better or flagged | time [s] |'
+    *('arm', 'places', 'spread before [mm]', 'after, each place left out [mm]', 'per axis [mm]'),
+    *(
+        'worst place [mm]',
+        'sockets [mm]',
+        'status',
+        'one place only: better or flagged',
+        'time [s]',
+    ),
 )
 EACH = (
-    '| arm | place left out | before [mm] | after [mm] | per axis [mm] | sockets [mm] | '
-    'foretold from the others [mm] | status |'
+    *('arm', 'place left out', 'before [mm]', 'after [mm]', 'per axis [mm]', 'sockets [mm]'),
+    *('foretold from the others [mm]', 'status'),
 )
 TITLE = """# Arms without an instrument
 
@@ -58,35 +67,32 @@ def summary(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def table(entries: Sequence[dict[str, Any]]) -> str:
     """Return the table in Markdown."""
-    lines = [TITLE, HEADER, '|' + '---|' * HEADER.count(' | ') + '---|']
-    for row in summary(entries):
-        near, far = min(row['distances_m']) * 1e3, max(row['distances_m']) * 1e3
-        status = ', '.join(
-            f'{row["status"].count(name)} {name}' for name in dict.fromkeys(row['status'])
-        )
-        cells = [
-            row['arm'],
-            str(row['places']),
-            *(
-                f'{row[key] * 1e3:.3f}'
-                for key in ('before_m', 'after_m', 'each_axis_m', 'worst_m')
-            ),
-            f'{near:.2f} to {far:.2f}',
-            status,
-            f'{row["alone"][0]} of {row["alone"][1]}',
-            f'{row["seconds"]:.1f}',
-        ]
-        lines.append('| ' + ' | '.join(cells) + ' |')
-    lines += ['', EACH, '|' + '---|' * EACH.count(' | ') + '---|']
-    for entry in entries:
-        if entry['kind'] == 'without':
-            row = entry['judged'][0]
-            sizes = (row['before_m'], row['after_m'], row['each_axis_m'])
-            cells = [entry['arm'], row['place'], *(f'{size * 1e3:.3f}' for size in sizes)]
-            told = entry['told_held_out_m']
-            cells += [
-                f'{row["distance_m"] * 1e3:.2f}',
-                '-' if told is None else f'{told * 1e3:.3f}',
-            ]
-            lines.append('| ' + ' | '.join([*cells, entry['status']]) + ' |')
-    return '\n'.join(lines) + '\n'
+    arms = [_arm(row) for row in summary(entries)]
+    places = [_place(entry) for entry in entries if entry['kind'] == 'without']
+    return '\n'.join([TITLE, markdown.table(HEADER, *arms), markdown.table(EACH, *places)])
+
+
+def _arm(row: dict[str, Any]) -> tuple[object, ...]:
+    near, far = min(row['distances_m']) * 1e3, max(row['distances_m']) * 1e3
+    counts = Counter(row['status'])
+    return (
+        row['arm'],
+        row['places'],
+        *(f'{row[key] * 1e3:.3f}' for key in ('before_m', 'after_m', 'each_axis_m', 'worst_m')),
+        f'{near:.2f} to {far:.2f}',
+        ', '.join(f'{count} {name}' for name, count in counts.items()),
+        f'{row["alone"][0]} of {row["alone"][1]}',
+        f'{row["seconds"]:.1f}',
+    )
+
+
+def _place(entry: dict[str, Any]) -> tuple[object, ...]:
+    row, told = entry['judged'][0], entry['told_held_out_m']
+    return (
+        entry['arm'],
+        row['place'],
+        *(f'{row[key] * 1e3:.3f}' for key in ('before_m', 'after_m', 'each_axis_m')),
+        f'{row["distance_m"] * 1e3:.2f}',
+        '-' if told is None else f'{told * 1e3:.3f}',
+        entry['status'],
+    )

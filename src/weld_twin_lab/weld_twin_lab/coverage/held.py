@@ -15,8 +15,10 @@ from weld_twin_core.diagnosis import Diagnosis
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects.setup_motion import seen_from
 from weld_twin_core.recording import Measurements, Recording
-from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covariances
+from weld_twin_core.twin.posterior import largest_sigma, pose_covariances
 from weld_twin_core.twin.twin import Twin
+
+from ..transfer.flags import flagged
 
 HOLD = 0.9
 """Share of the errors that a region promises to hold."""
@@ -90,22 +92,6 @@ def _twin(model: Model, train: Recording, other: Recording) -> Twin:
     """Return the model of a recording for another."""
     found = seen_from(model.found, train.epoch_ns, train.span_ns, other)
     return Model(model.robot, model.bases[:1], model.known, found).twin(0)
-
-
-def flagged(posterior: Posterior, other: Recording, t: Array) -> Mask:
-    """Return which poses a prediction flags as outside what was recorded, shape (M,)."""
-    q, qd = other.joints.at(t)
-    warm, load = other.temperature, other.wrench
-    found = posterior.domain.outside(
-        q,
-        None if other.joints.static else qd,
-        None if load is None else load.at(t),
-        None if warm is None else warm.at(t),
-    )
-    out = np.zeros(t.size, dtype=bool)
-    for first, last, _ in found:
-        out[first : last + 1] = True
-    return out
 
 
 def _within(other: Recording, measured: Measurements) -> Mask:

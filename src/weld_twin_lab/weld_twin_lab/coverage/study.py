@@ -18,15 +18,19 @@ from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.robots import load_robot
+from weld_twin_nodes.offline.told_twin import build_twin
 
 from ..blind import layout
 from ..blind.diagnosing import diagnosis_of
 from ..real_robots.unseen_stations import ALIGN
 from ..study import Parts
 from ..transfer.splits import TUNED_ON, Split, all_splits
-from .held import held
+from .held import flagged, held
+from .oracle import oracle_sigma
 
 NAME, PARTS = 'coverage', 'parts'
+FEWEST = 15
+"""Poses of a sealed case below which their share says nothing."""
 UR5_NOISE = 2e-5
 """A GTS3800 is good to 15 um + 6 um/m, a metre or two away [m]."""
 
@@ -85,10 +89,20 @@ def of_case(case: Path, truth: Path) -> dict[str, Any]:
     good = np.ones(test.measured.t.size, dtype=bool)
     good[np.asarray(told['outliers'], dtype=int)] = False
     noise = np.full(test.measured.t.size, float(told['sigma_m']))
-    entry['outside' if told['test'] == 'new motion' else 'inside'] = held(
-        found, train, test, noise, good
-    )
+    assert found.posterior is not None
+    beyond = flagged(found.posterior, test, test.measured.t)
+    effects = build_twin(robot, case / layout.KNOWN if _knows(case) else '').effects
+    for region, mask in (('inside', good & ~beyond), ('outside', good & beyond)):
+        if mask.sum() >= FEWEST:
+            entry[region] = held(found, train, test, noise, mask)
+            at = test.measured.t[mask]
+            entry[region]['oracle_sigma_m'] = oracle_sigma(robot, effects, told, (train, test), at)
     return entry
+
+
+def _knows(case: Path) -> bool:
+    """Tell whether a case tells effects beforehand."""
+    return bool(layout.read(case / layout.CASE)['known'])
 
 
 def _tried(work: Callable[[], Diagnosis], entry: dict[str, Any]) -> Diagnosis | None:

@@ -38,6 +38,8 @@ def summaries(entries: Sequence[Entry]) -> list[dict[str, Any]]:
 
 def _summary(source: str, group: str, region: str, mine: Sequence[Entry]) -> dict[str, Any]:
     held = np.array([e['held'] for e in mine])
+    known = [e for e in mine if e.get('oracle_sigma_m')]
+    wider = [e['median_sigma_m'] / e['oracle_sigma_m'] for e in known]
     poses = np.array([e['poses'] for e in mine])
     return {
         'source': source,
@@ -48,6 +50,7 @@ def _summary(source: str, group: str, region: str, mine: Sequence[Entry]) -> dic
         'held_of_all_poses': float(np.average(held, weights=poses)),
         'worst': float(held.min()),
         'flagged': float(np.mean([e['flagged'] for e in mine])),
+        'over_oracle': float(np.median(wider)) if wider else None,
     }
 
 
@@ -63,10 +66,21 @@ def summary_table(entries: Sequence[Entry]) -> str:
             f'{s["held_of_all_poses"]:.1%}',
             f'{s["worst"]:.0%}',
             f'{s["flagged"]:.1%}',
+            '' if s['over_oracle'] is None else f'{s["over_oracle"]:.2f}',
         ]
         for s in summaries(entries)
     ]
-    heads = ('of', 'group', 'poses', 'recordings', 'held', 'of all poses', 'worst', 'flagged')
+    heads = (
+        'of',
+        'group',
+        'poses',
+        'recordings',
+        'held',
+        'of all poses',
+        'worst',
+        'flagged',
+        'over oracle',
+    )
     return table(heads, *rows)
 
 

@@ -32,7 +32,7 @@ from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.programs import read_sources
 from weld_twin_msgs_py.programs.source import Source
-from weld_twin_nodes.offline.correcting import corrected_program, program_model
+from weld_twin_nodes.offline.correcting import CorrectedProgram, corrected_program, program_model
 from weld_twin_report.report.diagnosis_files import RESULT, diagnosis_text
 
 from ..blind.recorded_motion import RATE
@@ -106,9 +106,9 @@ def corrected_seam(language: str, seed: int, number: int) -> dict[str, Any]:
         return {'language': language, 'undrawn': str(error)}
     along = _along(seam, seam.text)
     found = _diagnosed(seam, along, seed)
-    after, outcome, why = _by_diagnosis(seam, found)
+    after, outcome, why, promised = _by_diagnosis(seam, found)
     asked = AskedModel(seam.robot, (), temperature=seam.temperature, seam=seam)
-    best, limit = _or_as_it_was(seam, asked)
+    _, best, limit = _or_as_it_was(seam, asked)
     texts = {'before': seam.text, 'after': after, 'true': best}
     accuracy = {name: _accuracy(seam, text, along) for name, text in texts.items()}
     return {
@@ -119,6 +119,7 @@ def corrected_seam(language: str, seed: int, number: int) -> dict[str, Any]:
         'limit': limit,
         'at_m': {name: one.at for name, one in accuracy.items()},
         'rms_m': {name: one.rms for name, one in accuracy.items()},
+        'promised': promised,
     }
 
 
@@ -141,25 +142,38 @@ def _diagnosed(seam: SealedSeam, along: Driven, seed: int) -> Diagnosis:
     return diagnose(seam.recordings(along, seed), seam.robot, known=known)
 
 
-def _by_diagnosis(seam: SealedSeam, found: Diagnosis) -> tuple[str, str, str]:
-    """Return the program corrected with a diagnosis file, what became of it, and why."""
+def _by_diagnosis(
+    seam: SealedSeam, found: Diagnosis
+) -> tuple[str, str, str, dict[str, Any] | None]:
+    """Return the program corrected with a diagnosis file, what became of it, why, and its promise."""
     with TemporaryDirectory() as place:
         file = Path(place) / RESULT
         write_text(file, diagnosis_text(found, ()))
         try:
             model = program_model(seam.robot, file, seam.temperature)
         except TwinError as error:
-            return seam.text, 'refused', str(error).replace(place, '')
-    text, why = _or_as_it_was(seam, model)
-    return text, 'left' if why else 'corrected', why
+            return seam.text, 'refused', str(error).replace(place, ''), None
+    made, text, why = _or_as_it_was(seam, model)
+    return text, 'left' if why else 'corrected', why, None if made is None else _promised(made)
 
 
-def _or_as_it_was(seam: SealedSeam, model: ProgramModel) -> tuple[str, str]:
-    """Return the program corrected by a model; as it was where it is left, and why."""
+def _promised(made: CorrectedProgram) -> dict[str, Any]:
+    """Return what a correction promises of before and after, as plain JSON values."""
+    return {
+        name: {'ci90_m': [told.low, told.high], 'sure_within_m': told.sure_within}
+        for name, told in zip(('before', 'after'), made.accuracy, strict=True)
+        if told is not None and told.low is not None
+    }
+
+
+def _or_as_it_was(
+    seam: SealedSeam, model: ProgramModel
+) -> tuple[CorrectedProgram | None, str, str]:
+    """Return the program corrected by a model, with its text; as it was where it is left, and why."""
     name = f'seam{CELLS[seam.language].suffix}'
     program = read_sources([Source(name, seam.text)], seam.context, seam.language)
     try:
-        text = corrected_program(program, seam.context, model).texts[0]
+        made = corrected_program(program, seam.context, model)
     except DataError as error:
-        return seam.text, str(error)
-    return text, '' if text != seam.text else UNCHANGED
+        return None, seam.text, str(error)
+    return made, made.texts[0], '' if made.texts[0] != seam.text else UNCHANGED

@@ -15,6 +15,7 @@ from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, JointSignal, Recording
+from weld_twin_msgs_py.files import markdown
 
 from ..real_robots.unseen_stations import ALIGN, residual
 from ..transfer.plain import PLAIN, plain_fit
@@ -114,14 +115,18 @@ def table(name: str, done: Sequence[Fold]) -> str:
         '',
         f'Position on stations that were not fitted, {len(done)} stretches of time left out in turn.',
         '',
-        '| model | mean mm | max mm | mean over frames alone |',
-        '|---|---|---|---|',
-        *(
-            f'| {words[way]} | {away.mean() * 1e3:.3f} | {away.max() * 1e3:.3f} '
-            f'| {away.mean() / start:.3f} |'
-            for way, away in each.items()
+        markdown.table(
+            ('model', 'mean mm', 'max mm', 'mean over frames alone'),
+            *(
+                (
+                    words[way],
+                    f'{away.mean() * 1e3:.3f}',
+                    f'{away.max() * 1e3:.3f}',
+                    f'{away.mean() / start:.3f}',
+                )
+                for way, away in each.items()
+            ),
         ),
-        '',
         'Found with efforts, stretch by stretch:',
         '',
         *(f'* {", ".join(fold.told) or "nothing"}' for fold in done),

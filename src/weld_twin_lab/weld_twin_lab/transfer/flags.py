@@ -7,18 +7,24 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from weld_twin_core.diagnosis import Diagnosis
+from weld_twin_core.arrays import Array
 from weld_twin_core.recording import Recording
+from weld_twin_core.twin.posterior import Posterior
+
+Mask = NDArray[np.bool_]
 
 
-def flagged(diagnosis: Diagnosis, train: Recording, stations: Recording) -> NDArray[np.bool_]:
-    """Return which stations a prediction would flag, shape (M,)."""
-    assert stations.measured is not None
-    flags = np.zeros(stations.measured.t.size, dtype=bool)
-    if diagnosis.posterior is None:
-        return flags
-    q, qd = stations.joints.at(stations.measured.t)
-    found = diagnosis.posterior.domain.outside(q, None if stations.joints.static else qd)
+def flagged(posterior: Posterior, other: Recording, t: Array) -> Mask:
+    """Return which poses a prediction flags as outside what was recorded, shape (M,)."""
+    q, qd = other.joints.at(t)
+    warm, load = other.temperature, other.wrench
+    found = posterior.domain.outside(
+        q,
+        None if other.joints.static else qd,
+        None if load is None else load.at(t),
+        None if warm is None else warm.at(t),
+    )
+    out = np.zeros(t.size, dtype=bool)
     for first, last, _ in found:
-        flags[first : last + 1] = True
-    return flags
+        out[first : last + 1] = True
+    return out

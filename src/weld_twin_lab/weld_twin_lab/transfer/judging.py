@@ -102,7 +102,9 @@ def _region(
         return out
     mine, frames = sizes[PRODUCT], sizes[FRAMES]
     best = min(PLAIN, key=lambda name: out['mean_m'][name])
-    flags = flagged(diagnosis, train, stations)
+    flags = np.zeros(mine.size, dtype=bool)
+    if diagnosis.posterior is not None and stations.measured is not None:
+        flags = flagged(diagnosis.posterior, stations, stations.measured.t)
     out['best'] = best
     out['over_best'] = paired(mine, sizes[best])
     out['over_frames'] = paired(mine, frames)

@@ -116,9 +116,14 @@ def read_recording(
         return touching(whole, touched, made)
     if seen:
         whole = looking(whole, seen, names, made)
-    elif names.measured_inverse and whole.measured is not None:
-        whole = whole.with_measured(whole.measured.inverted())
-    return _with_what_is_missing(whole, made, _ends(names, samples))
+    return _with_what_is_missing(_inverted(whole, names), made, _ends(names, samples))
+
+
+def _inverted(recording: Recording, names: TopicNames) -> Recording:
+    """Return the recording with poses of the tool, where those that came are of a fixed thing."""
+    if not names.measured_inverse or recording.measured is None or recording.images is not None:
+        return recording
+    return recording.with_measured(recording.measured.inverted())
 
 
 def _with_what_is_missing(

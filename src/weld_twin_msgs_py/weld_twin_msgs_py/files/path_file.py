@@ -8,7 +8,12 @@ import csv
 from collections.abc import Iterator
 from pathlib import Path as FilePath
 
+import numpy as np
+
+from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
 from weld_twin_core.errors import PathError
+from weld_twin_core.motion.inverse import rest
 from weld_twin_core.motion.paths import Path, Torch, from_mapping
 
 from .yaml_file import read_text, read_yaml
@@ -36,6 +41,50 @@ def read_path(path: FilePath | str) -> tuple[Path, Torch]:
         return from_mapping(data), Torch.from_mapping(torch or {})
     except PathError as error:
         raise PathError(f"path file '{path}': {error}") from None
+
+
+def read_external(path: FilePath | str, robot: Robot) -> Array | None:
+    """
+    Return where a path file says that external axes stand along the seam, shape (K, m) [rad or m].
+
+    ``external`` names joints of a positioner or a track, each with one position or with as many
+    as the others, spread evenly along the seam. Joints of the chain before them stand at zero.
+
+    Parameters
+    ----------
+    path : Path or str
+    robot : Robot
+
+    Raises
+    ------
+    PathError
+        It names no such joint, or its positions are none.
+
+    """
+    data = None if FilePath(path).suffix.lower() == '.csv' else read_yaml(path, 'path file')
+    given = data.get('external') if isinstance(data, dict) else None
+    if given is None:
+        return None
+    where = f"path file '{path}': external"
+    if not isinstance(given, dict) or not set(map(str, given)) <= set(robot.joint_names):
+        raise PathError(f'{where} must have positions by joint: {", ".join(robot.joint_names)}')
+    try:
+        knots = {str(k): np.atleast_1d(np.asarray(v, dtype=np.float64)) for k, v in given.items()}
+        columns = np.broadcast_arrays(*knots.values())
+    except (TypeError, ValueError):
+        raise PathError(
+            f'{where} needs one number for each joint, or lists of one length'
+        ) from None
+    last = max(robot.index(name) for name in knots)
+    told = np.zeros((columns[0].size, max(last + 1, robot.behind)))
+    told[:, : robot.behind] = rest(robot)
+    for name, column in zip(knots, columns, strict=True):
+        told[:, robot.index(name)] = column
+    if columns[0].ndim != 1 or not np.isfinite(told).all() or told.shape[1] >= robot.n:
+        raise PathError(f'{where} needs finite numbers, and a joint that is left to the arm')
+    still = np.clip(np.zeros((len(told), robot.n)), robot.lower, robot.upper)
+    robot.check_positions(np.concatenate([told, still[:, told.shape[1] :]], axis=1))
+    return told
 
 
 def _points(path: FilePath | str) -> list[list[float]]:

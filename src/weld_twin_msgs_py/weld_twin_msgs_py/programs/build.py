@@ -14,6 +14,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
+from weld_twin_core.motion.inverse import CarriedArm
 from weld_twin_core.motion.programs import Move, MoveProgram, Use
 from weld_twin_core.motion.programs.moves import Kind
 
@@ -39,6 +40,8 @@ class Point(NamedTuple):
     notation : Notation
     value : array
         A pose (4, 4) in its own base frame, or joint positions of the model (n,).
+    told : array, shape (m,), optional
+        External axes at a pose, as the first joints of the model; None where it does not say.
 
     """
 
@@ -47,6 +50,7 @@ class Point(NamedTuple):
     numbers: tuple[Number, ...]
     notation: Notation
     value: Array
+    told: Array | None = None
 
 
 class Ref(NamedTuple):
@@ -64,7 +68,11 @@ class Ref(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One move as a program says it; without an end it is not understood, ``why`` says why."""
+    """
+    One move as a program says it; without an end it is not understood, ``why`` says why.
+
+    ``along`` is False where the program says that a straight way is not one on the workpiece.
+    """
 
     kind: Kind
     where: str
@@ -78,6 +86,7 @@ class Step:
     duration: float = 0.0
     suits: Suits | None = None
     why: str = ''
+    along: bool = True
 
 
 @dataclass(eq=False)
@@ -111,10 +120,25 @@ class Program:
     one_seam: bool = False
 
     def add_point(
-        self, name: str, numbers: Sequence[Number], notation: Notation, file: int = 0
+        self,
+        name: str,
+        numbers: Sequence[Number],
+        notation: Notation,
+        file: int = 0,
+        told: Array | None = None,
     ) -> int:
         """
         Add a point and return its index.
+
+        Parameters
+        ----------
+        name : str
+        numbers : sequence of Number
+        notation : Notation
+        file : int
+            Which of the sources they stand in.
+        told : array, shape (m,), optional
+            External axes at a pose.
 
         Raises
         ------
@@ -127,7 +151,7 @@ class Program:
             value = notation.value([number.value for number in numbers])
         except DataError as error:
             raise DataError(f'{where}: {error}') from None
-        self.points.append(Point(name, where, tuple(numbers), notation, value))
+        self.points.append(Point(name, where, tuple(numbers), notation, value, told))
         return len(self.points) - 1
 
     def add(self, step: Step) -> None:
@@ -200,6 +224,9 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
         Where the controller's frames are on this robot, and the frames that were given.
 
     """
+    count = len(controller.external)
+    carried = CarriedArm(robot.with_frames(base=np.eye(4)), count)
+    points = [_with_external(point, count) for point in program.points]
     seam, pieces = -1, []
     for steps in program.pieces:
         seam += 1
@@ -207,33 +234,58 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
         for step in steps:
             if step.kind == 'joint' and moves and not program.one_seam:
                 seam += 1
-            moves.append(_move(step, seam, robot, controller))
+            moves.append(_move(step, seam, carried, controller, points))
         if moves:
             pieces.append(tuple(moves))
-    return MoveProgram(tuple(point.value for point in program.points), tuple(pieces))
+    still = np.zeros(count)
+    told = tuple(still if point.told is None else point.told for point in points)
+    values = tuple(point.value for point in points)
+    return MoveProgram(values, tuple(pieces), told if count else ())
 
 
-def _move(step: Step, seam: int, robot: Robot, controller: Controller) -> Move:
+def _with_external(point: Point, count: int) -> Point:
+    """Return a point that says where the external axes stand, as one of all joints does anyway."""
+    return point if point.value.ndim == 2 else point._replace(told=point.value[:count])
+
+
+def _move(
+    step: Step, seam: int, carried: CarriedArm, controller: Controller, points: Sequence[Point]
+) -> Move:
     try:
         if step.end is None:
             raise DataError(step.why)
-        tool, base = controller.tool(step.tool), controller.base(step.base)
+        tool = controller.tool(step.tool)
+        base, along = _base(step, points[step.end.point], carried, controller)
     except DataError as error:
         return Move('unknown', None, np.eye(4), where=step.where, seam=seam, why=str(error))
-    end = _use(step.end, base)
     return Move(
         step.kind,
-        end,
+        _use(step.end, base),
         tool,
         None if step.via is None else _use(step.via, base),
         step.speed,
         step.stop,
         step.dwell,
         step.duration,
-        None if step.suits is None else step.suits(robot, controller),
+        None if step.suits is None else step.suits(carried.robot, controller),
         step.where,
         seam,
+        along=along,
     )
+
+
+def _base(
+    step: Step, end: Point, carried: CarriedArm, controller: Controller
+) -> tuple[Array, bool]:
+    """Return the base frame of a move where the chain begins, and whether it goes along."""
+    if not carried.count:
+        return controller.base(step.base), True
+    if end.told is None:
+        raise DataError(f'{end.name} does not say where the external axes stand')
+    if end.value.ndim == 1:
+        return np.eye(4), step.along
+    base, along = controller.base(step.base), controller.goes_along(step.base)
+    return base if along else np.asarray(carried.roots(end.told) @ base), along and step.along
 
 
 def _use(ref: Ref, base: Array) -> Use:

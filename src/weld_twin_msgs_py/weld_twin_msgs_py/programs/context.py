@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from weld_twin_core.arrays import Array
 
 from .controllers import Controller
 from .notation import Notation, joint_notation
+from .source import Number
 
 
 class Context(NamedTuple):
@@ -32,9 +34,31 @@ class Context(NamedTuple):
     controller: Controller
     pulses_per_degree: Array | None = None
 
+    @property
+    def axes(self) -> int:
+        """Return how many joints the controller has as the arm's own."""
+        return self.robot.n - len(self.controller.external)
+
+    def told(self, numbers: Sequence[Number | None]) -> Array | None:
+        """
+        Return the external axes of a point as joints of the model; None where one is missing.
+
+        Parameters
+        ----------
+        numbers : sequence of Number or None
+            Degrees or mm, in the order of ``controller.external``.
+
+        """
+        values = [number.value for number in numbers if number is not None]
+        if len(values) < len(numbers):
+            return None
+        shown = [0.0] * self.axes + values
+        return self.degrees().value(shown)[: len(values)]
+
     def degrees(self, decimals: int = 5) -> Notation:
         """Return joint positions in degrees, of sliding joints in millimetres."""
-        unit = np.where(self.robot.prismatic, 1e-3, np.pi / 180.0)
+        slides = np.abs(self.controller.mix.T) @ self.robot.prismatic > 0.0
+        unit = np.where(slides, 1e-3, np.pi / 180.0)
         return joint_notation(unit, self.controller.mix, decimals, 'joints in degrees')
 
     def radians(self, decimals: int = 7) -> Notation:

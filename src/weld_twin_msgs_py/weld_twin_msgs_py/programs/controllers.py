@@ -10,7 +10,7 @@ counts joint 3 from the ground. Of a URDF the base and the flange are links.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -21,6 +21,9 @@ from weld_twin_core.arm.controller_lookup import bundled_name, controller_frames
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
+from weld_twin_core.motion.inverse import CarriedArm
+
+from .external_axes import LABELS, ExternalAxis, carrying, external_axes, shown_order
 
 AT_SECOND_AXIS = {'fanuc-ls': ('fanuc', 'FANUC'), 'inform': ('yaskawa', 'Yaskawa')}
 """Languages whose controllers have the origin there, with the names of bundled robots and maker."""
@@ -28,11 +31,43 @@ COUPLED = 'fanuc-ls'
 """The language whose controller counts joint 3 from the ground."""
 
 
+class Cell(NamedTuple):
+    """
+    What a user tells of the axes beside an arm.
+
+    Attributes
+    ----------
+    external : str
+        Which joint is which, as ``E1=rail,E2=-tilt``.
+    along : frozenset of str, optional
+        Names of bases that go along with a positioner, in lower case; None where it was not told.
+    world : array, shape (4, 4) [m], optional
+        Where the robot's rows begin in the world of the controller.
+
+    """
+
+    external: str = ''
+    along: frozenset[str] | None = None
+    world: Array | None = None
+
+
 class Frame(NamedTuple):
-    """A tool or base frame as a program names it; ``value`` None where it has no numbers."""
+    """
+    A tool or base frame as a program names it.
+
+    Attributes
+    ----------
+    name : str
+    value : array, shape (4, 4) [m], optional
+        None where the program has no numbers.
+    moving : bool or None
+        A base that goes along with a positioner; None where the program does not say.
+
+    """
 
     name: str
     value: Array | None = None
+    moving: bool | None = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +89,14 @@ class Controller:
         Frames that were given, by the names of the program, in lower case.
     notes : list of str
         What was assumed, in sentences.
+    external : tuple of ExternalAxis
+        In the order of the robot's first joints, which they are.
+    along : frozenset of str, optional
+        Names of bases that go along with a positioner, in lower case; None where nobody told.
+    placed : bool
+        Where bases that stand still count from is known. It is not of an arm on a track, unless told.
+    positioner : bool
+        Some of the external axes move the workpiece.
 
     """
 
@@ -64,6 +107,10 @@ class Controller:
     tools: Mapping[str, Array] = field(default_factory=dict)
     bases: Mapping[str, Array] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    external: tuple[ExternalAxis, ...] = ()
+    along: frozenset[str] | None = None
+    placed: bool = True
+    positioner: bool = False
 
     def tool(self, frame: Frame) -> Array:
         """
@@ -93,9 +140,39 @@ class Controller:
         )
         return self.own_tool
 
+    def goes_along(self, frame: Frame) -> bool:
+        """
+        Tell whether a base goes along with a positioner.
+
+        Raises
+        ------
+        DataError
+            Nothing tells it, or it stands still and nobody knows where it counts from.
+
+        """
+        moving = frame.moving
+        if moving and not self.positioner:
+            raise DataError(
+                'the base goes along with a positioner, and the robot file has none; give it as '
+                "'workpiece' (docs/conventions.md)"
+            )
+        if self.positioner and moving is None:
+            if self.along is None:
+                raise DataError(
+                    f'whether base {frame.name} goes along with the positioner is not in the '
+                    f"program; say --on-positioner '{frame.name}', or --on-positioner none"
+                )
+            moving = frame.name.lower() in self.along
+        if not moving and not self.placed:
+            raise DataError(
+                'positions in a frame that stands still count from the world of the controller, and '
+                'where the track begins in it is not known; say it with --world X,Y,Z,...'
+            )
+        return bool(moving)
+
     def base(self, frame: Frame) -> Array:
         """
-        Return ``T_base_frame`` on the model.
+        Return ``T_base_frame`` on the model; of one that goes along, on the positioner's flange.
 
         Raises
         ------
@@ -104,12 +181,13 @@ class Controller:
 
         """
         given = self.bases.get(frame.name.lower())
+        origin = np.eye(4) if self.goes_along(frame) else self.origin
         if given is not None:
-            return np.asarray(self.origin @ given)
+            return np.asarray(origin @ given)
         if frame.value is not None:
-            return np.asarray(self.origin @ frame.value)
+            return np.asarray(origin @ frame.value)
         if not frame.name:
-            return self.origin
+            return origin
         raise DataError(
             f'the numbers of base {frame.name} are not in the program; give them with '
             f"--base '{frame.name}=X,Y,Z,...'"
@@ -125,6 +203,7 @@ def controller_of(
     language: str,
     tools: Mapping[str, Array] | None = None,
     bases: Mapping[str, Array] | None = None,
+    cell: Cell | None = None,
 ) -> Controller:
     """
     Return the frames of the controller that runs a language on a robot.
@@ -136,29 +215,98 @@ def controller_of(
         Each maker's controller runs its own, on its own robots; on others nothing is assumed.
     tools, bases : mapping of str to array, optional
         Frames that were given, shape (4, 4) [m].
+    cell : Cell, optional
+        What was told of external axes.
 
     """
-    frames, name = controller_frames(robot), bundled_name(robot)
-    origin, mix, notes = np.array(frames.base), np.eye(robot.n), _linked(frames)
+    told = cell or Cell()
+    axes = external_axes(told.external, robot, language)
+    arm = CarriedArm(robot, len(axes)).arm
+    frames = robot.controller or controller_frames(arm)
+    origin, notes = np.array(frames.base), _linked(frames)
+    if told.world is not None:
+        origin = np.linalg.inv(told.world)
+    mix = _counting(arm, robot, language, origin, notes)
+    if axes and language in LABELS:
+        mix = shown_order(robot, axes) @ mix
+        notes += _cell_notes(robot, axes)
+    return Controller(
+        origin,
+        np.array(frames.flange),
+        mix,
+        np.array(robot.T_flange_tool),
+        _lower(tools),
+        _lower(bases),
+        notes,
+        axes,
+        told.along,
+        told.world is not None or len(axes) == robot.behind,
+        robot.behind > 0,
+    )
+
+
+def world_of(robot: Robot, language: str) -> tuple[Array, str]:
+    """
+    Return the world of a controller as delivered: the arm's own base, or where its track begins.
+
+    Parameters
+    ----------
+    robot : Robot
+    language : str
+
+    Returns
+    -------
+    array, shape (4, 4) [m]
+        In the frame where the robot's own rows begin.
+    str
+        What it is taken to be.
+
+    """
+    count = carrying(robot)
+    if count > robot.behind:
+        return np.eye(4), 'where the track begins'
+    arm = CarriedArm(robot, count).arm
+    frames = robot.controller or controller_frames(arm)
+    origin, notes = np.array(frames.base), list[str]()
+    _counting(arm, robot, language, origin, notes)
+    if origin[2, 3] != frames.base[2, 3]:
+        return origin, 'on axis 1 at the height of axis 2'
+    return origin, f'link {frames.base_link}' if frames.base_link else 'the base of the robot file'
+
+
+def _counting(arm: Robot, robot: Robot, language: str, origin: Array, notes: list[str]) -> Array:
+    """Return joints of the model from those shown, (n, n); note it, and lift the origin there."""
+    mix = np.eye(robot.n)
     begin, maker = AT_SECOND_AXIS.get(language, ('none', ''))
-    if name.startswith(begin):
+    if bundled_name(arm).startswith(begin):
         if robot.controller is None:
-            origin[2, 3] = robot.d[0]
+            origin[2, 3] = arm.d[0]
             notes.append(
-                f'positions count from the origin of {maker}, {robot.d[0]:.4g} m above the floor'
+                f'positions count from the origin of {maker}, {arm.d[0]:.4g} m above the floor'
             )
         if language == COUPLED:
             mix[2, 1] = 1.0
             notes.append('J3 counts from the ground, as the teach pendant shows it')
-    elif language == COUPLED and robot.controller is not None:
+    elif language == COUPLED and (arm is not robot or robot.controller is not None):
         notes.append(
             'J3 is taken as the joint of the robot file; if the teach pendant counts it from the '
             'ground, points in joints are read wrongly'
         )
-    own = np.array(robot.T_flange_tool)
-    return Controller(
-        origin, np.array(frames.flange), mix, own, _lower(tools), _lower(bases), notes
+    return mix
+
+
+def _cell_notes(robot: Robot, axes: Sequence[ExternalAxis]) -> list[str]:
+    listed = ', '.join(
+        f'{axis.label} is {"-" if axis.sign < 0.0 else ""}{robot.joint_names[axis.joint]}'
+        for axis in axes
     )
+    out = [f'{listed} of the robot file, with its zero; compare them with the pendant']
+    if robot.behind:
+        out.append(
+            'frames that go along with the positioner count from the end of its last row in the robot '
+            'file, where its flange is taken to be'
+        )
+    return out
 
 
 def _lower(frames: Mapping[str, Array] | None) -> dict[str, Array]:

@@ -37,7 +37,6 @@ _STATEMENT = re.compile(r'^[ \t]*(\d*)[ \t]*:[ \t]*([^;]*);', re.M)
 _MOVE = re.compile(r'^([JLCAS])[ \t]+(P|PR)\[\s*([^\]]*)\](.*)', re.S)
 _NEXT = re.compile(r'^\s*:?\s*(P|PR)\[\s*([^\]]*)\](.*)', re.S)
 _INDEX = re.compile(r'(\d+)\s*(?::.*)?\Z', re.S)
-_FIELD = re.compile(rf'\b(J\d|E\d|[XYZWPR])\s*=\s*({NUMBER}|\*+)', re.S)
 _KINDS: dict[str, Kind] = {'J': 'joint', 'L': 'linear', 'C': 'circular'}
 _SHIFTING = re.compile(r'\b(?:Tool_)?Offset\b|\bINC\b|\bVOFFSET\b|\bTOUCH|\bPTH_', re.I)
 _SPEED = re.compile(r'([\d.]+)[ \t]*(%|mm/sec|cm/min|inch/min|deg/sec|sec|msec)')
@@ -102,20 +101,34 @@ class _Reader:
         if fields is None:
             self.untaught[index] = f'P[{index}] is not taught'
             return
+        fields, starred = self._with_groups(fields, last, end, index)
         keys, notation = self._form(fields, where, index)
+        if self.context.controller.external and not notation.joints:
+            self.untaught[index] = (
+                f'P[{index}] is in X Y Z, and what that frame goes along with is not in the program; '
+                'teach it as joints'
+            )
+            return
         point = self.program.add_point(f'P[{index}]', [fields[k] for k in keys], notation)
         self.points[index] = point
         self.frames[point] = self._frames(first, last, where)
-        outer = [key for key in fields if key.startswith('E')]
-        if any(fields[key].value != 0.0 for key in outer) or self._others(last, end):
+        known = [axis.label for axis in self.context.controller.external]
+        outer = [key for key in fields if key[0] in 'EG' and key not in known]
+        if starred or any(fields[key].value != 0.0 for key in outer):
             self.program.hold(point, f'P[{index}] moves other axes')
 
-    def _others(self, start: int, end: int) -> bool:
-        """Tell whether another group stands somewhere but at zero."""
-        return any(
-            found[2].startswith('*') or float(found[2]) != 0.0
-            for found in _FIELD.finditer(self.text, start, end)
-        )
+    def _with_groups(
+        self, fields: dict[str, Number], start: int, end: int, index: int
+    ) -> tuple[dict[str, Number], bool]:
+        """Return the fields of all groups, of further ones as GP2.J1, and whether one is not taught."""
+        out, starred = dict(fields), False
+        heads = list(re.finditer(r'\b(GP\d+)\s*:', self.text[start:end]))
+        for k, head in enumerate(heads):
+            last = start + heads[k + 1].start() if k + 1 < len(heads) else end
+            group = self._fields(start + head.end(), last, index)
+            starred |= group is None
+            out |= {f'{head[1]}.{key}': number for key, number in (group or {}).items()}
+        return out, starred
 
     def _fields(self, start: int, end: int, index: int) -> dict[str, Number] | None:
         fields: dict[str, Number] = {}
@@ -132,11 +145,12 @@ class _Reader:
     def _form(
         self, fields: dict[str, Number], where: str, index: int
     ) -> tuple[tuple[str, ...], Notation]:
-        axes = tuple(f'J{k + 1}' for k in range(self.context.robot.n))
+        external = [axis.label for axis in self.context.controller.external]
+        axes = (*(f'J{k + 1}' for k in range(self.context.axes)), *external)
         for keys, notation in ((POSE_KEYS, FANUC_POSE), (axes, self.context.degrees(3))):
             if all(key in fields for key in keys):
                 return keys, notation
-        raise DataError(f'{where}: P[{index}] needs X Y Z W P R, or J1 to J{len(axes)}')
+        raise DataError(f'{where}: P[{index}] needs X Y Z W P R, or {", ".join(axes)}')
 
     def _frames(self, start: int, end: int, where: str) -> tuple[Frame, Frame]:
         found = re.search(r'\bUF\s*:\s*(\w+)\s*,\s*UT\s*:\s*(\w+)', self.text[start:end])
@@ -197,6 +211,7 @@ class _Reader:
             base,
             _speed(kind, tail),
             re.search(r'\bFINE\b', tail) is not None,
+            along=re.search(r'\bCOORD\b', tail) is not None,
         )
         self.program.add(step)
 

@@ -4,12 +4,14 @@
 KRL of KUKA: a ``.src`` with the moves and, beside it, a ``.dat`` with the points.
 
 PTP, LIN and CIRC, and their spline forms, to points that stand in the move or are declared. Lengths
-are mm, angles degrees, ``$VEL.CP`` m/s. The bits of T are the signs of the axes.
+are mm, angles degrees, ``$VEL.CP`` m/s. The bits of T are the signs of the axes. ``$BASE = EK(root,
+type, frame)`` is a base on the flange of an external kinematic system [2]_.
 
 References
 ----------
 .. [1] KUKA's expert programming manual as quoted at robot-forum.com, thread 7173 (Status, Turn);
    "Status and Turn in LIN motions", industrialmonitordirect.com: linear moves do not use them.
+.. [2] robot-forum.com, thread 40359; posts of the Robots plug-in (visose/Robots, GitHub): EK.
 
 """
 
@@ -55,6 +57,12 @@ _BAS = re.compile(r'^[ \t]*BAS[ \t]*\([ \t]*#(\w+)[ \t]*,[ \t]*([^)\r\n]*)\)', r
 _WAIT = re.compile(r'^[ \t]*WAIT[ \t]+SEC[ \t]+([^\s;]+)', re.I | re.M)
 _ROUTINE = re.compile(r'^[ \t]*(?:GLOBAL[ \t]+)?(?:DEF|DEFFCT)\b', re.I | re.M)
 _WITH = re.compile(r'\bWITH\b', re.I)
+_ALONG = re.compile(
+    r'EK[ \t]*\([ \t]*MACHINE_DEF\[[ \t]*(\w+)[ \t]*\]\.ROOT[ \t]*,'
+    r'[ \t]*MACHINE_DEF\[[ \t]*\1[ \t]*\]\.MECH_TYPE[ \t]*,(?=.*\)\Z)',
+    re.I,
+)
+"""A base that goes along with a positioner; the frame on its flange follows, and a bracket."""
 _AGGREGATE = re.compile(r'\{\s*(?:\w+\s*:)?')
 
 
@@ -107,6 +115,7 @@ class _Reader:
         self.used: list[set[int]] = [set() for _ in sources]
         self.suits: dict[int, Suits] = {}
         self.state = _State()
+        self.kinematic = ''
 
     def read(self) -> Program:
         for file in range(len(self.sources)):
@@ -186,13 +195,17 @@ class _Reader:
 
     def _point_of(self, file: int, content: Aggregate, start: int, name: str) -> int | None:
         """Add a point of all its components; None where some are missing or worked out."""
-        n = self.context.robot.n
-        axes = tuple(f'A{k + 1}' for k in range(n))
+        external = self.context.controller.external
+        known = [axis.label for axis in external]
+        axes = (*(f'A{k + 1}' for k in range(self.context.axes)), *known)
         for keys, notation in ((POSE_KEYS, KUKA_POSE), (axes, self.context.degrees())):
             if all(key in content.numbers for key in keys):
                 numbers = [content.numbers[key] for key in keys]
-                point = self.program.add_point(name, numbers, notation, file)
-                outer = [key for key in EXTERNAL if key in content.numbers]
+                told = [content.numbers.get(label) for label in known]
+                point = self.program.add_point(
+                    name, numbers, notation, file, self.context.told(told)
+                )
+                outer = [k for k in EXTERNAL if k in content.numbers and k not in known]
                 if any(content.numbers[key].value != 0.0 for key in outer):
                     self.program.hold(point, f'{name} moves external axes')
                 turn = content.numbers.get('T')
@@ -225,8 +238,15 @@ class _Reader:
         start, end = stripped(self.texts[0], *found.span(2))
         value = self.texts[0][start:end]
         if what in ('$BASE', '$TOOL'):
+            along = _ALONG.match(value) if what == '$BASE' else None
+            if along is not None:
+                self._second_kinematic(along[1])
+                start += along.end()
+                end -= 1
+                value = self.texts[0][start:end].strip()
             frame = self._frame_at(0, start, end)
-            named = Frame(_bare(value) or value, frame)
+            unclear = along is None and re.match(r'EK\b', value, re.I)
+            named = Frame(_bare(value) or value, frame, None if unclear else along is not None)
             self.state.base = named if what == '$BASE' else self.state.base
             self.state.tool = named if what == '$TOOL' else self.state.tool
         elif what == '$VEL.CP':
@@ -242,7 +262,9 @@ class _Reader:
     def _bas(self, found: re.Match[str]) -> None:
         what = found[1].upper()
         start, end = stripped(self.texts[0], *found.span(2))
-        if what in ('TOOL', 'BASE'):
+        if what == 'EX_BASE':
+            self.state.base = Frame(self.texts[0][start:end], None, None)
+        elif what in ('TOOL', 'BASE'):
             frame = self._numbered(what, self.texts[0][start:end])
             self.state.tool = frame if what == 'TOOL' else self.state.tool
             self.state.base = frame if what == 'BASE' else self.state.base
@@ -268,7 +290,8 @@ class _Reader:
         if text.strip() == '0':
             return Frame('', np.eye(4))
         key = f'{what}_DATA[{text.strip()}]'
-        return Frame(text.strip(), self.frames.get(key))
+        # Numbered bases of an external kinematic system are taken as such by the controller alone.
+        return Frame(text.strip(), self.frames.get(key), None if what == 'BASE' else False)
 
     def _frame_at(self, file: int, start: int, end: int) -> Array | None:
         """Return the frame that a piece of text stands for; None where it is worked out."""
@@ -288,6 +311,15 @@ class _Reader:
             self.used[file].add(start)
             return self.program.points[point].value
         return self.frames.get(re.sub(r'\s', '', text.upper()))
+
+    def _second_kinematic(self, index: str) -> None:
+        """Refuse two external kinematic systems in one program: a robot file has one positioner."""
+        self.kinematic = self.kinematic or index
+        if index != self.kinematic:
+            raise DataError(
+                f'{self.sources[0].name}: it works with the external kinematic systems '
+                f'{self.kinematic} and {index}, and a robot file has one positioner; split it'
+            )
 
     def _speed(self, start: int, end: int, default: float) -> float:
         try:

@@ -36,7 +36,7 @@ def turn_bits(turn: int) -> Suits:
         back = np.linalg.inv(controller.mix)
 
         def of(q: Array) -> Array:
-            axes = q @ back.T
+            axes = q @ back.T[:, : q.shape[1] - len(controller.external)]
             below = np.array([bool(turn >> k & 1) for k in range(axes.shape[1])])
             fits = np.where(below, axes < SIGN_DOUBT, axes > -SIGN_DOUBT)
             return np.asarray(fits.all(axis=1))
@@ -58,11 +58,12 @@ def quadrants(conf: Sequence[int]) -> Suits:
     """
 
     def suits(robot: object, controller: Controller) -> Any:
-        del robot, controller
-        places = np.array([0, 3, 5])
+        del robot
+        first = len(controller.external)
+        places = first + np.array([0, 3, 5])
 
         def of(q: Array) -> Array:
-            if q.shape[1] < 6:
+            if q.shape[1] < first + 6:
                 return np.ones(len(q), dtype=bool)
             low = np.array(conf[:3]) * 0.5 * np.pi
             axes = q[:, places]

@@ -4,12 +4,15 @@
 RAPID of ABB: ``MoveJ``, ``MoveL``, ``MoveC``, ``MoveAbsJ``, and the arc and trigger forms of them.
 
 Lengths are mm, angles degrees, orientations quaternions with the scalar first, speeds mm/s.
-``Offs`` and ``RelTool`` with plain numbers are places that go along with their point.
+``Offs`` and ``RelTool`` with plain numbers are places that go along with their point. A work object with
+a mechanical unit in the place of a programmed user frame goes along with that; its user frame is then
+one of the unit's parameters, and the one in the program is not used [2]_.
 
 References
 ----------
 .. [1] ABB, "RAPID Reference Manual": confdata; abb_rapid_msgs/RobTarget, docs.ros.org; the types
    of the package abb-motion-program-exec, whose words are those of 3HAC16581-1.
+.. [2] ABB, "Application manual MultiMove", 3HAC021272-001, 6.3; "Basic Characteristics RAPID", wobjdata.
 
 """
 
@@ -99,6 +102,7 @@ class _Reader:
         self.suits: dict[int, Suits] = {}
         self.config = {'j': True, 'l': True}
         self.displaced = ''
+        self.unit = ''
 
     def read(self) -> Program:
         for found in _DECLARED.finditer(self.text):
@@ -132,7 +136,9 @@ class _Reader:
             raise DataError(f'{where}: {found[2]} is declared twice')
         tree = self._tree(found.end(), closing(self.source, self.text, found.end()) + 1)
         if kind in ('robtarget', 'jointtarget'):
-            self.names[name] = self._target(tree, found.end(), found[2], kind == 'jointtarget')
+            point = self._target(tree, found.end(), found[2], kind == 'jointtarget')
+            if point is not None:
+                self.names[name] = point
         elif kind == 'tooldata':
             self.tools[name] = self._tool(tree, found[2], found.end())
         elif kind == 'wobjdata':
@@ -149,9 +155,28 @@ class _Reader:
 
     def _wobj(self, tree: Tree, name: str, at: int) -> Frame:
         parts = tree if isinstance(tree, list) else []
-        if len(parts) < 5 or not (self._is(parts[0], 'FALSE') and self._is(parts[1], 'TRUE')):
+        if len(parts) < 5 or not self._is(parts[0], 'FALSE'):
+            return Frame(f'{name}, which moves,')
+        if isinstance(parts[1], Leaf) and self._is(parts[1], 'FALSE'):
+            unit = re.match(r'\s*,\s*"([^"]+)"', self.source.text[parts[1].end :])
+            if unit is not None:  # strings are blanked out in what the parts are of
+                return self._on_unit(name, unit[1], self._pose(parts[4], name, at))
+        if not self._is(parts[1], 'TRUE'):
             return Frame(f'{name}, which moves,')
         return Frame('', self._pose(parts[3], name, at) @ self._pose(parts[4], name, at))
+
+    def _on_unit(self, name: str, unit: str, frame: Array) -> Frame:
+        """Return a work object that a mechanical unit moves: the unit has its user frame itself."""
+        if not self.context.controller.external:
+            return Frame(f'{name}, which moves,')
+        self.unit = self.unit or unit
+        if unit != self.unit:
+            raise DataError(
+                f'{self.source.name}: its work objects go along with {self.unit} and {unit}, and a '
+                'robot file has one positioner; split it'
+            )
+        self.program.notes.append(f'{unit} is taken to be the positioner, for {name} goes along')
+        return Frame('', frame, True)
 
     def _is(self, part: Tree, word: str) -> bool:
         return isinstance(part, Leaf) and self.text[part.start : part.end].upper() == word
@@ -163,25 +188,30 @@ class _Reader:
         except DataError as error:
             raise DataError(f'{self.source.where(at)}: {name}: {error}') from None
 
-    def _target(self, tree: Tree, start: int, name: str, joints: bool) -> int:
-        """Add a robtarget or a jointtarget that stands at a place."""
-        n = self.context.robot.n
+    def _target(self, tree: Tree, start: int, name: str, joints: bool) -> int | None:
+        """Add a robtarget or a jointtarget that stands at a place; None of one that says too little."""
+        n, external = self.context.axes, self.context.controller.external
+        places = ['abcdef'.index(axis.label[-1]) for axis in external]
         parts = tree if isinstance(tree, list) else []
+        at = 1 if joints else 3
+        outer = self._numbers([parts[at]], (6,), name, start) if len(parts) > at else []
+        given = [outer[k] if outer and abs(outer[k].value) < NO_AXIS else None for k in places]
         if joints:
             numbers = self._numbers(parts[:1], (n,), name, start)
+            numbers += [number for number in given if number is not None]
+            if len(numbers) < self.context.robot.n:
+                return None
             point = self.program.add_point(name, numbers, self.context.degrees())
-            outer = parts[1] if len(parts) > 1 else None
         else:
             numbers = self._numbers(parts[:2], (3, 4), name, start)
-            point = self.program.add_point(name, numbers, ABB_POSE)
-            outer = parts[3] if len(parts) > 3 else None
+            told = self.context.told(given)
+            point = self.program.add_point(name, numbers, ABB_POSE, told=told)
             if len(parts) > 2:
                 conf = self._numbers(parts[2:3], (4,), name, start)
                 self.suits[point] = quadrants([round(number.value) for number in conf])
-        if outer is not None:
-            values = self._numbers([outer], (6,), name, start)
-            if any(0.0 != abs(number.value) < NO_AXIS for number in values):
-                self.program.hold(point, f'{name} moves external axes')
+        others = [number for k, number in enumerate(outer) if k not in places]
+        if any(0.0 != abs(number.value) < NO_AXIS for number in others):
+            self.program.hold(point, f'{name} moves external axes')
         return point
 
     def _numbers(
@@ -277,7 +307,8 @@ class _Reader:
         text = self.text[start:cut]
         if text.startswith('['):
             tree = self._tree(start, cut)
-            return Ref(self._target(tree, start, f'line {self.source.line(start)}', joints))
+            found = self._target(tree, start, f'line {self.source.line(start)}', joints)
+            return None if found is None else Ref(found)
         call = re.match(r'(Offs|RelTool)\s*(\()', text, re.I)
         if call is not None:
             return self._shifted(call[1].lower(), start + call.start(2), cut)

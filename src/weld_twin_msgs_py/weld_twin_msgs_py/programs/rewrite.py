@@ -101,13 +101,19 @@ def check_written(before: Program, after: Program, points: Sequence[Array]) -> N
     if same:
         for one, other in zip(before.steps, after.steps, strict=True):
             same &= (one.kind, one.stop, one.where) == (other.kind, other.stop, other.where)
-        for value, point in zip(points, after.points, strict=True):
-            same &= _close(value, point)
+        for value, was, point in zip(points, before.points, after.points, strict=True):
+            same &= _close(value, point) and _same_external(was, point)
     if not same:
         raise DataError(
             f'{before.sources[0].name}: the corrected program reads differently from what was '
             'meant, so it is not written'
         )
+
+
+def _same_external(was: Point, point: Point) -> bool:
+    if was.told is None or point.told is None:
+        return was.told is point.told
+    return bool(np.abs(was.told - point.told).max(initial=0.0) < UNMOVED)
 
 
 def _close(value: Array, point: Point) -> bool:

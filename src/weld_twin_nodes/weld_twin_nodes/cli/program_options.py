@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
     from weld_twin_core.arrays import Array
     from weld_twin_msgs_py.programs import Context
+    from weld_twin_msgs_py.programs.controllers import Cell
 
 _UNITS = {'mm': 1e-3, 'um': 1e-6, 'm': 1.0, 'deg': 0.017453292519943295, 'rad': 1.0}
 
@@ -28,6 +29,15 @@ def add_program_options(parser: argparse.ArgumentParser) -> None:
     add('--base', 'NAME=X,Y,Z,...', 'the same of a base (user frame, work object)', many=True)
     text = 'of every axis of a Yaskawa arm whose points are in pulses'
     add('--pulses-per-degree', 'N,N,...', text)
+    text = 'which joint of the robot file each external axis is, such as E1=rail,E2=-tilt (KUKA), '
+    text += 'eax_a=rail (ABB), GP2.J1=tilt (FANUC); a minus where it counts the other way'
+    add('--external', 'E=JOINT,...', text, default='')
+    text = 'bases that go along with the positioner, where the program does not say; or none'
+    add('--on-positioner', 'NAME,...', text)
+    text = (
+        "where a track begins in the controller's world, for positions in frames that stand still"
+    )
+    add('--world', 'X,Y,Z,...', text)
 
 
 def add_trigger(parser: argparse.ArgumentParser) -> None:
@@ -74,7 +84,19 @@ def context_of(args: argparse.Namespace, robot: Robot, language: str) -> Context
             raise DataError(f'--pulses-per-degree needs {robot.n} numbers that are not zero')
     tools = _frames(args.tool, '--tool', language)
     bases = _frames(args.base, '--base', language)
-    return Context(robot, controller_of(robot, language, tools, bases), pulses)
+    cell = _cell(args, language)
+    return Context(robot, controller_of(robot, language, tools, bases, cell), pulses)
+
+
+def _cell(args: argparse.Namespace, language: str) -> Cell:
+    from weld_twin_msgs_py.programs.controllers import Cell
+
+    along = None
+    if args.on_positioner is not None:
+        names = {name.strip().lower() for name in args.on_positioner.split(',')}
+        along = frozenset(names - {'none', ''})
+    world = _frames([f'world={args.world}'], '--world', language) if args.world else {}
+    return Cell(args.external, along, world.get('world'))
 
 
 def _frames(given: Sequence[str], option: str, language: str) -> dict[str, Array]:

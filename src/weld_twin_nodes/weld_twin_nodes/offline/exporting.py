@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -22,6 +23,7 @@ from weld_twin_core.motion.programs import travel
 from weld_twin_msgs_py.files.joint_file import EASY, REST, read_joint_motion
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.programs import Context, read_sources, to_moves
+from weld_twin_msgs_py.programs.external_axes import BY_NAME, carrying
 from weld_twin_msgs_py.programs.source import Source
 from weld_twin_msgs_py.programs.writing import Exported, ExportMove, sheet, written
 
@@ -35,8 +37,6 @@ FAST = (EASY, 0.25)
 """The most of any run: share of the joints' speeds, and 250 mm/s, the reduced speed of ISO 10218."""
 SINGULAR = 200.0
 """Condition number of the Jacobian from which a place is near a singularity."""
-ANY_JOINTS = ('joint-trajectory', 'csv')
-"""Languages whose points are joints by name, in rad or m: any joint may be among them."""
 BACK = 2e-4
 """A program that is read again may be this far off [rad or m]: FANUC writes thousandths of degrees."""
 RATE = 50.0
@@ -95,8 +95,13 @@ def export(
 
     """
     robot = context.robot
-    _refuse_slides(robot, language)
+    _refuse_slides(context, language)
     plan = _planned(path, robot, seam_speed)
+    if plan.linear and context.controller.external and language not in BY_NAME:
+        raise DataError(
+            f'a seam beside external axes is written in {" or ".join(BY_NAME)}; a program in {language} '
+            'takes stations alone'
+        )
     robot.check_positions(plan.q)
     moves = _moves(plan, context, speeds)
     source = Path(path).name if isinstance(path, str) else 'a seam'
@@ -148,13 +153,14 @@ def write_program(
     ]
 
 
-def _refuse_slides(robot: Robot, language: str) -> None:
+def _refuse_slides(context: Context, language: str) -> None:
     """Refuse an arm with a joint that slides in a language whose axes are written as angles."""
-    slides = [n for n, slides in zip(robot.joint_names, robot.prismatic, strict=True) if slides]
-    if slides and language not in ANY_JOINTS:
+    robot, first = context.robot, len(context.controller.external)
+    slides = [robot.joint_names[k] for k in np.flatnonzero(robot.prismatic) if k >= first]
+    if slides and language not in BY_NAME:
         raise DataError(
             f'{slides[0]!r} of robot {robot.name!r} slides, and a program in {language} is written '
-            f'for axes that turn; choose {" or ".join(ANY_JOINTS)}, or leave the program out'
+            f'for axes that turn; choose {" or ".join(BY_NAME)}, or leave the program out'
         )
 
 
@@ -166,28 +172,29 @@ def _planned(path: str | SeamPlan, robot: Robot, speed: float) -> Plan:
             t, q, stations = given
             return Plan(q, t, stations, False, 0.0)
         plan = plan_motion(robot, plan, rate=RATE, speed=speed)
-    keep = _corners(plan.poses)
+    keep = _corners(plan.poses, plan.motion.q[:, : carrying(robot)])
     travel_speed = plan.length / max(plan.report.duration, 1e-6)
     return Plan(plan.motion.q[keep], plan.motion.t[keep], False, True, speed or travel_speed)
 
 
-def _corners(poses: Array) -> list[int]:
-    """Return the samples of a path between which it is straight enough."""
+def _corners(poses: Array, beside: Array) -> list[int]:
+    """Return the samples of a path between which it and what external axes do are straight enough."""
     keep, last = [0], len(poses) - 1
     while keep[-1] < last:
         low, high = keep[-1] + 1, min(keep[-1] + 2, last)
-        while high < last and _straight(poses, keep[-1], high):
+        while high < last and _straight(poses, beside, keep[-1], high):
             low, high = high, min(keep[-1] + 2 * (high - keep[-1]), last)
-        if _straight(poses, keep[-1], high):
+        if _straight(poses, beside, keep[-1], high):
             low = high
         while high - low > 1:
             middle = (low + high) // 2
-            low, high = (middle, high) if _straight(poses, keep[-1], middle) else (low, middle)
+            far = _straight(poses, beside, keep[-1], middle)
+            low, high = (middle, high) if far else (low, middle)
         keep.append(low)
     return keep
 
 
-def _straight(poses: Array, first: int, last: int) -> bool:
+def _straight(poses: Array, beside: Array, first: int, last: int) -> bool:
     part = poses[first : last + 1]
     step = part[:, :3, 3] - part[0, :3, 3]
     whole = step[-1]
@@ -196,7 +203,9 @@ def _straight(poses: Array, first: int, last: int) -> bool:
     off = np.linalg.norm(step - along[:, None] * whole, axis=1).max()
     turn = rotation_vector(part[:, :3, :3] @ part[0, :3, :3].T)
     bent = np.linalg.norm(turn - along[:, None] * turn[-1], axis=1).max()
-    return bool(off < CHORD[0] and bent < CHORD[1])
+    axes = beside[first : last + 1] - beside[first]
+    uneven = np.abs(axes - along[:, None] * axes[-1]).max(initial=0.0)
+    return bool(off < CHORD[0] and max(bent, uneven) < CHORD[1])
 
 
 def _moves(plan: Plan, context: Context, speeds: Speeds) -> tuple[ExportMove, ...]:
@@ -234,11 +243,7 @@ def _read_again(made: Exported, text: str, language: str) -> None:
     """Refuse a program that does not lead where it is to lead when it is read."""
     tools = {'0': made.tool, '1': made.tool}
     controller = made.context.controller
-    told = made.context._replace(
-        controller=type(controller)(
-            controller.origin, controller.flange, controller.mix, controller.own_tool, tools
-        )
-    )
+    told = made.context._replace(controller=replace(controller, tools=tools, bases={}, notes=[]))
     program = read_sources([Source(made.name, text)], told, language)
     found = travel(made.context.robot, to_moves(program, told.robot, told.controller))
     if found.lost:

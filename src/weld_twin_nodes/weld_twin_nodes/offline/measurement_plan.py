@@ -4,14 +4,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.predicting.planned import plan_stations
+from weld_twin_core.diagnosis.predicting.planned import MeasurementPlan
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.csv_text import csv_text
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
@@ -65,30 +66,30 @@ class Planned:
 
 def planned(
     robot: Robot,
-    tolerance: float,
+    plan_of: Callable[[int], MeasurementPlan],
     minutes: float | None,
-    noise: float,
     seconds: float,
-    spread: float,
     postures: int | None = None,
+    *,
+    least: int = LEAST,
+    offered: int = MOST_ASKED,
 ) -> Planned:
     """
-    Return the stations that a first measurement needs.
+    Return the stations that a measurement needs.
 
     Parameters
     ----------
     robot : Robot
-    tolerance : float [m]
+    plan_of : callable
+        Returns the plan of so many stations.
     minutes : float, optional
         There is time for; left out, as many as ``postures`` take.
-    noise : float [m]
-        Of every measured coordinate.
     seconds : float [s]
         That one station takes, the way to it apart.
-    spread : float [rad]
-        Half the range of every joint.
     postures : int, optional
         So many stations and no other number; left out, as many as the tolerance needs.
+    least, offered : int
+        Fewest stations that can be judged, and most that there are.
 
     Raises
     ------
@@ -97,34 +98,38 @@ def planned(
 
     """
     if postures is not None:
-        return _so_many(robot, postures, minutes, (tolerance, noise, seconds, spread))
+        return _so_many(robot, postures, minutes, seconds, plan_of, (least, offered))
     if minutes is None:
         raise DataError('say for how long there is time, or how many postures are wanted')
-    most = int(min(60.0 * minutes / seconds, MOST))
-    if most >= LEAST:
-        plan = plan_stations(robot, most, tolerance, noise, spread)
+    most = int(min(60.0 * minutes / seconds, MOST, offered))
+    if most >= least:
+        plan = plan_of(most)
         took = _took(robot, plan.q, seconds)
         most = int(np.searchsorted(took, minutes, side='right')) - 1
-    if most < LEAST:
+    if most < least:
         raise DataError(
             f'{minutes:g} minutes are enough for {max(most, 0)} stations of {seconds:g} s and the '
-            f'way between them, and {LEAST} are the fewest; give more time or shorter stations'
+            f'way between them, and {least} are the fewest; give more time or shorter stations'
         )
     enough = np.flatnonzero(plan.within[: most + 1] >= SURE)
-    needed = int(max(enough[0], LEAST)) if enough.size else None
+    needed = int(max(enough[0], least)) if enough.size else None
     count = needed or most
     q = plan.q[:count][_way(robot, plan.q[:count])]
     return Planned(q, took[: most + 1], plan.sigma[: most + 1], plan.within[: most + 1], needed)
 
 
 def _so_many(
-    robot: Robot, count: int, minutes: float | None, given: tuple[float, float, float, float]
+    robot: Robot,
+    count: int,
+    minutes: float | None,
+    seconds: float,
+    plan_of: Callable[[int], MeasurementPlan],
+    limits: tuple[int, int],
 ) -> Planned:
     """Return so many stations, however sure they make one."""
-    tolerance, noise, seconds, spread = given
-    if not LEAST <= count <= MOST_ASKED:
-        raise DataError(f'{count} postures are asked for; a plan has {LEAST} to {MOST_ASKED}')
-    plan = plan_stations(robot, count, tolerance, noise, spread)
+    if not limits[0] <= count <= limits[1]:
+        raise DataError(f'{count} postures are asked for; a plan has {limits[0]} to {limits[1]}')
+    plan = plan_of(count)
     q = plan.q[_way(robot, plan.q)]
     took = _took(robot, plan.q, seconds)
     if minutes is not None and took[-1] > minutes:
@@ -205,6 +210,9 @@ def write_plan(folder: Path, context: Context, language: str | None, plan: Plann
     t = plan.minutes[len(plan.q)] * 60.0 / len(plan.q) * np.arange(1.0, len(plan.q) + 1.0)
     motion = {'static': True, 'joint_names': robot.joint_names, 't': t, 'q': plan.q}
     write_joint_motion(folder / STATIONS, motion, 'Stations of a first measurement')
+    if context.controller.external:  # an import knows joints by the names of the robot file alone
+        plain = replace(context.controller, mix=np.eye(robot.n))
+        context, language = context._replace(controller=plain), None
     shown = context.degrees(4)
     units = np.where(robot.prismatic, 'mm', 'deg')
     labels = [

@@ -17,7 +17,7 @@ from weld_twin_core.motion.profiles import Profile, named
 from weld_twin_core.motion.sample_count import refuse_endless
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.files.joint_file import read_joint_motion, through_stations
-from weld_twin_msgs_py.files.path_file import read_path
+from weld_twin_msgs_py.files.path_file import read_external, read_path
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 
 
@@ -49,7 +49,8 @@ def plan_motion(
     if path in KINDS:
         return plan(robot, default_seam(robot, path), law, rate, fit=not speed)
     seam, torch = read_path(path)
-    return plan(robot, seam, law, rate, torch=torch, fit=not speed)
+    told = read_external(path, robot)
+    return plan(robot, seam, law, rate, torch=torch, fit=not speed, told=told)
 
 
 def joint_motion(

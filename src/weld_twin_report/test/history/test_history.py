@@ -19,15 +19,12 @@ from weld_twin_report.history import Database, entry_of, observations
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
 
-BAG = Path(__file__).parents[4] / 'bags/elbow_play'
 MONDAY = datetime(2026, 3, 2, 8, tzinfo=timezone.utc)
 
 
 @pytest.fixture(scope='module')
-def diagnosed(tmp_path_factory):
-    out = tmp_path_factory.mktemp('history') / 'found'
-    assert main(['diagnose', str(BAG), '--robot', 'ur5', '--out', str(out)]) == 0
-    return out
+def diagnosed(elbow_found):
+    return elbow_found
 
 
 @pytest.fixture

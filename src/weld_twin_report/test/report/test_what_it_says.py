@@ -11,8 +11,10 @@ from dataclasses import replace
 import diagnoses
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.result import Candidate, Check, Site, Where
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.metrics.conformity import Rule
@@ -431,3 +433,67 @@ def test_what_a_cause_does_is_told_at_the_stations_where_there_is_no_seam():
     assert 'Effect at the stations' in page and 'Effect on the seam' not in page
     moving = report_page(PLAY)
     assert 'Effect on the seam' in moving and 'Effect at the stations' not in moving
+
+
+ORDERS = {'kuka': ('ZYX', False), 'fanuc': ('xyz', False), 'abb': (None, True)}
+"""Angles as the makers write them, and whether positions are in metres."""
+
+
+def frame_in(text, brand):
+    """Return the frame that the numbers of a maker stand for."""
+    order, metres = ORDERS[brand]
+    text = re.sub(r'q1 to q4', '', text)
+    numbers = [float(v) for v in re.findall(r'-?\d+\.\d+', text)]
+    out = np.eye(4)
+    if order is None:
+        turn = Rotation.from_quat([*numbers[4:], numbers[3]])
+    else:
+        turn = Rotation.from_euler(order, numbers[3:], degrees=True)
+    out[:3, :3], out[:3, 3] = turn.as_matrix(), np.array(numbers[:3]) * (1.0 if metres else 1e-3)
+    return out
+
+
+@pytest.mark.parametrize('brand', ORDERS)
+def test_a_positioner_that_stands_elsewhere_is_told_as_its_controller_takes_it(brand):
+    """Old and new value, and what to do where the controller has the root at another place."""
+    turn = Rotation.from_euler('xyz', [20.0, -35.0, 110.0], degrees=True)
+    foot = {'xyz': [1.4, 0.2, 0.7], 'quat_xyzw': turn.as_quat().tolist()}
+    high = Rotation.from_euler('z', 90.0, degrees=True)
+    data = load('kuka_kr16_2').to_mapping() | {'name': 'cell'}
+    data['base'] = {'xyz': [0.0, 0.0, 0.5], 'quat_xyzw': high.as_quat().tolist()}
+    data['controller'] = {'base': {'xyz': [0.0, 0.0, 0.1], 'quat_xyzw': [1.0, 0.0, 0.0, 0.0]}}
+    data['workpiece'] = {'base': foot, 'joints': [{'name': 'tilt', 'a': 0.1}]}
+    error = {'effect': 'root_pose', 'xyz': [2e-3, -1e-3, 3e-3], 'rotvec': [1e-3, 2e-3, -3e-3]}
+    told = correction(effect_from_mapping(error), brand, Robot.from_mapping(data))
+
+    def placed(xyz, rotation):
+        out = np.eye(4)
+        out[:3, :3], out[:3, 3] = rotation.as_matrix(), xyz
+        return out
+
+    base = placed([0.0, 0.0, 0.5], high)
+    mine = base @ placed([0.0, 0.0, 0.1], Rotation.from_quat([1.0, 0.0, 0.0, 0.0]))
+    moved = Rotation.from_rotvec(high.apply(error['rotvec']))
+    real = placed(foot['xyz'] + high.apply(error['xyz']), moved * turn)
+    parts = re.split('Old value |; new value |\\. The origin ', told)
+    old, new = (frame_in(part, brand) for part in parts[1:3])
+    np.testing.assert_allclose(old, np.linalg.inv(mine) @ placed(foot['xyz'], turn), atol=2e-6)
+    np.testing.assert_allclose(new, np.linalg.inv(mine) @ real, atol=2e-6)
+    other = placed([0.3, -0.2, 0.4], Rotation.from_rotvec([0.2, 0.1, 1.0]))
+    step = frame_in(parts[3].split('new value is ')[1].split('old value')[0], brand)
+    step[:3, 3] *= 1e-3 if brand == 'abb' else 1.0  # PoseMult is in mm
+    np.testing.assert_allclose(step @ old @ other, new @ other, atol=4e-6)
+
+
+def test_a_frame_on_the_workpiece_is_told_where_it_is_on_the_positioner():
+    """Of a cell poses are measured there, and no bolt of the robot's foot is to blame."""
+    data = load('kuka_kr16_2').to_mapping() | {'name': 'cell'}
+    tool = {'xyz': [0.1, 0.05, 0.08], 'quat_xyzw': [0.0, 0.0, 0.6, 0.8]}
+    data['workpiece'] = {'joints': [{'name': 'turn'}], 'tool': tool}
+    turn, moved = Rotation.from_quat(tool['quat_xyzw']), np.array([0.012, -0.02, 0.004])
+    # What the measuring frame sees of the positioner is displaced by the error.
+    off = {'effect': 'base_pose', 'xyz': (-turn.inv().apply(moved)).tolist(), 'rotvec': [0.0] * 3}
+    told = effect_from_mapping(off).remedy(Robot.from_mapping(data))
+    assert 'at x, y, z = (112.000, 30.000, 84.000) mm' in told
+    assert 'in place of x, y, z = (100.000, 50.000, 80.000) mm' in told
+    assert 'fixture' in told and 'bolts' not in told

@@ -4,9 +4,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
 from weld_twin_core.effects.effect import Effect
+from weld_twin_core.effects.root_pose import RootPose
 from weld_twin_core.effects.wording import further
+from weld_twin_msgs_py.programs.controllers import world_of
+from weld_twin_msgs_py.programs.notation import ABB_POSE, FANUC_POSE, KUKA_POSE, Notation
 
 BRANDS = {
     'abb': 'ABB',
@@ -31,21 +40,29 @@ _PLACES = {
     (
         'kuka',
         'root',
-    ): 'Start-up > Calibrate > External kinematic system: change the root point, ROOT '
-    'of MACHINE_DEF[n].',
+    ): 'Start-up > Calibrate > External kinematic system > Root point (numeric): ROOT of '
+    'MACHINE_DEF[n] in the world.',
     ('kuka', 'tool'): 'Start-up > Calibrate > Tool: change TOOL_DATA[n].',
     ('kuka', 'load'): 'Start-up > Calibrate > Tool > Payload data: change LOAD_DATA[n].',
     ('abb', 'zero'): 'Calibration > Calib. parameters: motor calibration offset of the axis, in '
     'radians of the motor: new value = old value {radians_back} * G, where G is radians of the '
     'motor per radian of the joint, with its sign.',
     ('abb', 'base'): 'Change wobj.uframe of the work object, or Base Frame in the topic Motion.',
-    ('abb', 'root'): 'Change Base Frame of the positioner (topic Motion, type Single).',
+    (
+        'abb',
+        'root',
+    ): 'Base Frame of the positioner, such as that of orbit_a, in the world (topic Motion, '
+    'type Single; of two axes that are one unit, Robot).',
     ('abb', 'tool'): 'Change tframe of the tooldata.',
     ('abb', 'load'): 'Change the loaddata, or run LoadIdentify.',
     ('fanuc', 'zero'): 'MENU > SYSTEM > Master/Cal > Single axis master: MSTR POS of the axis, in '
     'degrees: new value = what it reads now {degrees}; then EXEC, without moving it before.',
     ('fanuc', 'base'): 'MENU > SETUP > Frames: change the user frame UFRAME[n].',
-    ('fanuc', 'root'): 'MENU > SETUP > Coord: change the frame of the coordinated pair.',
+    (
+        'fanuc',
+        'root',
+    ): 'MENU > SETUP > Coord: frame of the leader of the coordinated pair, in the world '
+    'of the robot.',
     ('fanuc', 'tool'): 'MENU > SETUP > Frames: change the tool frame UTOOL[n].',
     ('fanuc', 'load'): 'MENU > SYSTEM > Motion: change the payload schedule.',
     (
@@ -102,6 +119,61 @@ UNCHECKED = (
 """Said wherever a menu is named."""
 
 
+class _Frames(NamedTuple):
+    """
+    How a maker writes a frame of the cell.
+
+    Attributes
+    ----------
+    language : str
+        Whose world it counts from.
+    notation : Notation
+    words : callable
+        Takes its six or seven numbers.
+    moved : str
+        How a frame is displaced by another one in the world, {by} its numbers.
+
+    """
+
+    language: str
+    notation: Notation
+    words: Callable[[list[float]], str]
+    moved: str
+
+
+def _named(names: str, before: str, after: str) -> Callable[[list[float]], str]:
+    def words(numbers: list[float]) -> str:
+        places = (3, 3, 3, 4, 4, 4)
+        shown = zip(names.split(), numbers, places, strict=True)
+        return before + ', '.join(f'{n} {v + 0.0:.{k}f}' for n, v, k in shown) + after
+
+    return words
+
+
+def _in_metres(numbers: list[float]) -> str:
+    place = ', '.join(f'{v * 1e-3 + 0.0:.6f}' for v in numbers[:3])
+    turn = ', '.join(f'{v + 0.0:.7f}' for v in numbers[3:])
+    return f'x, y, z = {place} (in m), q1 to q4 = {turn}'
+
+
+def _rapid(numbers: list[float]) -> str:
+    parts = [f'{v + 0.0:.{k}f}' for v, k in zip(numbers, (3, 3, 3, 7, 7, 7, 7), strict=True)]
+    return f'[[{",".join(parts[:3])}],[{",".join(parts[3:])}]]'
+
+
+_FRAMES = {
+    'kuka': _Frames('krl', KUKA_POSE, _named('X Y Z A B C', '{', '}'), '{by} : old value'),
+    'abb': _Frames('rapid', ABB_POSE, _in_metres, 'PoseMult({by}, old value), both in mm'),
+    'fanuc': _Frames(
+        'fanuc-ls',
+        FANUC_POSE,
+        _named('X Y Z W P R', '', ''),
+        'the frame {by}, times the old value',
+    ),
+}
+"""Makers whose frame of a positioner is told in numbers: as they write it."""
+
+
 def brand_of(robot: str) -> str | None:
     """Return the brand whose robots are named like this, None where the name does not tell."""
     name = robot.lower().replace('motoman', 'yaskawa')
@@ -141,9 +213,30 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
     place = _PLACES.get((str(brand), kind))
     if place is None:
         return _PROGRAM
+    if isinstance(effect, RootPose) and robot is not None:
+        return f'{place} {_root(effect, str(brand), robot)} {UNCHECKED}'
     check = _CHECK if kind == 'zero' and brand not in _BY_MODEL else ''
     place = f'{place} {check}'.format(**off).rstrip()
     return f'{place} {UNCHECKED}' if ' > ' in place else place
+
+
+def _root(effect: RootPose, brand: str, robot: Robot) -> str:
+    """Return old and new value of a positioner's root frame as its controller writes them."""
+    form = _FRAMES[brand]
+    world, begins = world_of(robot, form.language)
+    now, new = effect.stands(robot, world)
+
+    def numbers(pose: Array) -> list[float]:
+        return form.notation.numbers(pose, [0.0] * 3 + [1.0] + [0.0] * 3)
+
+    by = numbers(np.asarray(new @ np.linalg.inv(now)))
+    step = _rapid(by) if brand == 'abb' else form.words(by)
+    return (
+        f'Old value {form.words(numbers(now))}; new value {form.words(numbers(new))}. '
+        f'The origin of that world is taken to be {begins}. '
+        'Where the old value there is another one, the controller has the root at another place of '
+        f'the positioner: then the new value is {form.moved.format(by=step)}.'
+    )
 
 
 def _instead(effect: Effect) -> str:

@@ -28,11 +28,13 @@ def correction_page(entry: Mapping[str, Any], inputs: Sequence[InputFile] = ()) 
 
     """
     title = f'{entry["program"]} · {entry["robot"]}'
+    told = tolerance_told(entry)
     body = main(
         ('Corrected program ', entry['language']),
         title,
         headline(entry),
         _figures(entry),
+        section('Tolerance', *(tag('p', sentence) for sentence in told)) if told else None,
         _first_run(entry),
         _left(entry),
         _outside(entry),
@@ -54,6 +56,36 @@ def headline(entry: Mapping[str, Any]) -> str:
         f'{done} of {len(moves)} moves were corrected: the real tool is expected '
         f'{_rms(before)} from where the program means it, and {_rms(after)} after.'
     )
+
+
+def tolerance_told(entry: Mapping[str, Any]) -> list[str]:
+    """Return in sentences whether a tolerance is kept; nothing where none was asked for."""
+    if 'tolerance' not in entry:
+        return []
+    told = entry['tolerance']
+    size, after = f'{told["tolerance_m"] * 1e3:.3g} mm', told['after']
+    decision = {
+        'kept': 'it counts as kept',
+        'not kept': 'it counts as not kept',
+        'open': 'it counts neither as kept nor as not kept',
+    }[after['decision']]
+    out = [
+        f'All along, the tool keeps within {size} of where the program means it with '
+        f'{told["before"]["probability"]:.0%} probability before and {after["probability"]:.0%} '
+        f'after: {decision} (from 95 % on, with guard bands as ISO 14253-1). After, it is 95 % sure '
+        f'to keep within {after["sure_within_m"] * 1e3:.3f} mm.'
+    ]
+    if after['decision'] == 'kept':
+        return out
+    more = told['postures_more']
+    if more is None:
+        return [*out, 'No number of postures measured along it makes that sure with this model.']
+    return [
+        *out,
+        f'{more} postures measured more along it make it 95 % sure: weld-twin investigate '
+        f'--tolerance {told["tolerance_m"] * 1e3:g} --model DIAGNOSIS --region {entry["program"]} '
+        f'--postures {more} says which.',
+    ]
 
 
 def _rms(accuracy: Mapping[str, Any]) -> str:

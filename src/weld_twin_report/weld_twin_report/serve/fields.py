@@ -195,6 +195,18 @@ FIELDS: dict[str, Field] = {
     'pulses_per_degree': Field(
         'Pulses per degree', 'of every axis of a Yaskawa arm', (CORRECT,), _numbers
     ),
+    'external': Field(
+        'External axes', 'which joint each is, such as E1=rail,E2=-tilt', (CORRECT,), _name
+    ),
+    'on_positioner': Field(
+        'Bases on the positioner',
+        'names of bases that go along with it, or none',
+        (CORRECT,),
+        _name,
+    ),
+    'world': Field(
+        'Where the track begins', 'X,Y,Z,... in the world of the controller', (CORRECT,), _numbers
+    ),
     'max_length': Field(
         'Farthest that a point may be moved', 'in mm; empty: 2 mm', (CORRECT,), _millimetres
     ),

@@ -261,8 +261,8 @@ def robust_scale(
     told = problem.told_weights
     residuals = [part * np.sqrt(own) for part, own in zip(residuals, told, strict=True)]
     lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
-    sure = problem.as_sure(residuals)
-    position = np.concatenate([measured_axes(rows).ravel() for rows, _ in sure])
+    residuals = problem.as_sure(residuals)
+    position = np.concatenate([measured_axes(part[:3]).ravel() for part in residuals])
     turn = np.concatenate([part[3:].ravel() for part in residuals])
     sigma = robust_spread(position) / lost
     sigma_turn = robust_spread(turn) / lost if turn.size else 1.0
@@ -271,10 +271,10 @@ def robust_scale(
     sigma = max(sigma, 1e-9)
     sigma_turn = max(sigma_turn, LEAST_TURN * sigma)
     weights = []
-    for (shifts, turns), own in zip(sure, told, strict=True):
-        off = np.sqrt((shifts**2).sum(axis=0) / max(len(shifts), 3)) / sigma
-        if turns.size:
-            off = np.maximum(off, np.sqrt((turns**2).sum(axis=0) / 3.0) / sigma_turn)
+    for part, own in zip(residuals, told, strict=True):
+        off = np.sqrt((part[:3] ** 2).sum(axis=0) / 3.0) / sigma
+        if part.shape[0] > 3:
+            off = np.maximum(off, np.sqrt((part[3:] ** 2).sum(axis=0) / 3.0) / sigma_turn)
         weights.append(own * np.minimum(1.0, (HUBER / np.maximum(off, 1e-12)) ** 2))
     return Scale(sigma, sigma_turn, tuple(weights))
 

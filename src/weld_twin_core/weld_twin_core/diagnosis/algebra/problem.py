@@ -333,10 +333,8 @@ class Problem:
         out = []
         taken = self.places_taken(scale)
         for k, part in enumerate(parts):
-            # Of no columns, as without a frame to fit, the size of a row must be said.
-            rows = self.in_noise(k, part, scale).reshape(
-                *part.shape[:-2], np.prod(part.shape[-2:])
-            )
+            rows = self.in_noise(k, part, scale)
+            rows = rows.reshape(*rows.shape[:-2], rows.shape[-2] * rows.shape[-1])  # of none, too
             own = taken[k] if taken else None
             if own is not None:
                 ways, left = own
@@ -351,12 +349,11 @@ class Problem:
         Where an instrument tells how sure its poses are, rows are mixed until each is as sure as
         a usual coordinate.
         """
-        turned = np.swapaxes(part, -1, -2)
         unit = np.full(part.shape[-2], 1.0 / scale.position)
+        unit[3:] = 1.0 / scale.orientation
+        turned = np.swapaxes(part, -1, -2)
         root = self.roots[k]
-        if root is None:
-            unit[3:] = 1.0 / scale.orientation
-        else:
+        if root is not None:
             turned = (root @ turned[..., None])[..., 0]
         out = np.empty(turned.shape)
         np.multiply(turned, np.sqrt(scale.weights[k])[:, None] * unit, out=out)
@@ -364,41 +361,29 @@ class Problem:
 
     def informed(self, k: int, part: Array, scale: Scale) -> Array:
         """Return a part (c, M) of recording k times what is known of its rows, (c, M)."""
-        root, size = self.roots[k], np.full((len(part), 1), scale.position**-2)
-        if root is not None:
-            part = np.einsum('mji,mjk,km->im', root, root, part)
-        else:
-            size[3:] = scale.orientation**-2
-        return np.asarray(part * size * scale.weights[k])
+        size = np.full((len(part), 1), scale.position**-2)
+        size[3:] = scale.orientation**-2
+        root = self.roots[k]
+        if root is None:
+            return np.asarray(part * size * scale.weights[k])
+        rows = np.einsum('mij,jm->im', root, part) * size * scale.weights[k]
+        return np.asarray(np.einsum('mji,jm->im', root, rows))
 
     def measured_rows(self, values: Array, scale: Scale) -> list[Array]:
         """Return `whitened` rows as shifts [m] and turns [rad] again, (M, c) per recording."""
         out = []
-        for k, part in enumerate(self.by_sample(values)):
-            root, unit = self.roots[k], np.full(part.shape[1], scale.position)
-            if root is None:
-                unit[3:] = scale.orientation
-            else:
-                part = np.linalg.solve(root, part[..., None])[..., 0]
-            weight = np.maximum(scale.weights[k], LEAST_WEIGHT)
-            out.append(part * unit / np.sqrt(weight)[:, None])
+        pairs = zip(self.roots, self.by_sample(values), scale.weights, strict=True)
+        for root, part, weight in pairs:
+            unit = np.full(part.shape[1], scale.position)
+            unit[3:] = scale.orientation
+            rows = part * unit / np.sqrt(np.maximum(weight, LEAST_WEIGHT))[:, None]
+            out.append(rows if root is None else np.linalg.solve(root, rows[..., None])[..., 0])
         return out
 
-    def as_sure(self, parts: list[Array]) -> list[tuple[Array, Array]]:
-        """
-        Return residual-like parts as rows in metres and rows in radians, (k, M) each.
-
-        Where an instrument tells how sure its poses are, all rows are in metres, and as sure as
-        a usual coordinate.
-        """
-        out = []
-        for part, root in zip(parts, self.roots, strict=True):
-            if root is None:
-                out.append((part[:3], part[3:]))
-            else:
-                rows = np.einsum('mij,jm->im', root, part)
-                out.append((rows, rows[:0]))
-        return out
+    def as_sure(self, parts: list[Array]) -> list[Array]:
+        """Return residual-like parts, (c, M), with shifts and turns as sure as a usual one."""
+        pairs = zip(self.roots, parts, strict=True)
+        return [p if root is None else np.einsum('mij,jm->im', root, p) for root, p in pairs]
 
     def by_sample(self, values: Array) -> list[Array]:
         """Return what `whitened` has laid out in rows as one array per recording, (M, c, ...)."""

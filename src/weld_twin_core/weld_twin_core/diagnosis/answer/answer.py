@@ -22,8 +22,7 @@ from ..frames.changes import told, untold
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..hypotheses.structural_aliases import never_parted
-from ..levels.causes import causes
-from ..levels.contributions import contributions
+from ..levels.causes import causes, contributions
 from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
 from ..result import (

@@ -52,6 +52,8 @@ MOST_EXCLUDED = 3
 FEW = 2
 """Instances of a kind that are tried on a joint at rest: what leaks in from either side; of waves
 one does, as all stand still."""
+MOST_PARTS = 6
+"""Coordinates of a frame: what one of its size is made up of is looked for."""
 SEED = 7
 """Of the postures: any generic set gives the same answer."""
 
@@ -121,20 +123,21 @@ def _also(
         *_constants_here(found, features, constants),
     ]
     seeds = [seed for seed in seeds if Site(seed.name, seed.site) not in taken]
-    if not seeds and outside is None:
+    parts = _parts(found, k, exclude)
+    if not seeds and not parts and outside is None:
         return [], None
     rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
     count, most = found.effective(now), max(rival.nats for rival in slot)
     alike = [_in_place(found, features, rest, slot, seed, count) for seed in seeds]
+    alike += _together(found, rest, parts, count)
     best = None
     if outside is not None:
         _, tried = contenders(outside, rest, count, now.model.found, MOST_EXCLUDED)
         more = [Rival(Site(*c.unit.site), nats_in_place(rest, f, count, c), f) for c, f in tried]
         alike += more
         # What is the same error on any motion is ahead by its fewer numbers alone.
-        always_alike = {Site(seed.name, seed.site) for seed in seeds}
-        parted = [rival for rival in more if rival.site not in always_alike]
-        best = max(parted, key=lambda rival: rival.nats, default=None)
+        same = {Site(seed.name, seed.site) for seed in seeds}
+        best = max((r for r in more if r.site not in same), key=lambda r: r.nats, default=None)
     return [
         replace(one, nats=min(one.nats, most))
         for one in _best_of_each(alike)
@@ -167,6 +170,47 @@ def _lead(found: Search, other: Rival) -> _Lead | None:
         return None
     replaced = [(e.name, e.site) not in kept for e in now.model.found]
     return _Lead(float(nats), np.array(replaced))
+
+
+def _parts(found: Search, k: int, exclude: Sequence[str]) -> list[Effect]:
+    """
+    Return errors that a person can set which together may be effect k, whatever the motion.
+
+    Where a positioner stands beside a robot is the zero of its first axis, that of the robot's, or
+    both at once.
+    """
+    effects = found.small.model.found
+    own, taken = effects[k], {(e.name, e.site) for e in effects}
+    if not _constant(type(own)) or own.coordinates().size < MOST_PARTS:
+        return []
+    robot = found.baseline.model.robot
+    frames = [_frame_columns(robot, name) for name in sorted(found.work.problem.align)]
+    fitted = span_of(np.concatenate(frames)) if frames else None
+    span, out = np.concatenate([_columns(robot, own), *frames]), []
+    for each in _settable(robot, frozenset(exclude)):
+        rows = _columns(robot, each)
+        seen = rows.any() and (fitted is None or share_outside(rows, fitted).min() > SAME)
+        if (each.name, each.site) not in taken and seen and _inside(rows, span):
+            out.append(each)
+    return out
+
+
+def _together(found: Search, rest: Fit, parts: Sequence[Effect], count: float) -> list[Rival]:
+    """Return errors that take a place together, where none of them does as well without another."""
+    problem, scale = found.work.problem, found.work.scale
+
+    def with_those(some: Sequence[Effect]) -> tuple[float, Fit]:
+        own = fit(problem, rest.model.with_found((*rest.model.found, *some)), scale, None, 4)
+        return nats_in_place(rest, own, count), own
+
+    while len(parts) > 1:
+        nats, own = with_those(parts)
+        fewer = [[e for e in parts if e is not one] for one in parts]
+        best = max(fewer, key=lambda some: with_those(some)[0])
+        if with_those(best)[0] < nats:
+            return [Rival(Site(e.name, e.site), nats, own) for e in parts]
+        parts = best
+    return []
 
 
 def _in_place(

@@ -108,8 +108,6 @@ def leftover(
 
     Parameters
     ----------
-    problem, scale : Problem, Scale
-    unseen : Unseen
     given : callable
         Mean and covariance of the uncertain coordinates given all rows but those of a mask.
     floor : NoiseFloor

@@ -17,6 +17,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from ...motion.planned_motion import plan
 from ...recording import JointMotion, Recording
 from ...sequences import halton
 from ...twin.features import Features
-from ...twin.posterior import Directions
+from ...twin.posterior import Directions, Posterior
 from ...twin.twin import Twin
 from . import plausible_arm
 from .allowed import FRAME_WIDTHS
@@ -58,6 +59,13 @@ show it if all errors were fitted: measured on plans that the plant carried out,
 and 40 stations (weld-twin lab plans, docs/first_measurement.md)."""
 DRAWS = 400
 """Of a tool's error at each posture, to count how many lie within the tolerance."""
+
+
+class Wanted(NamedTuple):
+    """Tolerance of the tool's position, and noise of a measured coordinate [m]."""
+
+    tolerance: float
+    noise: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +124,56 @@ def plan_stations(
     judged, offered = clear[:JUDGED], clear[JUDGED : JUDGED + max(CANDIDATES, count)]
     effects = plausible_arm.directions(robot, ())
     what = Directions(('base', 'tool'), 1, effects, plausible_arm.fine_knots([offered]))
-    columns = _columns(robot, np.concatenate([judged, offered]), what)
+    columns = _columns(Twin(robot), np.concatenate([judged, offered]), what)
     seen = columns * _widths(robot, what)
-    taken, sigma, within = _chosen(seen[:JUDGED], seen[JUDGED:], (tolerance, noise), count)
+    region = _Region(seen[:JUDGED], seen[JUDGED:], tolerance, noise**2 * np.eye(3))
+    taken, sigma, within = _chosen(region, count)
+    return MeasurementPlan(offered[taken], sigma, within)
+
+
+def plan_more(
+    posterior: Posterior, twin: Twin, region: tuple[Array, Array], count: int, given: Wanted
+) -> MeasurementPlan:
+    """
+    Return the stations that make a model surest in a region, after what was recorded already.
+
+    Before the first of them it is as sure there as `twin.posterior.usual_sigma` says: the promise
+    of a plan is the warning of the diagnosis. New stations count in the set-up that was recorded.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    twin : Twin
+        The fitted model.
+    region : (array, array), shapes (K, n) and (C, n)
+        Postures at which it is judged how sure the model is, and those that may be measured.
+    count : int
+        Stations; at most as many as may be measured.
+    given : Wanted
+
+    Raises
+    ------
+    DataError
+        A number means nothing.
+
+    """
+    judged, offered = region
+    if not (
+        0.0 < given.tolerance < 1.0 and 0.0 < given.noise < 0.1 and 0 <= count <= len(offered)
+    ):
+        raise DataError(
+            f'a plan in a region needs a tolerance and a noise above zero, and at most the '
+            f'{len(offered)} stations that there are'
+        )
+    q = np.concatenate([judged, offered])
+    t = np.arange(float(len(q)))
+    still = Recording('stations', JointMotion(t, q, static=True))
+    ways, rest = posterior.position_ways(Features(twin, still, t))
+    noise = rest[len(judged) :] + given.noise**2 * np.eye(3)
+    parts = _Region(
+        ways[: len(judged)], ways[len(judged) :], given.tolerance, noise, rest[: len(judged)], 0.0
+    )
+    taken, sigma, within = _chosen(parts, count)
     return MeasurementPlan(offered[taken], sigma, within)
 
 
@@ -135,12 +190,13 @@ def clear_postures(robot: Robot, spread: float) -> Array:
     """
     middle = plan(robot, default_seam(robot, 'line'), 'smooth', rate_hz=10.0).motion.q
     centre = middle[len(middle) // 2]
+    own = robot.branches[1] if robot.behind else robot
     half = np.where(robot.prismatic, SLIDE, spread)
     low, high = np.maximum(centre - half, robot.lower), np.minimum(centre + half, robot.upper)
     q = low + halton(robot.n, TRIED) * (high - low)
     least = CLEAR * float(abs(robot.a).sum() + abs(robot.d).sum())
-    (height,), (side,) = _room(robot, centre[None])
-    heights, sides = _room(robot, q)
+    (height,), (side,) = _room(own, centre[None, robot.behind :])
+    heights, sides = _room(own, q[:, robot.behind :])
     above = heights > (least if height > least else height - NEARER * abs(height))
     off = sides > (least if side > least else NEARER * side)
     return np.asarray(q[above & off])
@@ -155,11 +211,11 @@ def _room(robot: Robot, q: Array) -> tuple[Array, Array]:
     return heights, np.linalg.norm(points[..., :2], axis=-1).min(axis=1)
 
 
-def _columns(robot: Robot, q: Array, what: Directions) -> Array:
+def _columns(twin: Twin, q: Array, what: Directions) -> Array:
     """Return d position / d coordinate at postures at rest, shape (K, 3, P)."""
     t = np.arange(float(len(q)))
     still = Recording('stations', JointMotion(t, q, static=True))
-    return np.asarray(what.columns(Features(Twin(robot), still, t), 0)[:, :3].transpose(2, 1, 0))
+    return np.asarray(what.columns(Features(twin, still, t), 0)[:, :3].transpose(2, 1, 0))
 
 
 def _widths(robot: Robot, what: Directions) -> Array:
@@ -169,33 +225,48 @@ def _widths(robot: Robot, what: Directions) -> Array:
     return np.concatenate([frames_, own, np.full(fine, plausible_arm.FINE)])
 
 
-def _chosen(
-    judged: Array, offered: Array, given: tuple[float, float], count: int
-) -> tuple[list[int], Array, Array]:
-    """Take stations one by one; every column is that of a coordinate in units of its prior."""
-    tolerance, noise = given
-    covariance = np.eye(judged.shape[2])
+class _Region(NamedTuple):
+    """
+    Postures of a region.
+
+    ``judged`` (K, 3, P) and ``offered`` (C, 3, P) are the ways in which the tool may be off there, each
+    of unit size before the first station; ``noise`` (3, 3) or (C, 3, 3) [m^2] is that of a station,
+    ``rest`` (K, 3, 3) what no station takes away, ``choice`` as `CHOICE`.
+    """
+
+    judged: Array
+    offered: Array
+    tolerance: float
+    noise: Array
+    rest: Array | float = 0.0
+    choice: float = CHOICE
+
+
+def _chosen(region: _Region, count: int) -> tuple[list[int], Array, Array]:
+    """Take stations one by one."""
+    covariance = np.eye(region.judged.shape[2])
     draws = np.random.default_rng(1).standard_normal((DRAWS, 3))
+    noise = np.broadcast_to(region.noise, (len(region.offered), 3, 3))
     taken: list[int] = []
-    found = [_judged(judged, covariance, tolerance, draws)]
+    found = [_judged(region, covariance, 1.0, draws)]
     for number in range(1, count + 1):
-        best = _best(judged, offered, covariance, noise, taken)
+        best = _best(region, covariance, noise, taken)
         taken.append(best)
-        rows = offered[best]
+        rows = region.offered[best]
         gain = covariance @ rows.T
-        covariance -= gain @ np.linalg.solve(rows @ gain + noise**2 * np.eye(3), gain.T)
-        factor = 1.0 + (CHOICE / number) ** 3
-        found.append(_judged(judged, covariance, tolerance / factor, draws))
-        found[-1] = (min(found[-1][0] * factor, found[0][0]), found[-1][1])
+        covariance -= gain @ np.linalg.solve(rows @ gain + noise[best], gain.T)
+        factor = 1.0 + (region.choice / number) ** 3
+        found.append(_judged(region, covariance, factor, draws))
+        found[-1] = (min(found[-1][0], found[0][0]), found[-1][1])
     sigma, within = np.array(found).T
     return taken, sigma, within
 
 
-def _best(judged: Array, offered: Array, covariance: Array, noise: float, taken: list[int]) -> int:
+def _best(region: _Region, covariance: Array, noise: Array, taken: list[int]) -> int:
     """Return the station that takes most off the variance of the poses judged."""
+    judged, offered = region.judged, region.offered
     rows = offered.reshape(-1, offered.shape[2]) @ covariance
-    spread = np.einsum('kip,kjp->kij', rows.reshape(offered.shape), offered)
-    spread += noise**2 * np.eye(3)
+    spread = np.einsum('kip,kjp->kij', rows.reshape(offered.shape), offered) + noise
     cross = (judged.reshape(-1, judged.shape[2]) @ rows.T).reshape(-1, *offered.shape[:2])
     joint = np.einsum('mki,mkj->kij', cross, cross)
     gain = np.trace(np.linalg.solve(spread, joint), axis1=1, axis2=2)
@@ -204,10 +275,11 @@ def _best(judged: Array, offered: Array, covariance: Array, noise: float, taken:
 
 
 def _judged(
-    judged: Array, covariance: Array, tolerance: float, draws: Array
+    region: _Region, covariance: Array, factor: float, draws: Array
 ) -> tuple[float, float]:
     """Return the usual standard deviation, and how probably the tool is within the tolerance."""
-    spread = np.einsum('mip,pq,mjq->mij', judged, covariance, judged, optimize=True)
-    size = np.sqrt(np.maximum(np.linalg.eigvalsh(spread), 0.0))
+    judged = region.judged
+    spread = np.einsum('mip,pq,mjq->mij', judged, covariance, judged, optimize=True) + region.rest
+    size = factor * np.sqrt(np.maximum(np.linalg.eigvalsh(spread), 0.0))
     length = np.linalg.norm(draws[:, None] * size, axis=-1)
-    return float(np.median(size[:, -1])), float((length < tolerance).mean())
+    return float(np.median(size[:, -1])), float((length < region.tolerance).mean())

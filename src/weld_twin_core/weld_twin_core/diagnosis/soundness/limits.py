@@ -75,6 +75,12 @@ Arms mastered on wrong marks were up to 7 degrees off (see `effects.plausible`);
 to hundredths of a millimetre, and those of sibling arms differ by 5 to 30 mm. Links count together,
 by the root of the sum of their squares: a sibling differs in several of them.
 """
+ROOT_SPREAD, ROOT_MOST = 0.05, 0.1
+"""
+Spread, and the most [m, rad], of where a positioner stands beside a robot.
+
+Roots come from drawings, or were touched by hand; the most is that of `effects.plausible`.
+"""
 SIBLING = 4e-3
 """
 RMS motion [m] of the tool by wrong lengths of links, from which they are those of another arm.

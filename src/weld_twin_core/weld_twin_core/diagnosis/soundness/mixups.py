@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arm.robot import Robot
-from ...arm.rotation import rotation_vector
+from ...arm.rotation import quaternion_from_matrix, rotation_vector
 from ...arrays import Array
 from ...effects.constant import ChannelError
 from ...effects.effect import Effect
@@ -20,6 +20,7 @@ from ...effects.frame_errors import BasePose, ToolPose
 from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
 from ...effects.joint_compliance import JointCompliance
 from ...effects.plausible import plausible
+from ...effects.root_pose import RootPose
 from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem
 from .evidence import Case, Finding, mistake
@@ -186,6 +187,9 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
                 return ()
             framed = _framed(shot, model, frozenset(more - given), before, left)
             own = None if framed.kind == 'base_turned' else _within(shot, before, left, given)
+            if own and framed.kind == 'wrong_fixture' and own.at == shot.robot.joint_names[:1]:
+                # A fixture that is turned about the positioner's last axis is one with its zero.
+                own = own._replace(alike=(*own.alike, (framed.kind, framed.at)))
             return [own or framed]
     return ()
 
@@ -219,6 +223,8 @@ def _plausible(robot: Robot, model: Model) -> bool:
 def _framed(
     shot: Snapshot, model: Model, more: frozenset[str], before: float, left: float
 ) -> Finding:
+    if more == {'base'} and shot.robot.behind:
+        return _fixture(shot.robot, model.bases, _falls(before, left))
     turn = _turned(shot.robot.T_world_base, model.bases[0]) if more == {'base'} else None
     if turn is not None:
         return _base(shot.robot, turn, falls(before, left))
@@ -258,6 +264,29 @@ def _base(robot: Robot, turn: Array, told: str) -> Finding:
         partial(base_turned, turn=turn),
         alike=(('constant_angle', (first,)),) if either else (),
     )
+
+
+def _fixture(robot: Robot, bases: Sequence[Array], falls: str) -> Finding:
+    """Return the mistake that poses were measured in another frame of the workpiece than was given."""
+    seen = [np.asarray(np.linalg.inv(base)) for base in bases]
+    steps = [np.asarray(robot.T_world_base @ pose) for pose in seen]
+    far = [float(np.linalg.norm(step[:3, 3])) for step in steps]
+    k = int(np.argmax(far))
+    angle = np.degrees(np.linalg.norm(rotation_vector(steps[k][:3, :3])))
+    at = ', '.join(f'{value:.4f}' for value in seen[k][:3, 3])
+    turn = ', '.join(f'{value:.5f}' for value in quaternion_from_matrix(seen[k][:3, :3]))
+    which = f' of recording {k + 1}' if len(bases) > 1 else ''
+    words = (
+        f'The poses{which} were measured in the frame of another fixture than was given: on the '
+        f'positioner it lies {length(far[k])} from there, turned by {angle:.1f} degrees; with it, '
+        f'{falls}.'
+    )
+    remedy = (
+        "Give the frame of the fixture that was measured on (of a robot file 'tool' of the "
+        f'workpiece: xyz [{at}], quat_xyzw [{turn}]), or have it aligned (--align base)'
+    )
+    mend = partial(frames_fitted, frames=('base',))
+    return mistake(words, 'wrong_fixture', ('base',), remedy, mend)
 
 
 def _turned(given: Array, fitted: Array) -> Array | None:
@@ -310,6 +339,13 @@ def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     if arm.gap > LARGE or arm.gap > shot.gap(shot.framed()) / EXPLAINED or case.slips:
         return ()
     worst = arm.model.found[int(arm.strain.argmax())]
+    if isinstance(worst, RootPose):
+        words = (
+            'The positioner stands elsewhere beside the robot than it was given, farther than any '
+            f'root frame is off by. {worst.remedy(shot.robot)}'
+        )
+        remedy = 'Measure where it stands, or give the robot file of this cell'
+        return (mistake(words, 'other', ('base',), remedy),)
     if not isinstance(worst, JointOffset):
         return (_foreign(case.model.robot, worst, ', more than industrial arms are off by'),)
     joint, value = str(worst.site), np.degrees(worst.plain('offset'))
@@ -347,6 +383,7 @@ def _other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Finding, float]
         kind() for frame, kind in (('base', BasePose), ('tool', ToolPose)) if frame not in align
     ]
     own = [*given, *_of_joints(shot, (JointOffset, LinkTwist))]
+    own += [RootPose()] if shot.robot.behind else []
 
     def fitted(errors: Sequence[Effect], spread: float = 0.0) -> tuple[Model, float]:
         """Return the fit of errors by their own priors, lengths by a spread [m], and its gap."""

@@ -13,7 +13,9 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
+from ...effects.effect import Effect
 from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
+from ...effects.root_pose import RootPose
 from ...recording import JointMotion, Measurements, Recording
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale
@@ -25,6 +27,8 @@ from .limits import (
     LINK_SPREAD,
     OFFSET_MOST,
     OFFSET_SPREAD,
+    ROOT_MOST,
+    ROOT_SPREAD,
     SOFT,
     TINY,
     TWIST_MOST,
@@ -150,10 +154,15 @@ class Snapshot:
         spread, most = np.repeat(usual, self.robot.n), np.repeat(bounds, self.robot.n)
         straight = np.flatnonzero(self.robot.prismatic)
         spread[straight], most[straight] = LINK_SPREAD, LINK_MOST
-        errors = [kind(name) for kind in KINDS for name in self.robot.joint_names]
+        errors: list[Effect] = [kind(name) for kind in KINDS for name in self.robot.joint_names]
+        if self.robot.behind:
+            root = RootPose()
+            errors.append(root)
+            spread = np.append(spread, np.full(root.vector().size, ROOT_SPREAD))
+            most = np.append(most, ROOT_MOST)
         start = self.framed().with_found(tuple(errors))
         trial = bent(self.problem, start, spread**-2.0)
-        strain = np.abs([float(e.vector()[0]) for e in trial.found]) / most
+        strain = np.array([np.abs(e.vector()).max() for e in trial.found]) / most
         return Arm(trial, self.gap(trial), strain)
 
 

@@ -4,7 +4,8 @@
 
 from .all_branches import solve
 from .along_path import PathSolution, solve_path
+from .carried_arm import CarriedArm, rest
 from .closed_form import family
 from .newton import polish
 
-__all__ = ['PathSolution', 'family', 'polish', 'solve', 'solve_path']
+__all__ = ['CarriedArm', 'PathSolution', 'family', 'polish', 'rest', 'solve', 'solve_path']

@@ -14,7 +14,7 @@ from ...arm.robot import Robot
 from ...arm.rotation import rotation_matrix, transform
 from ...arrays import Array
 from ...errors import PathError, ReachError
-from ..inverse import solve_path
+from ..inverse import CarriedArm, rest, solve_path
 from ..inverse.continuity import reach
 from .arc import Arc, Circle
 from .line import Line
@@ -121,6 +121,9 @@ def default_seam(robot: Robot, kind: str = 'line', torch: Torch | None = None) -
     """
     if kind not in _SHAPES:
         raise PathError(f'no bundled seam is of kind {kind!r}; there are ' + ', '.join(KINDS))
+    if robot.behind:  # on the workpiece, where a positioner that stands at rest has it
+        beside = CarriedArm(robot, robot.behind)
+        robot = beside.arm.with_frames(base=beside.feet(rest(robot)))
     best: tuple[float, Path | None] = (-np.inf, None)
     for places in _places(robot):
         for place in places:

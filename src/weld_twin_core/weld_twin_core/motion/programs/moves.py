@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -69,6 +69,9 @@ class Move(NamedTuple):
         Moves of one number are corrected together or not at all.
     why : str
         Of an unknown move, why it is not understood.
+    along : bool
+        The frame that a linear or circular move is told in goes along with a positioner. Where it
+        stands still, the positioner must, too.
 
     """
 
@@ -84,6 +87,7 @@ class Move(NamedTuple):
     where: str = ''
     seam: int = 0
     why: str = ''
+    along: bool = True
 
     @property
     def uses(self) -> list[Use]:
@@ -102,15 +106,28 @@ class MoveProgram:
         A pose, shape (4, 4) [m], or joint positions, shape (n,) [rad or m].
     pieces : tuple of tuple of Move
         Moves that follow each other; where a piece begins, nobody knows where the arm is.
+    told : tuple of array, optional
+        Of every point the positions of the external axes, shape (m,) [rad or m]: the first joints of
+        the robot, those of a positioner among them. Left out, there are none.
 
     """
 
     points: tuple[Array, ...]
     pieces: tuple[tuple[Move, ...], ...]
+    told: tuple[Array, ...] = ()
 
     def with_points(self, points: Sequence[Array]) -> MoveProgram:
         """Return the same moves between other points."""
-        return MoveProgram(tuple(points), self.pieces)
+        return replace(self, points=tuple(points))
+
+    @property
+    def external(self) -> int:
+        """Return how many of the robot's first joints are external axes."""
+        return self.told[0].size if self.told else 0
+
+    def external_at(self, use: Use) -> Array:
+        """Return where the external axes are to be at a use, shape (m,) [rad or m]."""
+        return self.told[use.point] if self.told else np.zeros(0)
 
     def place(self, use: Use) -> Array:
         """Return where a use leads: ``T_base_tool``, shape (4, 4), or joints, shape (n,)."""

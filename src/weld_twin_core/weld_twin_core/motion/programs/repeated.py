@@ -11,7 +11,7 @@ from ...arm.robot import Robot
 from ...arrays import Array
 from ...errors import ReachError
 from ...recording import JointMotion
-from ..inverse import polish
+from ..inverse import CarriedArm
 from .moves import Move, MoveProgram
 from .travel import CLOSED, Piece, tool_way
 
@@ -41,12 +41,13 @@ def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
         way = _way_length(piece, k)
         assert move.end is not None
         arm = robot.with_frames(base=np.eye(4), tool=move.tool)
+        carried = CarriedArm(arm, program.external)
         if move.kind == 'joint' or way == 1:
-            part = _joint_part(arm, program, move, q, first, way)
+            part = _joint_part(carried, program, move, q, first, way)
         else:
             at = max(int(piece.vias[k]) - first, 0)
             poses, _ = tool_way(arm, program, move, forward(arm, q[first]), way, at)
-            part = _closed(arm, piece.motion.q[first : first + way], poses, move)
+            part = _closed(carried, piece.motion.q[first : first + way], poses, move)
         q[first : first + way] = part
         q[first + way : last + 1] = part[-1]
     return JointMotion(piece.motion.t, q)
@@ -72,21 +73,21 @@ def _way_length(piece: Piece, k: int) -> int:
 
 
 def _joint_part(
-    arm: Robot, program: MoveProgram, move: Move, q: Array, first: int, way: int
+    carried: CarriedArm, program: MoveProgram, move: Move, q: Array, first: int, way: int
 ) -> Array:
     assert move.end is not None
     place = program.place(move.end)
     end = place
     if place.ndim == 2:
-        end = _closed(arm, q[first + way - 1][None], place[None], move)[0]
+        end = _closed(carried, q[first + way - 1][None], place[None], move)[0]
     if way == 1:
         return np.asarray(end[None])
     share = np.linspace(0.0, 1.0, way)[:, None]
     return np.asarray(q[first] + share * (end - q[first]))
 
 
-def _closed(arm: Robot, q: Array, poses: Array, move: Move) -> Array:
-    found, error = polish(arm, q, poses)
+def _closed(carried: CarriedArm, q: Array, poses: Array, move: Move) -> Array:
+    found, error = carried.polish(q, poses)
     if np.abs(error).max() > CLOSED:
         raise ReachError(f'{move.where}: out of reach, or at a singularity')
     return found

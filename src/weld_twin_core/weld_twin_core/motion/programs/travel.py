@@ -22,7 +22,7 @@ from ...arm.rotation import rotation_matrix, rotation_vector, transform
 from ...arrays import Array
 from ...errors import DataError, PathError, ReachError
 from ...recording import JointMotion
-from ..inverse import polish, solve, solve_path
+from ..inverse import CarriedArm
 from ..paths import Arc
 from .moves import Move, MoveProgram
 
@@ -41,6 +41,10 @@ NEAR = 0.15
 to change the posture."""
 CLOSED = 1e-7
 """Gap [m, rad] up to which a pose counts as reached; programs write micrometres."""
+STANDS = (
+    'the positioner moves while the tool goes straight in a frame that stands still; what way it '
+    'takes on the workpiece is up to the controller'
+)
 LEAST_TIME = 0.02
 """Shortest time [s] of a move."""
 
@@ -159,15 +163,21 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
     if move.end is None:
         raise PathError(move.why or 'this move is not understood')
     arm = course.robot.with_frames(base=np.eye(4), tool=move.tool)
+    carried = CarriedArm(arm, course.program.external)
     if move.kind == 'joint' or (q is None and move.via is None):
-        return _joint_move(arm, course, move, q)
+        return _joint_move(carried, course, move, q)
     if q is None:
         raise PathError(
             'where the arm comes from is not known; let a joint move lead there, or say the '
             'joints with --start'
         )
+    told = course.program.external_at(move.end)
+    turned = np.abs(told - q[: told.size])[: arm.behind].max(initial=0.0)
+    if turned > CLOSED and not move.along:
+        raise PathError(STANDS)
     poses, via = tool_way(arm, course.program, move, forward(arm, q))
-    way = _on_the_way(arm, poses, q)
+    share = np.linspace(0.0, 1.0, len(poses))[:, None]
+    way = _on_the_way(carried, poses, q, q[: told.size] + share * (told - q[: told.size]))
     arm.check_positions(way)
     length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
     turn = float(np.linalg.norm(rotation_vector(poses[-1, :3, :3] @ poses[0, :3, :3].T)))
@@ -176,24 +186,25 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
     return _Reached(way, np.linspace(0.0, move.duration or duration, len(way)), via)
 
 
-def _on_the_way(arm: Robot, poses: Array, q: Array) -> Array:
+def _on_the_way(carried: CarriedArm, poses: Array, q: Array, told: Array) -> Array:
     """Return joint positions along poses that begin where the arm stands, shape (K, n)."""
     if len(poses) < SHORT:
-        near, error = polish(arm, np.tile(q, (len(poses), 1)), poses)
+        start = carried.whole(told, np.tile(q[told.shape[1] :], (len(poses), 1)))
+        near, error = carried.polish(start, poses)
         steps = np.abs(np.diff(near, axis=0, prepend=q[None])).max()
         if np.abs(error).max() < CLOSED and steps < NEAR:
             return near
-    found = solve_path(arm, poses, q).q
+    found = carried.whole(told, carried.solve_path(poses, told, q).q)
     if np.abs(found[0] - q).max() > NEAR:
         raise ReachError('the arm would have to change its posture on the way')
     return found
 
 
-def _joint_move(arm: Robot, course: _Course, move: Move, q: Array | None) -> _Reached:
+def _joint_move(carried: CarriedArm, course: _Course, move: Move, q: Array | None) -> _Reached:
     """Return the samples of a joint move; where it comes from may not be known."""
     assert move.end is not None
-    place = course.program.place(move.end)
-    end = place if place.ndim == 1 else _posture(arm, place, course, move, q)
+    arm, place = carried.robot, course.program.place(move.end)
+    end = place if place.ndim == 1 else _posture(carried, place, course, move, q)
     arm.check_positions(end[None])
     if q is None:
         return _Reached(end[None], np.zeros(1), -1)
@@ -204,16 +215,20 @@ def _joint_move(arm: Robot, course: _Course, move: Move, q: Array | None) -> _Re
     return _Reached(q + share * (end - q), times, -1)
 
 
-def _posture(arm: Robot, pose: Array, course: _Course, move: Move, q: Array | None) -> Array:
+def _posture(
+    carried: CarriedArm, pose: Array, course: _Course, move: Move, q: Array | None
+) -> Array:
     """Return the joint positions in which a move reaches a pose."""
-    found = solve(arm, pose, q)
+    assert move.end is not None
+    arm, told = carried.robot, course.program.external_at(move.end)
+    found = carried.solve(pose, told, q)
     if move.suits is not None:
-        found = _turned(arm, found)
+        found = _turned(carried, found)
         found = found[move.suits(found)]
         if not len(found):
             raise ReachError('no posture of this robot there is the one that the program names')
     elif q is not None:
-        found = _turned(arm, found)
+        found = _turned(carried, found)
     elif len(found) > 1:
         found = _known(found, course, move)
     near = np.zeros(arm.n) if q is None else q
@@ -232,11 +247,11 @@ def _known(found: Array, course: _Course, move: Move) -> Array:
     return known
 
 
-def _turned(arm: Robot, found: Array) -> Array:
-    """Return every solution on every full turn that the limits allow for the last joint."""
-    last = [found]
+def _turned(carried: CarriedArm, found: Array) -> Array:
+    """Return every solution on every full turn that the limits allow for the arm's joints."""
+    last, arm = [found], carried.robot
     for turn in (-2.0 * np.pi, 2.0 * np.pi):
-        for joint in np.flatnonzero(~arm.prismatic):
+        for joint in np.flatnonzero(~arm.prismatic & (np.arange(arm.n) >= carried.count)):
             moved = found.copy()
             moved[:, joint] += turn
             inside = (moved >= arm.lower) & (moved <= arm.upper)

@@ -12,6 +12,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 
 from ..context import Context
+from ..external_axes import ExternalAxis
 
 
 class ExportMove(NamedTuple):
@@ -81,6 +82,27 @@ class Exported:
     def joints(self, move: ExportMove) -> list[float]:
         """Return the joints of a move as the controller shows them, degrees or mm."""
         return self.context.degrees().numbers(move.q, [0.0] * self.context.robot.n)
+
+    @property
+    def external(self) -> tuple[ExternalAxis, ...]:
+        """Return the external axes that the controller has."""
+        return self.context.controller.external
+
+    def labelled(self, move: ExportMove, own: str) -> dict[str, float]:
+        """
+        Return the joints of a move as shown, by what the controller calls them.
+
+        Parameters
+        ----------
+        move : ExportMove
+        own : str
+            A form with a number, of the arm's joints; external axes follow in the order of their names.
+
+        """
+        names = [own.format(k + 1) for k in range(self.context.axes)]
+        labels = [*names, *(axis.label for axis in self.external)]
+        shown = list(zip(labels, self.joints(move), strict=True))
+        return dict(shown[: len(names)] + sorted(shown[len(names) :]))
 
     @property
     def joint_sizes(self) -> Array:

@@ -72,7 +72,6 @@ def _krl(program: Exported) -> str:
     ]
     share = speed = -1.0
     old = [0.0] * 6
-    joints = [f'A{k + 1}' for k in range(program.context.robot.n)]
 
     def move(step: ExportMove) -> list[str]:
         nonlocal share, speed, old
@@ -81,7 +80,7 @@ def _krl(program: Exported) -> str:
             if abs(step.share - share) > 5e-4:
                 share = step.share
                 out.append(f'BAS(#VEL_PTP,{100.0 * share:.3f})')
-            values = (f'{n} {v:.5f}' for n, v in zip(joints, program.joints(step), strict=True))
+            values = (f'{n} {v:.5f}' for n, v in program.labelled(step, 'A{}').items())
             return [*out, f'PTP {{{",".join(values)}}}' + ('' if step.stop else ' C_PTP')]
         if abs(step.speed - speed) > 1e-6:
             speed = step.speed
@@ -118,7 +117,11 @@ def _rapid(program: Exported) -> str:
         zone = 'fine' if step.stop else 'z1'
         speed = f'[{max(step.speed * 1e3, 1.0):.2f},50,50,50]'
         if step.kind == 'joint':
-            target = f'[[{comma(program.joints(step), 5)}],{away}]'
+            values = program.labelled(step, 'rax_{}')
+            own = [v for name, v in values.items() if name.startswith('rax')]
+            places = (values.get(f'eax_{letter}') for letter in 'abcdef')
+            outer = ','.join('9E9' if v is None else comma([v], 5) for v in places)
+            target = f'[[{comma(own, 5)}],[{outer}]]'
             return [f'    MoveAbsJ {target}, {speed}, {zone}, tMeasured;']
         old = ABB_POSE.numbers(step.pose, old)
         position, turn = _rapid_pose(old)
@@ -188,14 +191,31 @@ def _fanuc(program: Exported) -> str:
     body += _body(program, move, on, off, lambda s: f'WAIT {s:6.2f}(sec)', '!{}')
     rows = [f'/PROG  {program.name[:32].upper()}', '/ATTR', 'OWNER\t\t= MNEDITOR;']
     rows += [f'LINE_COUNT\t= {len(body)};', 'PROTECT\t\t= READ_WRITE;']
-    rows += ['DEFAULT_GROUP\t= 1,*,*,*,*;', 'CONTROL_CODE\t= 00000000 00000000;', '/MN']
+    further = {axis.label[:3] for axis in program.external if axis.label[0] == 'G'}
+    groups = ','.join('1' if f'GP{k}' in further or k == 1 else '*' for k in range(1, 6))
+    rows += [f'DEFAULT_GROUP\t= {groups};', 'CONTROL_CODE\t= 00000000 00000000;', '/MN']
     rows += [_fanuc_line(k, text) for k, text in enumerate(body, start=1)]
     rows.append('/POS')
     for k, step in enumerate(program.moves, start=1):
-        values = [f'J{i}= {v:9.3f} deg' for i, v in enumerate(program.joints(step), start=1)]
-        first, second = ',\t'.join(values[:3]), ',\t'.join(values[3:])
-        rows += [f'P[{k}]{{', '   GP1:', '\tUF : 0, UT : 1,\t', f'\t{first},', f'\t{second}', '};']
+        rows += [f'P[{k}]{{', *_fanuc_groups(program, step), '};']
     return '\r\n'.join([*rows, '/END', ''])
+
+
+def _fanuc_groups(program: Exported, step: ExportMove) -> list[str]:
+    """Return the joints of a point, group by group; extended axes are of the arm's group."""
+    robot = program.context.robot
+    slides = {axis.label for axis in program.external if robot.prismatic[axis.joint]}
+    of: dict[str, list[str]] = {'GP1': []}
+    for label, value in program.labelled(step, 'J{}').items():
+        group, _, name = label.rpartition('.')
+        unit = 'mm' if label in slides else 'deg'
+        of.setdefault(group or 'GP1', []).append(f'{name}= {value:9.3f} {unit}')
+    rows = []
+    for group, values in sorted(of.items()):
+        lines = [',\t'.join(values[i : i + 3]) for i in range(0, len(values), 3)]
+        rows += [f'   {group}:', '\tUF : 0, UT : 1,\t', *(f'\t{line},' for line in lines[:-1])]
+        rows.append(f'\t{lines[-1]}')
+    return rows
 
 
 def _fanuc_line(number: int, text: str) -> str:

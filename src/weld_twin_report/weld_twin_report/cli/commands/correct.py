@@ -35,11 +35,14 @@ if TYPE_CHECKING:
 
 EXAMPLE = 'weld-twin correct seam.script --robot ur5 --model found/diagnosis.json --out better'
 RESULT, PAGE = 'correction.json', 'report.html'
+NOISE = '0.03mm'
+"""Of a measured coordinate unless told: a tracker or a measuring arm."""
 LARGEST = ('2mm', '1deg')
 """How far a point may be moved unless told: more is no inaccuracy of an arm, but a mistake."""
 OF_PROGRAMS = (
     *('controller', 'max_correction', 'start', 'temperature', 'setup', 'force', 'tool', 'base'),
-    'pulses_per_degree',
+    *('tolerance', 'noise'),
+    *('pulses_per_degree', 'external', 'on_positioner', 'world'),
 )
 BAGS = ('.mcap', '.db3')
 
@@ -57,6 +60,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add('--controller', 'L', text, default='')
     text = 'how far a point may be moved (default: 2mm 1deg)'
     add('--max-correction', 'LENGTH', 'ANGLE', text)
+    text = 'of the tool, such as 0.3mm: also say how probably it is kept all along the seams'
+    add('--tolerance', 'LENGTH', text)
+    text = 'of a coordinate of your instrument, for what to measure more (default: 0.03mm)'
+    add('--noise', 'LENGTH', text, rare=True)
     text = 'joints before the first move, in degrees (mm for sliding ones)'
     add('--start', 'A,A,...', text)
     add('--temperature', 'DEGC', 'of the arm when the program runs', type=float)
@@ -118,7 +125,6 @@ def _corrected_program(args: argparse.Namespace) -> int:
     from weld_twin_msgs_py.programs.source import read_source
 
     robot = robot_of(args)
-    robot.refuse_positioner('a corrected program')
     language = language_of(read_source(args.what), args.what, args.controller)
     context = context_of(args, robot, language)
     program = read_program(args.what, context, language)
@@ -145,8 +151,9 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
         way,
     )
     from weld_twin_nodes.offline.told_twin import other_readings
+    from weld_twin_nodes.offline.tolerances import tolerance_entry
 
-    from ...report.correction_page import correction_page, headline
+    from ...report.correction_page import correction_page, headline, tolerance_told
 
     length, angle = args.max_correction or LARGEST
     caps = Caps(
@@ -162,6 +169,12 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
     )
     entry = correction_entry(made, robot, caps) | {'way': way(made, model)}
     entry['notes'] += not_told(content)
+    if args.tolerance:
+        size, noise = (
+            quantity(text, ('mm', 'm', 'um'), option)
+            for text, option in ((args.tolerance, '--tolerance'), (args.noise or NOISE, '--noise'))
+        )
+        entry['tolerance'] = tolerance_entry(made, model, size, noise)
     inputs = [hashed('program', args.what), hashed('model', args.model)]
     entry['inputs'] = [item.as_dict() for item in inputs]
     with output(args, RESULT) as place:
@@ -169,6 +182,7 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
         write_text(place / PAGE, correction_page(entry, inputs))
         _write_entry(place, entry)
     print(f'{Path(args.out) / program.sources[0].name}: {headline(entry)}')
+    print(*tolerance_told(entry), sep='\n', end='\n' if args.tolerance else '')
     _tell(entry)
     print(f'report: {Path(args.out) / PAGE}')
     return 0

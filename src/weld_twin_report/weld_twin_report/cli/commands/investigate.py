@@ -3,7 +3,8 @@
 """Diagnose, say what to measure next, until it is decided.
 
 Before anything is measured, --tolerance plans the first measurement: how many postures, which, and
-how sure one will be; DIR gets them with a table to fill in. Begin with DIR and recordings; --robot
+how sure one will be; DIR gets them with a table to fill in. With --model it plans what to measure on
+top of a diagnosis, in a --region or in the whole reach. Begin with DIR and recordings; --robot
 and --budget belong to the beginning. Record the experiment that it asks for (experiment.yaml), and go
 on with DIR and the new bag. DIR alone tells where it stands. It ends when the cause is sure, when the
 budget is spent, or when nothing would part what is left, and says which.
@@ -28,6 +29,7 @@ from weld_twin_nodes.cli.program_options import (
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.arrays import Array
     from weld_twin_msgs_py.programs import Context
     from weld_twin_nodes.offline.measurement_plan import Planned
 
@@ -83,6 +85,10 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     add('--seconds', 'S', text, type=float, rare=True)
     text = 'every joint turns so far to either side of a usual posture (default: 75)'
     add('--spread', 'DEG', text, type=float, rare=True)
+    add('--model', 'FILE', 'diagnosis.json: plan what to measure on top of it')
+    text = 'where the tool is to be sure, with --model: a program, a bag, or a box X,Y,Z:X,Y,Z (corners '
+    text += 'in the base frame, mm); the whole reach unless told'
+    add('--region', 'R', text)
     add('--out', 'FOLDER', 'where the plan goes, instead of DIR', rare=True)
 
 
@@ -92,7 +98,11 @@ def run(args: argparse.Namespace) -> int:
 
     if args.tolerance is not None:
         return _planned(args)
-    refuse(args, (*PLAN, 'out'), 'is of a plan; say with --tolerance what it is for')
+    refuse(
+        args,
+        (*PLAN, 'out', 'model', 'region'),
+        'is of a plan; say with --tolerance what it is for',
+    )
     if args.directory is None:
         raise DataError('give DIR, the folder of the investigation, or plan with --tolerance')
     return _investigated(args)
@@ -103,7 +113,7 @@ def _planned(args: argparse.Namespace) -> int:
     from math import radians
 
     from weld_twin_core.errors import DataError
-    from weld_twin_nodes.offline.measurement_plan import plan_table, planned
+    from weld_twin_nodes.offline.measurement_plan import plan_table
 
     refuse(args, ('live', 'budget', 'changed'), 'is of an investigation, not of a plan')
     if args.bags:
@@ -123,12 +133,82 @@ def _planned(args: argparse.Namespace) -> int:
     if not (0.0 < how['seconds'] <= 3600.0 and 0.0 < minutes <= 10_000.0):
         raise DataError('--minutes and --seconds must be above zero')
     how |= {'noise': how['noise'] * 1e-3, 'spread': radians(how['spread'])}
+    if args.region and not args.model:
+        raise DataError('--region says where a fitted model is to be sure; give it with --model')
     robot, tolerance = robot_of(args), args.tolerance * 1e-3
-    plan = planned(robot, tolerance, **how)
+    plan = (_more if args.model else _first)(args, robot, tolerance, how)
     print('\n'.join(plan_table(plan, tolerance)))
     if args.out:
         _write_plan(args, robot, plan, how['seconds'])
     return 0
+
+
+def _first(
+    args: argparse.Namespace, robot: Robot, tolerance: float, how: dict[str, Any]
+) -> Planned:
+    """Return the plan of a first measurement."""
+    from weld_twin_core.diagnosis.predicting.planned import plan_stations
+    from weld_twin_nodes.offline.measurement_plan import planned
+
+    given = (tolerance, how['noise'], how['spread'])
+    return planned(
+        robot,
+        lambda count: plan_stations(robot, count, *given),
+        how['minutes'],
+        how['seconds'],
+        how['postures'],
+    )
+
+
+def _more(
+    args: argparse.Namespace, robot: Robot, tolerance: float, how: dict[str, Any]
+) -> Planned:
+    """Return the plan of what to measure on top of a diagnosis, and say how sure it is so far."""
+    from weld_twin_core.diagnosis.predicting.planned import Wanted, plan_more
+    from weld_twin_core.effects.setup_motion import of_the_robot
+    from weld_twin_core.errors import DataError
+    from weld_twin_core.twin.twin import Twin
+    from weld_twin_msgs_py.files.diagnosis_model import load_model
+    from weld_twin_msgs_py.files.posterior_entry import read_posterior
+    from weld_twin_nodes.offline.measurement_plan import planned
+    from weld_twin_nodes.offline.region import anywhere
+
+    posterior, fitted = read_posterior(robot, args.model), load_model(robot, args.model)
+    if posterior is None:
+        raise DataError(
+            f"the diagnosis '{args.model}' does not say how sure it is; diagnose again"
+        )
+    twin = Twin(fitted.robot, of_the_robot(fitted.effects))
+    postures = _in_region(args, robot) if args.region else anywhere(robot, how['spread'])
+    wanted = Wanted(tolerance, how['noise'])
+    plan = planned(
+        robot,
+        lambda count: plan_more(posterior, twin, postures, count, wanted),
+        how['minutes'],
+        how['seconds'],
+        how['postures'],
+        least=1,
+        offered=len(postures[1]),
+    )
+    where = f"in the region '{args.region}'" if args.region else 'elsewhere in its reach'
+    print(
+        f'so far the corrected robot may be off by {plan.sigma[0] * 1e3:.2g} mm {where} '
+        '(one standard deviation)'
+    )
+    return plan
+
+
+def _in_region(args: argparse.Namespace, robot: Robot) -> tuple[Array, Array]:
+    """Return the postures of --region."""
+    from weld_twin_msgs_py.programs.languages import language_of
+    from weld_twin_msgs_py.programs.source import read_source
+    from weld_twin_nodes.offline.region import region
+
+    language = ''
+    if Path(args.region).is_file():
+        language = language_of(read_source(args.region), args.region, args.controller or '')
+    context = context_of(args, robot, language or args.controller or 'csv')
+    return region(robot, args.region, context, language)
 
 
 def _write_plan(args: argparse.Namespace, robot: Robot, plan: Planned, seconds: float) -> None:
@@ -144,7 +224,8 @@ def _write_plan(args: argparse.Namespace, robot: Robot, plan: Planned, seconds: 
         if args.controller:
             lines = _program(args, context, folder / STATIONS, out, 'measure', seconds)
     print('\n'.join([f'stations: {out / STATIONS}', f'table to fill in: {out / TABLE}', *lines]))
-    if not np.array_equal(context.controller.mix, np.eye(robot.n)):
+    counted = np.array_equal(context.controller.mix, np.eye(robot.n))
+    if not counted and not context.controller.external:
         print('J3 counts from the ground there: import the table with --coupled 3+2')
 
 

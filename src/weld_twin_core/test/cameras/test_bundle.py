@@ -1,0 +1,85 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Images made by a pinhole written out here become the poses they were made of."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.bundle import adjusted
+from weld_twin_core.cameras import Camera, Lens, Sightings, Target
+from weld_twin_core.errors import DataError
+
+FOCAL, CENTRE = 1500.0, np.array([900.0, 600.0])
+BOARD = np.array([[c, r, 0.0] for r in range(4) for c in range(6)]) * 0.03
+LENS = Lens([FOCAL, FOCAL], CENTRE, [])
+
+
+def board_before_camera(rng):
+    """Return poses of the board in the camera, some metre away, leant to all sides."""
+    out = np.tile(np.eye(4), (14, 1, 1))
+    out[:, :3, :3] = Rotation.from_rotvec(rng.uniform(-0.6, 0.6, (14, 3))).as_matrix()
+    out[:, :3, 3] = rng.uniform([-0.25, -0.2, 0.8], [0.1, 0.1, 1.2], (14, 3))
+    return out
+
+
+def seen(poses, lens=LENS, mounts=('world', 'tool'), noise=None):
+    there = BOARD @ np.swapaxes(poses[:, :3, :3], 1, 2) + poses[:, None, :3, 3]
+    pixel = (FOCAL * there[..., :2] / there[..., 2:] + CENTRE).reshape(-1, 2)
+    if noise is not None:
+        pixel = pixel + noise
+    count = len(BOARD)
+    image, none = np.repeat(np.arange(len(poses)), count), np.zeros(len(poses) * count, int)
+    target = Target('board', tuple(map(str, range(count))), BOARD, mounts[1], 5e-5)
+    return Sightings(
+        (Camera('eye', lens, mounts[0]),),
+        (target,),
+        np.arange(float(len(poses))),
+        image,
+        none,
+        none,
+        np.tile(np.arange(count), len(poses)),
+        pixel,
+    )
+
+
+@pytest.mark.parametrize('mounts', [('world', 'tool'), ('tool', 'world')])
+def test_images_become_poses_of_what_is_on_the_tool(mounts):
+    poses = board_before_camera(np.random.default_rng(2))
+    found = adjusted(seen(poses, mounts=mounts)).measured
+    truth = poses if mounts[0] == 'world' else np.linalg.inv(poses)
+    np.testing.assert_allclose(found.position, truth[:, :3, 3], atol=1e-6)
+    np.testing.assert_allclose(found.rotation, truth[:, :3, :3], atol=1e-6)
+
+
+def test_poses_are_as_sure_as_they_are_told_to_be():
+    rng = np.random.default_rng(3)
+    poses = board_before_camera(rng)
+    off = []
+    for _ in range(4):
+        found = adjusted(seen(poses, noise=rng.normal(0.0, 0.2, (14 * len(BOARD), 2)))).measured
+        turned = (
+            Rotation.from_matrix(found.rotation) * Rotation.from_matrix(poses[:, :3, :3]).inv()
+        )
+        error = np.hstack([found.position - poses[:, :3, 3], turned.as_rotvec()])
+        known = np.linalg.inv(found.noise.covariance)
+        assert (found.noise.covariance[:, 2, 2] > 10.0 * found.noise.covariance[:, 0, 0]).all()
+        # What all images share is fitted along with the arm, and so it is here.
+        change = found.common.change
+        normal = np.einsum('mcz,mcd,mdy->zy', change, known, change) + np.eye(change.shape[2])
+        right = np.einsum('mcz,mcd,md->z', change, known, error)
+        left = error - change @ np.linalg.solve(normal, right)
+        off.append(np.einsum('mi,mij,mj->m', left, known, left).mean())
+    # Six coordinates of each pose, of which what is shared takes a few.
+    assert 0.7 < np.mean(off) / 6.0 < 1.15
+
+
+def test_a_lens_that_is_one_per_cent_off_is_found_out():
+    poses = board_before_camera(np.random.default_rng(2))
+    found = adjusted(seen(poses, lens=Lens([1.01 * FOCAL] * 2, CENTRE, [])))
+    assert found.lenses[0].focal == pytest.approx([FOCAL] * 2, rel=5e-4)
+
+
+def test_what_hangs_on_the_same_side_tells_nothing_of_the_arm():
+    with pytest.raises(DataError, match='both on the tool'):
+        seen(board_before_camera(np.random.default_rng(2)), mounts=('tool', 'tool'))

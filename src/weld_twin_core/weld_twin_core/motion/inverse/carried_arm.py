@@ -1,0 +1,181 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""An arm that is carried, or whose workpiece is moved, by joints that are told beforehand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...arm.chain import forward
+from ...arm.robot import Robot
+from ...arrays import Array
+from ...errors import DataError
+from .all_branches import solve
+from .along_path import PathSolution, solve_path
+from .newton import polish
+
+
+def rest(robot: Robot) -> Array:
+    """Return where a positioner stands of which nothing is told: at zero, or nearest, (behind,)."""
+    return np.clip(
+        np.zeros(robot.behind), *(v[: robot.behind] for v in (robot.lower, robot.upper))
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedArm:
+    """
+    A robot whose first joints are told, as a controller is told its external axes.
+
+    Inverse kinematics is that of the arm behind them, with its base where they put it.
+
+    Attributes
+    ----------
+    robot : Robot
+    count : int
+        Joints that are told: those of a positioner, and the first ones of the robot itself.
+
+    Raises
+    ------
+    DataError
+        A joint of the positioner is not told, or no joint is left.
+
+    """
+
+    robot: Robot
+    count: int
+
+    def __post_init__(self) -> None:
+        if not self.robot.behind <= self.count < self.robot.n:
+            raise DataError(
+                f'robot {self.robot.name!r} needs positions of the {self.robot.behind} joints of '
+                f'its positioner, and one joint left; {self.count} joints are told'
+            )
+
+    @cached_property
+    def arm(self) -> Robot:
+        """Return the arm alone; its base is where its rows begin."""
+        if not self.count:
+            return self.robot
+        turn = np.eye(3) if self._track is None else self._slid(np.zeros(self.count))[:3, :3]
+        return self.robot.part(
+            range(self.count, self.robot.n),
+            T_world_base=np.eye(4),
+            gravity=turn.T @ self.robot.gravity,
+            controller=None,
+        )
+
+    @cached_property
+    def _track(self) -> Robot | None:
+        first = self.robot.behind
+        if self.count == first:
+            return None
+        still = {'T_world_base': np.eye(4), 'T_flange_tool': np.eye(4), 'controller': None}
+        return self.robot.part(range(first, self.count), **still)
+
+    def _slid(self, told: Array) -> Array:
+        """Return the arm's base where the robot's own rows begin, shape (..., 4, 4)."""
+        if self._track is None:
+            return np.eye(4)
+        return forward(self._track, told[..., self.robot.behind :])
+
+    def feet(self, told: Array) -> Array:
+        """
+        Return where the base of the arm is in the frame that the chain begins in.
+
+        Parameters
+        ----------
+        told : array, shape (..., count) [rad or m]
+
+        Returns
+        -------
+        array, shape (..., 4, 4) [m]
+
+        """
+        if not self.count:
+            return np.broadcast_to(np.eye(4), (*told.shape[:-1], 4, 4))
+        return np.asarray(self.roots(told) @ self._slid(told))
+
+    def roots(self, told: Array) -> Array:
+        """
+        Return where the robot's own rows begin in the frame that the chain begins in.
+
+        Parameters
+        ----------
+        told : array, shape (..., count) [rad or m]
+
+        Returns
+        -------
+        array, shape (..., 4, 4) [m]
+
+        """
+        robot = self.robot
+        if not robot.behind:
+            return np.broadcast_to(robot.T_world_base, (*told.shape[:-1], 4, 4))
+        table = forward(robot.branches[0], told[..., : robot.behind][..., ::-1])
+        return np.asarray(np.linalg.inv(table) @ robot.T_root_base)
+
+    def seen(self, poses: Array, told: Array) -> Array:
+        """
+        Return poses as the arm's base sees them, shape (..., 4, 4).
+
+        Parameters
+        ----------
+        poses : array, shape (..., 4, 4)
+            In the frame that the chain begins in.
+        told : array, shape (..., count) [rad or m]
+
+        """
+        return np.asarray(np.linalg.inv(self.feet(told)) @ poses) if self.count else poses
+
+    def whole(self, told: Array, q: Array) -> Array:
+        """Return positions (..., n) of all joints, of those told (..., count) and of the arm."""
+        if not self.count:
+            return q
+        told = np.broadcast_to(told, (*q.shape[:-1], self.count))
+        return np.concatenate([told, q], axis=-1)
+
+    def solve(self, pose: Array, told: Array, seed: Array | None = None) -> Array:
+        """
+        Return every posture that reaches a pose, shape (K, n), as `solve` does.
+
+        Parameters
+        ----------
+        pose : array, shape (4, 4)
+        told : array, shape (count,)
+        seed : array, shape (n,), optional
+
+        """
+        seed = None if seed is None else seed[self.count :]
+        return self.whole(told, solve(self.arm, self.seen(pose, told), seed))
+
+    def solve_path(self, poses: Array, told: Array, seed: Array | None = None) -> PathSolution:
+        """
+        Return the arm's own joints along a path, as `solve_path` does.
+
+        Parameters
+        ----------
+        poses : array, shape (N, 4, 4)
+        told : array, shape (N, count)
+        seed : array, shape (n,), optional
+
+        """
+        seed = None if seed is None else seed[self.count :]
+        return solve_path(self.arm, self.seen(poses, told), seed)
+
+    def polish(self, q: Array, poses: Array) -> tuple[Array, Array]:
+        """
+        Return joint positions closed onto poses by the arm, and the error left, as `polish` does.
+
+        Parameters
+        ----------
+        q : array, shape (N, n)
+        poses : array, shape (N, 4, 4)
+
+        """
+        told = q[..., : self.count]
+        found, error = polish(self.arm, q[..., self.count :], self.seen(poses, told))
+        return self.whole(told, found), error

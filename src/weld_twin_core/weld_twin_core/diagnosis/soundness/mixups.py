@@ -224,7 +224,7 @@ def _framed(
     shot: Snapshot, model: Model, more: frozenset[str], before: float, left: float
 ) -> Finding:
     if more == {'base'} and shot.robot.behind:
-        return _fixture(shot.robot, model.bases, _falls(before, left))
+        return _fixture(shot.robot, model.bases, falls(before, left))
     turn = _turned(shot.robot.T_world_base, model.bases[0]) if more == {'base'} else None
     if turn is not None:
         return _base(shot.robot, turn, falls(before, left))
@@ -266,7 +266,7 @@ def _base(robot: Robot, turn: Array, told: str) -> Finding:
     )
 
 
-def _fixture(robot: Robot, bases: Sequence[Array], falls: str) -> Finding:
+def _fixture(robot: Robot, bases: Sequence[Array], told: str) -> Finding:
     """Return the mistake that poses were measured in another frame of the workpiece than was given."""
     seen = [np.asarray(np.linalg.inv(base)) for base in bases]
     steps = [np.asarray(robot.T_world_base @ pose) for pose in seen]
@@ -279,7 +279,7 @@ def _fixture(robot: Robot, bases: Sequence[Array], falls: str) -> Finding:
     words = (
         f'The poses{which} were measured in the frame of another fixture than was given: on the '
         f'positioner it lies {length(far[k])} from there, turned by {angle:.1f} degrees; with it, '
-        f'{falls}.'
+        f'{told}.'
     )
     remedy = (
         "Give the frame of the fixture that was measured on (of a robot file 'tool' of the "

@@ -53,7 +53,7 @@ class BasePose(FrameError):
         new = transform(rotation_matrix(step[3:]) @ now[:3, :3], now[:3, 3] + step[:3])
         return (
             'Correct the frame on the workpiece: on the positioner it lies at '
-            f'{placed(np.linalg.inv(new))} in place of {placed(np.linalg.inv(now))}. If it was right '
+            f'{placed(np.array(np.linalg.inv(new)))} in place of {placed(np.array(np.linalg.inv(now)))}. If it was right '
             'when it was measured, the fixture has moved, or another one is there.'
         )
 

@@ -288,13 +288,13 @@ def test_what_is_refused_says_why_and_does_not_reach_the_controller(planner):
 
 
 def test_a_goal_is_cancelled_and_another_takes_its_place(planner):
-    handle, _ = planner.send(planner.goal(sway(4.0)))
+    handle, _ = planner.send(planner.goal(sway(40.0)))  # it runs still, however late the cancel
     asked = handle.cancel_goal_async()
     planner.cell.wait(asked.done, 'the cancel')
     assert len(asked.result().goals_canceling) == 1
     assert planner.result(handle).status == 5
     planner.to(HOME)
-    first, _ = planner.send(planner.goal(sway(4.0)))
+    first, _ = planner.send(planner.goal(sway(40.0)))
     second, _ = planner.send(planner.goal(sway(1.0)))
     ended = planner.result(first)
     assert (ended.status, ended.result.error_string) == (6, 'preempted')

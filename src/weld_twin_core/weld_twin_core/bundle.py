@@ -257,12 +257,12 @@ class _Point:
         """Return the place a damped step away."""
         own = self.reduced
         held = own.normal + np.diag(1.0 + damping * np.diag(own.normal))
-        step = np.linalg.solve(held, own.rest - self.state.unknowns)
+        step = np.asarray(np.linalg.solve(held, own.rest - self.state.unknowns), dtype=float)
         square = _swap(own.roots) @ own.roots
         each = np.einsum('mii->mi', square)
         square = square + damping * each[:, :, None] * np.eye(6)
         right = _times(_swap(own.roots), own.right - own.shared @ step)
-        tool = np.linalg.solve(square, right[..., None])[..., 0]
+        tool = _solved(square, right)
         return _Point.at(self.state.moved(step, tool), self.weight)
 
 
@@ -417,9 +417,9 @@ def _told(point: _Point, noise: float) -> Adjusted:
     moved = own.shared @ unit
     _, strength, kept = np.linalg.svd(moved.reshape(-1, moved.shape[2]), full_matrices=False)
     kept = kept[strength > SHOWN]
-    pose = _stepped(state.tool, np.linalg.solve(own.roots, own.right[..., None])[..., 0])
+    pose = _stepped(state.tool, _solved(own.roots, own.right))
     change = np.linalg.solve(own.roots, moved @ kept.T)
-    said = PoseNoise.of(np.linalg.inv(_swap(own.roots) @ own.roots))
+    said = PoseNoise.of(np.asarray(np.linalg.inv(_swap(own.roots) @ own.roots), dtype=float))
     measured = Measurements(
         state.seen.t,
         pose[:, :3, 3],
@@ -443,6 +443,11 @@ def _of_tool(
 
 def _times(matrix: Array, vector: Array) -> Array:
     return np.asarray((matrix @ vector[..., None])[..., 0])
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    """Return what every matrix (M, c, c) makes the right-hand side (M, c) of, (M, c)."""
+    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0], dtype=float)
 
 
 def _swap(matrix: Array) -> Array:

@@ -14,7 +14,7 @@ BENT = JointCurve('elbow_joint', (1e-3, -4e-4, 0.0, -4e-4, 1e-3), (-1, -0.5, 0, 
 
 
 pytestmark = pytest.mark.xfail(
-    reason='the calibration of today holds a ripple for likelier than not here (0.58), not sure'
+    reason='the calibration of today holds a ripple for likelier than not here (0.72), not sure'
 )
 
 

@@ -54,10 +54,9 @@ def _on(name: str, url: str, cells: int, diagnoses: int) -> list[Row]:
     rows = [Row(name, 'fill', _longest(lambda: fill(database, cells, diagnoses), 1), False)]
     long = list(made(cells, 2000))
     database.write(lambda connection: [database.put(connection, LONG, entry) for entry in long])
-    looks = _longest(lambda: [runs.look(cell) for cell in database.cells()[: cells // 10]], 1)
-    rows.append(
-        Row(name, 'what changed on a cell, once a diagnosis', looks / (cells // 10), False)
-    )
+    some = database.cells()[: max(cells // 10, 1)]
+    looks = _longest(lambda: [runs.look(cell) for cell in some], 1)
+    rows.append(Row(name, 'what changed on a cell, once a diagnosis', looks / len(some), False))
     rows += [
         Row(name, 'all cells', _longest(lambda: ranking_page(database, str))),
         Row(name, 'a cell', _longest(lambda: cell_page(database, 'line 002'))),

@@ -162,7 +162,7 @@ def _points(entry: Any) -> dict[str, Any]:
 
 def _of_table(name: str, path: Path, mount: str) -> Target:
     cells = read_cells(path, None, None)
-    columns = {}
+    columns: dict[str, str] = {}
     for column in cells.header:
         first = column.lower().replace('[', ' ').split()[0] if column.strip() else ''
         if first in AXES:

@@ -60,6 +60,16 @@ def test_a_change_smaller_than_the_noise_is_noticed_in_half_a_minute(kind):
     assert 'the mean of the last' in why
 
 
+def test_a_wrong_model_that_was_learned_with_much_noise_is_noticed_whichever_way_it_is_off():
+    """A steady instrument, and an arm that is off by as much everywhere, in every direction."""
+    rng = np.random.default_rng(9)
+    turn = np.arange(10 * int(RATE)) / RATE
+    way = np.column_stack([np.cos(turn), np.sin(turn), np.cos(0.7 * turn)]) / np.sqrt(1.5)
+    count, why = noticed(3.3e-4 * way + 0.1 * white(rng, turn.size), unsure=3.4e-5)
+    assert count <= 10 * RATE
+    assert 'the medians of the last' in why
+
+
 def test_a_large_change_is_noticed_at_once():
     rng = np.random.default_rng(5)
     calm = white(rng, 500)

@@ -133,7 +133,7 @@ class Controller(Node):
         end = float(goal.t[-1])
         beat = np.append(np.arange(0.0, end, TICK * self._pace), end)
         more = np.zeros(0) if self._beside is None else self._beside(goal)
-        return np.union1d(beat, more)[::-1].tolist()
+        return [float(t) for t in np.union1d(beat, more)[::-1]]
 
     def _look(self) -> None:
         """Go on, and tell where the arm is."""

@@ -168,7 +168,7 @@ class Compensator(ManagedNode):
         self._intake = Intake(self.robot, joint_names=self.joint_names, mend=True)
         self._arm = ArmState()
         self._around: tuple[Any, float | None] = (None, None)
-        self._streamed = self._around
+        self._streamed: tuple[Any, float | None] = self._around
         self._model: LoadedModel | None = None
         self._active = False
         self._told, self._looked_at, self._outdated = '', -np.inf, ''

@@ -138,7 +138,7 @@ def looking_at(place, aim):
     return out
 
 
-def cell(folder, *, zeros, side=0.025, mirrored=False, names=None, count=40):
+def cell(folder, *, zeros, side=0.025, mirrored=False, names=None, told=1.0, count=40):
     """Write a table of what two fixed cameras saw of a board on the tool, and its files."""
     rng = np.random.default_rng(3)
     middle = np.array([0.2, 0.35, 0.4, 0.3, 0.9, 0.2])
@@ -163,12 +163,13 @@ def cell(folder, *, zeros, side=0.025, mirrored=False, names=None, count=40):
                     own = (names or {}).get(name, name)
                     angles = (f'{value:.7f}' for value in q[k])
                     lines.append(','.join((str(k), own, str(at), f'{u:.3f}', f'{v:.3f}', *angles)))
+        fx, fy, cx, cy = numbers
         info = {
             'camera_name': name,
             'camera_matrix': {
                 'rows': 3,
                 'cols': 3,
-                'data': [numbers[0], 0.0, numbers[2], 0.0, numbers[1], numbers[3], 0.0, 0.0, 1.0],
+                'data': [fx * told, 0.0, cx, 0.0, fy * told, cy, 0.0, 0.0, 1.0],
             },
             'distortion_model': 'plumb_bob',
             'distortion_coefficients': {'rows': 1, 'cols': 5, 'data': list(bent)},
@@ -214,11 +215,12 @@ def test_mistakes_with_cameras_are_named(tmp_path, weld_twin):
     for kind, mistake in (
         ('target_scale', {'side': 0.98 * 0.025}),
         ('target_mirrored', {'mirrored': True}),
+        ('intrinsics', {'told': 1.08}),
         ('cameras_swapped', {'names': {'left': 'right', 'right': 'left'}}),
     ):
         folder = tmp_path / kind
         folder.mkdir()
-        robot = cell(folder, zeros=zeros, count=25, **mistake)
+        robot = cell(folder, zeros=zeros, count=16, **mistake)
         _, found = diagnosed(folder, robot, weld_twin)
         assert found['verdict']['status'] == 'unsound'
         assert [entry['kind'] for entry in found['unsound']] == [kind]

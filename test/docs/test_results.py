@@ -13,8 +13,8 @@ import pytest
 from weld_twin_nodes.cli.main import parser_of, renamed
 
 RESULTS = Path(__file__).parents[2] / 'docs/results'
-LARGE, ALL = 100_000, 3_000_000
-"""Bytes of the largest file that is kept, and of all."""
+LARGE, ALL = 100_000, 2_200_000
+"""Bytes of the largest file that is kept, and of all, but for what is learned from."""
 LEARNED = 'belief/cases.jsonl.gz'
 """The statements that the calibration is learned from; the only file that is larger."""
 MADE = (RESULTS / 'SHA256SUMS').read_text(encoding='utf-8')
@@ -26,7 +26,8 @@ def test_what_is_kept_is_small():
         for file in RESULTS.rglob('*')
         if file.is_file()
     }
-    assert [name for name, size in sizes.items() if size > LARGE] == [LEARNED]
+    assert sizes.pop(LEARNED)
+    assert [name for name, size in sizes.items() if size > LARGE] == []
     assert sum(sizes.values()) < ALL
 
 

@@ -32,6 +32,7 @@ PACKAGES = [
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
 MODULES = {
     'PyYAML': 'yaml',
+    'opencv-python-headless': 'cv2',
     'urdf-parser-py': 'urdf_parser_py',
     'pin': 'pinocchio',
     'SALib': 'SALib',

@@ -11,7 +11,8 @@ from own_arm import Arm, frame, measured, model, motion, stations
 from scipy.spatial.transform import Rotation
 
 import weld_twin_core as wt
-from weld_twin_core.diagnosis.soundness import Given, examine
+from weld_twin_core.diagnosis.soundness.gate import examine
+from weld_twin_core.diagnosis.soundness.mending import Given
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.robots import write_robot_yaml
 from weld_twin_nodes.cli import main

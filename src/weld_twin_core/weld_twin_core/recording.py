@@ -454,6 +454,20 @@ class Recording:
         first, last = (self.epoch_ns + end for end in ends)
         return first, last
 
+    @property
+    def seen(self) -> Measurements:
+        """Return what was measured; `DataError` where nothing was."""
+        if self.measured is None:
+            raise DataError(f'{self.name} holds no measured poses or points')
+        return self.measured
+
+    @property
+    def touched(self) -> Contacts:
+        """Return the contacts; `DataError` where there are none."""
+        if self.contacts is None:
+            raise DataError(f'{self.name} holds no contacts')
+        return self.contacts
+
     def with_measured(self, measured: Measurements | None) -> Recording:
         """
         Return the recording with other measurements beside the same motion.

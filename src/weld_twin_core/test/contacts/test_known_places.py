@@ -11,8 +11,7 @@ import weld_twin_core as wt
 from weld_twin_core.arm.reaching import reaching
 from weld_twin_core.arm.rotation import rotation_matrix
 from weld_twin_core.contacts import Artefact, Contacts, lengths, places
-from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_core.diagnosis.frames.places import not_told
+from weld_twin_core.diagnosis.frames.aligned import aligned, not_told
 from weld_twin_core.errors import DataError
 
 SIZE = [0.3, 0.24, 0.2]

@@ -18,9 +18,8 @@ from weld_twin_core.diagnosis.hypotheses.rivals import Rival
 from weld_twin_core.diagnosis.many.weighed_families import WeighedFamily
 from weld_twin_core.diagnosis.result import Site
 from weld_twin_core.diagnosis.unseen.leftover_structure import Structure
-from weld_twin_core.diagnosis.verdict.decision import decide
+from weld_twin_core.diagnosis.verdict.decision import Left, decide
 from weld_twin_core.diagnosis.verdict.evidence import Evidence
-from weld_twin_core.diagnosis.verdict.left import Left
 
 ELBOW, WRIST = 'elbow_joint', 'wrist_1_joint'
 PLAY, OFFSET = Site('backlash', ELBOW), Site('joint_offset', WRIST)

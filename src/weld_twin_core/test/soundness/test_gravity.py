@@ -10,7 +10,8 @@ from measured_cells import recorded, stations
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.rotation import transform
-from weld_twin_core.diagnosis.soundness import Given, examine
+from weld_twin_core.diagnosis.soundness.gate import examine
+from weld_twin_core.diagnosis.soundness.mending import Given
 
 G = 9.80665
 CEILING, WALL = (Rotation.from_euler('x', angle, degrees=True).as_matrix() for angle in (180, 90))

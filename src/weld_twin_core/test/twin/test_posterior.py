@@ -192,3 +192,21 @@ def test_drawn_models_have_the_covariance_told_and_are_off_alike_along_a_path():
     of_frames = posterior(robot, what, frames)
     assert np.abs(of_frames.drawn(seen, framed=False)).max() == 0.0
     assert np.abs(of_frames.drawn(seen)).max() > 1e-3
+
+
+def test_a_motion_to_come_is_not_late_by_the_clock_of_the_instrument():
+    robot = load('ur5')
+    effects = (
+        REGISTRY['joint_offset'](robot.joint_names[1], 1e-3),
+        REGISTRY['time_delay'](0.0),
+        REGISTRY['joint_offset'](robot.joint_names[2], 0.0),
+    )
+    what = Directions((), 1, effects)
+    late = posterior(robot, what, np.diag([1e-8, 1e-4, 4e-8]))
+    t = np.linspace(0.0, 1.0, 51)
+    moving = Recording('m', JointMotion(t, np.outer(np.sin(3.0 * t), np.ones(6))))
+    seen = Features(Twin(robot, effects), moving, t)
+    bare = posterior(robot, Directions((), 1, effects[::2]), np.diag([1e-8, 4e-8]))
+    told = late.without_clocks().pose_covariance(seen)
+    np.testing.assert_allclose(told, bare.pose_covariance(seen), rtol=1e-9, atol=1e-18)
+    assert np.trace(late.pose_covariance(seen)[0, :3, :3]) > 100.0 * np.trace(told[0, :3, :3])

@@ -16,9 +16,9 @@ from .algebra.problem import frames_named
 from .answer.answer import answer, refusal
 from .beliefs import Beliefs
 from .calibration.calibrated import stated
+from .frames.aligned import not_told
 from .frames.changes import families_named, settled_between
 from .frames.open_directions import held
-from .frames.places import not_told
 from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
 from .hypotheses.structural_aliases import with_structural_aliases
@@ -30,14 +30,16 @@ from .posterior.table import table_of
 from .predicting.allowed import allowed
 from .predicting.alone import alone
 from .result import Diagnosis, Shrink
-from .soundness import Examined, Given, examine, refuse_reused
 from .soundness.efforts import with_sign
+from .soundness.gate import Examined, examine
+from .soundness.mending import Given
+from .soundness.repeats import refuse_reused
 from .unseen.elsewhere import borne_out
 from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
 from .unseen.leftover_structure import structure
 from .unseen.unseen_stretches import Unseen
 from .verdict.decision import LIKELIER, decide
-from .verdict.gathered_evidence import gathered
+from .verdict.evidence import gathered
 
 Progress = Callable[[str], None]
 

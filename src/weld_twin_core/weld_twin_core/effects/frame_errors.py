@@ -51,9 +51,10 @@ class BasePose(FrameError):
         """Return the same of a cell, where poses are measured in a frame that a positioner moves."""
         now, step = robot.T_world_base, self.vector()
         new = transform(rotation_matrix(step[3:]) @ now[:3, :3], now[:3, 3] + step[:3])
+        before, after = (placed(np.array(np.linalg.inv(pose))) for pose in (now, new))
         return (
             'Correct the frame on the workpiece: on the positioner it lies at '
-            f'{placed(np.linalg.inv(new))} in place of {placed(np.linalg.inv(now))}. If it was right '
+            f'{after} in place of {before}. If it was right '
             'when it was measured, the fixture has moved, or another one is there.'
         )
 

@@ -248,7 +248,8 @@ def _along(told: Array, length: float) -> Callable[..., Array]:
         return lambda s, order=0: np.broadcast_to(
             told[0] * (order == 0), (*s.shape, told.shape[1])
         )
-    return PchipInterpolator(np.linspace(0.0, length, len(told)), told)
+    course: Callable[..., Array] = PchipInterpolator(np.linspace(0.0, length, len(told)), told)
+    return course
 
 
 def _slowed(timing: Timing, factor: float) -> Timing:

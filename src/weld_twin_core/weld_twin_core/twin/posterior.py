@@ -22,7 +22,7 @@ import numpy as np
 
 from ..arm.robot import Robot
 from ..arrays import Array, readonly
-from ..effects.effect import Effect
+from ..effects.effect import Effect, Stage
 from ..errors import DataError, ModelError
 from ..recording import JointMotion, Recording, Signal
 from ..sequences import halton
@@ -308,6 +308,22 @@ class Posterior:
         ways = np.column_stack([self.factor, self.mean])
         moved = np.tensordot(ways, self._columns(features, setup), axes=(0, 0))
         return moved, self.discrepancy.covariance(*_levers(self.domain, features))
+
+    def without_clocks(self) -> Posterior:
+        """Return how sure poses of a motion to come are, whose place nobody stamps."""
+        what = self.directions
+        stays = [effect.stage is not Stage.CLOCK for effect in what.effects]
+        own = np.repeat(stays, what.sizes).astype(bool)
+        curves = sum(k.size for k in what.knots)
+        keep = np.concatenate([np.ones(what.frame_count, bool), own, np.ones(curves, bool)])
+        effects = tuple(e for e, stay in zip(what.effects, stays, strict=True) if stay)
+        return replace(
+            self,
+            directions=replace(what, effects=effects),
+            mean=self.mean[keep],
+            covariance=self.covariance[np.ix_(keep, keep)],
+            prior_std=None if self.prior_std is None else self.prior_std[keep],
+        )
 
     def after(self, features: Features, noise: float) -> Posterior:
         """

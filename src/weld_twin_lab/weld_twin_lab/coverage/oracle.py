@@ -13,7 +13,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.algebra.fit import robust_fit
-from weld_twin_core.diagnosis.frames.places import posed
+from weld_twin_core.diagnosis.frames.aligned import posed
 from weld_twin_core.effects import Effect, effects_from_list
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording

@@ -24,8 +24,9 @@ from ..blind import layout
 from ..blind.diagnosing import diagnosis_of
 from ..real_robots.unseen_stations import ALIGN
 from ..study import Parts
+from ..transfer.flags import flagged
 from ..transfer.splits import TUNED_ON, Split, all_splits
-from .held import flagged, held
+from .held import held
 from .oracle import oracle_sigma
 
 NAME, PARTS = 'coverage', 'parts'

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.diagnosis.soundness import Given, examine
+from weld_twin_core.diagnosis.soundness.gate import examine
+from weld_twin_core.diagnosis.soundness.mending import Given
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 

@@ -225,7 +225,7 @@ def controller_of(
     frames = robot.controller or controller_frames(arm)
     origin, notes = np.array(frames.base), _linked(frames)
     if told.world is not None:
-        origin = np.linalg.inv(told.world)
+        origin = np.array(np.linalg.inv(told.world))
     mix = _counting(arm, robot, language, origin, notes)
     if axes and language in LABELS:
         mix = shown_order(robot, axes) @ mix

@@ -154,7 +154,7 @@ def _sightings(
             )
         point[k] = labels[which].index(label)
     sigma = cells.numbers(columns['sigma']) if 'sigma' in columns else None
-    kept = np.isfinite(pixel).all(axis=1)
+    kept = np.asarray(np.isfinite(pixel).all(axis=1))
     whole = Sightings(
         tuple(cameras),
         tuple(targets),

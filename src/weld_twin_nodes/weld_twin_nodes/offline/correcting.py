@@ -111,6 +111,7 @@ def program_model(
         effects = of_the_robot(twin.effects)
         _refuse_by_effort(effects, path)
         posterior = read_posterior(robot, path)
+        posterior = None if posterior is None else posterior.without_clocks()
         return ProgramModel(twin.robot, tuple(effects), posterior, temperature, setup)
     twin = build_twin(robot, path, mended=True)
     _refuse_by_effort(twin.effects, path)

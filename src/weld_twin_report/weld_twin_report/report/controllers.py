@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.arrays import Array
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.root_pose import RootPose
 from weld_twin_core.effects.wording import further
@@ -225,14 +224,14 @@ def _root(effect: RootPose, brand: str, robot: Robot) -> str:
     form = _FRAMES[brand]
     world, begins = world_of(robot, form.language)
     now, new = effect.stands(robot, world)
-
-    def numbers(pose: Array) -> list[float]:
-        return form.notation.numbers(pose, [0.0] * 3 + [1.0] + [0.0] * 3)
-
-    by = numbers(np.asarray(new @ np.linalg.inv(now)))
+    zeros = [0.0] * 7
+    # The old one as near the new one as it can be written: where angles are one, any would do.
+    after = form.notation.numbers(new, zeros)
+    before = form.notation.numbers(now, after)
+    by = form.notation.numbers(np.asarray(new @ np.linalg.inv(now)), zeros)
     step = _rapid(by) if brand == 'abb' else form.words(by)
     return (
-        f'Old value {form.words(numbers(now))}; new value {form.words(numbers(new))}. '
+        f'Old value {form.words(before)}; new value {form.words(after)}. '
         f'The origin of that world is taken to be {begins}. '
         'Where the old value there is another one, the controller has the root at another place of '
         f'the positioner: then the new value is {form.moved.format(by=step)}.'

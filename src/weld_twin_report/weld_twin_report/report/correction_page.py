@@ -34,7 +34,7 @@ def correction_page(entry: Mapping[str, Any], inputs: Sequence[InputFile] = ()) 
         title,
         headline(entry),
         _figures(entry),
-        section('Tolerance', *(tag('p', sentence) for sentence in told)) if told else None,
+        section('Tolerance', sentences(told), id_='tolerance') if told else None,
         _first_run(entry),
         _left(entry),
         _outside(entry),

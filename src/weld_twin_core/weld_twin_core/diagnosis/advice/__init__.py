@@ -4,6 +4,6 @@
 
 from .actions import actions
 from .experiment import next_experiment
-from .limits import Limits
+from .postures import Limits
 
 __all__ = ['Limits', 'actions', 'next_experiment']

@@ -14,8 +14,7 @@ from ...arm.rotation import transform
 from ...arrays import Array
 from ...recording import JointMotion, Recording, Signal
 from ..algebra.problem import Model, Problem
-from .limits import Limits
-from .postures import Room
+from .postures import Limits, Room
 
 NAME = 'next measurement'
 STATIONS = 80
@@ -112,69 +111,149 @@ def candidates(
     problem: Problem, model: Model, limits: Limits, joints: Sequence[str] = ()
 ) -> Iterator[Candidate]:
     """
-    Yield what could be measured next.
+    Yield what could be measured next, beside the recordings at hand.
 
-    Parameters
-    ----------
-    problem : Problem
-        The recordings at hand.
-    model : Model
-    limits : Limits
-    joints : sequence of str
-        Those that causes in question sit on.
-
+    ``joints`` are those that causes in question sit on.
     """
-    now = replace(model, bases=model.bases[:1], found=())
-    room = Room(problem, model.robot, limits)
-    # Elsewhere than the experiments before.
-    skip = STATIONS * (len(problem.recordings) - 1)
-    spread = room.spread(STATIONS, skip)
-    still = problem.at_rest
-    if limits.set_up or not still:
-        yield _path(problem, now, room, spread, joints, ANOTHER if still else 0.0)
-    yield from _at_rest(problem, now, room, spread)
+    here = _Here(problem, replace(model, bases=model.bases[:1], found=()), limits)
+    if limits.set_up or not problem.at_rest:
+        yield here.path(joints)
+    yield from here.at_rest()
     if limits.set_up:
         if all(r.wrench is not None for r in problem.recordings):
-            yield _pressed(problem, now, room, spread)
-        yield _warm_up(problem, now, room, spread)
-        yield from _changed(problem, now, room, spread)
+            yield here.pressed()
+        yield here.warm_up()
+        yield from here.changed()
 
 
-def _path(
-    problem: Problem,
-    now: Model,
-    room: Room,
-    spread: Array,
-    joints: Sequence[str],
-    set_up: float,
-) -> Candidate:
-    """Return ways from home and back: all joints at once, seams, and joints in question alone."""
-    motions, at = [], 0
-    for k in range(PATHS):
-        stops = [room.home]
-        while len(stops) < 4 and at < len(spread):
-            if room.way([stops[-1], spread[at]]):
-                stops.append(spread[at])
-            at += 1
-        if len(stops) > 1:
-            # Back the same way: every place is passed in both directions.
-            motions.append(room.travel([*stops, *stops[-2::-1]], SPEEDS[k % 3]))
-    motions += _retraced(problem, room)
-    together = len(motions)
-    for name in list(dict.fromkeys(joints))[:SINGLE]:
-        motions += [room.travel(_alone(room, now, name), speed) for speed in SPEEDS[::2]]
-    recordings = tuple(with_sides(problem, motion) for motion in motions)
-    pieces = tuple(Piece(k, None, float(m.t[-1])) for k, m in enumerate(motions))
-    return Candidate(
-        'path',
-        'Run the proposed path, and record joints and tool all the way.',
-        set_up,
-        recordings,
-        pieces,
-        now,
-        room,
-        alone=len(motions) - together,
-    )
+class _Here:
+    """The cell as it is: the recordings at hand, the model, and postures to choose from."""
+
+    def __init__(self, problem: Problem, model: Model, limits: Limits) -> None:
+        self.problem, self.model = problem, model
+        self.room = Room(problem, model.robot, limits)
+        # Elsewhere than the experiments before.
+        skip = STATIONS * (len(problem.recordings) - 1)
+        self.spread = self.room.spread(STATIONS, skip)
+
+    def path(self, joints: Sequence[str]) -> Candidate:
+        """Return ways from home and back: all joints at once, seams, those in question alone."""
+        room, motions, at = self.room, [], 0
+        for k in range(PATHS):
+            stops = [room.home]
+            while len(stops) < 4 and at < len(self.spread):
+                if room.way([stops[-1], self.spread[at]]):
+                    stops.append(self.spread[at])
+                at += 1
+            if len(stops) > 1:
+                # Back the same way: every place is passed in both directions.
+                motions.append(room.travel([*stops, *stops[-2::-1]], SPEEDS[k % 3]))
+        motions += _retraced(self.problem, room)
+        together = len(motions)
+        for name in list(dict.fromkeys(joints))[:SINGLE]:
+            i = self.model.robot.index(name)
+            motions += [room.travel(_alone(room, i), speed) for speed in SPEEDS[::2]]
+        return Candidate(
+            'path',
+            'Run the proposed path, and record joints and tool all the way.',
+            ANOTHER if self.problem.at_rest else 0.0,
+            tuple(_with_sides(self.problem, motion) for motion in motions),
+            tuple(Piece(k, None, float(m.t[-1])) for k, m in enumerate(motions)),
+            self.model,
+            room,
+            alone=len(motions) - together,
+        )
+
+    def at_rest(self) -> Iterator[Candidate]:
+        """Yield stations, and stations approached from both sides."""
+        yield self._stations(
+            'stations',
+            'Measure {count} stations at rest, spread over a wider part of the workspace.',
+            self.spread,
+        )
+        few = self.spread[: len(self.spread) // 4]
+        approach = np.array([[-STEP], [0.0], [STEP], [0.0]])
+        both = np.repeat(few, 4, axis=0) + np.tile(approach, (len(few), 1))
+        yield self._stations(
+            'bidirectional',
+            'Measure {count} stations at rest, each approached from both sides of every joint.',
+            both,
+            group=4,
+        )
+
+    def pressed(self) -> Candidate:
+        """Return stations with a force on the tool."""
+        made = self._stations(
+            'press',
+            f'Measure {{count}} stations while the tool is pressed with {PRESS:g} N along x, y and '
+            'z in turn.',
+            self.spread,
+            group=3,
+            set_up=5.0,
+        )
+        force = np.zeros((len(self.spread), 6))
+        force[np.arange(len(force)), np.arange(len(force)) % 3] = PRESS
+        recording = made.recordings[0]
+        push = Signal(recording.joints.t, force)
+        pushed = replace(recording, wrench=push, wrench_frame='base')
+        whole = tuple(p for p in made.pieces if p.rows and p.rows[-1] < len(self.spread))
+        return replace(made, recordings=(pushed,), pieces=whole)
+
+    def warm_up(self) -> Candidate:
+        """Return a few stations again and again."""
+        again = np.concatenate([self.spread[:5]] * 12)
+        sentence = 'Measure five stations again and again for an hour while the arm warms up.'
+        made = self._stations('warm_up', sentence, again, len(again), seconds=SOAK, rise=RISE)
+        return replace(made, whole=True)
+
+    def changed(self) -> Iterator[Candidate]:
+        """Yield the same stations with something changed in the cell."""
+        robot, words = self.model.robot, 'Measure {count} stations'
+        kind, more = 'payload_swap', f'{words} with {MASS:g} kg more hung from the tool point.'
+        heavy = replace(robot, payload_mass=robot.payload_mass + MASS)
+        made = self._stations(kind, more, self.spread, set_up=20.0)
+        made = replace(made, model=replace(self.model, robot=heavy))
+        yield replace(made, changed=f'load={MASS:g}')
+        longer = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
+        yield replace(
+            made,
+            kind='longer_tool',
+            sentence=f'{words} with a tool {LONGER * 1e3:g} mm longer.',
+            set_up=30.0,
+            model=replace(self.model, robot=robot.with_frames(tool=longer)),
+            new_tool=True,
+            changed='tool',
+        )
+        base = transform(np.eye(3), np.array([1.5, 0.5, 0.0])) @ self.model.bases[0]
+        yield replace(
+            made,
+            kind='moved_instrument',
+            sentence=f'Move the instrument by 1.5 m. {words}.',
+            set_up=35.0,
+            model=replace(self.model, bases=(base,)),
+            new_base=True,
+            changed='instrument',
+        )
+
+    def _stations(
+        self,
+        kind: str,
+        sentence: str,
+        q: Array,
+        group: int = 1,
+        set_up: float = 0.0,
+        seconds: float = STAY,
+        rise: float = 0.0,
+    ) -> Candidate:
+        """Return stations (N, n) every so many seconds, in groups, while it grows warmer [K]."""
+        t = seconds * np.arange(len(q), dtype=np.float64)
+        made = _with_sides(self.problem, JointMotion(t, q, static=True))
+        if made.temperature is not None:
+            ramp = made.temperature.value[0] + np.linspace(0.0, rise, t.size)
+            made = replace(made, temperature=Signal(t, ramp))
+        first = range(0, len(q), group)
+        pieces = tuple(Piece(0, tuple(range(k, k + group)), seconds * group) for k in first)
+        return Candidate(kind, sentence, set_up, (made,), pieces, self.model, self.room)
 
 
 def _retraced(problem: Problem, room: Room) -> list[JointMotion]:
@@ -205,9 +284,8 @@ def _joined(*motions: JointMotion) -> JointMotion:
     return JointMotion(t, q)
 
 
-def _alone(room: Room, now: Model, name: str) -> list[Array]:
+def _alone(room: Room, i: int) -> list[Array]:
     """Return the stops of one joint that moves through its range, as far as it is free."""
-    i = now.robot.index(name)
     for share in (1.0, 0.5, 0.25, 0.1):
         ends = [room.home.copy() for _ in range(2)]
         ends[0][i] += share * (room.high[i] - room.home[i])
@@ -218,142 +296,8 @@ def _alone(room: Room, now: Model, name: str) -> list[Array]:
     return stops
 
 
-def _at_rest(problem: Problem, now: Model, room: Room, spread: Array) -> Iterator[Candidate]:
-    """Yield stations, and stations approached from both sides."""
-    yield _stations(
-        problem,
-        now,
-        room,
-        'stations',
-        'Measure {count} stations at rest, spread over a wider part of the workspace.',
-        spread,
-    )
-    few = spread[: len(spread) // 4]
-    approach = np.array([[-STEP], [0.0], [STEP], [0.0]])
-    both = np.repeat(few, 4, axis=0) + np.tile(approach, (len(few), 1))
-    yield _stations(
-        problem,
-        now,
-        room,
-        'bidirectional',
-        'Measure {count} stations at rest, each approached from both sides of every joint.',
-        np.asarray(both),
-        group=4,
-    )
-
-
-def _stations(
-    problem: Problem,
-    now: Model,
-    room: Room,
-    kind: str,
-    sentence: str,
-    q: Array,
-    group: int = 1,
-    set_up: float = 0.0,
-) -> Candidate:
-    recording = at_rest(problem, q)
-    pieces = tuple(
-        Piece(0, tuple(range(k, k + group)), STAY * group) for k in range(0, len(q), group)
-    )
-    return Candidate(kind, sentence, set_up, (recording,), pieces, now, room)
-
-
-def _warm_up(problem: Problem, now: Model, room: Room, spread: Array) -> Candidate:
-    again = np.concatenate([spread[:5]] * 12)
-    recording = at_rest(problem, again, SOAK, RISE)
-    return Candidate(
-        'warm_up',
-        'Measure five stations again and again for an hour while the arm warms up.',
-        0.0,
-        (recording,),
-        (Piece(0, tuple(range(len(again))), SOAK * len(again)),),
-        now,
-        room,
-        whole=True,
-    )
-
-
-def _pressed(problem: Problem, now: Model, room: Room, spread: Array) -> Candidate:
-    words = f'while the tool is pressed with {PRESS:g} N along x, y and z in turn.'
-    made = _stations(
-        problem, now, room, 'press', 'Measure {count} stations ' + words, spread, 3, set_up=5.0
-    )
-    force = np.zeros((len(spread), 6))
-    force[np.arange(len(force)), np.arange(len(force)) % 3] = PRESS
-    recording = made.recordings[0]
-    pushed = replace(recording, wrench=Signal(recording.joints.t, force), wrench_frame='base')
-    whole = tuple(piece for piece in made.pieces if piece.rows and piece.rows[-1] < len(spread))
-    return replace(made, recordings=(pushed,), pieces=whole)
-
-
-def _changed(problem: Problem, now: Model, room: Room, spread: Array) -> Iterator[Candidate]:
-    """Yield the same stations with something changed in the cell."""
-    robot = now.robot
-    words = 'Measure {count} stations'
-    heavy = replace(robot, payload_mass=robot.payload_mass + MASS)
-    made = _stations(
-        problem,
-        replace(now, robot=heavy),
-        room,
-        'payload_swap',
-        f'{words} with {MASS:g} kg more hung from the tool point.',
-        spread,
-        set_up=20.0,
-    )
-    yield replace(made, changed=f'load={MASS:g}')
-    longer = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
-    yield replace(
-        made,
-        kind='longer_tool',
-        sentence=f'{words} with a tool {LONGER * 1e3:g} mm longer.',
-        set_up=30.0,
-        model=replace(now, robot=robot.with_frames(tool=longer)),
-        new_tool=True,
-        changed='tool',
-    )
-    base = transform(np.eye(3), np.array([1.5, 0.5, 0.0])) @ now.bases[0]
-    yield replace(
-        made,
-        kind='moved_instrument',
-        sentence=f'Move the instrument by 1.5 m. {words}.',
-        set_up=35.0,
-        model=replace(now, bases=(base,)),
-        new_base=True,
-        changed='instrument',
-    )
-
-
-def at_rest(problem: Problem, q: Array, seconds: float = STAY, rise: float = 0.0) -> Recording:
-    """
-    Return stations every so many seconds, while it grows warmer.
-
-    Parameters
-    ----------
-    problem : Problem
-    q : array, shape (N, n) [rad, m]
-    seconds : float
-    rise : float [K]
-
-    """
-    t = seconds * np.arange(len(q), dtype=np.float64)
-    recording = with_sides(problem, JointMotion(t, q, static=True))
-    if recording.temperature is None:
-        return recording
-    ramp = recording.temperature.value[0] + np.linspace(0.0, rise, t.size)
-    return replace(recording, temperature=Signal(t, ramp))
-
-
-def with_sides(problem: Problem, joints: JointMotion) -> Recording:
-    """
-    Return a recording of a motion, as warm and as loaded as those at hand were on average.
-
-    Parameters
-    ----------
-    problem : Problem
-    joints : JointMotion
-
-    """
+def _with_sides(problem: Problem, joints: JointMotion) -> Recording:
+    """Return a recording of a motion, as warm and as loaded as those at hand were on average."""
     ends = joints.t[[0, -1]]
     warm = [r.temperature.value.mean() for r in problem.recordings if r.temperature is not None]
     load = [

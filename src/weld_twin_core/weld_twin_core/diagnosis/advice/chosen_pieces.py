@@ -14,7 +14,7 @@ from ...effects.effect import Effect
 from ...recording import JointMotion
 from ..algebra.problem import Model, Problem, Scale
 from .candidates import STAY, Candidate
-from .limits import Limits
+from .postures import Limits
 from .separation import Normals, Pair, Side, normals
 
 DECIDES = 6.0
@@ -121,17 +121,8 @@ def planned(
     """
     Return the best pieces of a measurement; None where none of them fits into the minutes.
 
-    Parameters
-    ----------
-    problem, model, alternatives, scale
-        As `separation.normals` takes them.
-    limits : Limits
-    option : Candidate
-    now : Side
-        What the alternatives say of the data at hand.
-    named : int
-        So many of the alternatives, the first ones, are named by the verdict.
-
+    The first arguments are those of `separation.normals`; ``now`` is what the alternatives say of
+    the data at hand, and the first ``named`` alternatives are named by the verdict.
     """
     room = 60.0 * min(limits.minutes - option.set_up, limits.moving)
     whole = option.whole and sum(piece.seconds for piece in option.pieces) > room
@@ -237,16 +228,7 @@ def _mean(before: Mapping[Pair, float], pair: Pair) -> float:
 
 
 def widening(problem: Problem, options: Sequence[Candidate], limits: Limits) -> Plan:
-    """
-    Return a measurement that shows more of the arm than the data at hand, whatever is in doubt.
-
-    Parameters
-    ----------
-    problem : Problem
-    options : sequence of Candidate
-    limits : Limits
-
-    """
+    """Return a measurement that shows more of the arm than the data, whatever is in doubt."""
     still = problem.at_rest
     wanted = ('bidirectional', 'stations') if still else ('path',)
     room = 60.0 * min(limits.minutes, limits.moving)

@@ -5,12 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ...arrays import Array
 from ...effects.apart import way
 from ...effects.effect import Effect
 from ...errors import TwinError
@@ -18,13 +16,14 @@ from ...recording import JointMotion
 from ..algebra.problem import Model, Problem, Scale
 from .candidates import Candidate, candidates
 from .chosen_pieces import Plan, planned, widening
-from .limits import Limits
+from .postures import Limits
 from .separation import at_hand
 
 WORTH = 0.8
 """A cheaper measurement is taken when it decides this share of what the best one does."""
 NEAR = 0.5
 """Minutes within which measurements take equally long."""
+Explanation = tuple[Effect, ...]
 PACE = 0.1
 """Time [s] between the samples of a path as it is written: a spline through them is the path."""
 
@@ -32,7 +31,7 @@ PACE = 0.1
 def next_experiment(
     problem: Problem,
     model: Model,
-    alternatives: Sequence[tuple[Effect, ...]],
+    alternatives: Sequence[Explanation],
     scale: Scale,
     limits: Limits | None = None,
     *,
@@ -73,20 +72,21 @@ def next_experiment(
     joints = [e.site for effects in alternatives for e in effects if e.site]
     asked = [joint for joint in dict.fromkeys(joints) if joints.count(joint) < len(alternatives)]
     options = list(candidates(problem, model, limits, asked))
+
+    def wider(reason: str) -> dict[str, Any]:
+        return _entry(widening(problem, options, limits), reason, model)
+
     if len(alternatives) < 2:
-        return _entry(widening(problem, options, limits), _UNKNOWN, model)
+        return wider(_UNKNOWN)
     plans, skipped = _plans(problem, model, alternatives, scale, limits, options, named)
     if not plans:
         return None
     best = max(plan.score for plan in plans)
     decided = not closed and all(plan.decided for plan in plans)
-    if best == 0.0 or decided:
-        if decided:
-            told: dict[str, Any] = _entry(widening(problem, options, limits), _DECIDED, model)
-        elif closed:
-            told = _outside(alternatives[0], alternatives[1])
-        else:
-            told = _entry(widening(problem, options, limits), _ALIKE, model)
+    if decided:
+        told = wider(_DECIDED)
+    elif best == 0.0:
+        told = _outside(alternatives[0], alternatives[1]) if closed else wider(_ALIKE)
     else:
         good = [plan for plan in plans if plan.score >= WORTH * best]
         if not problem.at_rest:
@@ -105,19 +105,7 @@ def confirming(
     """
     Return the measurement that shows whether an answer holds once all joints move widely.
 
-    Parameters
-    ----------
-    problem, model
-        The data at hand, and the model with its frames.
-    joints : sequence of str
-        Those that did not.
-    limits : Limits
-
-    Returns
-    -------
-    dict
-        As `next_experiment` returns it, and 'confirms': the joints.
-
+    It is as `next_experiment` returns it, with 'confirms': the joints that did not.
     """
     options = list(candidates(problem, model, limits, joints))
     reason = _NARROW.format(joints=', '.join(joints))
@@ -127,7 +115,7 @@ def confirming(
 def _plans(
     problem: Problem,
     model: Model,
-    alternatives: Sequence[tuple[Effect, ...]],
+    alternatives: Sequence[Explanation],
     scale: Scale,
     limits: Limits,
     options: Sequence[Candidate],
@@ -166,65 +154,55 @@ _NARROW = (
 )
 
 
-def _told(plan: Plan, alternatives: Sequence[tuple[Effect, ...]], model: Model) -> dict[str, Any]:
+def _told(plan: Plan, alternatives: Sequence[Explanation], model: Model) -> dict[str, Any]:
     assert plan.pair is not None
-    one, other = (alternatives[k] for k in plan.pair)
-    told = ' from '.join(filter(None, _differing(one, other)))
+    one, other = _apart(*(alternatives[k] for k in plan.pair))
+    told = ' from '.join(filter(None, (_named(one, other), _named(other, one))))
     reason = (
         f'The data at hand tell {told} by {plan.before:.1f} standard deviations; this would add '
         f'{plan.after:.0f}.'
     )
-    return _entry(plan, reason, model, _sides(one, other))
+    return _entry(plan, reason, model, [_side(one), _side(other)])
 
 
-def _outside(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> dict[str, Any]:
+def _outside(first: Explanation, second: Explanation) -> dict[str, Any]:
     """Return what to do when no motion of the joints separates two explanations."""
-    one, other = (side or 'nothing more' for side in _differing(first, second))
-    families = {effect.name for effect in _only(first, second) + _only(second, first)}
+    one, other = _apart(first, second)
+    names = [_named(*pair) or 'nothing more' for pair in ((one, other), (other, one))]
+    families = sorted({effect.name for effect in one + other})
     return {
         'kind': 'outside',
         'motion': None,
         'cost': None,
         'robot_minutes': None,
         'stations': None,
-        'between': _sides(first, second),
+        'between': [_side(one), _side(other)],
         'changes': '',
         'expected_separation_sigma': 0.0,
-        'sentence': f'No motion tells {one} from {other}: {way(sorted(families))}.',
+        'sentence': f'No motion tells {names[0]} from {names[1]}: {way(families)}.',
         'reason': 'Both move the tool alike wherever the joints go.',
     }
 
 
-def _sides(
-    first: tuple[Effect, ...], second: tuple[Effect, ...]
-) -> list[list[dict[str, str | None]]]:
-    """Return what each of two explanations has that the other has not."""
-    out = []
-    for one, other in ((first, second), (second, first)):
-        side: list[dict[str, str | None]] = []
-        for e in _only(one, other):
-            joint = str(e.site) if e.site else None
-            item = {'effect': e.name, 'joint': joint, 'at': e.at, 'on': e.on}
-            if item not in side:
-                side.append(item)
-        out.append(side)
-    return out
+def _apart(first: Explanation, second: Explanation) -> tuple[list[Effect], list[Effect]]:
+    """Return the effects of each of two explanations that the other has not."""
+    one, other = ({(e.key, e.on) for e in effects} for effects in (first, second))
+    return [e for e in first if (e.key, e.on) not in other], [
+        e for e in second if (e.key, e.on) not in one
+    ]
 
 
-def _differing(first: tuple[Effect, ...], second: tuple[Effect, ...]) -> tuple[str, str]:
-    one, other = _only(first, second), _only(second, first)
-    return _named(one, other), _named(other, one)
-
-
-def _only(effects: tuple[Effect, ...], others: tuple[Effect, ...]) -> list[Effect]:
-    """Return the effects that the others do not have."""
-    known = {(effect.key, effect.on) for effect in others}
-    return [effect for effect in effects if (effect.key, effect.on) not in known]
+def _side(effects: Sequence[Effect]) -> list[dict[str, str | None]]:
+    """Return effects as plain values, each once."""
+    each = (
+        {'effect': e.name, 'joint': str(e.site) if e.site else None, 'at': e.at, 'on': e.on}
+        for e in effects
+    )
+    return list({tuple(item.values()): item for item in each}.values())
 
 
 def _named(effects: Sequence[Effect], others: Sequence[Effect]) -> str:
-    if not effects:
-        return ''
+    """Return effects in words, beside those that they are told from."""
     return ' with '.join(dict.fromkeys(_name(effect, others) for effect in effects))
 
 
@@ -263,16 +241,13 @@ def _entry(
 
 
 def _motion(joints: JointMotion, names: Sequence[str]) -> dict[str, Any]:
+    t, q = joints.t, joints.q
     if not joints.static:
-        joints = _paced(joints)
+        t = np.linspace(0.0, t[-1], int(np.ceil(t[-1] / PACE)) + 1)
+        q = joints.at(t)[0]
     return {
         'static': joints.static,
         'joint_names': list(names),
-        't': joints.t.round(6).tolist(),
-        'q': joints.q.round(7).tolist(),
+        't': t.round(6).tolist(),
+        'q': q.round(7).tolist(),
     }
-
-
-def _paced(joints: JointMotion) -> JointMotion:
-    t: Array = np.linspace(0.0, joints.t[-1], int(np.ceil(joints.t[-1] / PACE)) + 1)
-    return replace(joints, t=t, q=joints.at(t)[0], qd=None)

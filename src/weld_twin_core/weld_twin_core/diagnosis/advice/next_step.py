@@ -28,9 +28,8 @@ from ..levels.groups import Group
 from ..verdict.decision import Verdict
 from .chosen_pieces import DECIDES
 from .experiment import confirming, next_experiment
-from .limits import Limits
 from .next_touches import next_touches
-from .postures import Room
+from .postures import Limits, Room
 
 TOUCHED = 4
 """The same where contacts measured: every touch that could be made is tried with each."""
@@ -112,7 +111,7 @@ def _parting(
     closed = verdict.status == 'ambiguous' and verdict.sure and len(listed) > 1
     if not closed:
         room = Room(found.work.problem, found.small.model.robot, limits)
-        shapes = without_names(found, rival, room.low, room.high)
+        shapes = _without_names(found, rival, room.low, room.high)
         if verdict.status == 'unknown' and verdict.confidence >= NAMELESS:
             listed, named = [*shapes, *listed], 1
         else:
@@ -128,7 +127,7 @@ def _parting(
         closed=closed,
         named=min(named, MOST),
     )
-    return None if wanted is None else {**wanted, 'promise': promise(verdict, wanted)}
+    return None if wanted is None else {**wanted, 'promise': _promise(verdict, wanted)}
 
 
 def _as_weighed(found: Search) -> Scale:
@@ -145,20 +144,12 @@ def _as_weighed(found: Search) -> Scale:
     return replace(scale, position=wider * scale.position, orientation=wider * scale.orientation)
 
 
-def promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
+def _promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
     """
-    Return how probable it is that an experiment decides what it is asked for.
+    Return how probable it is that an experiment decides what it is asked for; None if it asks nothing.
 
     It has to part its explanations by as much as a decision needs, and one of the two has to be
     near the truth: where nothing of the library is believed, that is not to be expected.
-
-    Parameters
-    ----------
-    verdict : Verdict
-        Before the experiment, with the confidence that it has earned.
-    wanted : mapping
-        As `next_experiment` returned it; None where it compares nothing.
-
     """
     sigma = wanted['expected_separation_sigma']
     if wanted['between'] is None or wanted['motion'] is None or sigma is None:
@@ -192,20 +183,13 @@ def _beside(found: Search) -> list[tuple[Effect, ...]]:
     return [(*model.found, choice.effect()) for choice in more[: MOST - 1]]
 
 
-def without_names(
+def _without_names(
     found: Search, rival: Curved | None, low: Array, high: Array
 ) -> list[Explanation]:
     """
-    Return the free-form explanation and the nearest other ones, likeliest first.
+    Return the free-form explanation and the nearest other ones, likeliest first; none without a rival.
 
-    Parameters
-    ----------
-    found : Search
-    rival : Curved or None
-        What explains the gap without a formula; None where nothing does.
-    low, high : array, shape (n,) [rad, m]
-        What joints may reach in an experiment: curves over an angle go on there, free to bend.
-
+    Curves over an angle go on, free to bend, to what the joints may reach, from low to high, (n,).
     """
     if rival is None:
         return []

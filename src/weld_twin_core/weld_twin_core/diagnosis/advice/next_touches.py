@@ -118,9 +118,8 @@ def _touchable(
         yield _Group(design, same, None)
     wider, last = design.with_place(), len(problem.recordings)
     for recording in beside(problem, model) if elsewhere else ():
-        assert recording.measured is not None
         there = wider.touchable(last, recording)
-        yield _Group(wider, [there], recording.measured.position[0])
+        yield _Group(wider, [there], recording.seen.position[0])
 
 
 def _unknowns(
@@ -156,7 +155,7 @@ def _entry(best: _Option, spread: Array, model: Model, parted: float | None) -> 
     """Return the proposal as plain numbers and strings."""
     rows, touches, place = best.order[:COUNT], best.group.touches, best.group.place
     q = np.concatenate([each.recording.joints.q for each in touches])[rows]
-    labels = [label for each in touches for label in _labels(each)]
+    labels = [label for each in touches for label in each.recording.touched.labels]
     both = (best.group.before, best.best)
     before, after = (1e3 * each.sigma * each.open(spread) ** 0.5 for each in both)
     what = f'Touch what was touched in these {len(rows)} postures.'
@@ -185,8 +184,3 @@ def _entry(best: _Option, spread: Array, model: Model, parted: float | None) -> 
             'contact': [labels[k] for k in rows],
         },
     }
-
-
-def _labels(touchable: Touchable) -> tuple[str, ...]:
-    assert touchable.recording.contacts is not None
-    return touchable.recording.contacts.labels

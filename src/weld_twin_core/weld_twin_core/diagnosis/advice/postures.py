@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -16,7 +17,54 @@ from ...errors import DataError
 from ...recording import JointMotion
 from ...sequences import halton
 from ..algebra.problem import Problem
-from .limits import Limits
+
+USUAL_MINUTES = 60.0
+"""Of robot motion that an experiment takes at most, unless told: an arm warms up in an hour."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """
+    What an experiment may cost, and where it has to stay.
+
+    Attributes
+    ----------
+    minutes : float [min]
+        Of robot motion and of what has to be set up for it, at most.
+    moving : float [min]
+        Of robot motion alone, at most.
+    set_up : bool
+        Whether something in the cell may be changed for it: another tool, a moved instrument.
+    box : array, shape (2, 3), optional [m]
+        Corners in the measuring frame that the arm stays between.
+    confirm : bool
+        Whether one is asked for where the question is closed, but some joints did not move widely:
+        what depends on their angle looks like something else.
+
+    Raises
+    ------
+    DataError
+        The minutes are not positive, or a box has no room.
+
+    """
+
+    minutes: float = USUAL_MINUTES
+    moving: float = np.inf
+    set_up: bool = True
+    box: Array | None = None
+    confirm: bool = False
+
+    def __post_init__(self) -> None:
+        least = min(self.minutes, self.moving)
+        if not least > 0.0:
+            raise DataError(f'an experiment needs minutes, got {least:g}')
+        if self.box is None:
+            return
+        box = np.array(self.box, dtype=float)
+        if box.shape != (2, 3) or not (box[0] < box[1]).all():
+            raise DataError('the box of the cell is two corners, the lower one first, in metres')
+        object.__setattr__(self, 'box', box)
+
 
 WIDE = 1.2
 """Half the range [rad, m] about the recorded middle that every joint may use, within its limits: the
@@ -77,15 +125,7 @@ class Room:
             self.home = self._inside(middle)
 
     def _inside(self, middle: Array) -> Array:
-        """
-        Return the posture in the box that is nearest to the middle of what was recorded.
-
-        Raises
-        ------
-        DataError
-            None is.
-
-        """
+        """Return the free posture nearest to the middle, of those recorded or drawn."""
         drawn = self.low + halton(self._robot.n, LOOKED_FOR) * (self.high - self.low)
         for places in (self._seen, drawn):
             inside = places[self.free(places)]
@@ -108,14 +148,8 @@ class Room:
         """
         Return postures that fill the range evenly, as many as are free, shape (count, n).
 
-        The way from home to each is free too.
-
-        Parameters
-        ----------
-        count : int
-        skip : int
-            Of the sequence, so that later experiments go elsewhere.
-
+        The way from home to each is free too. ``skip`` are left out, so that later experiments go
+        elsewhere.
         """
         unit = halton(self._robot.n, skip + DRAWN * count)[skip:]
         q = self.low + unit * (self.high - self.low)
@@ -147,14 +181,9 @@ class Room:
 
     def travel(self, stops: Sequence[Array], speed: float) -> JointMotion:
         """
-        Return the motion from stop to stop, at rest at each.
+        Return the motion from stop to stop, (n,) [rad, m], at rest at each.
 
-        Parameters
-        ----------
-        stops : sequence of array, shape (n,) [rad, m]
-        speed : float
-            Share of the fastest that an experiment may.
-
+        ``speed`` is the share of the fastest that an experiment may.
         """
         robot = self._robot
         fast = FASTEST * speed * np.where(np.isfinite(robot.max_velocity), robot.max_velocity, 1.0)
@@ -186,12 +215,6 @@ def widened(problem: Problem, robot: Robot) -> tuple[Array, Array]:
     Return the least and the most of every joint that a touch uses, shape (n,) each.
 
     The recorded range, a little wider, within the limits.
-
-    Parameters
-    ----------
-    problem : Problem
-    robot : Robot
-
     """
     q = np.concatenate([r.joints.q for r in problem.recordings])
     middle = 0.5 * (q.min(axis=0) + q.max(axis=0))

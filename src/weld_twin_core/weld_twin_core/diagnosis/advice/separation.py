@@ -82,15 +82,7 @@ class Normals:
         """
         Return by how many standard deviations pairs part with further pieces, shape (len(more),).
 
-        Parameters
-        ----------
-        pairs : sequence of (int, int)
-            Those that are asked about.
-        chosen : sequence of int
-            Pieces that are in already.
-        more : sequence of int
-            Pieces of which each is tried beside them.
-
+        Each piece of ``more`` is tried beside those that are in already, ``chosen``.
         """
         out = {}
         for pair in pairs:
@@ -128,8 +120,9 @@ def normals(
 
     Parameters
     ----------
-    alternatives : sequence of Alternative
-        The explanations to tell apart.
+    problem, model, alternatives, scale
+        As `at_hand` takes them.
+    candidate : Candidate
     now : Side
         As `at_hand` returned it.
 
@@ -186,6 +179,9 @@ def at_hand(
 
     Parameters
     ----------
+    problem : Problem
+    model : Model
+        What is believed so far; everything is taken about it.
     alternatives : sequence of Alternative
         The explanations to tell apart.
 
@@ -212,8 +208,7 @@ def _ahead(
     side = _side(further, candidate.model, alternatives, with_weights(scale, further), mark)
     if recording.joints.static:
         return side
-    assert made.measured is not None
-    told = float(np.ptp(recording.joints.t)) / EVERY / made.measured.t.size
+    told = float(np.ptp(recording.joints.t)) / EVERY / made.seen.t.size
     share = float(np.sqrt(min(told, 1.0)))
     return replace(
         side,

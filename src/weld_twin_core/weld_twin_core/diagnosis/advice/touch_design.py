@@ -59,13 +59,9 @@ BELOW = 0.05
 @dataclass(frozen=True, eq=False)
 class Touchable:
     """
-    Touches that could be made, whitened.
+    Touches that could be made, and what each sees of all unknowns, whitened, shape (N, 3, P).
 
-    Attributes
-    ----------
-    rows : array, shape (N, 3, P)
-        What each sees of all unknowns; rows that a kind of contact does not have are zero.
-
+    Rows that a kind of contact does not have are zero.
     """
 
     recording: Recording
@@ -124,7 +120,6 @@ class Design:
         effects : sequence of Effect
             The errors that take part, as large as they were found.
         scale : Scale
-            The noise, and the weight of every touch.
 
         """
         # A base that is fitted along counts as known: another touch tells more of it anyway.
@@ -138,9 +133,8 @@ class Design:
         information = np.diag(np.append(prior, np.full(sum(freedom), ANYWHERE**-2.0)))
         surfaces = []
         for k, recording in enumerate(problem.recordings):
-            assert recording.contacts is not None
             points = model.twin(k).poses(recording, recording.joints.t).position
-            surfaces.append(places(recording.contacts, points))
+            surfaces.append(places(recording.touched, points))
             rows = _rows(model, k, recording, surfaces[k], points, tool) / sigma
             rows = rows * np.sqrt(scale.weights[k])[:, None, None]
             own = np.concatenate([np.arange(prior.size), np.arange(starts[k], starts[k + 1])])
@@ -166,24 +160,13 @@ class Design:
         return replace(self, starts=(*self.starts, size), root=wider)
 
     def touchable(self, k: int, recording: Recording) -> Touchable:
-        """
-        Return touches of place k, or of a new one, as this design sees them.
-
-        Parameters
-        ----------
-        k : int
-            Which place, counted from 0; the last one where it is new.
-        recording : Recording
-            With contacts.
-
-        """
-        assert recording.contacts is not None
+        """Return touches of place k, or of a new one behind the last, as this sees them."""
         twin = min(k, len(self.surfaces) - 1)
         points = self.model.twin(twin).poses(recording, recording.joints.t).position
         if k < len(self.surfaces):
-            where = Places(recording.contacts, self.surfaces[k].surfaces)
+            where = Places(recording.touched, self.surfaces[k].surfaces)
         else:
-            where = places(recording.contacts, points)
+            where = places(recording.touched, points)
         own = _rows(self.model, twin, recording, where, points, self.tool) / self.sigma
         rows = np.zeros((len(points), 3, len(self.root)))
         count, at = own.shape[1], self.starts[k]
@@ -215,13 +198,7 @@ def scatter(touches: Sequence[Touchable], errors: int) -> Array:
     """
     Return the weight of errors in how far tool points scatter about their places, squared.
 
-    In units of the noise; shape (errors, errors).
-
-    Parameters
-    ----------
-    errors : int
-        Number of unknowns that are no place.
-
+    In units of the noise; its shape is (E, E), where E unknowns, ``errors``, are no place.
     """
     each = [t.rows[..., :errors] - t.rows[..., :errors].mean(axis=0) for t in touches]
     count = sum(len(rows) for rows in each)
@@ -282,18 +259,9 @@ def again(problem: Problem, model: Model) -> Iterator[tuple[int, Recording]]:
 
     The joints stay within the recorded range, a little widened, and the tool leans no further
     than it has leaned there: what holds the artefact is not known.
-
-    Parameters
-    ----------
-    problem : Problem
-        Of contacts.
-    model : Model
-        With the tool point as found.
-
     """
     for k, recording in enumerate(problem.recordings):
-        contacts, measured = recording.contacts, recording.measured
-        assert contacts is not None and measured is not None
+        contacts, measured = recording.touched, recording.seen
         rows = np.arange(TRIED) % contacts.size
         q, good = _reached(problem, model, [recording], measured.position[rows])
         kept = np.flatnonzero(good)[:ENOUGH]
@@ -306,19 +274,9 @@ def again(problem: Problem, model: Model) -> Iterator[tuple[int, Recording]]:
 
 
 def beside(problem: Problem, model: Model) -> Iterator[Recording]:
-    """
-    Yield touches of places where nothing was touched, each far from all others.
-
-    Parameters
-    ----------
-    problem : Problem
-        Of contacts.
-    model : Model
-        With the tool point as found.
-
-    """
+    """Yield touches of places where nothing was touched, each far from all others."""
     low, high = widened(problem, model.robot)
-    known = [_middle(recording) for recording in problem.recordings]
+    known = [recording.seen.position.mean(axis=0) for recording in problem.recordings]
     lowest = min(float(point[2]) for point in known) - BELOW
     free = forward(model.robot, low + halton(model.robot.n, TRIED) * (high - low))[:, :3, 3]
     free = free[free[:, 2] > lowest]
@@ -352,11 +310,6 @@ def _reached(
     middle = leaned.mean(axis=0) / max(float(np.linalg.norm(leaned.mean(axis=0))), 1e-9)
     good &= forward(robot, q)[:, :3, 2] @ middle >= (leaned @ middle).min()
     return q, good
-
-
-def _middle(recording: Recording) -> Array:
-    assert recording.measured is not None
-    return np.asarray(recording.measured.position.mean(axis=0))
 
 
 def _touching(recording: Recording, q: Array, points: Array, contacts: Contacts) -> Recording:

@@ -108,10 +108,10 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
         now = effect.coordinates()
         effects.append(effect.with_coordinates(now + step[at : at + now.size]))
         at += now.size
-    own = len(model.changes)
-    pairs = zip(model.changes, effects[:own], strict=True)
+    count = len(model.changes)
+    pairs = zip(model.changes, effects[:count], strict=True)
     changes = tuple(change._replace(effect=effect) for change, effect in pairs)
-    return replace(model, changes=changes, found=tuple(effects[own:]))
+    return replace(model, changes=changes, found=tuple(effects[count:]))
 
 
 def coordinates(model: Model) -> Array:

@@ -17,8 +17,8 @@ from ..algebra.fit import trusted
 from ..algebra.problem import Model
 from ..beliefs import Beliefs
 from ..calibration.calibrated import Stated, calibrated
+from ..frames.aligned import NOT_TOLD, not_told
 from ..frames.changes import told, untold
-from ..frames.places import NOT_TOLD, not_told
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..hypotheses.structural_aliases import never_parted
@@ -38,13 +38,12 @@ from ..result import (
     Unexplained,
     Where,
 )
-from ..soundness import Examined
 from ..soundness.efforts import compared
+from ..soundness.gate import Examined
 from ..unseen.unseen_stretches import Unseen
 from ..unseen.where import locate
-from ..verdict.decision import Verdict
+from ..verdict.decision import Left, Verdict
 from ..verdict.evidence import Evidence
-from ..verdict.left import Left
 from .contact_spreads import contact_spreads
 from .named_effects import named_effects
 from .share_intervals import with_intervals

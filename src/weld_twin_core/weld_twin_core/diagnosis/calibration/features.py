@@ -20,8 +20,8 @@ from ..levels.free_form import FreeForm
 from ..posterior.table import Row, dependence_of
 from ..result import Cause
 from ..unseen.unseen_stretches import Unseen
+from ..verdict.decision import Left
 from ..verdict.evidence import Evidence
-from ..verdict.left import Left
 
 Numbers = dict[str, float]
 FAR = 1e3

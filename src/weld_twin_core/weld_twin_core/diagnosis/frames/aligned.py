@@ -1,19 +1,31 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The problem that recordings pose, and the nominal model with frames to start from."""
+"""
+The problem that recordings pose, and the nominal model with frames to start from.
+
+Contacts are one recording per place. A place is whatever hangs together by known lengths: one socket,
+two sockets on a plate, a block. Where it is not known where it is, no contact shows where the base
+is. What an instrument measured may stand beside; each recording of it stays as it is.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from ...arm.robot import Robot
+from ...arm.rotation import transform
+from ...arrays import Array
+from ...contacts import places
 from ...effects.effect import Effect
-from ...recording import Recording
+from ...effects.registry import REGISTRY
+from ...errors import DataError
+from ...recording import Measurements, Recording
 from ..algebra.fit import fit
 from ..algebra.problem import Anchor, Model, Problem, frames_named, usable
 from .alignment import initial_frames
-from .places import posed
 
 
 def aligned(
@@ -73,3 +85,190 @@ def frames_only(recording: Recording, robot: Robot, align: frozenset[str]) -> Mo
     problem = Problem((usable(recording),), align)
     start = initial_frames(problem, Model(robot, (robot.T_world_base,)))
     return fit(problem, start, problem.unit_scale()).model
+
+
+NEAR = 0.02
+"""Median distance [m] of the tool point from its contacts from which a fit finds its own way."""
+ROUNDS = 20
+"""Times that the tool vector is found anew with less weight for what is off; it settles sooner."""
+FLOOR = 1e-5
+"""Distance [m] below which a contact gains no more weight."""
+NO_CONTACT = ('time', 'place', 'direction', 'speed', 'acceleration', 'temperature')
+"""What effects may depend on that no contact tells of."""
+NOT_TOLD = 'contacts do not tell of it'
+"""Why such an effect is not considered."""
+FEWEST = 2
+"""Postures that one contact needs at the least: of a single one its unknown place takes everything."""
+
+
+def posed(
+    recordings: Sequence[Recording],
+    robot: Robot,
+    align: frozenset[str],
+    known: Sequence[Effect],
+    given: Sequence[int] = (),
+) -> tuple[Problem, Model]:
+    """
+    Return contacts as a problem, and the model that a search starts from.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        With contacts; what an instrument measured comes first in the problem.
+    robot : Robot
+        The nominal model.
+    align : frozenset of str
+        'tool' where the tool point is not known; 'base' where it is not known where the base stands,
+        which says nothing where all places are unknown too.
+    known : sequence of Effect
+        Put into the twin first.
+    given : sequence of int
+        Of which of the recordings given each is a part; each by itself when left out.
+
+    Raises
+    ------
+    DataError
+        Contacts are too few, or a recording holds neither contacts nor measurements.
+
+    """
+    pairs = list(zip(given or range(len(recordings)), recordings, strict=True))
+    tracked = [(k, usable(r)) for k, r in pairs if r.contacts is None]
+    touched = [(k, part) for k, r in pairs if r.contacts is not None for part in _by_place(r)]
+    parts = tuple(k for k, _ in (*tracked, *touched))
+    model = _started([r for _, r in tracked], [r for _, r in touched], robot, align, known)
+    model = replace(model, given=parts)
+    filled = [_filled(r, model, k) for k, (_, r) in enumerate(touched, len(tracked))]
+    anchor = Anchor(model.bases, model.robot.T_flange_tool)
+    every = (*(r for _, r in tracked), *filled)
+    problem = Problem(every, align, anchor, given=parts).touching(model)
+    if problem.untracked and not problem.placed:
+        problem = replace(problem, align=align & {'tool'})
+    return problem, model
+
+
+def _started(
+    tracked: list[Recording],
+    touched: list[Recording],
+    robot: Robot,
+    align: frozenset[str],
+    known: Sequence[Effect],
+) -> Model:
+    """Return the model with frames to start from: an instrument tells them better than contacts."""
+    model = Model(robot, tuple(robot.T_world_base for _ in tracked), tuple(known))
+    if tracked:
+        model = initial_frames(Problem(tuple(tracked), align), model)
+    bases = (*model.bases, *(robot.T_world_base for _ in touched))
+    model = replace(model, bases=bases)
+    if 'tool' in align and not tracked:
+        model = replace(model, robot=model.robot.with_frames(tool=_tool(touched, model)))
+    return model
+
+
+def tracked_part(problem: Problem, model: Model) -> tuple[Problem, Model]:
+    """Return what an instrument measured, without the contacts beside it."""
+    kept = [k for k in range(len(problem.recordings)) if problem.contact(k) is None]
+    given = tuple(problem.given[k] for k in kept)
+    anchor = problem.anchor
+    if anchor is not None:
+        anchor = replace(anchor, bases=tuple(anchor.bases[k] for k in kept))
+    recordings = tuple(problem.recordings[k] for k in kept)
+    part = replace(
+        problem, recordings=recordings, anchor=anchor, touched=(), given=given, loose=()
+    )
+    bases = tuple(model.bases[k] for k in kept)
+    common = tuple(model.common[k] for k in kept) if model.common else ()
+    return part, replace(model, bases=bases, given=given, common=common)
+
+
+def not_told(problem: Problem) -> tuple[str, ...]:
+    """
+    Return the kinds of effect that no contact tells of; none where an instrument measured.
+
+    A place may be anywhere unless it is known, so nothing that moves all of the cell shows; a
+    contact has no approach and no time that counts; there is no instrument.
+    """
+    if not problem.untracked:
+        return ()
+    return tuple(
+        name
+        for name, kind in REGISTRY.items()
+        if (kind.place == 'base' and not problem.placed) or kind.depends_on in NO_CONTACT
+    )
+
+
+def _by_place(recording: Recording) -> list[Recording]:
+    """Return the contacts of every place as a recording of its own; refuse too few of one."""
+    contacts = recording.touched
+    for label in dict.fromkeys(contacts.labels):
+        if contacts.of(label).size < FEWEST and not contacts.artefact.named(label).known:
+            raise DataError(
+                f'contact {label!r} of {recording.name} has {contacts.of(label).size} postures; '
+                f'touch it in at least {FEWEST}'
+            )
+    out = []
+    for index in contacts.parts():
+        part = contacts.take(index)
+        motion = replace(
+            recording.joints, t=recording.joints.t[index], q=recording.joints.q[index], qd=None
+        )
+        name = '+'.join(contact.label for contact in part.artefact.contacts)
+        out.append(replace(recording, name=name, joints=motion, contacts=part))
+    return out
+
+
+def _filled(recording: Recording, model: Model, k: int) -> Recording:
+    """Return the recording with what its contacts measure at the model, for pictures."""
+    points = model.twin(k).poses(recording, recording.joints.t).position
+    where = places(recording.touched, points).foot(points)
+    return recording.with_measured(Measurements(recording.joints.t, where))
+
+
+def _tool(recordings: Sequence[Recording], model: Model) -> Array:
+    """
+    Return the tool frame whose point rests at the contacts: the many-point tool calibration.
+
+    The turn of the tool is not seen by a point and stays as given. Only contacts of points tell;
+    without them, or where the given point is near already, it stays.
+    """
+    given = model.robot.T_flange_tool
+    if _off(recordings, model) < NEAR:
+        return given
+    bare = replace(model, robot=model.robot.with_frames(tool=np.eye(4)))
+    normal = []
+    for k, recording in enumerate(recordings):
+        contacts = recording.touched
+        flange = bare.twin(k).poses(recording, recording.joints.t)
+        for contact in contacts.artefact.contacts:
+            if contact.kind == 'point':
+                index = contacts.of(contact.label)
+                normal.append((flange.position[index], flange.rotation[index]))
+    if not normal:
+        return given
+    return transform(given[:3, :3], _tool_point(normal))
+
+
+def _tool_point(touched: Sequence[tuple[Array, Array]]) -> Array:
+    """Return the vector in the flange that stays in place at every contact, shape (3,) [m]."""
+    weights: list[Array] = [np.ones(len(point)) for point, _ in touched]
+    vector: Array = np.zeros(3)
+    for _ in range(ROUNDS):
+        square, right, off = np.zeros((3, 3)), np.zeros(3), []
+        for (point, turn), weight in zip(touched, weights, strict=True):
+            share = weight / weight.sum()
+            columns = turn - np.einsum('m,mij', share, turn)
+            left = share @ point - point
+            square += np.einsum('m,mki,mkj', weight, columns, columns)
+            right += np.einsum('m,mki,mk', weight, columns, left)
+            off.append((columns, left))
+        vector = np.asarray(np.linalg.lstsq(square, right, rcond=1e-9)[0], dtype=float)
+        weights = [1.0 / np.maximum(np.linalg.norm(c @ vector - s, axis=1), FLOOR) for c, s in off]
+    return vector
+
+
+def _off(recordings: Sequence[Recording], model: Model) -> float:
+    sizes = []
+    for k, recording in enumerate(recordings):
+        points = model.twin(k).poses(recording, recording.joints.t).position
+        rows = places(recording.touched, points).rows(points)[0]
+        sizes.append(np.linalg.norm(rows, axis=1))
+    return float(np.median(np.concatenate(sizes)))

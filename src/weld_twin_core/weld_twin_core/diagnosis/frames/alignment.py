@@ -26,7 +26,6 @@ import numpy as np
 
 from ...arm.rotation import transform
 from ...arrays import Array
-from ...errors import DataError
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem
 from .in_turn import FLOOR, LEVER, TIE, Track, bases_of, chord, in_turn, nearest_rotation
@@ -70,13 +69,8 @@ def rough_frames(
     """
     Return models with base and tool frames in closed form, both free, of several trials at once.
 
-    Parameters
-    ----------
-    trials : sequence of list of Track, and Model
-        One track for every recording; all trials have as many samples, all are turned or none.
-    thorough : bool
-        Start from more tools.
-
+    A trial has one track for every recording; all have as many samples, all are turned or none.
+    Where ``thorough``, more tools are started from.
     """
     reaches = REACHES if thorough else ()
     out: list[Model] = []
@@ -108,9 +102,7 @@ def tracks(problem: Problem, model: Model) -> list[Track]:
 
 
 def _track(problem: Problem, model: Model, k: int) -> Track:
-    measured = problem.recordings[k].measured
-    if measured is None:
-        raise DataError(f'{problem.recordings[k].name} holds no measured poses or points')
+    measured = problem.recordings[k].seen
     bare = replace(
         model,
         robot=model.robot.with_frames(tool=np.eye(4)),

@@ -23,6 +23,7 @@ from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...errors import ModelError
 from ...twin.features import joints_of
+from ..algebra.definite import unit_diagonal
 from ..algebra.designed import Design, designed
 from ..algebra.fit import coordinates, design, fit, robust_fit, robust_scale
 from ..algebra.independent_rows import effective_share
@@ -226,9 +227,7 @@ def _evidence(
     index = np.concatenate([fixed, more]).astype(int)
     if not index.size:
         return 0.0
-    system = normal[np.ix_(index, index)]
-    size = np.sqrt(np.maximum(np.diag(system), 1e-300))
-    scaled = system / np.outer(size, size) + 1e-11 * np.eye(size.size)
+    scaled, size = unit_diagonal(normal[np.ix_(index, index)], 1e-11)
     wanted = right[index] / size
     gain = 0.5 * float(wanted @ np.linalg.solve(scaled, wanted))
     volume = 0.5 * float(np.linalg.slogdet(scaled)[1] + 2.0 * np.log(size).sum())
@@ -240,14 +239,6 @@ def settled_between(found: Search, families: Sequence[str], beliefs: Beliefs) ->
     Return what was found with the differences between recordings chosen anew beside it.
 
     Before the effects were found, what they leave could pass for a difference, or hide one.
-
-    Parameters
-    ----------
-    found : Search
-    families : sequence of str
-        What may differ.
-    beliefs : Beliefs
-
     """
     if len(found.problem.recordings) < 2 or not families:
         return found
@@ -333,16 +324,7 @@ def _columns(
 
 
 def untold(problem: Problem, model: Model, families: Sequence[str]) -> list[str]:
-    """
-    Return what may differ but cannot be told by these recordings, in words.
-
-    Parameters
-    ----------
-    problem, model
-        A model fitted to all measurements.
-    families : sequence of str
-
-    """
+    """Return what may differ but cannot be told by these recordings, in words."""
     candidates = _candidates(problem, model.robot, families)
     if not candidates:
         return []

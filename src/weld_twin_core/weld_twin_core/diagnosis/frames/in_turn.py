@@ -69,16 +69,7 @@ def in_turn(
 
 
 def bases_of(tracks: Sequence[Track], bases: Sequence[Array], tools: Array) -> tuple[Array, ...]:
-    """
-    Return the base frames, each (T, 4, 4), of tools that are known, (T, 4, 4).
-
-    Parameters
-    ----------
-    tracks, bases
-        As `in_turn` takes them.
-    tools : array, shape (T, 4, 4)
-
-    """
+    """Return the base frames of known tools, each (T, 4, 4); see `in_turn`."""
     turn, vectors = tools[:, :3, :3], tools[:, None, :3, 3]
     pairs = zip(tracks, _started(bases, vectors), strict=True)
     found = [_based(*pair, turn, vectors, ROUNDS) for pair in pairs]

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
-from ..algebra.fit import Fit, coordinates, design, fit, stepped
+from ..algebra.fit import Fit, coordinates, design, fit, solve_scaled, stepped
 from ..algebra.independent_rows import effective_share
 from ..algebra.prior import frame_offset, frame_prior
 from ..algebra.problem import Model, Problem, Scale
@@ -38,13 +38,8 @@ class Open(NamedTuple):
     """
     Directions that the data hardly show.
 
-    Attributes
-    ----------
-    names : list of str
-        Of the frame columns, as `Problem.frame_columns` gives them.
-    vectors : array, shape (F, k)
-        Columns are steps of the frames [m, rad].
-
+    ``names`` are those of the frame columns; ``vectors``, (F, k), has steps of the frames [m, rad] as
+    columns.
     """
 
     names: list[str]
@@ -53,30 +48,51 @@ class Open(NamedTuple):
 
 def open_directions(problem: Problem, model: Model) -> Open:
     """Return the directions of the aligned frames in which a visible error would not show."""
+    names, size, strength, vectors = shown(problem, model)
+    return Open(names, size[:, None] * vectors[:, strength < 1.0])
+
+
+def shown(
+    problem: Problem, model: Model, *, moving: bool = False
+) -> tuple[list[str], Array, Array, Array]:
+    """
+    Return how well the data show each direction of the aligned frames, the least first.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : Model
+    moving : bool
+        Leave out frame columns that move nothing at all.
+
+    Returns
+    -------
+    names : list of str
+        Of the F frame columns.
+    size : array, shape (F,) [m, rad]
+        Of an error that the data should show.
+    strength, vectors : array, shape (F,) and (F, F)
+        Errors of this size in units of the least noise, squared, and the directions in columns.
+
+    """
     problem = problem.thinned(ROWS).of_frames()
     parts, names = problem.frame_columns(problem.features(model))
-    if not names:
-        return Open(names, np.zeros((0, 0)))
-    columns = problem.whitened(parts, problem.unit_scale())
     size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in names])
-    scaled = columns * size[:, None]
-    strength, vectors = np.linalg.eigh(scaled @ scaled.T)
-    return Open(names, size[:, None] * vectors[:, strength < 1.0])
+    if not names:
+        return names, size, np.zeros(0), np.zeros((0, 0))
+    scaled = problem.whitened(parts, problem.unit_scale()) * size[:, None]
+    live = np.abs(scaled).max(axis=1) > 0.0 if moving else np.ones(size.size, dtype=bool)
+    scaled = scaled[live]
+    kept = [name for name, alive in zip(names, live, strict=True) if alive]
+    return kept, size[live], *np.linalg.eigh(scaled @ scaled.T)
 
 
 def held(found: Fit, problem: Problem, scale: Scale, precision: Array, given: Robot) -> Fit:
     """
     Return the fit with the open directions as they were given, where the data bear that.
 
-    Parameters
-    ----------
-    found : Fit
-    problem, scale : Problem, Scale
-    precision : array, shape (K,)
-        Prior precision of the found effects' coordinates; may be empty.
-    given : Robot
-        With the frames that were given.
-
+    ``precision``, (K,), is the prior precision of the found effects' coordinates, and may be
+    empty; ``given`` has the frames that were given.
     """
     free = open_directions(problem, found.model)
     if not free.vectors.size:
@@ -135,9 +151,5 @@ def _closed_step(
     held = precision if precision.size else np.zeros(coordinates(model).size)
     ridge[closed.shape[1] :] = np.concatenate([own[frames:], held])
     pull[closed.shape[1] :] = ridge[closed.shape[1] :] * x
-    norm = np.sqrt((mixed**2).sum(axis=1) + ridge)
-    norm[norm == 0.0] = 1.0
-    unit = mixed / norm[:, None]
-    system = unit @ unit.T + np.diag(ridge / norm**2 + 1e-11)
-    step = np.linalg.solve(system, (mixed @ residual - pull) / norm) / norm
+    step = solve_scaled(mixed @ mixed.T + np.diag(ridge), mixed @ residual - pull, 0.0)
     return np.concatenate([closed @ step[: closed.shape[1]], step[closed.shape[1] :]])

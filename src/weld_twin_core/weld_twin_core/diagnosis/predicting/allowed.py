@@ -229,9 +229,7 @@ def _thinned(problem: Problem, scale: Scale) -> tuple[Problem, Scale]:
         return problem, scale
     kept = []
     for full, part, weight in zip(problem.recordings, thin.recordings, scale.weights, strict=True):
-        assert full.measured is not None
-        assert part.measured is not None
-        kept.append(weight[np.searchsorted(full.measured.t, part.measured.t)])
+        kept.append(weight[np.searchsorted(full.seen.t, part.seen.t)])
     return thin, replace(scale, weights=tuple(kept))
 
 

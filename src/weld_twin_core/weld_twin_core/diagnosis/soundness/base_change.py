@@ -28,15 +28,13 @@ from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
 from .lag import KEPT
-from .mending import measured
+from .limits import TINY
 
 GEOMETRY = ('theta', 'd', 'a', 'alpha', 'beta')
 WIDE = 0.9
 """Quantile of the residuals that noise is taken from, as that of a Gaussian."""
 MOST_ROWS = 18000
 """Rows on which changes in time are looked for: three thousand poses, enough for any instant."""
-DEAD = 1e-18
-"""Share of the largest squared column below which a column is rounding."""
 LOOSE = (3e-3, 1e-2)
 """Prior spread of the arm's own errors [m, rad]."""
 LOOPS = (0.02, 0.1)
@@ -49,8 +47,6 @@ ACTIVE = 0.05
 """Share of a shape's largest value from which a sample takes part in it."""
 FEWEST = 12.0
 """Independent rows that are counted at the least: two frames have as many numbers."""
-RANK = 1e-9
-"""Strength of a direction of unit columns below which it is rounding."""
 TIED = 1e-6
 """Pull of a change to zero, in units of its columns: decides what data leave open."""
 CONSTANTS = np.geomspace(0.05, 0.7, 7)
@@ -182,7 +178,7 @@ class Change:
             before, left = (float((c.residual[:, part] ** 2).sum()) for c in (rest, after))
             if before > 0.0:
                 count = max(after.share * free * after.residual[:, part].size, FEWEST)
-                fall += 0.5 * count * float(np.log(before / max(left, 1e-12 * before)))
+                fall += 0.5 * count * float(np.log(before / max(left, TINY**2 * before)))
                 total += count
         return fall - 0.5 * float(self.columns.shape[2] * np.log(total))
 
@@ -191,13 +187,7 @@ def rest_of(parts: list[Array], problem: Problem, model: Model) -> Rest:
     """
     Return the residual ready to be searched for changes in time.
 
-    Parameters
-    ----------
-    parts : list of array, shape (c, M)
-        Residuals of the model, one per recording.
-    problem, model
-        As `Problem.residuals` took them.
-
+    ``parts`` are the residuals of the model, (c, M), one per recording.
     """
     scale, n = _scale(parts), model.robot.n
     pairs = list(zip(problem.features(model), problem.rows, strict=True))
@@ -225,7 +215,7 @@ def thinned(problem: Problem, parts: list[Array]) -> tuple[Problem, list[Array]]
     few = problem.thinned(MOST_ROWS)
     out = []
     for whole, thin, part in zip(problem.recordings, few.recordings, parts, strict=True):
-        out.append(part[:, np.isin(measured(whole).t, measured(thin).t)])
+        out.append(part[:, np.isin(whole.seen.t, thin.seen.t)])
     return few, out
 
 
@@ -241,9 +231,9 @@ def _scale(parts: list[Array]) -> Scale:
         else 1.0
         for rows in (slice(0, 3), slice(3, 6))
     ]
-    position, turn = (max(s, 1e-9) for s in size)
+    position, turn = (max(s, TINY) for s in size)
     off = [np.linalg.norm(p[:3], axis=0) / (np.sqrt(3.0) * position) for p in parts]
-    weights = tuple(np.minimum(1.0, (HUBER / np.maximum(o, 1e-12)) ** 2) for o in off)
+    weights = tuple(np.minimum(1.0, (HUBER / np.maximum(o, TINY)) ** 2) for o in off)
     return Scale(position, turn, weights)
 
 
@@ -280,7 +270,7 @@ def _arm(maker: Features, rows: int) -> Array:
         for signal in (*signals, side, *_abrupt(maker, i)):
             # A joint that rests in one recording and moves in another has the same columns in both.
             spread = float(np.abs(signal).max())
-            out.append(joint * (signal / spread if spread > 1e-9 else 0.0 * signal))
+            out.append(joint * (signal / spread if spread > TINY else 0.0 * signal))
     return np.stack(out)
 
 
@@ -292,7 +282,7 @@ def _abrupt(maker: Features, i: int) -> list[Array]:
     """
     view, name = maker.view, maker.twin.robot.joint_names[i]
     pull = view.shift[('tau', i)]
-    most = max(float(np.abs(pull).max()), 1e-9)
+    most = max(float(np.abs(pull).max()), TINY)
     # A load that stays on one side is as good as constant, and there already.
     out = [pull / np.hypot(pull, share * most) for share in SHARES]
     if view.static:  # loops have closed
@@ -331,7 +321,7 @@ def _orthonormal(columns: Array) -> Array:
     columns = columns[:, size > 0.0] / size[size > 0.0]
     if columns.shape[1] == 0:
         return columns
-    return _strong(columns, RANK)
+    return _strong(columns, TINY)
 
 
 def _strong(columns: Array, least: float) -> Array:
@@ -353,7 +343,7 @@ def _flat(columns: Array) -> Array:
 def _solved(right: Array, normal: Array) -> Array:
     """Return the change of each of several systems, (S, i), zero where nothing moves."""
     mass = np.diagonal(normal, axis1=1, axis2=2)
-    live = mass > DEAD * max(float(mass.max(initial=0.0)), 1e-300)
+    live = mass > TINY**2 * float(mass.max(initial=TINY))
     size = np.where(live, np.sqrt(np.maximum(mass, 0.0)), np.inf)
     scaled = normal / (size[:, :, None] * size[:, None, :]) + TIED * np.eye(mass.shape[1])
     unit = (right / size)[:, :, None]

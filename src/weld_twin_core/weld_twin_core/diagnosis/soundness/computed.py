@@ -22,9 +22,9 @@ from ..algebra.noise_floor import SAME_STATION
 from ..algebra.prior import effect_precision
 from ..algebra.problem import FRAMES, Model, Problem, Scale
 from ..frames.changes import constant_errors
-from .evidence import Case, Finding, length, mistake
+from .evidence import Case, Finding, mistake, note
+from .lengths import length
 from .limits import COMPUTED, ROUNDED, UNEXPLAINED
-from .mending import measured
 
 SAMPLES = 120
 """Postures compared: several times the numbers that a rigid arm has."""
@@ -100,7 +100,7 @@ def _paired(case: Case, k: int) -> Iterator[Recording]:
     A pose that was computed belongs to one joint state, whatever its own stamp says.
     """
     recording = case.recordings[k]
-    joints, seen = recording.joints, measured(recording)
+    joints, seen = recording.joints, recording.seen
     each = [case.motions[k]]
     if not joints.static:
         after = np.searchsorted(joints.t, seen.t).clip(1, joints.t.size - 1)
@@ -113,7 +113,7 @@ def _paired(case: Case, k: int) -> Iterator[Recording]:
 
 def _stations(recording: Recording, model: Model) -> Problem | None:
     """Return some postures that differ as a problem; None where they are too few."""
-    seen, q = measured(recording), recording.joints.q
+    seen, q = recording.seen, recording.joints.q
     _, first = np.unique(np.round(q / SAME_STATION), axis=0, return_index=True)
     first = np.sort(first)
     pick = first[np.unique(np.linspace(0, first.size - 1, SAMPLES).round().astype(int))]
@@ -149,7 +149,7 @@ def _rounding(problem: Problem, model: Model) -> float:
     """Return the distance [m] that rounding of the numbers leaves, where that is little; else 0."""
     (recording,), (maker,) = problem.recordings, problem.features(model)
     turning = ~model.robot.prismatic
-    step, angle = _grid(measured(recording).position, GRIDS), _grid(recording.joints.q, ANGLES)
+    step, angle = _grid(recording.seen.position, GRIDS), _grid(recording.joints.q, ANGLES)
     reach = [maker.column(('q', i))[:3] for i in np.flatnonzero(turning).tolist()]
     squares = np.sum([(column**2).sum(axis=0).mean() for column in reach])
     out = OVER * float(np.sqrt((3.0 * step**2 + squares * angle**2) / 12.0))
@@ -165,18 +165,14 @@ def _grid(values: Array, steps: Sequence[float]) -> float:
     return 0.0
 
 
-def source(case: Case) -> Sequence[Finding]:
-    """Return a note when moving joint positions carry no trace of an encoder."""
+def source(case: Case) -> Iterator[Finding]:
+    """Yield a note when moving joint positions carry no trace of an encoder."""
     names = [r.name for r in case.recordings if _commanded(r.joints)]
-    if not names:
-        return ()
-    return (
-        Finding(
-            'note',
+    if names:
+        yield note(
             f'The joint positions of {", ".join(names)} are as smooth as a command: what the '
-            'drives make of it (lag, following error) is then part of the gap.',
-        ),
-    )
+            'drives make of it (lag, following error) is then part of the gap.'
+        )
 
 
 def _commanded(joints: JointMotion) -> bool:

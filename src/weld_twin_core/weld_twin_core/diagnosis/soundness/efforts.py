@@ -23,7 +23,7 @@ from ...errors import DataError
 from ...recording import Recording
 from ...twin.expected_effort import with_expected_effort
 from ..result import EffortCause, Efforts, JointEffort
-from .evidence import Case, Finding
+from .evidence import Case, Finding, note, warning
 
 ROWS = 400
 """Samples of a recording that are compared; neighbours of a moving arm say the same."""
@@ -136,36 +136,33 @@ def efforts(case: Case) -> Sequence[Finding]:
 
 def _told_differences(found: Efforts) -> Iterator[Finding]:
     if not found.weighed:
-        yield Finding(
-            'note',
+        yield note(
             'The robot model has no link masses, so the unit of the efforts is not checked; a '
-            'compliance found with them is for each unit of effort.',
+            'compliance found with them is for each unit of effort.'
         )
     elif found.causes:
-        yield Finding('warning', _told_causes(found))
+        yield warning(_told_causes(found))
     elif found.difference > AGREES:
         factors = [f'{j.joint} {j.factor:.2f}' for j in found.joints if j.factor is not None]
-        yield Finding(
-            'note',
+        yield note(
             f'Efforts and statics differ by {found.difference:.0%} of the load, and neither a '
             'payload nor the torque constant of one joint explains it: the masses of the links may '
-            f'be rough. Measured for each N m of the model: {", ".join(factors)}.',
+            f'be rough. Measured for each N m of the model: {", ".join(factors)}.'
         )
 
 
 def _told_sign(found: Efforts) -> Finding:
     meaning = 'what holds the load' if found.holds else 'the load itself, not what holds it'
     if abs(found.correlation) < CLEAR:
-        return Finding(
-            'warning',
+        return warning(
             f'Springs take the measured efforts as {meaning}, and nothing confirms that: with '
-            f'gravity on the links they correlate by {found.correlation:.2f}.',
+            f'gravity on the links they correlate by {found.correlation:.2f}.'
         )
     sentence = (
         f'Springs take the measured efforts as {meaning}: so taken they correlate by '
         f'{found.correlation:.2f} with gravity on the links.'
     )
-    return Finding('note', sentence)
+    return note(sentence)
 
 
 def _told_causes(found: Efforts) -> str:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -18,11 +18,10 @@ from ..frames.alignment import refined
 from ..result import Unsound
 from .base_change import Rest, rest_of, thinned
 from .lag import Lag, lag
-from .lengths import length
 from .limits import BY_ITSELF, LATE_LEFT, LATE_WORTH, RATE_MOST, UNEXPLAINED
 from .mending import Mend, as_entry
 from .slips import Settling, Slip, changes
-from .snapshot import Snapshot, measured, snapshot
+from .snapshot import Snapshot, snapshot
 
 ENOUGH = 30
 """Joint states from which a motion has a shape in time."""
@@ -32,9 +31,6 @@ EXPLAINED = 0.35
 """for it to be believed once the frames are fitted with it."""
 LARGEST = 0.99
 """Quantile of the gaps that stands for the largest."""
-
-
-__all__ = ['Case', 'Checker', 'Finding', 'distance', 'length', 'listed', 'mistake']
 
 
 class Finding(NamedTuple):
@@ -61,6 +57,8 @@ class Finding(NamedTuple):
         return Unsound(self.kind, self.at, self.sentence, self.remedy, applied, self.alike, done)
 
 
+note, warning = partial(Finding, 'note'), partial(Finding, 'warning')
+"""Return what a check found in a sentence."""
 mistake = partial(Finding, 'unsound')
 """Returns the mistake of a sentence, kind, place and remedy."""
 
@@ -135,7 +133,7 @@ class Case:
     def _lags(self, model: Model, *, wide: bool = False) -> list[Lag | None]:
         out: list[Lag | None] = []
         for k, recording in enumerate(self.recordings):
-            t, seen = recording.joints.t, measured(recording)
+            t, seen = recording.joints.t, recording.seen
             if recording.joints.static or t.size < ENOUGH:
                 out.append(None)
                 continue
@@ -146,7 +144,7 @@ class Case:
     def _motions(self, lags: Sequence[Lag | None]) -> list[Array]:
         out = []
         for recording, late in zip(self.recordings, lags, strict=True):
-            t = measured(recording).t
+            t = recording.seen.t
             out.append(recording.joints.at(t if late is None else t - late.at(t))[0])
         return out
 
@@ -182,14 +180,9 @@ class Case:
         return snapshot(self.problem, self.model, self.motions)
 
 
-Checker = Callable[[Case], Sequence[Finding]]
+Checker = Callable[[Case], Iterable[Finding]]
 
 
 def distance(part: Array) -> Array:
     """Return the length of the position part of a residual, shape (M,) [m]."""
     return np.asarray(np.linalg.norm(part[:3], axis=0))
-
-
-def listed(names: Sequence[str]) -> str:
-    """Return names as a list in a sentence."""
-    return ' and '.join([', '.join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -19,23 +19,50 @@ from ...effects.effect import Effect
 from ...recording import Recording
 from ..algebra.problem import Model, Problem
 from ..beliefs import Beliefs
-from ..frames.aligned import aligned
+from ..frames.aligned import aligned, tracked_part
 from ..frames.alignment import refined
 from ..frames.changes import with_changes
-from ..frames.places import tracked_part
 from ..result import Check, Unsound
-from .checks import CHECKS
-from .evidence import Case, Finding, mistake
+from .changed import parted, setup
+from .computed import computed, source
+from .efforts import efforts
+from .evidence import Case, Checker, Finding, mistake
+from .images import images
 from .limits import ENDS
-from .mending import Given, as_entry, measured
+from .mending import Given, as_entry
+from .mixups import mixups
+from .orientation import gravity, orientation
+from .repeats import outliers, repeats
+from .richness import motion, quantity
 from .slips import Slip
-from .streams import streams, velocities_checked
+from .stamps import clocks, stamps, streams, velocities_checked
+from .stuck import stuck
 from .touches import touches
 
 ROUNDS = 4
 """So often the checks are made anew after a mistake was undone; each finds what the last hid."""
 FIT_ROWS = 6000
 """Rows on which the frames are fitted that the checks start from."""
+
+CHECKS: dict[str, tuple[Checker, str]] = {
+    'quantity': (quantity, 'There is enough to work on.'),
+    'readings': (stuck, 'No reading stands still while the tool moves.'),
+    'tools': (parted, 'No recording has another tool than the first.'),
+    'images': (images, 'No camera measured.'),
+    'units, signs, joints, robot': (mixups, 'Joints, positions and robot belong together.'),
+    'gravity': (gravity, 'Gravity pulls down where the base stands.'),
+    'efforts': (efforts, 'No measured effort of the joints is used.'),
+    'orientation': (orientation, 'Orientations turn as the joints say.'),
+    'instrument': (computed, 'The poses have the noise of an instrument.'),
+    'clocks': (clocks, 'Joint and measurement stamps belong to one clock.'),
+    'stamps': (stamps, 'Stamps come regularly and without gaps.'),
+    'repeats': (repeats, 'Nothing was recorded twice.'),
+    'source of the joints': (source, 'Joint positions are not plainly those of a command.'),
+    'motion': (motion, 'Every joint moves, both ways, and the frames can be told apart.'),
+    'outliers': (outliers, 'No single reading stands out from its neighbours.'),
+    'set-up': (setup, 'The set-up did not move while it was measured.'),
+}
+"""Every check by name: the function, and what it says when it finds nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +96,8 @@ class Examined:
     def told(self, found: Sequence[Effect]) -> tuple[Unsound, ...]:
         """Return the mistakes, and the slips that a fit has among what it found."""
         kept = {effect.key for effect in found}
-        own = [_told(slip, self.given) for slip in self.slips if slip.effect().key in kept]
+        slips = (slip for slip in self.slips if slip.effect().key in kept)
+        own = (_gave_way(slip, self.given).told(applied=True) for slip in slips)
         return (*self.unsound, *own)
 
     def torn(self, problem: Problem, model: Model) -> Examined:
@@ -77,15 +105,9 @@ class Examined:
         Return the same, unsound where something gave way in one of several recordings.
 
         A slip counts one time for all recordings, so no search can weigh one of them against the
-        library. It is told only where what the library explains still leaves it: loops of lost
-        motion and play that the load turns over look like steps until they are fitted.
-
-        Parameters
-        ----------
-        problem : Problem
-        model : Model
-            What the library explains best.
-
+        library. It is told only where what the library explains best, ``model``, still leaves it:
+        loops of lost motion and play that the load turns over look like steps until they are
+        fitted.
         """
         if len(problem.recordings) < 2 or not self.slips:
             return self
@@ -93,7 +115,7 @@ class Examined:
         kept = [slip for slip in self.slips if any(_same(slip, other, problem) for other in left)]
         if not kept:
             return self
-        mistakes = [_undated(slip, problem) for slip in kept]
+        mistakes = [_gave_way(slip, problem) for slip in kept]
         return replace(
             self,
             posed=None,
@@ -128,7 +150,7 @@ def examine(
     apply : bool
         Go on with mended data where every mistake can be undone.
     beliefs : Beliefs, optional
-        What a difference between recordings must be worth; the usual ones when left out.
+        What a difference between recordings must be worth.
 
     Raises
     ------
@@ -208,7 +230,7 @@ def _checked_beside(problem: Problem, model: Model) -> tuple[list[Check], list[F
     """Return the same of an instrument's recordings beside contacts; nothing is mended there."""
     part = tracked_part(problem, model)
     checks, found, dated = _checked(*part)
-    mistakes = [*found, *(_undated(slip, part[0]) for slip in dated)]
+    mistakes = [*found, *(_gave_way(slip, part[0]) for slip in dated)]
     return checks, [each._replace(mend=None) for each in mistakes]
 
 
@@ -234,20 +256,14 @@ def _checked(
     return out, [], tuple(case.slips)
 
 
-def _told(slip: Slip, given: Given) -> Unsound:
-    recording = given.recordings[slip.recording]
-    sentence = slip.sentence(recording)
-    return Unsound(slip.kind, slip.at, sentence, slip.remedy, applied=True, alike=slip.alike)
-
-
 def _same(slip: Slip, other: Slip, problem: Problem) -> bool:
     """Return whether two steps of one recording are as near as one instant can be told."""
-    t = measured(problem.recordings[slip.recording]).t
+    t = problem.recordings[slip.recording].seen.t
     near = abs(slip.time - other.time) <= ENDS * float(np.ptp(t))
     return slip.recording == other.recording and near
 
 
-def _undated(slip: Slip, problem: Problem) -> Finding:
-    """Return what gave way in one of several recordings: their effects count one time for all."""
-    sentence = slip.sentence(problem.recordings[slip.recording])
+def _gave_way(slip: Slip, of: Given | Problem) -> Finding:
+    """Return the mistake that a slip is; of several recordings, effects count one time for all."""
+    sentence = slip.sentence(of.recordings[slip.recording])
     return mistake(sentence, slip.kind, slip.at, slip.remedy, alike=slip.alike)

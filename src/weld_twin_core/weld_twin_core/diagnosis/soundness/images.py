@@ -32,7 +32,6 @@ from .limits import (
     TARGET_EXPLAINS,
     TARGET_SCALE,
 )
-from .snapshot import measured
 
 LOOKED = 20
 """Images in which it is looked whether a board is seen from behind."""
@@ -157,7 +156,7 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
     left = left - basis @ (basis.T @ left)
     told: list[tuple[float, float, str]] = []
     for kind, columns in (('target_scale', _larger), ('intrinsics', _farther)):
-        each = [columns(r.images, measured(r).position) for r in problem.recordings]
+        each = [columns(r.images, r.seen.position) for r in problem.recordings]
         rows = [
             np.concatenate([part.T, np.zeros((c - 3, len(part)))])
             for part, c in zip(each, problem.rows, strict=True)

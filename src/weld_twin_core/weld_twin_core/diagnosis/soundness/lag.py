@@ -50,17 +50,10 @@ def lag(
     joints: Array, path: Array, t: Array, position: Array, *, wide: bool = False
 ) -> Lag | None:
     """
-    Return how late measurements are against a path; None when too few to tell.
+    Return how late measurements, (M,) [s] and (M, 3) [m], are against a path, (N,) and (N, 3).
 
-    Whatever lag, the path may be turned and shifted, so no base frame is needed.
-
-    Parameters
-    ----------
-    joints, path : array, shape (N,) [s] and (N, 3) [m]
-    t, position : array, shape (M,) [s] and (M, 3) [m]
-    wide : bool
-        Look at lags up to `WIDEST` of the recording.
-
+    None when too few to tell. Whatever lag, the path may be turned and shifted, so no base frame
+    is needed. Where ``wide``, lags up to `WIDEST` of the recording are looked at.
     """
     span = float(np.ptp(t))
     most = WIDEST * span if wide else min(MOST_LAG, 0.1 * span)

@@ -1,8 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Lengths and instants in the sentences of the checks."""
+"""Lengths, instants and lists in the sentences of the checks."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -23,17 +25,18 @@ def length(value: float) -> str:
     return f'{value * 1e3:.3g} mm' if value >= _FINE else f'{value * 1e3:.3f} mm'
 
 
+def falls(before: float, after: float) -> str:
+    """Return that the gap [m] falls from one length to another."""
+    return f'the gap falls from {length(before)} to {length(after)}'
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a list in a sentence."""
+    return ' and '.join([', '.join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
 def instant(recording: Recording, time: float) -> str:
-    """
-    Return an instant as people find it: the number of the first station then, or the time.
-
-    Parameters
-    ----------
-    recording : Recording
-        With measurements.
-    time : float [s]
-
-    """
+    """Return an instant [s] as people find it: the first station then, or the time."""
     if not recording.joints.static or recording.measured is None:
         return f't = {time:.4g} s'
     t = recording.measured.t

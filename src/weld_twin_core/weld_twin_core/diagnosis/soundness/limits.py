@@ -10,6 +10,10 @@ the diagnosis. The numbers below lie between the two, with room on both sides; t
 ``weld-twin lab gate`` measures that room.
 """
 
+TINY = 1e-9
+"""What is less is rounding: metres, radians, seconds, and shares of what it is compared with."""
+NOISE = 5e-5
+"""Gap [m] that is the noise of a good tracker: below it nothing is looked for in tools and stamps."""
 LARGE = 1e-3
 """
 Median gap [m] that frames and a plausible arm leave, from which mistakes are looked for.
@@ -24,6 +28,14 @@ Factor by which undoing a mistake must bring down what is wrong.
 Undoing a real one brings centimetres to the noise (factors of 100 and more); undoing one that is
 not there by chance never did better than 2 on sound recordings.
 """
+HALVED = 2.0
+"""
+The same where other errors stay: loads and play beside other lengths of links, beside a tool of each
+recording's own, beside even stamps; or where undoing it also brings joints back into their range.
+
+Of sound pairs of recordings tools of their own took off a tenth, of sound arms other lengths a
+quarter; even stamps of a buffered tracker brought 126 mm to 0.3 mm.
+"""
 UNDONE = 4e-3
 """
 Median gap [m] that a plausible arm may leave once a mistake is undone.
@@ -31,8 +43,6 @@ Median gap [m] that a plausible arm may leave once a mistake is undone.
 Play, ripple, lag and springs leave up to 2 mm; of rows that do not belong together any turn of a
 joint may by chance leave a fifth, and still centimetres.
 """
-EXPLAINED_IMPOSSIBLE = 2.0
-"""The same factor where undoing it also brings joints back into their range."""
 BEYOND = 1.0
 """Reading [rad, m] beyond a joint's range that no controller gives, whatever its zero."""
 WORTH = 0.7
@@ -78,13 +88,6 @@ RMS motion [m] of the tool by wrong lengths of links, from which they are those 
 The two arms of docs/real_robots.md are off by 2 to 3 mm in all, most of it by their zeros; arms of
 one family differ by 5 to 30 mm.
 """
-LINKS_EXPLAIN = 2.0
-"""
-Factor by which other lengths must bring down the gap that all other errors of an arm leave.
-
-Whatever else is at work stays (play, ripple, loads: up to 2 mm), so it is less than `EXPLAINED`;
-lengths of sound arms never did better than 1.3 where a millimetre was left.
-"""
 LINKS_APART = LINK_SPREAD, 0.02
 """Spreads [m] of lengths that are tried in turn: within a family, and of an arm of another size."""
 SOFT = 2e-4, 4e-4
@@ -114,7 +117,7 @@ of EMPS: 6.5 ms); clocks that nobody synchronised are off by anything.
 LATE_LEFT = 1e-2
 """Gap [m] that a lag must leave at most: more, and something else is wrong that a lag imitates."""
 BY_ITSELF = 2e-3
-"""Median gap [m] that a sound arm leaves by itself: play, ripple, lag and springs."""
+"""Gap [m] that a sound arm leaves by itself, moving or at rest: play, ripple, lag and springs."""
 LATE_WORTH = 0.6
 """
 Share of what the errors of a sound arm would leave, RMS, that a lag must stay below there.
@@ -131,16 +134,12 @@ A cheap quartz is within 100 ppm; more is stamps made by something else than a c
 RATE_MOST = 0.1
 """Rate beyond which it is no clock: rows that do not belong together look like that."""
 
-STILL_SPEED = 1e-12
-"""Velocity [rad/s, m/s] below which a stream says zero; sensors at rest show noise, not zero."""
 MOVED = 0.02
-"""Motion [rad, m] in a stream from which zero velocities cannot be true."""
+"""Motion [rad, m] of a joint that hardly moves: it shows next to nothing, and less may be at rest."""
 STUCK_LEAST, STUCK_STATIONS = 0.5, 4
 """Shortest stretch, in s or in stations, in which readings that stand still are looked at."""
 STUCK_AFTER = 0.3
 """Seconds that an arm may go on after its command stands still: lag and settling."""
-STUCK_FAR = 2e-3
-"""Motion or gap [m] at the tool that no standing arm has; play and springs are smaller."""
 STUCK_STRAYS = 0.1
 """Share of the measurements of a standing stretch, one at least, that may lie anywhere: instruments have
 strays, and a tool that moves on is elsewhere in all the others too."""
@@ -157,7 +156,7 @@ DATED, DATED_MOVING = 6.0, 20.0
 """
 Nats by which a step must beat no step, on stations and on a moving arm.
 
-The residuals of a moving arm hang together however good the model; see `setup_change`.
+The residuals of a moving arm hang together however good the model; see `changed`.
 """
 MARGIN = 10.0
 """Nats by which a step must beat every smooth change of anything."""
@@ -186,15 +185,6 @@ ENDS = 0.05
 MOST_SLIPS = 4
 """So many changes in time are taken out in turn."""
 
-PARTED = 2.0
-"""
-Factor by which a tool of its own in each recording must bring down the gap that an arm leaves.
-
-As for links: what else is at work stays. Of sound pairs of recordings it took off a tenth.
-"""
-PARTED_LEAST = 5e-5
-"""Gap [m] that an arm leaves below which no tool is looked at: the noise of a good tracker."""
-
 COMPUTED = 2e-6
 """
 Gap [m] that a rigid arm leaves of computed poses at most: a fifth of what the best tracker repeats.
@@ -204,15 +194,6 @@ Numbers of 32 bits leave 1e-7. Of the real arms under a tracker a rigid arm left
 ROUNDED = 1e-5
 """The same [m] where the numbers were rounded, and rounding alone explains what is left."""
 
-EVEN = 2.0
-"""
-Factor by which even stamps must bring down the gap for bursts to be believed.
-
-Of a buffered tracker on a UR5 they brought 126 mm to 0.3 mm; of a stream that really is measured in
-bursts they make all of it wrong.
-"""
-EVEN_LEAST = 5e-5
-"""Gap [m] below which stamps are as good as they need to be: the noise of a good tracker."""
 PARTED_TURN = 0.01
 """Turn [rad] that an arm leaves of orientations below which no tool is looked at: zeros and twists of
 an arm as delivered turn the tool by some milliradians."""

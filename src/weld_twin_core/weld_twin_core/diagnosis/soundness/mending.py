@@ -5,7 +5,7 @@ Corrections of what was given: each takes recordings, robot and frames, and retu
 
 A correction is kept as a function of this file with its values (`functools.partial`). So it can stand
 in diagnosis.json (`as_entry`) and be made again wherever the model of that diagnosis is used on the
-same source (`from_entry`, `replayed`).
+same source (`replayed`).
 """
 
 from __future__ import annotations
@@ -54,18 +54,10 @@ Mend = Callable[[Given], Given]
 
 def joints_as(given: Given, matrix: Array, offset: Array) -> Given:
     """
-    Return what was given with joint positions q matrix' + offset.
+    Return what was given with joint positions q matrix' + offset, (n, n) and (n,) [rad or m].
 
     Efforts go with the joints that they are of, in the sense that these are counted in; they keep
     their size where only the unit of the positions was wrong.
-
-    Parameters
-    ----------
-    given : Given
-        Recordings, robot and frames as they were given.
-    matrix : array, shape (n, n)
-    offset : array, shape (n,) [rad or m]
-
     """
     out = []
     for r in given.recordings:
@@ -86,16 +78,23 @@ def positions_as(given: Given, factor: Array) -> Given:
 
     A mirrored frame has no orientations; they are left out.
     """
-    out = []
-    for r in given.recordings:
-        if r.measured is None:
-            out.append(r)
-            continue
-        seen = measured(r)
+
+    def scaled(seen: Measurements) -> Measurements:
         turn = None if np.prod(factor) < 0.0 else seen.rotation
         # How sure they are was told of what has proved to be something else.
-        scaled = Measurements(seen.t, seen.position * factor, turn, seen.sigma)
-        out.append(r.with_measured(scaled))
+        return Measurements(seen.t, seen.position * factor, turn, seen.sigma)
+
+    return _seen_as(given, scaled)
+
+
+def _seen_as(
+    given: Given, change: Callable[[Measurements], Measurements], only: int | None = None
+) -> Given:
+    """Return what was given with other measurements, of one recording or of all that have some."""
+    out = list(given.recordings)
+    for k, recording in enumerate(out):
+        if recording.measured is not None and only in (None, k):
+            out[k] = recording.with_measured(change(recording.measured))
     return replace(given, recordings=tuple(out))
 
 
@@ -122,24 +121,17 @@ def _rolled(turn: Array, places: int) -> Array:
 
 def turns_as(given: Given, way: str) -> Given:
     """Return what was given with measured rotations, shape (M, 3, 3), by one of `WAYS`."""
-    out = []
-    for r in given.recordings:
-        if r.measured is None:
-            out.append(r)
-            continue
-        seen = measured(r)
+
+    def turned(seen: Measurements) -> Measurements:
         turn = None if seen.rotation is None else WAYS[way][1](seen.rotation)
-        out.append(r.with_measured(Measurements(seen.t, seen.position, turn, seen.sigma)))
-    return replace(given, recordings=tuple(out))
+        return Measurements(seen.t, seen.position, turn, seen.sigma)
+
+    return _seen_as(given, turned)
 
 
 def poses_inverted(given: Given) -> Given:
     """Return what was given with measured poses inverted; points stay as they are."""
-    out = []
-    for r in given.recordings:
-        posed = r.measured is not None and r.measured.rotation is not None
-        out.append(r.with_measured(measured(r).inverted()) if posed else r)
-    return replace(given, recordings=tuple(out))
+    return _seen_as(given, lambda seen: seen if seen.rotation is None else seen.inverted())
 
 
 def robot_as(given: Given, name: str) -> Given:
@@ -169,16 +161,14 @@ def base_turned(given: Given, turn: Array) -> Given:
 
 def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> Given:
     """
-    Return what was given with the arm's own stamps of recording k on the clock of the measurements.
+    Return what was given with the arm's own stamps of recording k on the measurements' clock.
 
     The measurements keep their stamps, so that whatever is told of an instant is told in theirs.
 
     Parameters
     ----------
     given : Given
-        Recordings, robot and frames as they were given.
     k : int
-        Which recording, counted from 0.
     late : float [s]
         How late its measurements are in the middle.
     rate : float [s/s]
@@ -221,9 +211,7 @@ def stamped_evenly(
     Parameters
     ----------
     given : Given
-        Recordings, robot and frames as they were given.
     k : int
-        Which recording, counted from 0.
     first, step : float [s]
         The first stamp, and the time from one to the next.
     lost : array of int
@@ -233,13 +221,12 @@ def stamped_evenly(
         takes its share.
 
     """
-    recordings = list(given.recordings)
-    seen = recordings[k].measured
-    if seen is None:
-        return given
-    even = evenly(first, step, np.asarray(lost, dtype=int), seen.t.size, count)
-    recordings[k] = recordings[k].with_measured(replace(seen, t=even))
-    return replace(given, recordings=tuple(recordings))
+
+    def stamped(seen: Measurements) -> Measurements:
+        missing = np.asarray(lost, dtype=int)
+        return replace(seen, t=evenly(first, step, missing, seen.t.size, count))
+
+    return _seen_as(given, stamped, only=k)
 
 
 def velocities_left_out(given: Given, k: int) -> Given:
@@ -271,10 +258,8 @@ def as_entry(mend: Mend | None) -> dict[str, Any] | None:
     """Return a correction as plain values, for diagnosis.json; None for none."""
     if not isinstance(mend, partial):
         return None
-    name = next((name for name, made in MENDS.items() if made is mend.func), None)
-    return (
-        None if name is None else {'do': name, **{k: _plain(v) for k, v in mend.keywords.items()}}
-    )
+    values = {key: _plain(value) for key, value in mend.keywords.items()}
+    return next(({'do': name, **values} for name, f in MENDS.items() if f is mend.func), None)
 
 
 def _plain(value: Any) -> Any:
@@ -283,16 +268,8 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def from_entry(entry: Mapping[str, Any]) -> Mend:
-    """
-    Return a correction from plain values, as `as_entry` gives them.
-
-    Raises
-    ------
-    ModelError
-        It is none that is known.
-
-    """
+def _from_entry(entry: Mapping[str, Any]) -> Mend:
+    """Return a correction from plain values, as `as_entry` gives them."""
     try:
         values = {key: value for key, value in entry.items() if key != 'do'}
         made = MENDS[entry['do']]
@@ -332,7 +309,7 @@ def replayed(entries: Sequence[Mapping[str, Any]], given: Given, which: int = 0)
                 continue
             own[_ONE] = 0
         try:
-            given = from_entry(own)(given)
+            given = _from_entry(own)(given)
         except (TypeError, ValueError, KeyError, IndexError, DataError) as error:
             raise ModelError(f'a correction of data cannot be made again: {error}') from None
     return given
@@ -341,12 +318,6 @@ def replayed(entries: Sequence[Mapping[str, Any]], given: Given, which: int = 0)
 def reading_map(entries: Sequence[Mapping[str, Any]], count: int) -> tuple[Array, Array]:
     """
     Return what corrections make of joint positions as they were recorded.
-
-    Parameters
-    ----------
-    entries : sequence of mapping
-    count : int
-        Joints of the robot, n.
 
     Returns
     -------
@@ -366,18 +337,3 @@ def turned_joints(entries: Sequence[Mapping[str, Any]], robot: Robot) -> tuple[s
     """Return the joints whose readings were recorded with the other sign; see `reading_map`."""
     matrix, _ = reading_map(entries, robot.n)
     return tuple(robot.joint_names[k] for k in np.flatnonzero(np.diag(matrix) < 0.0).tolist())
-
-
-def measured(recording: Recording) -> Measurements:
-    """
-    Return what was measured.
-
-    Raises
-    ------
-    DataError
-        Nothing was.
-
-    """
-    if recording.measured is None:
-        raise DataError(f'{recording.name} holds no measured poses or points')
-    return recording.measured

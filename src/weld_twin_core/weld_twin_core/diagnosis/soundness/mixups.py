@@ -23,15 +23,15 @@ from ...effects.plausible import plausible
 from ...effects.root_pose import RootPose
 from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem
-from .evidence import Case, Finding, length, listed, mistake
+from .evidence import Case, Finding, mistake
+from .lengths import falls, length, listed
 from .limits import (
     BESIDE,
     EXPLAINED,
-    EXPLAINED_IMPOSSIBLE,
     FAR,
+    HALVED,
     LARGE,
     LINKS_APART,
-    LINKS_EXPLAIN,
     MOST,
     SHORTLIST,
     SIBLING,
@@ -86,14 +86,10 @@ def _told(tried: _Tried, before: float, after: float) -> Finding:
     one, others = tried.suspicion, tried.alike
     words = f'{one.sentence[0].upper()}{one.sentence[1:]}'
     if after < before:
-        words += f'; undone, {_falls(before, after)}'
+        words += f'; undone, {falls(before, after)}'
     if others:
         words += f'. As well it may be that {" or that ".join(o.sentence for o in others)}'
     return one._replace(sentence=f'{words}.', alike=tuple((o.kind, o.at) for o in others))
-
-
-def _falls(before: float, after: float) -> str:
-    return f'the gap falls from {length(before)} to {length(after)}'
 
 
 def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list[_Tried], Arm]:
@@ -107,7 +103,7 @@ def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list
                 break
             found.append(best)
             trial, arm, look = best.undone, best.arm, suspicions
-        factor = EXPLAINED if shot.possible or not trial.possible else EXPLAINED_IMPOSSIBLE
+        factor = EXPLAINED if shot.possible or not trial.possible else HALVED
         told = arm.off < start.off / factor or _as_given(shot, trial, start, align)
         # What is shrunk leaves less of everything; it must leave less for its size as well.
         size = trial.shrunk(shot)
@@ -216,7 +212,7 @@ def _plausible(robot: Robot, model: Model) -> bool:
         ('tool_pose', np.linalg.inv(robot.T_flange_tool) @ model.robot.T_flange_tool)
     ]
     for effect, off in pairs:
-        turn = float(np.arccos(np.clip(0.5 * (np.trace(off[:3, :3]) - 1.0), -1.0, 1.0)))
+        turn = np.linalg.norm(rotation_vector(off[:3, :3]))
         if np.linalg.norm(off[:3, 3]) > plausible(robot, effect, 'xyz').high:
             return False
         if turn > plausible(robot, effect, 'rotvec').high:
@@ -228,10 +224,10 @@ def _framed(
     shot: Snapshot, model: Model, more: frozenset[str], before: float, left: float
 ) -> Finding:
     if more == {'base'} and shot.robot.behind:
-        return _fixture(shot.robot, model.bases, _falls(before, left))
+        return _fixture(shot.robot, model.bases, falls(before, left))
     turn = _turned(shot.robot.T_world_base, model.bases[0]) if more == {'base'} else None
     if turn is not None:
-        return _base(shot.robot, turn, _falls(before, left))
+        return _base(shot.robot, turn, falls(before, left))
     names = listed(sorted(more))
     return mistake(
         f'The gap of {length(before)} is almost only one of frames: with the {names} fitted '
@@ -244,7 +240,7 @@ def _framed(
     )
 
 
-def _base(robot: Robot, turn: Array, falls: str) -> Finding:
+def _base(robot: Robot, turn: Array, told: str) -> Finding:
     """Return the mistake that a base is that stands turned, shape (3, 3)."""
     vector = np.degrees(rotation_vector(turn))
     k, angle = int(np.abs(vector).argmax()), float(np.linalg.norm(vector))
@@ -260,7 +256,7 @@ def _base(robot: Robot, turn: Array, falls: str) -> Finding:
     words = f'; a joint {first} whose zero is off by as much would look the same'
     return mistake(
         f'The base of the robot stands turned by {size:.0f} degrees about its {about} against '
-        f'the frame that was given; turned back, {falls}.',
+        f'the frame that was given; turned back, {told}.',
         'base_turned',
         ('base',),
         'Use the axes of the robot base that the controller counts in (for a UR: base or '
@@ -270,7 +266,7 @@ def _base(robot: Robot, turn: Array, falls: str) -> Finding:
     )
 
 
-def _fixture(robot: Robot, bases: Sequence[Array], falls: str) -> Finding:
+def _fixture(robot: Robot, bases: Sequence[Array], told: str) -> Finding:
     """Return the mistake that poses were measured in another frame of the workpiece than was given."""
     seen = [np.asarray(np.linalg.inv(base)) for base in bases]
     steps = [np.asarray(robot.T_world_base @ pose) for pose in seen]
@@ -283,7 +279,7 @@ def _fixture(robot: Robot, bases: Sequence[Array], falls: str) -> Finding:
     words = (
         f'The poses{which} were measured in the frame of another fixture than was given: on the '
         f'positioner it lies {length(far[k])} from there, turned by {angle:.1f} degrees; with it, '
-        f'{falls}.'
+        f'{told}.'
     )
     remedy = (
         "Give the frame of the fixture that was measured on (of a robot file 'tool' of the "
@@ -304,8 +300,7 @@ def _turned(given: Array, fitted: Array) -> Array | None:
     turn[np.arange(3), rows] = np.sign(off[np.arange(3), rows])
     if len(set(rows.tolist())) < 3 or np.linalg.det(turn) < 0.0 or np.array_equal(turn, np.eye(3)):
         return None
-    cosine = 0.5 * (np.trace(turn.T @ off[:3, :3]) - 1.0)
-    return turn if np.arccos(np.clip(cosine, -1.0, 1.0)) < TURNED else None
+    return turn if np.linalg.norm(rotation_vector(turn.T @ off[:3, :3])) < TURNED else None
 
 
 # Nothing known ---------------------------------------------------------------------------------
@@ -314,12 +309,12 @@ def _turned(given: Array, fitted: Array) -> Array | None:
 def _links(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     """Return that free frames and a bent arm took up what are the links of another one."""
     align = case.problem.align
-    found = other_links(shot, align) if case.gap >= SIBLING else None
+    found = _other_links(shot, align) if case.gap >= SIBLING else None
     if found is None:
         return ()
     told, left = found
     bundled = _best(shot, arm, robots(shot.robot), align)
-    if bundled and bundled.arm.off < 1.0 and other_links(bundled.undone, align) is None:
+    if bundled and bundled.arm.off < 1.0 and _other_links(bundled.undone, align) is None:
         return (_told(bundled, left, bundled.arm.gap),)
     return (told,)
 
@@ -375,20 +370,12 @@ def _foreign(robot: Robot, worst: Effect, why: str) -> Finding:
     return mistake(words, 'other_robot', ('robot',), GIVE_ITS_MODEL)
 
 
-def other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Finding, float] | None:
+def _other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Finding, float] | None:
     """
     Return that the lengths of the links are those of another arm; None where they are not.
 
-    With it comes the median gap [m] that every other error of an arm leaves.
-
-    Frames that are not aligned stay within what they can be off by, as all errors do.
-
-    Parameters
-    ----------
-    shot : Snapshot
-    align : frozenset of str
-        Frames that are fitted.
-
+    With it comes the median gap [m] that every other error of an arm leaves. Frames that are not
+    aligned stay within what they can be off by, as all errors do.
     """
     problem = replace(shot.problem, align=align)
     start = shot.framed() if align == FRAMES else shot.aligned(align)
@@ -414,12 +401,12 @@ def other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Finding, float] 
         return None
     for spread in LINKS_APART:
         arm, after = fitted([*own, *_of_joints(shot, (LinkLength, LinkOffset))], spread)
-        if LINKS_EXPLAIN * after < left:
+        if HALVED * after < left:
             if _moved(problem, arm) <= SIBLING:
                 return None
             lengths = [e for e in arm.found if e.name in LENGTHS]
             worst = max(lengths, key=lambda e: abs(float(e.vector()[0])))
-            why = f'; with other lengths {_falls(left, after)}'
+            why = f'; with other lengths {falls(left, after)}'
             return _foreign(arm.robot, worst, why), left
     return None
 

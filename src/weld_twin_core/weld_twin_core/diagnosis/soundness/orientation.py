@@ -4,69 +4,54 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
 from ...arrays import Array
 from ..algebra.problem import Model
-from .evidence import Case, Finding, mistake
-from .limits import TILTED, UNEXPLAINED
+from .evidence import Case, Finding, mistake, warning
+from .limits import EXPLAINED, TILTED, UNEXPLAINED
 from .mending import WAYS, turns_as
-from .snapshot import Snapshot, gap
+from .snapshot import Snapshot
 
 WRONG = 0.05
 """Median angle [rad] from which orientations do not belong to the joints."""
-Undo = Callable[[Array], Array]
 
 
 def orientation(case: Case) -> Sequence[Finding]:
     """Return what is wrong with orientations while positions are right."""
-    if all(rows == 3 for rows in case.problem.rows):
-        return ()
-    angle = np.median(np.concatenate([_angle(p) for p in case.residuals if len(p) > 3]))
-    if angle < WRONG:
+    if _angle(case.residuals) < WRONG:
         return ()
     shot = case.snapshot
     turned = disagreement(shot, shot.framed())
-    points = shot.with_turns([None] * len(shot.recordings))
-    if turned < WRONG or gap(points.problem, points.framed()) > UNEXPLAINED:
+    points = shot.pointed()
+    if turned < WRONG or points.gap(points.framed()) > UNEXPLAINED:
         return ()
-    for way, (words, undo) in WAYS.items():
-        trial = shot.with_turns(_changed(shot, undo))
-        if disagreement(trial, trial.framed()) < 0.2 * turned:
+    for way, (words, _) in WAYS.items():
+        mend = partial(turns_as, way=way)
+        trial = shot.mended(mend)
+        if EXPLAINED * disagreement(trial, trial.framed()) < turned:
             sentence = f'{words}; undone, they agree with the joints.'
             remedy = 'Mend the convention where the orientations are exported'
-            mend = partial(turns_as, way=way)
             return (mistake(sentence, 'other', ('instrument',), remedy, mend),)
     return (
-        Finding(
-            'warning',
+        warning(
             f'Measured orientations disagree with the joints by {np.degrees(turned):.3g} degrees '
-            '(median) though positions agree; check their convention, or give positions only.',
+            '(median) though positions agree; check their convention, or give positions only.'
         ),
     )
 
 
-def _changed(shot: Snapshot, undo: Undo) -> list[Array | None]:
-    out: list[Array | None] = []
-    for recording in shot.recordings:
-        turn = None if recording.measured is None else recording.measured.rotation
-        out.append(None if turn is None else undo(turn))
-    return out
-
-
 def disagreement(shot: Snapshot, model: Model) -> float:
     """Return the median angle [rad] that a model leaves of orientations; 0 where none are."""
-    parts = [p for p in shot.problem.residuals(model) if len(p) > 3]
-    if not parts:
-        return 0.0
-    return float(np.median(np.concatenate([_angle(p) for p in parts])))
+    return _angle(shot.problem.residuals(model))
 
 
-def _angle(part: Array) -> Array:
-    return np.asarray(np.linalg.norm(part[3:], axis=0))
+def _angle(parts: Sequence[Array]) -> float:
+    angles = [np.linalg.norm(part[3:], axis=0) for part in parts if len(part) > 3]
+    return float(np.median(np.concatenate(angles))) if angles else 0.0
 
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -89,11 +74,10 @@ def gravity(case: Case) -> Sequence[Finding]:
         for vector in (pull, np.round(np.linalg.norm(pull) * turn.T @ DOWN, 5))
     )
     return (
-        Finding(
-            'warning',
+        warning(
             f'Gravity ({own}) m/s^2 is in the base frame, and with the base that was given it pulls '
             f'{np.degrees(off):.0f} degrees away from down. If the measuring frame stands upright, '
-            f'gravity is ({right}); springs and payload come out wrong with another.',
+            f'gravity is ({right}); springs and payload come out wrong with another.'
         ),
     )
 

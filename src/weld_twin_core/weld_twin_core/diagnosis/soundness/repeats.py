@@ -13,8 +13,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ...arrays import Array
 from ...errors import DataError
 from ...recording import Recording
-from .evidence import Case, Finding, distance, length
-from .snapshot import measured
+from .evidence import Case, Finding, distance, warning
+from .lengths import length
+from .limits import TINY
 
 REUSED = 0.2
 """
@@ -55,30 +56,22 @@ def _shown(recording: Recording) -> Array:
     """Return what a recording shows: positions, or the postures of contacts."""
     if recording.contacts is not None:
         return recording.joints.q
-    return measured(recording).position
+    return recording.seen.position
 
 
-def repeats(case: Case) -> Sequence[Finding]:
-    """Return recordings given twice, samples given twice, and frozen measurements."""
-    return [*_recordings(case), *_samples(case)]
-
-
-def _recordings(case: Case) -> Iterator[Finding]:
-    seen = [measured(r).position for r in case.recordings]
+def repeats(case: Case) -> Iterator[Finding]:
+    """Yield recordings given twice, samples given twice, and frozen measurements."""
+    seen = [r.seen.position for r in case.recordings]
     for i, k in combinations(range(len(seen)), 2):
         same = _common(seen[i], seen[k])
         if same > 0.5 * min(len(seen[i]), len(seen[k])):
-            yield Finding(
-                'warning',
+            yield warning(
                 f'{case.recordings[i].name} and {case.recordings[k].name} hold the same '
                 f'measurements ({same} of {min(len(seen[i]), len(seen[k]))}); give each '
-                'recording once.',
+                'recording once.'
             )
-
-
-def _samples(case: Case) -> Iterator[Finding]:
     for recording, q in zip(case.recordings, case.motions, strict=True):
-        position = measured(recording).position
+        position = recording.seen.position
         still = (np.diff(position, axis=0) == 0.0).all(axis=1)
         moving = np.abs(np.diff(q, axis=0)).max(axis=1) > 1e-6
         frozen = int((still & moving).sum())
@@ -92,10 +85,9 @@ def _samples(case: Case) -> Iterator[Finding]:
         both = np.concatenate([position, q], axis=1)
         twice = len(both) - len(np.unique(both, axis=0))
         if recording.joints.static and twice > 0:
-            yield Finding(
-                'warning',
+            yield warning(
                 f'{twice} station(s) of {recording.name} are there twice, equal to the last '
-                'digit; a station measured again never is.',
+                'digit; a station measured again never is.'
             )
 
 
@@ -121,26 +113,22 @@ MANY = 0.1
 """Share of outliers from which a note becomes a warning."""
 
 
-def outliers(case: Case) -> Sequence[Finding]:
-    """Return how many measurements are far off, and the worst of them."""
-    out = []
+def outliers(case: Case) -> Iterator[Finding]:
+    """Yield how many measurements are far off, and the worst of them."""
     for recording, part in zip(case.recordings, case.residuals, strict=True):
         off = _stations(part) if recording.joints.static else _of_samples(part)
         bad = off > 0.0
         if not bad.any():
             continue
         worst = int(off.argmax())
-        at = measured(recording).t[worst]
+        at = recording.seen.t[worst]
         where = f'station {worst}' if recording.joints.static else f't = {at:.3f} s'
-        out.append(
-            Finding(
-                'warning' if bad.mean() > MANY else 'note',
-                f'{int(bad.sum())} of {off.size} measurements of {recording.name} lie far off '
-                f'their neighbours, the worst by {length(float(off[worst]))} at {where}; they '
-                'lose their weight in every fit.',
-            )
+        yield Finding(
+            'warning' if bad.mean() > MANY else 'note',
+            f'{int(bad.sum())} of {off.size} measurements of {recording.name} lie far off '
+            f'their neighbours, the worst by {length(float(off[worst]))} at {where}; they '
+            'lose their weight in every fit.',
         )
-    return out
 
 
 def _running_median(part: Array) -> Array:
@@ -156,7 +144,7 @@ def _of_samples(part: Array) -> Array:
     off = np.linalg.norm(part[:3] - smooth, axis=0)
     # Vibration comes and goes: what one sample in ten does is no outlier.
     limit = max(FAR * float(np.median(off)), 4.0 * float(np.quantile(off, 0.9)))
-    limit = max(limit, SMALL * float(np.median(distance(part))), 1e-9)
+    limit = max(limit, SMALL * float(np.median(distance(part))), TINY)
     bad = (off > limit) & (_peak(part[:3]) > ALONE * off)
     # Two joints that reverse at nearly the same time leave a spike; an instrument leaves several.
     if bad.sum() < SEVERAL and off.max() < GROSS * limit:
@@ -173,7 +161,7 @@ def _peak(position: Array) -> Array:
 
 def _stations(part: Array) -> Array:
     off = distance(part - np.median(part, axis=1, keepdims=True))
-    limit = max(STATION_FAR * float(np.median(off)), 1e-9)
+    limit = max(STATION_FAR * float(np.median(off)), TINY)
     # Far off together means that the set-up moved; an outlier is alone.
     alone = distance(part[:3] - _running_median(part[:3]))
     return np.where((off > limit) & (alone > 0.5 * off), off, 0.0)

@@ -9,13 +9,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...errors import DataError
-from .evidence import Case, Finding, listed
-from .snapshot import measured
+from ..frames.open_directions import shown
+from .evidence import Case, Finding, note
+from .lengths import listed
+from .limits import MOVED, TINY
 
-LITTLE = 0.02
-"""A joint that moves less [rad, m] shows next to nothing."""
-VISIBLE = (1e-3, 5e-3)
-"""A frame error [m, rad] that the data should show."""
 TWO_ARMS = 12
 """Turning joints from which a chain holds two arms: of six each. An arm on a gantry that welds on a
 positioner has nine, or ten with seven axes."""
@@ -35,11 +33,10 @@ def _two_arms(case: Case) -> Iterator[Finding]:
     """Yield that the chain has the joints of two arms."""
     turning = int((~case.model.robot.prismatic).sum())
     if turning >= TWO_ARMS:
-        yield Finding(
-            'note',
+        yield note(
             f'The chain of {case.model.robot.name!r} has {turning} turning joints, as two arms '
             'together have; if only one was measured, give its own chain (--base-link, --tip-link): '
-            'errors of the other take up its own.',
+            'errors of the other take up its own.'
         )
 
 
@@ -48,14 +45,13 @@ def _hardly(case: Case) -> Iterator[Finding]:
     robot = case.model.robot
     names = [
         f'{robot.joint_names[i]!r} ({_moved(ranges[i], bool(robot.prismatic[i]))})'
-        for i in np.flatnonzero(ranges < LITTLE)
+        for i in np.flatnonzero(ranges < MOVED)
     ]
     if names:
-        yield Finding(
-            'note',
+        yield note(
             f'{listed(names)} hardly move{"s" if len(names) == 1 else ""}; gear, play, ripple and '
             'spring of such a joint cannot be seen, and its offset looks like one of its '
-            'neighbours or of a frame.',
+            'neighbours or of a frame.'
         )
 
 
@@ -69,41 +65,30 @@ def _one_way(case: Case) -> Iterator[Finding]:
     turned = np.zeros(case.model.robot.n, dtype=bool)
     for q in case.motions:
         moved = np.diff(q, axis=0)
-        travel = np.maximum(np.abs(moved).sum(axis=0), 1e-12)
+        travel = np.maximum(np.abs(moved).sum(axis=0), TINY)
         one_way = np.abs(moved.sum(axis=0))
         turned |= one_way < 0.999 * travel
-        turned |= travel < LITTLE
+        turned |= travel < MOVED
     names = [
         repr(name) for name, t in zip(case.model.robot.joint_names, turned, strict=True) if not t
     ]
     if names:
-        yield Finding(
-            'note',
+        yield note(
             f'{listed(names)} never reverse{"s" if len(names) == 1 else ""}; '
-            'play there looks like an offset.',
+            'play there looks like an offset.'
         )
 
 
 def _frames(case: Case) -> Iterator[Finding]:
     """Report directions of the frames in which an error would not show."""
-    problem = case.problem.thinned(3000).of_frames()
-    parts, names = problem.frame_columns(problem.features(case.model))
-    columns = problem.whitened(parts, problem.unit_scale())
-    if not len(names):
-        return
-    size = np.array([VISIBLE[0] if int(n.split('.')[1]) < 3 else VISIBLE[1] for n in names])
-    live = np.abs(columns).max(axis=1) > 0.0
-    scaled = columns[live] * size[live, None]
-    strength, vectors = np.linalg.eigh(scaled @ scaled.T)
+    names, _, strength, vectors = shown(case.problem, case.model, moving=True)
     hidden = int((strength < 1.0).sum())
     if hidden:
-        kept = [name for name, alive in zip(names, live, strict=True) if alive]
         strongest = np.argsort(-np.abs(vectors[:, 0]))[:2]
-        pair = listed([_named(kept[i]) for i in sorted(strongest)])
-        yield Finding(
-            'note',
-            f'The motion leaves {hidden} of {len(kept)} directions of the aligned frames open '
-            f'(first of all {pair}); turn the tool more, about more axes, or align less.',
+        pair = listed([_named(names[i]) for i in sorted(strongest)])
+        yield note(
+            f'The motion leaves {hidden} of {len(names)} directions of the aligned frames open '
+            f'(first of all {pair}); turn the tool more, about more axes, or align less.'
         )
 
 
@@ -131,7 +116,7 @@ def quantity(case: Case) -> Sequence[Finding]:
             f'align have {frames}; measure more, or align less'
         )
     spread = max(float(np.ptp(q, axis=0).max()) for q in case.motions)
-    seen = max(float(np.ptp(measured(r).position, axis=0).max()) for r in case.recordings)
+    seen = max(float(np.ptp(r.seen.position, axis=0).max()) for r in case.recordings)
     if spread < STILL:
         raise DataError(
             'the joints do not move in any recording; '
@@ -145,5 +130,5 @@ def quantity(case: Case) -> Sequence[Finding]:
         raise DataError('the joints move, but the measured tool never does; is the topic right?')
     total = sum(problem.samples)
     if problem.at_rest and total < FEW_STATIONS:
-        return (Finding('note', f'With {total} stations few causes can be told apart.'),)
+        return (note(f'With {total} stations few causes can be told apart.'),)
     return ()

@@ -34,8 +34,8 @@ from .limits import (
     MARGIN,
     MOST_SLIPS,
     NEARLY,
+    TINY,
 )
-from .mending import measured
 
 SLOW = 2.0
 """Seconds below which nothing warms up; what dies away faster is a transient of the arm."""
@@ -146,7 +146,6 @@ def changes(
         The measurements that ``rest`` is of.
     rest : Rest
     joints : sequence of str
-        Names in chain order.
     largest : float [m]
         How far the largest gaps are; nothing moved twice as far.
 
@@ -233,7 +232,7 @@ class _Seen:
             yield _Trial(change.nats(shape), change, shape, k)
 
     def _steps(self, k: int) -> Iterator[_Trial]:
-        t = measured(self.problem.recordings[k]).t
+        t = self.problem.recordings[k].seen.t
         edge = max(3, int(ENDS * t.size))
         allowed = np.zeros(t.size, dtype=bool)
         allowed[edge : t.size - edge] = True
@@ -245,7 +244,7 @@ class _Seen:
             shape = self._placed((np.arange(t.size) >= at).astype(np.float64), k)
             # Every instant was asked; the best of many is better than it should be.
             nats = change.nats(shape) - float(np.log(t.size))
-            time = 0.5 * float(t[at - 1] + t[at])
+            time = float(t[at - 1] + t[at]) / 2
             slip = Slip(kind, joint, k, time, change.size(shape), nats)
             yield _Trial(nats, change, shape, k, slip, at)
 
@@ -254,13 +253,13 @@ class _Seen:
         if smooth.change is not self._base:
             return None
         k, age = smooth.recording, self._age(smooth.recording)
-        t = measured(self.problem.recordings[k]).t
+        t = self.problem.recordings[k].seen.t
         if np.array_equal(smooth.shape, self._placed(np.ones(age.size), k)):
             if not self._surpasses(smooth.nats, smooth.shape, k, smooth_shapes(age)):
                 return None
             # A move of the set-up before a recording: of the first, before the second.
             k, size = max(k, 1), self._base.size(smooth.shape)
-            start = float(measured(self.problem.recordings[k]).t[0])
+            start = float(self.problem.recordings[k].seen.t[0])
             return Slip(KNOCKED, None, k, start, size, smooth.nats, dated=False)
 
         def settled(constant: float) -> Array:
@@ -285,8 +284,8 @@ class _Seen:
 
     def _age(self, k: int) -> Array:
         """Return time in a recording as a share of it, shape (M,)."""
-        t = measured(self.problem.recordings[k]).t
-        return np.asarray((t - t[0]) / max(float(np.ptp(t)), 1e-9))
+        t = self.problem.recordings[k].seen.t
+        return np.asarray((t - t[0]) / max(float(np.ptp(t)), TINY))
 
     def _placed(self, shape: Array, k: int) -> Array:
         out = np.zeros(self.rest.recording.size)

@@ -30,13 +30,12 @@ from .limits import (
     ROOT_MOST,
     ROOT_SPREAD,
     SOFT,
+    TINY,
     TWIST_MOST,
     TWIST_SPREAD,
     UNLIKE,
 )
-from .mending import Given, Mend, measured
-
-__all__ = ['FRAMES', 'Arm', 'Snapshot', 'gap', 'measured', 'snapshot']
+from .mending import Given, Mend
 
 SAMPLES = 60
 """Samples of a snapshot in all: enough for every error of an arm, few enough for fits at once."""
@@ -74,19 +73,18 @@ class Snapshot:
             model = replace(model, known=(), changes=frames)
         return Snapshot(out.recordings, model)
 
-    def with_turns(self, turns: list[Array | None]) -> Snapshot:
-        """Return the snapshot with other measured rotations, or none."""
-        pairs = zip(self.recordings, turns, strict=True)
-        seen = [(r, measured(r), turn) for r, turn in pairs]
-        out = [
-            r.with_measured(Measurements(m.t, m.position, turn, m.sigma)) for r, m, turn in seen
+    def pointed(self) -> Snapshot:
+        """Return the snapshot without measured rotations."""
+        seen = [
+            Measurements(r.seen.t, r.seen.position, None, r.seen.sigma) for r in self.recordings
         ]
+        out = [r.with_measured(m) for r, m in zip(self.recordings, seen, strict=True)]
         return replace(self, recordings=tuple(out))
 
     @cached_property
     def spread(self) -> float:
         """Return how far the measured positions spread, RMS [m]."""
-        return _spread([measured(recording).position for recording in self.recordings])
+        return _spread([recording.seen.position for recording in self.recordings])
 
     @cached_property
     def collapsed(self) -> float:
@@ -96,19 +94,19 @@ class Snapshot:
         Whatever is shrunk to a point leaves no gap: that explains nothing.
         """
         twins = [
-            self.model.twin(k).poses(recording, measured(recording).t).position
+            self.model.twin(k).poses(recording, recording.seen.t).position
             for k, recording in enumerate(self.recordings)
         ]
-        return max(1.0, _spread(twins) / (UNLIKE * max(self.spread, 1e-12)))
+        return max(1.0, _spread(twins) / (UNLIKE * max(self.spread, TINY)))
 
     def shrunk(self, before: Snapshot) -> float:
         """Return by what factor the measurements spread less than before, or 1."""
-        return max(1.0, before.spread / max(self.spread, 1e-12))
+        return max(1.0, before.spread / max(self.spread, TINY))
 
     @property
     def turned(self) -> bool:
         """Return whether every recording has orientations."""
-        return all(measured(r).rotation is not None for r in self.recordings)
+        return all(r.seen.rotation is not None for r in self.recordings)
 
     @property
     def possible(self) -> bool:
@@ -170,16 +168,9 @@ class Snapshot:
 
 class Arm(NamedTuple):
     """
-    A plausible arm fitted to a snapshot.
+    A plausible arm fitted to a snapshot, and the median distance [m] that it leaves.
 
-    Attributes
-    ----------
-    model : Model
-    gap : float [m]
-        Median distance that it leaves.
-    strain : array, shape (K,)
-        Every error of the arm in units of the most that an arm can have.
-
+    ``strain``, (K,), is every error of the arm in units of the most that an arm can have.
     """
 
     model: Model
@@ -200,22 +191,14 @@ class Arm(NamedTuple):
 
 def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
     """
-    Return evenly spread samples of every recording as stations.
+    Return evenly spread samples of every recording as stations, about a model without effects.
 
-    Parameters
-    ----------
-    problem : Problem
-        The recordings to explain, and the frames that are fitted along.
-    model : Model
-        What is believed so far; everything is taken about it.
-    motions : list of array, each shape (M, n) [rad or m]
-        Joint positions at the measurements, one array per recording.
-
+    ``motions`` are the joint positions at the measurements, (M, n) [rad or m], one per recording.
     """
     share = max(12, SAMPLES // len(problem.recordings))
     out = []
     for recording, q in zip(problem.recordings, motions, strict=True):
-        seen = measured(recording)
+        seen = recording.seen
         index = np.unique(np.linspace(0, seen.t.size - 1, share).round().astype(int))
         joints = JointMotion(seen.t[index], q[index], static=True)
         out.append(replace(recording, joints=joints, measured=seen.take(index)))
@@ -226,15 +209,8 @@ def bent(problem: Problem, start: Model, precision: Array, noise: float = np.inf
     """
     Return the model after a robust fit of its frames and the errors that it has.
 
-    Parameters
-    ----------
-    problem : Problem
-    start : Model
-    precision : array, shape (K,)
-        Prior precision of every coordinate of the errors.
-    noise : float [m]
-        At most so much of what is left counts as noise.
-
+    ``precision``, (K,), is the prior precision of every coordinate of the errors; at most
+    ``noise`` [m] of what is left counts as noise.
     """
     least, model = Scale(*SOFT, problem.unit_scale().weights), start
     for _ in range(ROUNDS):
@@ -254,12 +230,7 @@ def rough_models(shots: Sequence[Snapshot], *, thorough: bool = False) -> list[M
     """
     Return every snapshot's model after a quick fit of both frames; those of a shape at once.
 
-    Parameters
-    ----------
-    shots : sequence of Snapshot
-    thorough : bool
-        Whether the fit starts from many tools.
-
+    Where ``thorough``, the fit starts from many tools.
     """
     shapes: dict[tuple[object, ...], list[Snapshot]] = {}
     for shot in shots:

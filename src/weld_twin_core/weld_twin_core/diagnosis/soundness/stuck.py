@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,16 +14,17 @@ from ...arrays import Array
 from ...recording import JointMotion, Recording
 from ..algebra.problem import Model
 from ..frames.alignment import refined
-from .evidence import Case, Finding, distance, length, mistake
+from .evidence import Case, Finding, distance, mistake
+from .lengths import length
 from .limits import (
+    BY_ITSELF,
     STUCK_AFTER,
     STUCK_EXPLAINED,
-    STUCK_FAR,
     STUCK_LEAST,
     STUCK_STATIONS,
     STUCK_STRAYS,
+    TINY,
 )
-from .snapshot import measured
 
 ROUNDS = 12
 """Newton steps that find where a joint really stood; it may have gone on by a radian."""
@@ -39,28 +40,24 @@ LONGEST_STEP = 0.3
 """Longest Newton step [rad, m]: farther, the derivative means nothing."""
 
 
-def stuck(case: Case) -> Sequence[Finding]:
-    """Return stretches in which a joint's reading stands still and the tool says it moved."""
-    out: list[Finding] = []
+def stuck(case: Case) -> Iterator[Finding]:
+    """Yield stretches in which a joint's reading stands still and the tool says it moved."""
     for k, recording in enumerate(case.recordings):
-        found = (
-            _whole(recording)
-            or max(_joints(case, k), key=lambda pair: pair[0], default=(0.0, None))[1]
-        )
-        if found is not None:
-            out.append(found)
-    return out
+        if whole := _whole(recording):
+            yield whole
+        elif found := list(_joints(case, k)):
+            yield max(found, key=lambda pair: pair[0])[1]
 
 
 def _whole(recording: Recording) -> Finding | None:
     """Return that all joints stand still together while the measured tool moves."""
-    seen = measured(recording)
+    seen = recording.seen
     for start, end in _runs(recording.joints.q, recording.joints):
         inside = _inside(recording, start, end)
         if inside.sum() < 2:
             continue
         way = _way(seen.position[inside])
-        if way > STUCK_FAR:
+        if way > BY_ITSELF:
             sentence = (
                 f'The joint positions of {recording.name} stand still {_when(recording, start, end)}'
                 f' while the tool moves by {length(way)}.'
@@ -88,7 +85,7 @@ def _joints(case: Case, k: int) -> Iterator[tuple[float, Finding]]:
         if inside.sum() < 2 or inside.all():
             continue
         model, off = case.model, distance(case.residuals[k])
-        if np.median(off[inside]) > max(STUCK_FAR, float(np.median(off[~inside]))):
+        if np.median(off[inside]) > max(BY_ITSELF, float(np.median(off[~inside]))):
             # Frames that were fitted to the stretch as well leave some of its gap elsewhere.
             if case.problem.align and refits < REFITS and (~inside).sum() > ENOUGH:
                 refits += 1
@@ -112,7 +109,7 @@ def _longest(case: Case, k: int) -> list[tuple[int, int, int]]:
 def _unfitted(case: Case, k: int, inside: NDArray[np.bool_]) -> tuple[Model, Array]:
     """Return the model with its frames fitted to all but a stretch, and the gaps it leaves."""
     recordings = list(case.recordings)
-    recordings[k] = recordings[k].with_measured(measured(recordings[k]).take(~inside))
+    recordings[k] = recordings[k].with_measured(recordings[k].seen.take(~inside))
     problem = replace(case.problem, recordings=tuple(recordings)).thinned(FIT_ROWS)
     model = refined(problem, case.model)
     return model, distance(case.problem.residuals(model)[k])
@@ -124,7 +121,7 @@ def _freed_there(
     """Return that a joint went on while its reading stood still, and how much that explains."""
     inside, name = _inside(recording, *run), model.robot.joint_names[i]
     gap, rest = float(np.median(off[inside])), float(np.median(off[~inside]))
-    if gap < max(STUCK_FAR, STUCK_EXPLAINED * rest):
+    if gap < max(BY_ITSELF, STUCK_EXPLAINED * rest):
         return None
     left = _freed(model, recording, k, i, inside)
     if left > gap / STUCK_EXPLAINED:
@@ -155,7 +152,7 @@ def _runs(q: Array, joints: JointMotion) -> list[tuple[int, int]]:
 
 def _inside(recording: Recording, start: int, end: int) -> NDArray[np.bool_]:
     """Return which measurements lie in a stretch, bool (M,); after a stop the arm settles."""
-    joints, t = recording.joints, measured(recording).t
+    joints, t = recording.joints, recording.seen.t
     # Between the last still sample and the next the stream is already on its way.
     first, last = joints.t[start], joints.t[end]
     if not joints.static:
@@ -165,7 +162,7 @@ def _inside(recording: Recording, start: int, end: int) -> NDArray[np.bool_]:
 
 def _freed(model: Model, recording: Recording, k: int, i: int, inside: NDArray[np.bool_]) -> float:
     """Return the median gap [m] when joint i may stand anywhere at every measurement."""
-    seen = measured(recording).take(inside)
+    seen = recording.seen.take(inside)
     q = np.array(recording.joints.at(seen.t)[0])
     twin = model.twin(k)
 
@@ -180,7 +177,7 @@ def _freed(model: Model, recording: Recording, k: int, i: int, inside: NDArray[n
         here = tip(q)
         column = (tip(q + nudge) - here) / STEP
         pull = ((seen.position - here) * column).sum(axis=1)
-        step = pull / np.maximum((column**2).sum(axis=1), 1e-12)
+        step = pull / np.maximum((column**2).sum(axis=1), TINY)
         q[:, i] += np.clip(step, -LONGEST_STEP, LONGEST_STEP)
     return float(np.median(np.linalg.norm(seen.position - tip(q), axis=1)))
 

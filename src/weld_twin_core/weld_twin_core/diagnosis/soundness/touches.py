@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...contacts import Artefact, Contact, Contacts
@@ -23,10 +24,11 @@ from ...recording import Recording
 from ..algebra.fit import robust_fit, robust_scale
 from ..algebra.independent_rows import robust_spread
 from ..algebra.problem import Model, Problem
-from ..frames.places import FEWEST, posed
+from ..frames.aligned import FEWEST, posed
 from ..hypotheses.library import plain_causes
 from ..result import Unsound
 from .evidence import Finding, mistake
+from .limits import TINY
 
 FAR = 8.0
 """Distance from its contact, in median distances, from which a posture is a slip: of normal errors
@@ -63,46 +65,38 @@ class Touched(NamedTuple):
 
     problem: Problem
     model: Model
-    told: tuple[Unsound, ...]
-    mistakes: tuple[Finding, ...]
+    told: tuple[Unsound, ...] = ()
+    mistakes: tuple[Finding, ...] = ()
 
 
 def touches(problem: Problem, model: Model) -> Touched:
-    """
-    Return contacts as they are, and what was wrong with how they were called.
-
-    Parameters
-    ----------
-    problem : Problem
-        Of contacts.
-    model : Model
-
-    """
+    """Return contacts as they are, and what was wrong with how they were called."""
     plain = _plain_fit(problem, model)
     for _ in range(0 if problem.untracked else ROUNDS):
         problem = replace(problem, loose=_loose(problem, problem.residuals(plain)))
         plain = _plain_fit(problem, plain.with_found(()))
     rows = problem.residuals(plain)
-    each = [k for k in range(len(problem.recordings)) if problem.contact(k) is not None]
-    points = {
-        k: plain.twin(k).poses(r, r.joints.t).position
+    every = {
+        k: _Postures(r, plain.twin(k).poses(r, r.joints.t).position)
         for k, r in enumerate(problem.recordings)
-        if k in each
+        if problem.contact(k) is not None
     }
-    recordings = {k: problem.recordings[k] for k in each}
-    broken = tuple(_broken(recordings, points))
+    middles = {label: at for own in every.values() for label, at in own.middles()}
+    broken = tuple(mixed for own in every.values() for mixed in own.broken(middles))
     if broken:
-        return Touched(problem, model, (), broken)
-    usual = float(np.median(np.concatenate([np.linalg.norm(rows[k], axis=0) for k in each])))
-    told: list[Unsound] = []
-    kept = _resorted(recordings, points, usual, told)
+        return Touched(problem, model, mistakes=broken)
+    usual = float(np.median(np.concatenate([np.linalg.norm(rows[k], axis=0) for k in every])))
+    told = tuple(each for own in every.values() for each in own.resorted(middles, usual))
     if not told:
-        return Touched(problem, model, (), ())
-    every = [kept.get(k, recording) for k, recording in enumerate(problem.recordings)]
-    again, start = posed(every, model.robot, problem.align, model.known, problem.given)
+        return Touched(problem, model)
+    mended = [
+        every[k].recording if k in every else recording
+        for k, recording in enumerate(problem.recordings)
+    ]
+    again, start = posed(mended, model.robot, problem.align, model.known, problem.given)
     loose = dict(zip(problem.given, problem.loose, strict=False))
     again = replace(again, loose=tuple(loose[k] for k in again.given if loose))
-    return Touched(again, start, tuple(told), ())
+    return Touched(again, start, told)
 
 
 def _plain_fit(problem: Problem, model: Model) -> Model:
@@ -122,8 +116,6 @@ def _loose(problem: Problem, rows: list[Array]) -> tuple[float, ...]:
     A ball in its socket and a tracker differ by several times. What an arm as wrong as machines are
     leaves of each tells; the places of contacts took their share of it.
     """
-    if problem.untracked:
-        return ()
     of: dict[object, list[int]] = {}
     for k in range(len(rows)):
         touched = problem.contact(k) is not None
@@ -137,12 +129,28 @@ def _loose(problem: Problem, rows: list[Array]) -> tuple[float, ...]:
     return tuple(float(value) for value in noise / noise.min())
 
 
-def _broken(recordings: Mapping[int, Recording], points: Mapping[int, Array]) -> Iterator[Finding]:
-    """Yield known lengths that cannot be; a few postures in a wrong socket do not move a median."""
-    middles = _middles(recordings, points)
-    for recording in recordings.values():
-        assert recording.contacts is not None
-        for tie in recording.contacts.artefact.ties:
+class _Postures:
+    """The postures of a recording with their tool points, (M, 3): what each touches; which count."""
+
+    def __init__(self, recording: Recording, points: Array) -> None:
+        self._given, self._contacts, self._points = recording, recording.touched, points
+        self._labels = list(self._contacts.labels)
+        self._keep = np.ones(self._contacts.size, dtype=bool)
+
+    def _touched(self) -> Iterator[tuple[str, NDArray[np.int_]]]:
+        """Yield contacts of points and their postures."""
+        for contact in self._contacts.artefact.contacts:
+            if contact.kind == 'point':
+                yield contact.label, self._contacts.of(contact.label)
+
+    def middles(self) -> Iterator[tuple[str, Array]]:
+        """Yield where every contact of a point is, by the median of its postures."""
+        for label, index in self._touched():
+            yield label, np.median(self._points[index], axis=0)
+
+    def broken(self, middles: Mapping[str, Array]) -> Iterator[Finding]:
+        """Yield known lengths that cannot be; a few postures in a wrong socket move no median."""
+        for tie in self._contacts.artefact.ties:
             if not set(tie.between) <= set(middles):
                 continue
             one, other = tie.between
@@ -157,158 +165,93 @@ def _broken(recordings: Mapping[int, Recording], points: Mapping[int, Array]) ->
                 'Check which file belongs to which contact, and the length in the artefact',
             )
 
+    def resorted(self, middles: Mapping[str, Array], usual: float) -> Iterator[Unsound]:
+        """Count postures where they belong, and yield what was changed."""
+        for label, index in self._touched():
+            yield from self._strays(label, index, middles, usual)
+            yield from self._moved(label, index[self._keep[index]], usual)
 
-def _resorted(
-    recordings: Mapping[int, Recording],
-    points: Mapping[int, Array],
-    usual: float,
-    told: list[Unsound],
-) -> dict[int, Recording]:
-    """Return the recordings with postures where they belong, and say what was changed."""
-    middles = _middles(recordings, points)
-    out: dict[int, Recording] = {}
-    for k, recording in recordings.items():
-        contacts = recording.contacts
-        assert contacts is not None
-        labels = list(contacts.labels)
-        keep = np.ones(contacts.size, dtype=bool)
-        for contact in contacts.artefact.contacts:
-            index = contacts.of(contact.label)
-            if contact.kind != 'point':
+    def _strays(
+        self, label: str, index: NDArray[np.int_], middles: Mapping[str, Array], usual: float
+    ) -> Iterator[Unsound]:
+        """Leave out postures that rest elsewhere, and name where; a row of them may have moved."""
+        others = {name: middle for name, middle in middles.items() if name != label}
+        away = np.linalg.norm(self._points[index] - middles[label], axis=1)
+        elsewhere: dict[str, list[int]] = {}
+        for row in np.flatnonzero(away > max(FAR * usual, LEAST_SLIP)).tolist():
+            point = self._points[index[row]]
+            apart = {name: float(np.linalg.norm(point - at)) for name, at in others.items()}
+            nearest = min(apart, key=lambda name: apart[name], default='')
+            near = bool(nearest) and apart[nearest] < NEARER * away[row]
+            elsewhere.setdefault(nearest if near else '', []).append(row)
+        for name, rows in elsewhere.items():
+            if not name and len(rows) >= STRETCH and np.ptp(rows) == len(rows) - 1:
                 continue
-            _strays(contact.label, index, points[k], middles, usual, labels, keep, told)
-            _moved(contact.label, index[keep[index]], points[k], usual, labels, told)
-        out[k] = _relabelled(recording, labels, keep)
-    return out
+            self._keep[index[rows]] = False
+            several = len(rows) > 1
+            which = f'Posture{"s" if several else ""} {", ".join(str(k + 1) for k in rows)}'
+            off = f'{float(away[rows].max()) * 1e3:.1f} mm'
+            if name:
+                rest = f'rest{"" if several else "s"} in {name!r}, {off} away.'
+                yield _mended(
+                    (label, name), f'{which} of {label!r} {rest}', f'Label them {name!r}'
+                )
+            else:
+                lie = f'{"are up to" if several else "is"} {off} off: the contact slipped.'
+                again = 'Touch again in these postures'
+                yield _mended((label,), f'{which} of {label!r} {lie}', again)
 
-
-def _middles(recordings: Mapping[int, Recording], points: Mapping[int, Array]) -> dict[str, Array]:
-    """Return where every contact of a point is, by the median of its postures."""
-    out = {}
-    for k, recording in recordings.items():
-        own = points[k]
-        assert recording.contacts is not None
-        for contact in recording.contacts.artefact.contacts:
-            if contact.kind == 'point':
-                out[contact.label] = np.median(own[recording.contacts.of(contact.label)], axis=0)
-    return out
-
-
-def _strays(
-    label: str,
-    index: np.ndarray,
-    points: Array,
-    middles: dict[str, Array],
-    usual: float,
-    labels: list[str],
-    keep: np.ndarray,
-    told: list[Unsound],
-) -> None:
-    """Leave out postures that rest elsewhere, and name where; a row of them may have moved."""
-    away = np.linalg.norm(points[index] - middles[label], axis=1)
-    far = away > max(FAR * usual, LEAST_SLIP)
-    elsewhere: dict[str, list[int]] = {}
-    for row, (k, off) in enumerate(zip(index, away, strict=True)):
-        if far[row]:
-            distances = {
-                name: float(np.linalg.norm(points[k] - middle))
-                for name, middle in middles.items()
-                if name != label
-            }
-            nearest = min(distances, key=lambda name: distances[name], default='')
-            found = nearest if nearest and distances[nearest] < NEARER * off else ''
-            elsewhere.setdefault(found, []).append(row)
-    for name, rows in elsewhere.items():
-        if not name and len(rows) >= STRETCH and np.ptp(rows) == len(rows) - 1:
-            continue
-        keep[index[rows]] = False
-        told.append(_told_stray(label, name, rows, float(away[rows].max())))
-
-
-def _told_stray(label: str, name: str, rows: list[int], off: float) -> Unsound:
-    which = _numbered(rows)
-    if name:
-        rest = 'rest' if len(rows) > 1 else 'rests'
-        sentence = f'{which} of {label!r} {rest} in {name!r}, {off * 1e3:.1f} mm away.'
-        return Unsound('other', (label, name), sentence, f'Label them {name!r}', True)
-    lie = 'are up to' if len(rows) > 1 else 'is'
-    sentence = f'{which} of {label!r} {lie} {off * 1e3:.1f} mm off: the contact slipped.'
-    return Unsound('other', (label,), sentence, 'Touch again in these postures', True)
-
-
-def _numbered(rows: list[int]) -> str:
-    """Return postures by their number among those of a contact, counted from 1."""
-    numbers = [str(row + 1) for row in rows]
-    return f'Posture{"s" if len(rows) > 1 else ""} ' + ', '.join(numbers)
-
-
-def _moved(
-    label: str,
-    index: np.ndarray,
-    points: Array,
-    usual: float,
-    labels: list[str],
-    told: list[Unsound],
-) -> None:
-    """Give postures in a row that rest together elsewhere a contact of their own."""
-    if index.size < 2 * STRETCH:
-        return
-    first, last, shift, explained = _stretch(points[index])
-    if explained < EXPLAINED or shift < max(2.0 * usual, LEAST_SLIP):
-        return
-    for k in index[first:last]:
-        labels[k] = f'{label} moved'
-    told.append(
-        Unsound(
-            'other',
+    def _moved(self, label: str, index: NDArray[np.int_], usual: float) -> Iterator[Unsound]:
+        """Give postures in a row that rest together elsewhere a contact of their own."""
+        if index.size < 2 * STRETCH:
+            return
+        first, last, shift, explained = _stretch(self._points[index])
+        if explained < EXPLAINED or shift < max(2.0 * usual, LEAST_SLIP):
+            return
+        for k in index[first:last]:
+            self._labels[k] = f'{label} moved'
+        yield _mended(
             (label,),
             f'Postures {first + 1} to {last} of {label!r} rest {shift * 1e3:.1f} mm from the '
             'others: its place was moved while it was measured.',
             'Fasten the artefact, and measure this place again',
-            True,
         )
-    )
+
+    @property
+    def recording(self) -> Recording:
+        """Return the recording with the postures that count, under the labels they have now."""
+        given, labels, artefact = self._given, self._labels, self._contacts.artefact
+        counted = [label for label, kept in zip(labels, self._keep, strict=True) if kept]
+        index = [
+            k for k in np.flatnonzero(self._keep).tolist() if counted.count(labels[k]) >= FEWEST
+        ]
+        known = {contact.label for contact in artefact.contacts}
+        new = dict.fromkeys(labels[k] for k in index if labels[k] not in known)
+        artefact = Artefact((*artefact.contacts, *map(Contact, new)), artefact.ties)
+        part = self._contacts.take(np.array(index, dtype=int))
+        touched = Contacts(artefact, tuple(labels[k] for k in index), part.value, part.sigma)
+        t, q = given.joints.t[index], given.joints.q[index]
+        motion = replace(given.joints, t=t, q=q, qd=None)
+        return replace(given, joints=motion, measured=None, contacts=touched)
+
+
+def _mended(at: tuple[str, ...], sentence: str, remedy: str) -> Unsound:
+    return Unsound('other', at, sentence, remedy, applied=True)
 
 
 def _stretch(points: Array) -> tuple[int, int, float, float]:
     """Return the postures in a row that lie most apart: first, end, shift [m], share explained."""
     x = points - points.mean(axis=0)
-    total = float((x**2).sum())
     sums = np.concatenate([np.zeros((1, 3)), np.cumsum(x, axis=0)])
-    m, best = len(x), (0, 0, 0.0, 0.0)
-    for i in range(m - STRETCH + 1):
-        for j in range(i + STRETCH, m + 1):
-            inside, outside = j - i, m - (j - i)
-            if outside < STRETCH:
-                continue
-            part = sums[j] - sums[i]
-            gain = float(part @ part) * (1.0 / inside + 1.0 / outside)
-            if gain > best[3] * total:
-                shift = float(np.linalg.norm(part)) * (1.0 / inside + 1.0 / outside)
-                best = (i, j, shift, gain / max(total, 1e-300))
-    first, last, shift, share = best
+    i, j = np.triu_indices(len(x) + 1, STRETCH)
+    fair = len(x) - (j - i) >= STRETCH
+    i, j = i[fair], j[fair]
+    part, each = sums[j] - sums[i], 1.0 / (j - i) + 1.0 / (len(x) - (j - i))
+    gain = (part**2).sum(axis=1) * each
+    best = int(gain.argmax())
+    first, last = int(i[best]), int(j[best])
+    shift = float(np.linalg.norm(part[best]) * each[best])
     # The shorter part is what is told of.
-    if first == 0 and last > m // 2:
-        first, last = last, m
-    return first, last, shift, share
-
-
-def _relabelled(recording: Recording, labels: list[str], keep: np.ndarray) -> Recording:
-    """Return the recording with some postures left out and others under new labels."""
-    contacts = recording.contacts
-    assert contacts is not None
-    index = np.flatnonzero(keep)
-    few = {label for label in labels if sum(labels[k] == label for k in index) < FEWEST}
-    index = np.array([k for k in index if labels[k] not in few], dtype=int)
-    new = dict.fromkeys(labels[k] for k in index)
-    known = {contact.label: contact for contact in contacts.artefact.contacts}
-    artefact = Artefact(
-        (*known.values(), *(Contact(label) for label in new if label not in known)),
-        contacts.artefact.ties,
-    )
-    part = contacts.take(index)
-    touched = Contacts(artefact, tuple(labels[k] for k in index), part.value, part.sigma)
-    motion = replace(
-        recording.joints, t=recording.joints.t[index], q=recording.joints.q[index], qd=None
-    )
-    return replace(recording, joints=motion, measured=None, contacts=touched)
+    if first == 0 and last > len(x) // 2:
+        first, last = last, len(x)
+    return first, last, shift, float(gain[best]) / max(float((x**2).sum()), TINY**2)

@@ -16,7 +16,7 @@ from ...recording import Recording
 from ..algebra.fit import fit, robust_scale, trusted
 from ..algebra.problem import Model, Problem, usable
 from ..beliefs import Beliefs
-from ..frames.places import posed
+from ..frames.aligned import posed
 from ..hypotheses.search import Search
 from ..result import Shrink
 from .folds import jackknife, posture_regions

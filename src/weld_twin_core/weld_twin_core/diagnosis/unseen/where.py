@@ -185,13 +185,12 @@ def _path(
     parts = problem.residuals(model)
     total = sum(float((part[:3, g] ** 2).sum()) for part, g in zip(parts, good, strict=True))
     for recording, part, kept in zip(problem.recordings, parts, good, strict=True):
-        assert recording.measured is not None
         squares = (part[:3] ** 2).sum(axis=0)
         count = max(1, round(STRETCHES * squares.size / max(sum(problem.samples), 1)))
         for stretch in np.array_split(np.arange(squares.size), count):
             index = stretch[kept[stretch]]
             if index.size:
-                t = recording.measured.t[index]
+                t = recording.seen.t[index]
                 share = float(squares[index].sum()) / max(total, 1e-300)
                 rms = float(np.sqrt(squares[index].mean()))
                 out.append((float(t[0]), float(t[-1]), share, rms))

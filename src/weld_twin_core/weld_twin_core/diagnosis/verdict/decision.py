@@ -12,16 +12,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..beliefs import Beliefs
 from ..posterior.table import named_together
 from ..result import Family, Site
 from .evidence import Evidence
-from .left import Left
 
 FIELD = 'instrument'
 """A free field over the workspace speaks against every formula: it is what each of them bends to."""
 LIKELIER = 0.5
 """Probability from which on a cause counts as named: it is likelier right than wrong."""
+TINY = 1e-18
+"""Least squared gap [m^2] divided by: a nanometre, far below any instrument."""
 _MANY_IMITATE = (
     'many small errors together fit best, but leave so much that they rather imitate a cause that '
     'is not in the library'
@@ -52,16 +55,64 @@ class Verdict:
     complete: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class Left:
+    """Evidence, and the numbers from which on what it leaves is more than noise."""
+
+    evidence: Evidence
+    beliefs: Beliefs
+
+    @property
+    def structured(self) -> bool:
+        """Return whether generic columns find something beyond doubt."""
+        gain, sure = self.evidence.structure.gain, self.evidence.structure.sure
+        usual = gain > self.beliefs.structure_gain and sure > self.beliefs.structure_sure
+        blatant = gain > self.beliefs.blatant_gain and sure > self.beliefs.blatant_sure
+        return usual or blatant
+
+    @property
+    def high(self) -> bool:
+        """Return whether what remains rises above a floor that was measured apart."""
+        told = self.evidence
+        return told.independent and told.after > self.beliefs.above * told.floor
+
+    @property
+    def wide(self) -> bool:
+        """Return whether what remains is far wider than a floor that only the fit shows."""
+        told = self.evidence
+        return not told.independent and told.after > self.beliefs.far_above * told.floor
+
+    @property
+    def above_noise(self) -> bool:
+        """Return whether what remains is more than noise."""
+        return self.structured or self.high
+
+    @property
+    def share(self) -> float:
+        """Return the share of the squared gap above noise that is not explained."""
+        told = self.evidence
+        found = told.structure.gain * told.after**2 if self.structured else 0.0
+        over = told.after**2 - told.floor**2 if self.high else 0.0
+        if self.wide:
+            # Such a floor may be too low by that factor; what is beyond is left all the same.
+            over = told.after**2 - (self.beliefs.far_above * told.floor) ** 2
+        return float(np.clip(max(found, over) / self._excess, 0.0, 1.0))
+
+    @property
+    def explained(self) -> float:
+        """Return the share of the squared gap above noise that the model takes off unseen data."""
+        told = self.evidence
+        return float(np.clip((told.gap**2 - told.after**2) / self._excess, 0.0, 1.0))
+
+    @property
+    def _excess(self) -> float:
+        told = self.evidence
+        least = self.beliefs.least_excess * told.floor**2
+        return max(told.gap**2 - told.floor**2, least, TINY)
+
+
 def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
-    """
-    Return the verdict.
-
-    Parameters
-    ----------
-    beliefs : Beliefs, optional
-        The usual ones when left out.
-
-    """
+    """Return the verdict, by the usual beliefs when none are given."""
     left = Left(evidence, beliefs or Beliefs())
     if evidence.families is not None:
         return _of_families(left)

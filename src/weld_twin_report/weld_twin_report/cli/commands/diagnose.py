@@ -223,7 +223,7 @@ def _limits(args: argparse.Namespace) -> Limits:
     import numpy as np
 
     from weld_twin_core.diagnosis.advice import Limits
-    from weld_twin_core.diagnosis.advice.limits import USUAL_MINUTES
+    from weld_twin_core.diagnosis.advice.postures import USUAL_MINUTES
     from weld_twin_core.errors import DataError
 
     minutes = USUAL_MINUTES if args.experiment_minutes is None else args.experiment_minutes

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What is wrong with the streams themselves, before any robot is looked at."""
+"""Do the streams belong to one clock, with stamps and velocities that can be?"""
 
 from __future__ import annotations
 
@@ -11,14 +11,18 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Array
 from ...bursts import Bursts, bursts, evenly
 from ...recording import Recording
 from ...two_clocks import ONE_CLOCK
+from ..algebra.independent_rows import robust_spread
 from ..algebra.problem import FRAMES
 from ..frames.aligned import aligned
-from .evidence import Case, Finding, length, listed, mistake
-from .limits import EVEN, EVEN_LEAST, LIKE_LENGTH, MOVED, STILL_SPEED
-from .mending import Given, Mend, measured, stamped_evenly, stamps_as, velocities_left_out
+from .evidence import Case, Finding, mistake, note, warning
+from .lag import Lag
+from .lengths import falls, listed
+from .limits import HALVED, LATE, LIKE_LENGTH, MOVED, NOISE, RATE, TINY
+from .mending import Given, Mend, stamped_evenly, stamps_as, velocities_left_out
 
 ROUNDS = 2
 """Times that frames and delay are found in turn; a third changes nothing."""
@@ -65,12 +69,12 @@ def _still(recording: Recording) -> NDArray[np.bool_]:
     if joints.qd is None or joints.static:
         return np.zeros(joints.q.shape[1], dtype=bool)
     moving = np.ptp(joints.q, axis=0) > MOVED
-    return np.asarray(moving & (np.abs(joints.qd).max(axis=0) < STILL_SPEED))
+    return np.asarray(moving & (np.abs(joints.qd).max(axis=0) < TINY))
 
 
 def _apart(recording: Recording, k: int) -> Iterator[Finding]:
     """Yield that no measurement lies inside the joint stream."""
-    t, seen = recording.joints.t, measured(recording).t
+    t, seen = recording.joints.t, recording.seen.t
     if seen.size == 0 or ((seen >= t[0]) & (seen <= t[-1])).any():
         return
     spans = float(np.ptp(t)), float(np.ptp(seen))
@@ -93,19 +97,19 @@ def _apart(recording: Recording, k: int) -> Iterator[Finding]:
 def _in_bursts(given: Given, k: int) -> Iterator[Finding]:
     """Yield that measurements were stamped when they were sent, where an even clock explains more."""
     recording = given.recordings[k]
-    found = bursts(measured(recording).t)
+    found = bursts(recording.seen.t)
     if found is None or recording.contacts is not None:
         return
     before, even, after = _evenly(given, k, found)
-    if before < EVEN_LEAST or EVEN * after > before:
+    if before < NOISE or HALVED * after > before:
         return
-    t = measured(recording).t
+    t = recording.seen.t
     waited = float(np.median(t - evenly(even.first, even.step, even.lost, t.size, t.size)))
     missing = f' ({even.lost.size} were lost on the way)' if even.lost.size else ''
     yield mistake(
         f'The measurements of {recording.name} are {even.words}: they waited in a buffer{missing}, '
-        f'{waited * 1e3:.0f} ms in the middle. Stamped evenly and so much earlier, the gap falls '
-        f'from {length(before)} to {length(after)}.',
+        f'{waited * 1e3:.0f} ms in the middle. Stamped evenly and so much earlier, '
+        f'{falls(before, after)}.',
         'stamps_in_bursts',
         ('clock',),
         "Record the instrument's own time of each measurement, or send each at once; --apply "
@@ -118,7 +122,7 @@ def _in_bursts(given: Given, k: int) -> Iterator[Finding]:
 def _evenly(given: Given, k: int, found: Bursts) -> tuple[float, Bursts, float]:
     """Return the median gap [m] as stamped, the even stamps that explain most, and their gap."""
     alone = replace(given, recordings=(given.recordings[k],))
-    count = measured(given.recordings[k]).t.size
+    count = given.recordings[k].seen.t.size
     even = found
     for _ in range(ROUNDS):
         (late,) = _posed(_stamped(even, 0, count)(alone)).lags
@@ -140,3 +144,109 @@ def _stamped(even: Bursts, k: int, count: int) -> Mend:
 def _posed(given: Given) -> Case:
     """Return a recording with both frames fitted, wherever they are."""
     return Case(*aligned(given.recordings, given.robot, FRAMES, ()))
+
+
+GAP = 4.5
+"""A step of so many usual steps is a gap."""
+MISSING = 0.2
+"""Share of lost messages from which a note becomes a warning."""
+JITTER = 0.3
+"""Spread of the steps between stamps, as a share of the usual step, from which it is told."""
+GRIDS = (1e-2, 1e-3)
+"""Grids [s] that clocks are rounded to: hundredths and milliseconds."""
+ENOUGH = 20
+"""Stamps below which their steps say nothing."""
+FEW = 3.0
+"""A lag of fewer samples is left to the fit."""
+
+
+def stamps(case: Case) -> Iterator[Finding]:
+    """Yield gaps, jitter and rounding of the joint and measurement stamps."""
+    for recording in case.recordings:
+        both = (recording.joints.t, 'joint states'), (recording.seen.t, 'measurements')
+        for t, what in () if recording.joints.static else both:
+            if t.size >= ENOUGH:
+                yield from _stream(t, f'The {what} of {recording.name}')
+
+
+def _stream(t: Array, name: str) -> Iterator[Finding]:
+    sent = bursts(t)
+    if sent is not None:
+        yield warning(f'{name} are {sent.words}: none has its own time.')
+        return
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    gaps = steps > GAP * usual
+    if gaps.any():
+        lost = float((steps[gaps] / usual - 1.0).sum())
+        level = 'warning' if lost > MISSING * (t.size + lost) else 'note'
+        at = float(t[:-1][gaps][steps[gaps].argmax()])
+        yield Finding(
+            level,
+            f'{name} have {int(gaps.sum())} gap(s), the longest {steps.max():.3g} s at '
+            f't = {at:.3g} s; about {lost:.0f} messages are missing.',
+        )
+    grid = _grid(t)
+    if grid is not None:
+        yield note(
+            f'{name} are stamped in whole {grid * 1e3:g} ms; positions are '
+            f'uncertain by the way made in {grid * 5e2:g} ms.'
+        )
+        return
+    spread = robust_spread(steps[~gaps] - usual)
+    if spread > JITTER * usual:
+        yield note(
+            f'{name} come irregularly: every {usual * 1e3:.3g} ms, give or take '
+            f'{spread * 1e3:.2g} ms.'
+        )
+
+
+def _grid(t: Array) -> float | None:
+    """Return the grid that stamps were rounded to; a grid of the rate itself rounds nothing."""
+    for grid in GRIDS:
+        counts = (t - t[0]) / grid
+        if np.abs(counts - counts.round()).max() > 1e-4:
+            continue
+        steps = np.diff(counts).round()
+        usual = np.median(steps)
+        # Dropped messages make whole multiples of the usual step, rounding makes one more or less.
+        uneven = np.abs(steps - usual) == 1
+        return grid if uneven.mean() > 0.05 and usual > 1 else None
+    return None
+
+
+def clocks(case: Case) -> Iterator[Finding]:
+    """Yield how late the measurements of a moving arm are, where that explains the gap."""
+    for k, late in enumerate(case.lags):
+        if late is not None:
+            yield from _recording(case.recordings[k], late, k)
+
+
+def _recording(recording: Recording, lag: Lag, k: int) -> Iterator[Finding]:
+    t = recording.seen.t
+    step = max(float(np.median(np.diff(s))) for s in (t, recording.joints.t))
+    start, end = (float(lag.at(edge)) for edge in (t[0], t[-1]))
+    mend = partial(stamps_as, k=k, late=lag.late, rate=lag.rate, middle=lag.middle)
+    if abs(end - start) > step:
+        sentence = (
+            f'The clocks of {recording.name} run apart by {lag.rate * 1e6:.0f} ppm: the '
+            f'measurements are {_late(start)} at the start and {_late(end)} at the end.'
+        )
+        wrong = abs(lag.rate) > RATE
+    elif abs(lag.late) > FEW * step:
+        cause = ', or commanded joints were recorded and the arm lags behind'
+        sentence = (
+            f'The measurements of {recording.name} are {_late(lag.late)} against the joint states:'
+            f' the clocks are not synchronised{cause if lag.late > 0.0 else ""}.'
+        )
+        wrong = abs(lag.late) > LATE
+    else:
+        return
+    if wrong:
+        yield mistake(sentence, 'clock', ('clock',), ONE_CLOCK, mend, of_all=False)
+    else:
+        yield note(sentence)
+
+
+def _late(seconds: float) -> str:
+    return f'{abs(seconds) * 1e3:.0f} ms {"late" if seconds >= 0.0 else "early"}'

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Does the tool of one recording stand elsewhere than that of the first, without a word of it?"""
+"""Did the set-up move, or does the tool of one recording stand elsewhere than that of the first?"""
 
 from __future__ import annotations
 
@@ -14,11 +14,57 @@ from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from ...effects.frame_errors import ToolPose
 from ..algebra.problem import Change, Model
-from .evidence import Case, Finding, length, listed, mistake
-from .limits import PARTED, PARTED_LEAST, PARTED_TURN
+from .evidence import Case, Finding, mistake, note, warning
+from .lengths import falls, instant, length, listed
+from .limits import HALVED, NOISE, PARTED_TURN
 from .mending import differing
 from .orientation import WRONG, disagreement
+from .slips import KNOCKED, Settling, Slip
 from .snapshot import Arm, Snapshot
+
+SEEN = 2.0
+"""
+A change this many times as large as the largest gaps did not happen: whatever is aligned, one side
+of a step keeps half of it. A strong shake makes such steps that other columns undo.
+"""
+
+
+def setup(case: Case) -> Sequence[Finding]:
+    """Return steps and settling of the set-up; those that are dated are causes, and told there."""
+    most = SEEN * case.largest
+    out = []
+    for each in case.changes:
+        if isinstance(each, Settling) and each.size < most:
+            out.append(note(_settled(case, each)))
+        elif isinstance(each, Slip) and each.kind == KNOCKED and each.size < most:
+            out += [] if case.slips else [warning(_moved(case, each))]
+    return out
+
+
+def _moved(case: Case, step: Slip) -> str:
+    recording = case.recordings[step.recording]
+    if step.time == recording.seen.t[0]:
+        return (
+            f'The set-up moved by {length(step.size)} before {recording.name}; have the base '
+            'aligned, so that each recording gets its own.'
+        )
+    return (
+        f'The set-up of {recording.name} moved by {length(step.size)} at '
+        f'{instant(recording, step.time)}; split the '
+        'recording there and have the base aligned, so that each part gets its own.'
+    )
+
+
+def _settled(case: Case, found: Settling) -> str:
+    recording = case.recordings[found.recording]
+    constant, unit = found.time_constant, 's'
+    if recording.joints.static:
+        constant, unit = constant / float(np.median(np.diff(recording.seen.t))), 'stations'
+    return (
+        f'The set-up of {recording.name} settles by {length(found.size)} with a time constant of '
+        f'{constant:.3g} {unit}, as in warming up.'
+    )
+
 
 MUCH = 0.2
 """Share of the largest difference from which a recording is named."""
@@ -36,24 +82,24 @@ def parted(case: Case) -> Sequence[Finding]:
     shot = case.snapshot
     before = shot.arm()
     turn = disagreement(shot, before.model)
-    if before.gap < PARTED_LEAST and turn < TURN_TOLD:
+    if before.gap < NOISE and turn < TURN_TOLD:
         return ()
     apart = _with_tools(shot)
     own = apart.arm()
     after = disagreement(apart, own.model)
-    shifted = PARTED * own.gap < before.gap and before.gap > PARTED_LEAST
-    turned = PARTED * after < turn and turn > PARTED_TURN
+    shifted = HALVED * own.gap < before.gap and before.gap > NOISE
+    turned = HALVED * after < turn and turn > PARTED_TURN
     if not (shifted or turned):
         return ()
-    falls = [f'the gap falls from {length(before.gap)} to {length(own.gap)}'] * shifted
-    falls += [f'that of the turns from {_angle(turn)} to {_angle(after)}'] * turned
-    sentence = f'{_words(case, own)}; so told, {listed(falls)}.'
+    fallen = [falls(before.gap, own.gap)] * shifted
+    fallen += [f'that of the turns from {_angle(turn)} to {_angle(after)}'] * turned
+    sentence = f'{_words(case, own)}; so told, {listed(fallen)}.'
     remedy = (
         'Tell it (--may-change tool_pose, or --changed BAG tool), or diagnose the recordings one '
         'by one'
     )
     if before.off < 1.0 and turn < WRONG:
-        return (Finding('warning', f'{sentence} {remedy}.'),)
+        return (warning(f'{sentence} {remedy}.'),)
     mend = partial(differing, families=('tool_pose',))
     return (mistake(sentence, 'reflector_jumped', ('tool',), remedy, mend),)
 

@@ -235,8 +235,8 @@ def hand(one, q, off):
 
 def joined(goal, off, rng):
     """Return postures in which the real ball of the right arm is at a place in the left hand."""
-    middle = np.array([0.0, -0.8, 0.9, 0.0] * 2)
-    q = middle + rng.uniform(-1.0, 1.0, (len(goal), 8)) * [0.8, 0.4, 0.5, 1.5] * 2
+    middle, wide = np.array([0.0, -0.8, 0.9, 0.0] * 2), [0.8, 0.4, 0.5, 1.5] * 2
+    q = middle + rng.uniform(-1.0, 1.0, (len(goal), 8)) * wide
 
     def away(q):
         left, right = hand(ARMS['left'], q[:, :4], off), hand(ARMS['right'], q[:, 4:], off)
@@ -264,7 +264,7 @@ def test_two_arms_calibrate_each_other_by_a_ball_in_sockets(tmp_path):
     ties = [{'between': ['one', 'two'], 'value': 0.06, 'sigma': 5e-5}]
     sockets = {label: {'kind': 'point'} for label in places}
     artefact.write_text(yaml.safe_dump({'contacts': sockets, 'distances': ties}))
-    robot.write_text(yaml.safe_dump(ARMS['right'] | {'workpiece': ARMS['left']}))
+    robot.write_text(json.dumps(ARMS['right'] | {'workpiece': ARMS['left']}))
     words = ('import', tmp_path / 'touches.csv', '--contacts', artefact, '--robot', robot)
     assert commanded(*words, '--out', tmp_path / 'bag') == 0
     words = ('diagnose', tmp_path / 'bag', '--robot', robot, '--align', 'tool')

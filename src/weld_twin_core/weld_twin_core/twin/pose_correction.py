@@ -291,7 +291,7 @@ def between(start: Array, end: Array) -> Array:
 def moved(pose: Array, twist: Array) -> Array:
     """Return poses (..., 4, 4) moved by twists (..., 6) [m, rad], shape (..., 4, 4)."""
     if twist.ndim == 1:
-        one = np.array(pose)
+        one: Array = pose.copy()
         one[:3, 3] += twist[:3]
         one[:3, :3] = turn_matrix(twist[3:]) @ pose[:3, :3]
         return one

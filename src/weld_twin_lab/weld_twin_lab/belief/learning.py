@@ -18,7 +18,7 @@ from weld_twin_core.diagnosis.calibration.weights import SCHEMA
 from .bound import Bound, bounded, precise
 from .judged import Example
 from .logistic import fitted
-from .terms import OF_FAMILIES, TERMS
+from .terms import CAUSE_RISK, OF_FAMILIES, RISK, TERMS
 
 RIDGE = 30.0
 """Of half the squared weights, against log loss in nats: each weight moves as far as some hundred
@@ -27,8 +27,6 @@ FOLDS = 8
 """Parts of the cases that take turns in being unseen."""
 ENDS = (0.005, 0.995)
 """Quantiles of a feature between which it counts: beyond, single cases would decide."""
-RISK, CAUSE_RISK = 0.0025, 0.01
-"""Probability that an answer is sure and wrong, and that a cause told as sure is wrong."""
 OF_TODAY = 1.0
 """Weight of a case from which on the engine at hand diagnosed it. What is sure of causes is read off
 these alone, as older engines told fewer causes; a bound on whole answers needs more cases than these."""

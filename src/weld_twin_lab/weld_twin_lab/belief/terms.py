@@ -9,6 +9,8 @@ weights may have one sign only: 1 is good news, -1 bad news, 0 either.
 
 from __future__ import annotations
 
+RISK, CAUSE_RISK = 0.0025, 0.01
+"""Probability that an answer is sure and wrong, and that a cause told as sure is wrong."""
 SITUATION = {
     'gap': 1,
     'left elsewhere': -1,

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ...belief.terms import RISK
 from ...study import Study, option, options, study
 
 LEARNED, JUDGED = 'cases.jsonl.gz', 'held_out.jsonl.gz'
@@ -33,7 +34,7 @@ add_arguments = options(
     option('--learn-from', [], 'TABLE', 'tables kept from other runs', nargs='*'),
     option('--judge-on', [], 'TABLE', 'tables kept from other runs', nargs='*'),
     option(
-        '--risk', 0.002, 'P', 'probability that an answer may be sure and wrong (default: 0.002)'
+        '--risk', RISK, 'P', f'probability that an answer may be sure and wrong (default: {RISK})'
     ),
     out='where everything goes',
     pool=True,

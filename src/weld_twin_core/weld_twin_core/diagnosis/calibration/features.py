@@ -125,6 +125,7 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
             'apart': log(min(row.apart, FAR)),
             'size': log(size),
             'wander': log(wandered),
+            'wander over size': log(wandered) - log(size),
             'members': len(row.listed),
             'left at its joint': float(any(str(row.leader.site.joint) in w for w in left_at[:1])),
             'constant': float(on == 'constant'),

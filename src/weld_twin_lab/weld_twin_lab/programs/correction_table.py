@@ -32,6 +32,14 @@ HEADS = (
     'worse than before',
 )
 """Heads of the table a language."""
+PROMISED_HEADS = (
+    'of',
+    'seams',
+    'RMS in its 90 % interval',
+    'within what was 95 % sure',
+    'width, mm',
+)
+"""Heads of the table of promises."""
 SEAM_HEADS = (
     'language',
     'robot',
@@ -153,25 +161,7 @@ def page(result: dict[str, Any]) -> str:
             '',
             '## Promises',
             '',
-            markdown.table(
-                (
-                    'of',
-                    'seams',
-                    'RMS in its 90 % interval',
-                    'within what was 95 % sure',
-                    'width, mm',
-                ),
-                *(
-                    (
-                        name,
-                        f'{told["seams"]:.0f}',
-                        f'{told["held"]:.0%}',
-                        f'{told["within"]:.0%}',
-                        f'{1e3 * told["width_m"]:.3f}',
-                    )
-                    for name, told in kept(drawn).items()
-                ),
-            ),
+            markdown.table(PROMISED_HEADS, *map(_promised_row, kept(drawn).items())),
             '',
             '## Why seams were left as they were',
             '',
@@ -182,6 +172,17 @@ def page(result: dict[str, Any]) -> str:
             markdown.table(SEAM_HEADS, *(_seam_row(case) for case in drawn)),
             '',
         ]
+    )
+
+
+def _promised_row(named: tuple[str, dict[str, float]]) -> tuple[str, ...]:
+    name, told = named
+    return (
+        name,
+        f'{told["seams"]:.0f}',
+        f'{told["held"]:.0%}',
+        f'{told["within"]:.0%}',
+        f'{1e3 * told["width_m"]:.3f}',
     )
 
 

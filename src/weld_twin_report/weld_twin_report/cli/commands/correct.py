@@ -155,11 +155,7 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
 
     from ...report.correction_page import correction_page, headline, tolerance_told
 
-    length, angle = args.max_correction or LARGEST
-    caps = Caps(
-        quantity(length, ('mm', 'm', 'um'), '--max-correction'),
-        quantity(angle, ('deg', 'rad'), '--max-correction'),
-    )
+    caps = Caps(*_largest(args))
     robot = context.robot
     setup = 0 if args.setup is None else args.setup - 1
     model = program_model(robot, args.model, args.temperature, setup)
@@ -170,11 +166,7 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
     entry = correction_entry(made, robot, caps) | {'way': way(made, model)}
     entry['notes'] += not_told(content)
     if args.tolerance:
-        size, noise = (
-            quantity(text, ('mm', 'm', 'um'), option)
-            for text, option in ((args.tolerance, '--tolerance'), (args.noise or NOISE, '--noise'))
-        )
-        entry['tolerance'] = tolerance_entry(made, model, size, noise)
+        entry['tolerance'] = tolerance_entry(made, model, *_allowed(args))
     inputs = [hashed('program', args.what), hashed('model', args.model)]
     entry['inputs'] = [item.as_dict() for item in inputs]
     with output(args, RESULT) as place:
@@ -186,6 +178,21 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
     _tell(entry)
     print(f'report: {Path(args.out) / PAGE}')
     return 0
+
+
+def _largest(args: argparse.Namespace) -> tuple[float, float]:
+    """Return how far a point may be moved and turned [m, rad]."""
+    length, angle = args.max_correction or LARGEST
+    return _length(length, '--max-correction'), quantity(angle, ('deg', 'rad'), '--max-correction')
+
+
+def _allowed(args: argparse.Namespace) -> tuple[float, float]:
+    """Return the deviation allowed and the noise of what measures it [m]."""
+    return _length(args.tolerance, '--tolerance'), _length(args.noise or NOISE, '--noise')
+
+
+def _length(text: str, option: str) -> float:
+    return quantity(text, ('mm', 'm', 'um'), option)
 
 
 def _tell(entry: dict[str, Any]) -> None:

@@ -20,7 +20,7 @@ from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from ..blind.judging import NOT_IN_LIBRARY
 from ..blind.statistics import brier, calibration_error, share
-from . import learning
+from . import learning, terms
 from .bound import upper_limit
 from .goals import goal_measures
 from .judged import Example, examples_of, kept
@@ -59,7 +59,7 @@ def rows_of(seed: int, count: int, runner: Runner, mix: str = USUAL) -> list[dic
     return [{'mix': mix, **kept(row)} for row in runner.run(tasks)]
 
 
-def fit(rows: Sequence[Mapping[str, Any]], risk: float = learning.RISK) -> dict[str, Any]:
+def fit(rows: Sequence[Mapping[str, Any]], risk: float = terms.RISK) -> dict[str, Any]:
     """
     Return the content of the file of weights that some cases teach.
 

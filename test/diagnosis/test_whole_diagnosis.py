@@ -46,11 +46,6 @@ def near(found, truth):
     }
 
 
-IMITATED = {'backlash'}
-"""Right, and never sure on one motion: a link that sticks and slips is no effect of the library, and
-jumps as play does where a joint turns round."""
-
-
 @pytest.mark.parametrize('name', SINGLE)
 def test_a_single_cause_is_named_on_its_joint_with_its_size(name):
     truth = SINGLE[name]
@@ -60,9 +55,8 @@ def test_a_single_cause_is_named_on_its_joint_with_its_size(name):
     (found,) = answer.effects
     right = near(found, truth)
     assert all(right.values()), (right, found.as_dict())
-    assert answer.confidence > (0.8 if name in IMITATED else 0.9)
-    assert not (answer.sure and name in IMITATED)
-    assert answer.sure or name in IMITATED
+    assert answer.confidence > 0.9
+    assert answer.sure
     assert answer.shrink.rms_after_m == pytest.approx(FLOOR, rel=0.1)
 
 

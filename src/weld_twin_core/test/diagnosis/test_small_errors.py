@@ -177,3 +177,24 @@ def test_one_wrong_scale_is_not_ten_wrong_links(robot):
     assert [effect.name for effect in few.final.model.found] == ['measurement_scale']
     assert members_beside(few, many, Beliefs()) == 0
     assert members_beside(replace(few, final=few.baseline), many, Beliefs()) > 3
+
+
+def test_a_sound_arm_at_fifteen_stations_has_no_cause(robot):
+    """Dozens of errors whose sizes know what was left out predict pure noise there."""
+    together, told = 0, []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        q = rng.uniform(-1.2, 1.2, (15, 6)) + MIDDLE
+        motion = wt.JointMotion(np.arange(15.0), q, static=True)
+        exact = wt.Twin(robot).poses(wt.Recording('stations', motion)).position
+        noisy = wt.Measurements(motion.t, exact + 3e-5 * rng.standard_normal(exact.shape))
+        found = wt.diagnose(
+            wt.Recording('stations', motion).with_measured(noisy),
+            robot,
+            align='base,tool',
+            experiment=False,
+        )
+        told += found.effects
+        together += bool(found.families)
+    assert not told
+    assert together <= 2

@@ -25,7 +25,7 @@ from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..unseen.unseen_stretches import Unseen
-from .shrinkage import believed, groups, learned_precision
+from .shrinkage import believed, groups, learned_precision, predicted
 from .small_errors import many_small
 
 BEAR = (10, 30, 100)
@@ -45,6 +45,9 @@ those of machines at large predicted a ninth alike (0.23, 0.37 and 0.20 mm both)
 did better (0.54 mm RMS on each left out instead of 0.61)."""
 CREEPS = 1.0
 """Growth of the squared unseen error without a creep from which on it stays: the error doubles."""
+FEW_COLUMNS = 200
+"""Coordinates up to which sizes are learned anew for every part that is left out: with more there are
+so many stations that sizes hardly hang on some of them, and it would take minutes."""
 CHOSEN = 1.2
 """Effects chosen one by one were chosen on the stations left out as well: what they leave there
 counts a fifth more where the many are many. From draws of 15 to 60 stations of two real arms."""
@@ -75,7 +78,9 @@ def fitted_together(
             best, left, dropped = trial, remains, less
     best, left = _without_creep(found, best, left, (*exclude, *dropped), beliefs, progress)
     few = unseen_rms(found)
-    better = found.crowded or left < beliefs.better * few
+    # Few that were chosen on what is left out have their lead by that.
+    lead = 1.0 if found.final.model.found and _relearned(best) else beliefs.better
+    better = found.crowded or left < lead * few
     if not better:
         better = left < CHOSEN * few and _many(found, best, beliefs)
     if better and not found.crowded and _one_and_crumbs(best, beliefs):
@@ -243,7 +248,17 @@ def _one_number(kind: type[Effect]) -> bool:
 def unseen_rms(found: Search) -> float:
     """Return the RMS [m] on stretches and on regions of posture left out, both together."""
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    return float(np.sqrt(np.mean([each.rms(each.whole) ** 2 for each in unseen.every_way()])))
+    model, anew = found.final.model, _relearned(found)
+    ways = [
+        each.rms(predicted(each, model, found.work.beliefs) if anew else each.whole)
+        for each in unseen.every_way()
+    ]
+    return float(np.sqrt(np.mean(np.square(ways))))
+
+
+def _relearned(found: Search) -> bool:
+    """Return whether the sizes of many are learned anew for every part left out."""
+    return found.dense and found.final.coordinates.size <= FEW_COLUMNS
 
 
 def members_beside(few: Search, many: Search, beliefs: Beliefs) -> int:

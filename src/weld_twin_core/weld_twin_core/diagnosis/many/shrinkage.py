@@ -22,12 +22,14 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...errors import DataError
+from ..algebra.atoms import rows_of
 from ..algebra.definite import solved
 from ..algebra.designed import designed
 from ..algebra.fit import Fit, coordinates, fit, robust_scale, solve_scaled, stepped
 from ..algebra.prior import effect_precision, frame_prior
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
+from ..unseen.unseen_stretches import Unseen
 
 ROUNDS = 15
 """Times that variances and noise are learned in turn; they settle within ten."""
@@ -203,7 +205,7 @@ def _learned(
     target = _target(normal, right, float(residual @ residual), x)
     precision, freedom = learned_precision(
         *_projected(*target, frames),
-        residual.size,
+        residual.size - frames,
         labels,
         scales,
         believed(model),
@@ -217,6 +219,46 @@ def _learned(
     if moved @ moved + precision @ x_moved**2 > residual @ residual + precision @ x**2:
         trial = fit(problem, model, scale, precision, iterations=2).model
     return trial, precision, freedom + frames
+
+
+def predicted(unseen: Unseen, model: Model, beliefs: Beliefs, *, learn: bool = True) -> Array:
+    """
+    Return what is left on every part by a model fitted on the others, shape (rows,), whitened.
+
+    The sizes of its groups are learned on the others as well: learned on all, they know what was
+    left out, and on a dozen stations dozens of errors predict pure noise.
+
+    Parameters
+    ----------
+    learn : bool
+        Whether sizes are learned; see `learned_precision`.
+
+    """
+    x, frames = coordinates(model), unseen.frames
+    labels, scales = groups(model.found, beliefs)
+    held, pulled = np.zeros((2, frames + x.size))
+    held[:frames], pulled[:frames] = unseen.precision[:frames], unseen.pull[:frames]
+    spans = rows_of(unseen.labels)
+    parts = [unseen.columns.within(rows) for rows in spans]
+    normals = [part.normal() for part in parts]
+    rights = [part.times(unseen.residual[r]) for part, r in zip(parts, spans, strict=True)]
+    squares = [float(unseen.residual[r] @ unseen.residual[r]) for r in spans]
+    whole, all_right = np.sum(normals, axis=0) + np.diag(held), np.sum(rights, axis=0) - pulled
+    out = np.array(unseen.residual)
+    for part, rows, normal, right, rss in zip(parts, spans, normals, rights, squares, strict=True):
+        rest, force = whole - normal, all_right - right
+        precision, _ = learned_precision(
+            *_projected(*_target(rest, force, sum(squares) - rss, x), frames),
+            unseen.residual.size - len(unseen.residual[rows]) - frames,
+            labels,
+            scales,
+            believed(model),
+            learn=learn,
+        )
+        ridge = np.concatenate([np.zeros(frames), precision])
+        pull = ridge * np.concatenate([np.zeros(frames), x])
+        out[rows] -= part.mixed(solve_scaled(rest + np.diag(ridge), force - pull, 1e-9))
+    return out
 
 
 def believed(model: Model) -> Array:

@@ -23,8 +23,12 @@ def recording():
     return sound.draw(np.random.default_rng(4), rich=True)
 
 
+ELSEWHERE = {'wrong_fixture', 'intrinsics', 'target_scale', 'target_mirrored', 'cameras_swapped'}
+"""Mistakes of a cell with a positioner and of cameras: the tests of cells and of cameras make them."""
+
+
 def test_every_kind_of_mistake_that_is_documented_is_made():
-    assert set(KINDS) == set(MISTAKES)
+    assert set(KINDS) | ELSEWHERE == set(MISTAKES)
 
 
 @pytest.mark.parametrize('kind', [k for k in KINDS if k not in MOVING_ONLY])

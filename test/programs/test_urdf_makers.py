@@ -87,7 +87,7 @@ class Arm:
 
 def command(name, maker, *more):
     robot = MAKERS / f'{maker}.urdf'
-    said = weld_twin(name, *more, '--robot', robot, '--tip-link', 'tcp')
+    said = weld_twin(*name.split(), *more, '--robot', robot, '--tip-link', 'tcp')
     assert said.code == 0, said.err
     return said
 
@@ -157,7 +157,7 @@ def program(maker, arm, folder):
     language, suffix, reader, base, flange, _ = CASES[maker]
     path = folder / f'seam{suffix}'
     if maker not in NEAR:
-        command('export', 'program', maker, 'arc', '--controller', language, '--out', path)
+        command('export program', maker, 'arc', '--controller', language, '--out', path)
         (_, (near,)), *_ = reader([path.read_bytes().decode('latin-1')])
         return path, near, ()
     near = NEAR[maker]

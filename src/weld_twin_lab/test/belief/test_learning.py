@@ -51,7 +51,7 @@ def test_no_weight_gets_the_wrong_sign():
 
 
 def test_what_is_learned_is_as_often_right_as_it_says_and_sure_as_seldom_wrong():
-    content = learned(examples(1500, 3, slope=4.0), {'seeds': [3]}, risk=0.01)
+    content = learned(examples(3000, 3, slope=4.0), {'seeds': [3]}, risk=0.01)
     told = calibration_from(content)
     fresh = examples(3000, 4, slope=4.0, kinds=('answer, named',))
     p = np.array([told.probability(e.kind, e.features) for e in fresh])

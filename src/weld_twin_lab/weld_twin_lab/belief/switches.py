@@ -59,7 +59,7 @@ MECHANISMS = {
     'misfit': Mechanism('hypotheses.selection', '_misfit', no),
     'starts_again': Mechanism('hypotheses.selection', 'restarted', second),
     'stand_ins': Mechanism('hypotheses.selection', '_without_stand_in', third),
-    'taken_out_alike': Mechanism('hypotheses.structural_aliases', '_kin', nothing),
+    'taken_out_alike': Mechanism('hypotheses.structural_aliases', '_outside', no),
     'taken_out_constants': Mechanism('hypotheses.structural_aliases', '_same_anywhere', nothing),
     'constants_here': Mechanism('hypotheses.structural_aliases', '_constants_here', nothing),
     'settable_first': Mechanism('hypotheses.structural_aliases', '_settable_first', first),

@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Diagnose, say what to measure next, until it is decided.
 
-Before anything is measured, --tolerance plans the first measurement: how many postures, which, and
-how sure one will be; DIR gets them with a table to fill in. With --model it plans what to measure on
-top of a diagnosis, in a --region or in the whole reach. Begin with DIR and recordings; --robot
-and --budget belong to the beginning. Record the experiment that it asks for (experiment.yaml), and go
-on with DIR and the new bag. DIR alone tells where it stands. It ends when the cause is sure, when the
-budget is spent, or when nothing would part what is left, and says which.
+Before anything is measured, --tolerance plans how many postures and which; DIR gets them with a
+table to fill in. With --model it plans on top of a diagnosis. Begin with DIR, recordings, --robot
+and --budget. Record the experiment that it asks for (experiment.yaml), and go on with DIR and the
+new bag. DIR alone tells where it stands. It ends when the cause is sure, when the budget is spent,
+or when nothing would part what is left, and says which.
 """
 
 from __future__ import annotations

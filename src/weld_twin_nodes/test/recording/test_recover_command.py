@@ -47,7 +47,7 @@ def test_the_command_that_is_printed_for_a_full_disk_works(cut_short, weld_twin,
     usage = lambda place: full if Path(place) == cut_short.parent else room  # noqa: E731
     monkeypatch.setattr(shutil, 'disk_usage', usage)
     said = weld_twin('bag', cut_short)
-    printed = re.search(r"'weld-twin (recover .*)'", said.err)
+    printed = re.search(r"'weld-twin (bag recover .*)'", said.err)
     assert printed is not None
     assert weld_twin(*shlex.split(printed[1])).code == 0
     with BagReader(here / 'bag') as bag:

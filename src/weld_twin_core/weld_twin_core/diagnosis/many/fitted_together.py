@@ -78,9 +78,9 @@ def fitted_together(
             best, left, dropped = trial, remains, less
     best, left = _without_creep(found, best, left, (*exclude, *dropped), beliefs, progress)
     few = unseen_rms(found)
-    # Few that were chosen on what is left out have their lead by that.
-    lead = 1.0 if found.final.model.found and _relearned(best) else beliefs.better
-    better = found.crowded or left < lead * few
+    # Several that were chosen on the parts left out as well have their lead by that.
+    chosen = len(found.final.model.found) >= beliefs.several and _relearned(best)
+    better = found.crowded or left < (1.0 if chosen else beliefs.better) * few
     if not better:
         better = left < CHOSEN * few and _many(found, best, beliefs)
     if better and not found.crowded and _one_and_crumbs(best, beliefs):

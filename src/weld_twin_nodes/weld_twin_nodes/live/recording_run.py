@@ -38,6 +38,11 @@ Seconds without a message after which what is still missing will not come. Fast 
 what it has sent, and a reader that lacks some of it asks for it then. Of a node that stands still,
 or has ended, nothing will.
 """
+FLOWS_WITHIN = 1.0
+"""
+Seconds without a message after which nothing more comes of a node that does not tell of itself. A
+recorder that stood still itself has heard of nobody for a while, and yet has much to take in.
+"""
 LONGEST = 9.0
 """Seconds in all; `ros2 launch` kills what has not ended ten seconds after Ctrl-C."""
 
@@ -163,7 +168,8 @@ class RecordingRun:
             self._lacked, self._moved = lacking, now
         since = now - self._ending_since
         untold = self._untold() and since < TOLD_WITHIN
-        coming = self._still_sent(lacking) and now - self._moved < ARRIVED_WITHIN
+        within = ARRIVED_WITHIN if self._still_sent(lacking) else FLOWS_WITHIN
+        coming = lacking and now - self._moved < within
         if not (untold or coming) or since > LONGEST or self._bag.failure is not None:
             self._conclude()
 

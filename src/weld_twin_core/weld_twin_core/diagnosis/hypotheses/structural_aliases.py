@@ -163,13 +163,11 @@ def _lead(found: Search, other: Rival) -> _Lead | None:
     kept = {(e.name, e.site) for e in own.model.found}
     if (other.site.effect, other.site.joint) not in kept:
         return None
-    bare = fit(work.problem, now.model.with_found(()), work.scale, None, 4)
-    count = found.effective(now)
-    nats = nats_in_place(bare, own, count) - nats_in_place(bare, now, count)
+    nats = nats_in_place(now, own, found.effective(now))
     if nats <= work.beliefs.enter_nats:
         return None
     replaced = [(e.name, e.site) not in kept for e in now.model.found]
-    return _Lead(float(nats), np.array(replaced))
+    return _Lead(nats, np.array(replaced))
 
 
 def _parts(found: Search, k: int, exclude: Sequence[str]) -> list[Effect]:

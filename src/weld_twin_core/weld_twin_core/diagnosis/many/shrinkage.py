@@ -200,20 +200,9 @@ def _learned(
     normal, right = columns.normal(), columns.times(residual)
     normal[:frames, :frames] += np.diag(frame_ridge)
     right[:frames] -= frame_ridge * off
-    labels, scales = groups(model.found, beliefs)
-    x = coordinates(model)
-    target = _target(normal, right, float(residual @ residual), x)
-    precision, freedom = learned_precision(
-        *_projected(*target, frames),
-        residual.size - frames,
-        labels,
-        scales,
-        believed(model),
-        learn=learn,
-    )
-    ridge = np.concatenate([np.zeros(frames), precision])
-    pull = ridge * np.concatenate([np.zeros(frames), x])
-    step = solve_scaled(normal + np.diag(ridge), right - pull, 1e-9)
+    x, rss = coordinates(model), float(residual @ residual)
+    learned = _solved_anew(model, beliefs, normal, right, rss, residual.size, learn=learn)
+    precision, freedom, step = learned
     trial = stepped(problem, model, step)
     moved, x_moved = problem.whitened(problem.residuals(trial), scale), coordinates(trial)
     if moved @ moved + precision @ x_moved**2 > residual @ residual + precision @ x**2:
@@ -221,43 +210,62 @@ def _learned(
     return trial, precision, freedom + frames
 
 
-def predicted(unseen: Unseen, model: Model, beliefs: Beliefs, *, learn: bool = True) -> Array:
+def _solved_anew(
+    model: Model,
+    beliefs: Beliefs,
+    normal: Array,
+    right: Array,
+    rss: float,
+    rows: int,
+    *,
+    learn: bool = True,
+) -> tuple[Array, float, Array]:
+    """
+    Return the prior precision learned, the freedom that it leaves, and the step to where it leads.
+
+    Parameters
+    ----------
+    normal, right, rss, rows
+        Normal equations of the frames, with what is believed of these, and of all coordinates.
+
+    """
+    labels, scales = groups(model.found, beliefs)
+    x = coordinates(model)
+    frames = len(right) - x.size
+    precision, freedom = learned_precision(
+        *_projected(*_target(normal, right, rss, x), frames),
+        rows - frames,
+        labels,
+        scales,
+        believed(model),
+        learn=learn,
+    )
+    ridge = np.concatenate([np.zeros(frames), precision])
+    pull = ridge * np.concatenate([np.zeros(frames), x])
+    return precision, freedom, solve_scaled(normal + np.diag(ridge), right - pull, 1e-9)
+
+
+def predicted(unseen: Unseen, model: Model, beliefs: Beliefs) -> Array:
     """
     Return what is left on every part by a model fitted on the others, shape (rows,), whitened.
 
     The sizes of its groups are learned on the others as well: learned on all, they know what was
     left out, and on a dozen stations dozens of errors predict pure noise.
-
-    Parameters
-    ----------
-    learn : bool
-        Whether sizes are learned; see `learned_precision`.
-
     """
-    x, frames = coordinates(model), unseen.frames
-    labels, scales = groups(model.found, beliefs)
-    held, pulled = np.zeros((2, frames + x.size))
-    held[:frames], pulled[:frames] = unseen.precision[:frames], unseen.pull[:frames]
+    frames, residual = unseen.frames, unseen.residual
     spans = rows_of(unseen.labels)
     parts = [unseen.columns.within(rows) for rows in spans]
     normals = [part.normal() for part in parts]
-    rights = [part.times(unseen.residual[r]) for part, r in zip(parts, spans, strict=True)]
-    squares = [float(unseen.residual[r] @ unseen.residual[r]) for r in spans]
-    whole, all_right = np.sum(normals, axis=0) + np.diag(held), np.sum(rights, axis=0) - pulled
-    out = np.array(unseen.residual)
-    for part, rows, normal, right, rss in zip(parts, spans, normals, rights, squares, strict=True):
-        rest, force = whole - normal, all_right - right
-        precision, _ = learned_precision(
-            *_projected(*_target(rest, force, sum(squares) - rss, x), frames),
-            unseen.residual.size - len(unseen.residual[rows]) - frames,
-            labels,
-            scales,
-            believed(model),
-            learn=learn,
-        )
-        ridge = np.concatenate([np.zeros(frames), precision])
-        pull = ridge * np.concatenate([np.zeros(frames), x])
-        out[rows] -= part.mixed(solve_scaled(rest + np.diag(ridge), force - pull, 1e-9))
+    rights = [part.times(residual[rows]) for part, rows in zip(parts, spans, strict=True)]
+    whole, force = np.sum(normals, axis=0), np.sum(rights, axis=0)
+    whole[:frames, :frames] += np.diag(unseen.precision[:frames])
+    force[:frames] -= unseen.pull[:frames]
+    out = np.array(residual)
+    for part, rows, normal, right in zip(parts, spans, normals, rights, strict=True):
+        here = residual[rows]
+        rss, count = float(residual @ residual - here @ here), residual.size - here.size
+        *_, step = _solved_anew(model, beliefs, whole - normal, force - right, rss, count)
+        out[rows] -= part.mixed(step)
     return out
 
 

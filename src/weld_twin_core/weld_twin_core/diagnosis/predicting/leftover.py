@@ -28,7 +28,7 @@ from ..algebra.fit import TRUSTED, solve_scaled
 from ..algebra.independent_rows import by_sample
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Problem, Scale
-from ..algebra.unit_scale import Index
+from ..algebra.definite import Index
 
 HOLD = 0.9
 """Share of unseen postures that their regions shall hold."""
@@ -181,8 +181,8 @@ def _of_the_arm(
         Whether stations were measured, which lie apart.
 
     """
-    if left <= 0.0:
-        return 1.0
+    # Where open directions account for all of it, neighbours have nothing in common either.
+    left = max(left, 1e-12)
     common = min(max(beside, 0.0), left)
     alone = left - common
     if noise is None:

@@ -6,8 +6,9 @@ How large every small error of this arm is: models weighed by what they say of t
 No arm is exact, but most of what it could have it has next to nothing of. Every coordinate therefore
 has one of a few sizes, and a model is a choice of sizes. Models are drawn as often as the recordings
 vouch for them [1]_: coordinates given the sizes, sizes given the coordinates, in turn. What sizes are
-usual is learned along, family by family and from all families together. Where data show nothing of a
-coordinate, all sizes that this arm's other errors have remain.
+usual is learned along, family by family and from all families together. What no data could show, for
+it is one with a fitted frame or does nothing in them, is as wide as machines have it, but for what the
+others of its family show: that an arm is good in one thing is no witness of what nobody looked at.
 
 References
 ----------
@@ -35,6 +36,9 @@ BELIEF = np.array([0.2, 0.15, 0.15, 0.15, 0.15, 0.15, 0.05])
 of their small errors at a usual size, simulated ones hardly any, and either shows within a few."""
 POOLED, OWN = 3.0, 4.0
 """So many coordinates' worth of belief in that, and in what all families together show, for each."""
+OPEN = 0.05
+"""Part of what a coordinate does in the data that is not what fitted frames do, up to which it is hidden:
+a sensor's noise leaves nothing to be told by a twentieth."""
 USUAL = 0.3
 """Size from which on an error is one that machines usually have."""
 SWEEPS, LEARNING, EVERY = 240, 60, 3
@@ -139,6 +143,23 @@ def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
     )
 
 
+def hidden(columns: Array, frames: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """
+    Return which coordinates no data like these could show, shape (P,).
+
+    Parameters
+    ----------
+    columns : array, shape (P, rows)
+    frames : array of bool, shape (P,)
+        Coordinates of fitted frames.
+
+    """
+    basis = np.linalg.svd(columns[frames], full_matrices=False)[2]
+    own = np.linalg.norm(columns, axis=1)
+    left = np.linalg.norm(columns - (columns @ basis.T) @ basis, axis=1)
+    return np.asarray(~frames & (left <= OPEN * own))
+
+
 @dataclass
 class _Seen:
     """Sums over the models looked at, coordinates in units of their widths."""
@@ -166,7 +187,8 @@ class _Chain:
         unit = rows.columns * prior.width[:, None]
         self.normal, self.right = rows.share * unit @ unit.T, rows.share * unit @ rows.residual
         self.middle = prior.middle / prior.width
-        self.small = prior.group >= 0
+        self.hidden = hidden(unit, prior.group < 0)
+        self.small = (prior.group >= 0) & ~self.hidden
         self.size, self.noise = np.where(self.small, SIZES[2], 1.0), self.expected
         self.belief = np.tile(BELIEF, (prior.gears.size, 1))
         n = prior.width.size
@@ -220,6 +242,8 @@ class _Chain:
         self.size[self.small] = SIZES[chosen]
         counts = np.zeros(self.belief.shape)
         np.add.at(counts, (group, chosen), 1.0)
+        alike = counts[self.prior.group[self.hidden]] + OWN * BELIEF
+        self.size[self.hidden] = np.sqrt(alike @ SIZES**2 / alike.sum(axis=1))
         for part in (gears, ~gears):
             common = counts[part].sum(axis=0) + POOLED * BELIEF
             drawn = self.rng.standard_gamma(counts[part] + OWN * common / common.sum())

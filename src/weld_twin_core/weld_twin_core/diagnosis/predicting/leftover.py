@@ -23,12 +23,12 @@ from scipy.special import chdtri
 
 from ...arrays import Array
 from ...recording import Recording
+from ..algebra.definite import Index
 from ..algebra.designed import Design
 from ..algebra.fit import TRUSTED, solve_scaled
 from ..algebra.independent_rows import by_sample
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Problem, Scale
-from ..algebra.definite import Index
 
 HOLD = 0.9
 """Share of unseen postures that their regions shall hold."""
@@ -108,27 +108,25 @@ def leftover(
     samples = _by_sample(problem)
     errors, moments, pairs = _predicted(problem, unseen, given, samples)
     levers = [unseen.turns[:, index].T @ unseen.turns[:, index] for index in samples]
-    units = (scale.position, scale.orientation)
     weight = np.concatenate(scale.weights)
 
     def part(axes: slice) -> tuple[Array, Array, Array]:
         """Return errors, moments and levers on three axes of the samples that have them."""
         wide = [k for k, index in enumerate(samples) if index.size >= axes.stop]
-        unit = units[axes.start // 3] / np.sqrt(weight[wide])
+        unit = (scale.position if axes.start < 3 else scale.orientation) / np.sqrt(weight[wide])
         count = axes.stop - axes.start
-        return (
-            np.array([errors[k][axes] for k in wide]).reshape(-1, count) * unit[:, None],
-            np.array([moments[k][axes, axes] for k in wide]).reshape(-1, count, count)
-            * unit[:, None, None] ** 2,
-            np.array([levers[k][axes, axes] for k in wide]).reshape(-1, count, count)
-            * unit[:, None, None] ** 2,
-        )
+        square = [
+            np.array([each[k][axes, axes] for k in wide]).reshape(-1, count, count)
+            * unit[:, None, None] ** 2
+            for each in (moments, levers)
+        ]
+        off = np.array([errors[k][axes] for k in wide]).reshape(-1, count) * unit[:, None]
+        return off, square[0], square[1]
 
     if all(index.size < 3 for index in samples):
         # Faces and lengths show one way each: nothing parts what is left by axes or gears.
         off, moment, _ = part(slice(0, 1))
-        position = float(np.sqrt(max(float((off**2).mean() - moment.mean()), 0.0)))
-        gear = 0.0
+        position, gear = float(np.sqrt(max((off**2).mean() - moment.mean(), 0.0))), 0.0
     else:
         position, gear = _shared(*part(slice(0, 3)))
     e, v, levered = part(slice(3, 6))
@@ -136,9 +134,8 @@ def leftover(
     turn = _size(e, v + gear**2 * levered, np.eye(3)) if e.size else position
     noise = _noise(problem, floor)
     common = _common(errors, moments, pairs, weight > TRUSTED)
-    share = _of_the_arm(
-        *common, None if noise is None else noise / scale.position, rough, problem.at_rest
-    )
+    noise = None if noise is None else noise / scale.position
+    share = _of_the_arm(*common, noise, rough, problem.at_rest)
     return Rest(position * share, turn * share, gear * share)
 
 

@@ -211,7 +211,9 @@ class Folds:
         together = bool((np.diff(labels) >= 0).all())
         order = None if together else np.argsort(labels, kind='stable')
         ends = np.cumsum(np.unique(labels, return_counts=True)[1]).tolist()
-        return cls(columns, target, labels, order, tuple(slice(a, b) for a, b in pairwise([0, *ends])))
+        return cls(
+            columns, target, labels, order, tuple(slice(a, b) for a, b in pairwise([0, *ends]))
+        )
 
     def errors(self, index: Index, precision: Array) -> Array:
         """Return the squared error on every fold of the columns fitted on the others, (B,)."""

@@ -28,7 +28,8 @@ from .folds import steadiness
 DRAWS = 100
 """Drawings of noise. What none of them reaches noise reaches once in a hundred times."""
 FEW = 400
-"""Rows up to which chance counts: of more, no hundred candidates predict the twentieth part asked for."""
+"""Rows up to which chance counts: of more, the best of a hundred candidates predicts no twentieth
+part, which is what is asked for."""
 CLEAR = 80.0
 """Rows times logarithm of the fall, from which on nothing is drawn: the best of a hundred groups of ten
 columns reaches a chi-square of 45 once in ten thousand times."""
@@ -153,7 +154,9 @@ def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, kno
     unseen = [(left_out(columns, precision, w, targets) ** 2).mean(axis=1) for w in ways]
     floors = np.ones(len(targets))
     if not known:
-        floors = np.array([spread_of(each) for each in left_out(columns, precision, None, targets)])
+        floors = np.array(
+            [spread_of(each) for each in left_out(columns, precision, None, targets)]
+        )
     return float((np.sqrt(np.max(unseen, axis=0)) / floors).max())
 
 

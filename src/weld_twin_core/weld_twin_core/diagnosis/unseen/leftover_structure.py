@@ -69,7 +69,9 @@ def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
     chance = 0.0
     if best.share > beliefs.structure_gain and best.steady > beliefs.blatant_sure:
         each = (columns for _, columns in groups)
-        tried = Candidates(unseen.columns.written_out(), unseen.precision, each, RIDGES, [unseen.labels])
+        tried = Candidates(
+            unseen.columns.written_out(), unseen.precision, each, RIDGES, [unseen.labels]
+        )
         chance = chance_gain(tried, best.share, beliefs.blatant_sure)
     return Structure(best.rms_m, best.share, best.steady, names, chance)
 

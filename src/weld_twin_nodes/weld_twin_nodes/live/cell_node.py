@@ -17,6 +17,7 @@ from rclpy.node import Node
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import ModelError, TwinError
+from weld_twin_msgs_py.assembly import Intake
 from weld_twin_msgs_py.assembly.beside import Beside
 from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, FedBack, plain_messages
 from weld_twin_msgs_py.messages.to_messages import ros_messages
@@ -398,7 +399,7 @@ class CellNode(Node):
             self.health.remarks.append(sentence)
             self.get_logger().info(sentence)
 
-    def tell_beside(self, beside: Beside) -> None:
+    def _tell_beside(self, beside: Beside) -> None:
         """Tell of joints that move and are none of the robot's: one may carry it."""
         sentence = beside.warning(self._carrying_nothing) if beside.moving else ''
         if sentence and self.health.lasting.get(BESIDE) != sentence:
@@ -488,7 +489,15 @@ class CellNode(Node):
             self.frames.tree.clear()
         self.time_went_back()
 
+    def intakes(self) -> Sequence[Intake]:
+        """Return what takes messages in: what it takes for granted is told, not with every message."""
+        return ()
+
     def _tell_health(self) -> None:
+        for intake in self.intakes():
+            for sentence in intake.remarks:
+                self.remark(sentence)
+            self._tell_beside(intake.joints.beside)
         for source in self._sources:
             source.adapt()
             self.health.inputs[source.name].matched = source.matched()

@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future as Done
 from concurrent.futures import ThreadPoolExecutor, wait
 from datetime import datetime, timezone
@@ -55,7 +55,7 @@ from weld_twin_msgs_py.messages.topics import (
 
 from ..offline.loaded_model import LoadedModel, loaded
 from ..streams.arm_state import ArmState
-from ..streams.pose_stream import Found, PoseStream, Work
+from ..streams.pose_stream import PoseStream
 from ..streams.supervision import Supervision
 from .cell_frames import base_frame
 from .goal_relay import Decision, GoalRelay
@@ -175,7 +175,7 @@ class Compensator(ManagedNode):
         self._watch = Supervision()
         self._listened, self._most_age = False, self.setting('max_age')
         self._stream: PoseStream | None = None
-        self._beside, self._goals, self._books = (ThreadPoolExecutor(1) for _ in range(3))
+        self._goals, self._books = ThreadPoolExecutor(1), ThreadPoolExecutor(1)
         self._written: Done[None] | None = None
         self._out = self.offer(POSE_OUT)
         self._correction = self.offer(CORRECTION, awaited=False)
@@ -237,7 +237,7 @@ class Compensator(ManagedNode):
         """End what is worked out beside; what became of goals is written before."""
         if self._written is not None:
             wait([self._written], WRITTEN)
-        for pool in (self._beside, self._goals, self._books):
+        for pool in (self._goals, self._books):
             pool.shutdown(wait=False, cancel_futures=True)
         if self._relay is not None:
             self._relay.close()
@@ -289,6 +289,10 @@ class Compensator(ManagedNode):
 
     # What is known ---------------------------------------------------------------------------
 
+    def intakes(self) -> Sequence[Intake]:
+        """Return what takes its messages in."""
+        return (self._intake,)
+
     def _on_wrench(self, message: Any) -> None:
         taken = self._intake.take(Role.WRENCH, message)
         if taken is not None:
@@ -301,8 +305,6 @@ class Compensator(ManagedNode):
 
     def _on_joints(self, message: Any) -> None:
         taken = self._intake.joint_sample(message)
-        for sentence in self._intake.remarks:
-            self.remark(sentence)
         if taken is None:
             return
         if taken[1]:
@@ -378,13 +380,7 @@ class Compensator(ManagedNode):
             self._limits(),
             passing=self.setting('on_refusal') == 'pass',
             shadow=not self.setting('apply'),
-            later=self._later,
         )
-
-    def _later(self, work: Work) -> Callable[[], Found | None]:
-        """Begin work beside; return what tells its result once it is there."""
-        doing = self._beside.submit(work)
-        return lambda: doing.result() if doing.done() else None
 
     def _on_pose(self, message: Any) -> None:
         self._frame.take(message.header.frame_id)

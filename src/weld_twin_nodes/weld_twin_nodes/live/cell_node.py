@@ -157,7 +157,11 @@ class CellNode(Node):
             self._tell_last_losses()
             begun = time.monotonic()
             for output in self._outputs:
-                self._wait_for_readers(output, begun)
+                if not self._taken_in(output, begun):
+                    self.get_logger().warning(
+                        f'{output.topic}: a subscriber has not taken in all that was sent to it; '
+                        'this node ends without waiting for it any longer'
+                    )
         super().destroy_node()  # type: ignore[no-untyped-call]
 
     def _meet_listeners(self) -> None:
@@ -167,20 +171,17 @@ class CellNode(Node):
         while there() < self.count_subscribers(DIAGNOSTICS.name) and time.monotonic() < end:
             time.sleep(READY_EVERY)
 
-    def _wait_for_readers(self, output: Output, begun: float) -> None:
-        """Wait until all who take an output have all of it, or stand still; and say so."""
+    def _taken_in(self, output: Output, begun: float) -> bool:
+        """Wait until all who take an output have all of it, or stand still; return whether they have."""
+        asked = begun if self.ending_since is None else self.ending_since
         while True:
             live = readers(self, output.topic) <= self.neighbours.alive()
-            asked = begun if self.ending_since is None else self.ending_since
-            end = begun + LAST_WORDS if live else asked + ALIVE
-            if output.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED)):
-                return
-            if time.monotonic() > end:
-                break
-        self.get_logger().warning(
-            f'{output.topic}: a subscriber has not taken in all that was sent to it; this node ends '
-            'without waiting for it any longer'
-        )
+            left = (begun + LAST_WORDS if live else asked + ALIVE) - time.monotonic()
+            # What stands still has had its time with the outputs before, and an ack is there or not.
+            if output.wait_for_all_acked(Duration(seconds=min(max(left, 1e-3), ACKNOWLEDGED))):
+                return True
+            if left <= 0.0:
+                return False
 
     def take_robot(self, robot: Robot | None, joint_names: tuple[str, ...] | None = None) -> None:
         """

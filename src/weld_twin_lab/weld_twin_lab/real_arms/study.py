@@ -79,7 +79,7 @@ def told_claims(said: Mapping[str, Any]) -> list[dict[str, Any]]:
     """
     out: dict[tuple[str, ...], dict[str, Any]] = {}
     for cause in said['causes']:
-        names = [n for n in cause['names'] if n[0] in REGISTRY and REGISTRY[n[0]].cause]
+        names = [n for n in cause['names'] if n[0] in REGISTRY and REGISTRY[n[0]].traits.cause]
         if cause['probability'] <= TOLD or cause['rest'] or not names:
             continue
         many = said['families'] and all(p > TOLD for _, _, p in names)

@@ -99,7 +99,7 @@ class JointStream:
 
     def _take_efforts(self) -> None:
         """Ask the joint states for efforts where effects take them."""
-        self._intake.joints.efforts = any(effect.by_effort for effect in self._twin.effects)
+        self._intake.joints.efforts = any(effect.twin.by_effort for effect in self._twin.effects)
 
     def reset(self) -> None:
         """Begin anew, as after a jump of the clock; wrench and temperature hold."""

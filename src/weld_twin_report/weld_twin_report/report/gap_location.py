@@ -86,7 +86,7 @@ def _dependences(answer: Answer) -> list[tuple[str, float, str]]:
 def _on(told: CauseAnswer) -> Sequence[tuple[str, float]]:
     """Return what a cause depends on; where several causes fit alike, what each of them does."""
     effects = [REGISTRY.get(site.effect) for site in told.alike]
-    on = list(dict.fromkeys(effect.depends_on for effect in effects if effect is not None))
+    on = list(dict.fromkeys(effect.traits.depends_on for effect in effects if effect is not None))
     return [(each, HALF / len(on)) for each in on] if len(on) > 1 else told.cause.dependence
 
 

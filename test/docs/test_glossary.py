@@ -14,11 +14,12 @@ from weld_twin_nodes.wording.words import DEPENDENCES, PLACES, STATUS
 
 ROOT = Path(__file__).parents[2]
 GLOSSARY = (ROOT / 'docs/glossary.md').read_text(encoding='utf-8')
-ORDINARY = set(
+ORDINARY = (
     'a acceleration against all and apart are as at by can cannot cause controller data direction do '
-    'does each effect enter far from good how if in is it itself joint larger left lies looked made '
-    'may measure much motion next of off on only other pass path position recording robot speed spot '
-    'take tell the them then these this to use value we what where which why with worst'.split()
+    'does each effect enter far found from good how if in is it itself joint larger left lies looked '
+    'made may measure much motion next of off on only other pass path position recording robot s '
+    'speed spot take tell the them then these this to ur use value we weld were what where which why '
+    'with worst'
 )
 """Words that any reader has, in the questions and heads of the page."""
 
@@ -42,7 +43,7 @@ def unexplained(label, words):
     left = re.sub(r'\b\w*_\w+\b', '', label)
     for word in sorted(words, key=len, reverse=True):
         left = re.sub(rf'(?<!\w){re.escape(word)}s?(?!\w)', '', left)
-    return [word for word in re.findall(r'[a-z]+', left) if word not in ORDINARY]
+    return [word for word in re.findall(r'[a-z]+', left) if word not in ORDINARY.split()]
 
 
 @pytest.fixture(scope='module')

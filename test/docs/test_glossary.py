@@ -3,23 +3,28 @@
 """The glossary explains every term on the page of a diagnosis."""
 
 import re
+import sys
 from html import unescape
 from pathlib import Path
 
 import pytest
 
-from weld_twin_core.effects import REGISTRY
 from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_nodes.wording.words import DEPENDENCES, PLACES, STATUS
 
 ROOT = Path(__file__).parents[2]
-GLOSSARY = (ROOT / 'docs/glossary.md').read_text(encoding='utf-8')
+sys.path.insert(0, str(ROOT / 'docs/_ext'))
+
+from range_rows import cause_rows  # noqa: E402
+
+CAUSES = '\n'.join(f'| {title} | {meaning} |' for title, meaning in cause_rows())
+GLOSSARY = (ROOT / 'docs/glossary.md').read_text(encoding='utf-8') + '\n' + CAUSES
 ORDINARY = (
     'a acceleration against all and apart are as at by can cannot cause controller data direction do '
     'does each effect enter far found from good how if in is it itself joint larger left lies looked '
     'made may measure much motion next of off on only other pass path position recording robot s '
     'speed spot take tell the them then these this to ur use value we weld were what where which why '
-    'with worst'
+    'with worst wrong'
 )
 """Words that any reader has, in the questions and heads of the page."""
 
@@ -68,8 +73,7 @@ def test_what_the_page_explains_itself_is_explained_alike(page):
 
 def test_every_cause_status_place_and_dependence_is_explained():
     words, text = rows(GLOSSARY), GLOSSARY.lower()
-    titles = {kind.traits.title for kind in REGISTRY.values() if kind.traits.cause}
-    assert titles <= words
+    assert all(len(meaning.split()) > 3 for _, meaning in cause_rows())
     assert set(STATUS) <= words
     assert all(place.removeprefix('the ') in text for place in PLACES.values())
     assert all(

@@ -91,6 +91,7 @@ class Backlash(MemoryEffect):
     name = 'backlash'
     traits = Traits(
         title='backlash',
+        meaning='a gap in a gear (play): at every reversal the motor crosses it, and the arm stays',
         entered="the joint's gear",
         depends_on='direction',
         changes_in_use=True,

@@ -86,7 +86,12 @@ class BearingTilt(Effect):
 
     name = 'bearing_tilt'
     traits = Traits(
-        title='axis wobble', entered='program', depends_on='angle', common=False, by_motion=True
+        title='axis wobble',
+        meaning='an axis leans as it turns, once or twice per turn',
+        entered='program',
+        depends_on='angle',
+        common=False,
+        by_motion=True,
     )
     of = 'joint'
     stage = Stage.LINK

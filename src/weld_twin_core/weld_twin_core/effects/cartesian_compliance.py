@@ -29,6 +29,7 @@ class CartesianCompliance(Effect):
     name = 'cartesian_compliance'
     traits = Traits(
         title='compliance at the tool',
+        meaning='the tool gives way under a force',
         entered='stiffness and of the force at the tool',
         depends_on='load',
         place='tool',

@@ -27,6 +27,7 @@ class ClockRate(Effect):
     name = 'clock_rate'
     traits = Traits(
         title='clock that runs fast or slow',
+        meaning='the two clocks drift apart',
         entered='its clocks',
         depends_on='time',
         place='clock',

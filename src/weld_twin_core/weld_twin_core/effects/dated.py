@@ -88,7 +88,12 @@ class JointSlip(Sudden, ChannelError):
     time: float = 0.0
 
     name = 'joint_slip'
-    traits = replace(Sudden.traits, title='slip', entered='zero')
+    traits = replace(
+        Sudden.traits,
+        title='slip',
+        meaning='a joint slipped at one instant, as by a tooth of a belt',
+        entered='zero',
+    )
     of = 'joint'
     stage = Stage.JOINT
     channel = 'q'
@@ -135,7 +140,11 @@ class ToolSlip(SuddenFrame):
 
     name = 'tool_slip'
     traits = replace(
-        SuddenFrame.traits, title='slipped tool or reflector', entered='tool', place='tool'
+        SuddenFrame.traits,
+        title='slipped tool or reflector',
+        meaning='tool or reflector moved on the flange at one instant',
+        entered='tool',
+        place='tool',
     )
     channel = 'tool'
     parameters = frame_parameters(
@@ -165,6 +174,7 @@ class InstrumentKnock(SuddenFrame):
     traits = replace(
         SuddenFrame.traits,
         title='knocked instrument or base',
+        meaning='instrument or base was moved at one instant',
         entered='the instrument or the base was knocked',
         place='instrument',
     )

@@ -25,6 +25,7 @@ class Drift(Effect):
     name = 'drift'
     traits = Traits(
         title='drift of the frame',
+        meaning='everything measured creeps with time',
         entered='what the frame stands on, or of the temperature',
         depends_on='time',
         place='base',

@@ -30,6 +30,7 @@ class BasePose(FrameError):
     traits = replace(
         FrameError.traits,
         title='base pose error',
+        meaning='the robot stands elsewhere than its base frame says',
         entered='base',
         place='base',
         fitted_with='base',
@@ -81,6 +82,7 @@ class ToolPose(FrameError):
     traits = replace(
         FrameError.traits,
         title='tool pose error',
+        meaning='the tool is not where its tool frame says',
         entered='tool',
         place='tool',
         changes_in_use=True,

@@ -85,6 +85,7 @@ class Friction(MemoryEffect):
     name = 'friction'
     traits = Traits(
         title='friction',
+        meaning='a joint lags behind while it moves, and gives that up when it rests',
         entered="the joint's gear, bearings and grease",
         depends_on='direction',
         changes_in_use=True,

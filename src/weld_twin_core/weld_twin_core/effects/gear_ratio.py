@@ -38,6 +38,7 @@ class GearRatio(Effect):
     name = 'gear_ratio'
     traits = Traits(
         title='gear ratio error',
+        meaning='a joint turns by a constant factor too far',
         entered='ratio',
         depends_on='angle',
         demand=2,

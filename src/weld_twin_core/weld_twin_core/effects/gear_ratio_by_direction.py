@@ -52,6 +52,7 @@ class GearRatioByDirection(MemoryEffect):
     name = 'gear_ratio_by_direction'
     traits = Traits(
         title='gear ratio that differs by direction',
+        meaning='the same, with another factor each way',
         entered="the joint's gear",
         depends_on='direction',
         common=False,

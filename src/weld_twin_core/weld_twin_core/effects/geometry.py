@@ -38,6 +38,7 @@ class JointOffset(ChannelError):
     traits = replace(
         ChannelError.traits,
         title='zero offset',
+        meaning="a joint's zero is wrong by a constant angle",
         entered='zero',
         changes_in_use=True,
         set_at_controller=True,
@@ -86,7 +87,12 @@ class LinkLength(LinkError):
     da: Value = 0.0
 
     name = 'link_length'
-    traits = replace(LinkError.traits, title='link length error', changes_in_use=True)
+    traits = replace(
+        LinkError.traits,
+        title='link length error',
+        meaning='a length in the model of the robot is wrong',
+        changes_in_use=True,
+    )
     channel = 'a'
     parameters = (
         Parameter(
@@ -111,7 +117,11 @@ class LinkOffset(LinkError):
     dd: Value = 0.0
 
     name = 'link_offset'
-    traits = replace(LinkError.traits, title='link offset error')
+    traits = replace(
+        LinkError.traits,
+        title='link offset error',
+        meaning='an offset along an axis in the model of the robot is wrong',
+    )
     channel = 'd'
     parameters = (
         Parameter(
@@ -136,7 +146,11 @@ class LinkTwist(LinkError):
     dalpha: Value = 0.0
 
     name = 'link_twist'
-    traits = replace(LinkError.traits, title='link twist error')
+    traits = replace(
+        LinkError.traits,
+        title='link twist error',
+        meaning='an angle between two axes in the model of the robot is wrong',
+    )
     channel = 'alpha'
     off = 'the axes are twisted by'
     parameters = (
@@ -158,7 +172,11 @@ class AxisParallelism(LinkError):
     dbeta: Value = 0.0
 
     name = 'axis_parallelism'
-    traits = replace(LinkError.traits, title='axis parallelism error')
+    traits = replace(
+        LinkError.traits,
+        title='axis parallelism error',
+        meaning='two axes that should be parallel are tilted',
+    )
     channel = 'beta'
     off = 'the axes are out of parallel by'
     parameters = (

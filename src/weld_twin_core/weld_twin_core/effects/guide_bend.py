@@ -30,7 +30,12 @@ class GuideBend(GuideError):
     curvature: Value = (0.0, 0.0)
 
     name = 'guide_bend'
-    traits = replace(GuideError.traits, title='bent guide', entered='program')
+    traits = replace(
+        GuideError.traits,
+        title='bent guide',
+        meaning='the guide of a joint that slides is no straight line',
+        entered='program',
+    )
     stage = Stage.POSE
     parameters = (
         Parameter(

@@ -30,7 +30,12 @@ class GuideTilt(GuideError):
     rate: Value = (0.0, 0.0, 0.0)
 
     name = 'guide_tilt'
-    traits = replace(GuideError.traits, title='tilting carriage', entered='program')
+    traits = replace(
+        GuideError.traits,
+        title='tilting carriage',
+        meaning='the carriage of a joint that slides turns on its way',
+        entered='program',
+    )
     stage = Stage.POSE
     parameters = (
         Parameter(

@@ -50,6 +50,8 @@ class Traits:
 
     title: str = ''
     """What people call it; left out, its name with spaces."""
+    meaning: str = ''
+    """What is wrong with a machine that has it: half a sentence in plain words."""
     entered: str = ''
     """Which field of a controller takes a correction of it: 'zero', 'base', 'root', 'tool', 'load',
     'model' or 'ratio'; 'program' where none does and the points of a program can be corrected. Else

@@ -46,6 +46,7 @@ class HosePull(Effect):
     name = 'hose_pull'
     traits = Traits(
         title='pull of the hose package',
+        meaning='the hoses pull at the flange',
         entered='program',
         depends_on='load',
         place='load',

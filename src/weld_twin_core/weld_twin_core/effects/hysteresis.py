@@ -69,6 +69,7 @@ class Hysteresis(MemoryEffect):
     name = 'hysteresis'
     traits = Traits(
         title='hysteresis',
+        meaning='a joint stays behind where it came from, more the farther it came',
         entered="the joint's gear",
         depends_on='direction',
         changes_in_use=True,

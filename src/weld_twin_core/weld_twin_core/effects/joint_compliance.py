@@ -72,6 +72,7 @@ class JointCompliance(Effect):
     name = 'joint_compliance'
     traits = Traits(
         title='compliance',
+        meaning='a joint gives way under load, like a spring',
         entered='program',
         depends_on='load',
         changes_in_use=True,

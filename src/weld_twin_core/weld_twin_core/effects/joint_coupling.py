@@ -40,7 +40,12 @@ class JointCoupling(Effect):
 
     name = 'joint_coupling'
     traits = Traits(
-        title='coupling', entered='ratio', depends_on='angle', demand=2, by_motion=True
+        title='coupling',
+        meaning='turning one joint turns another a little',
+        entered='ratio',
+        depends_on='angle',
+        demand=2,
+        by_motion=True,
     )
     of = 'joint'
     stage = Stage.JOINT

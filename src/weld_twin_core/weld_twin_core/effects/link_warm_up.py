@@ -55,7 +55,11 @@ class LinkWarmUp(Effect):
 
     name = 'link_warm_up'
     traits = Traits(
-        title='warm-up of the link', entered='warming up', depends_on='time', common=False
+        title='warm-up of the link',
+        meaning='one link grows as it warms up',
+        entered='warming up',
+        depends_on='time',
+        common=False,
     )
     of = 'link'
     stage = Stage.LINK

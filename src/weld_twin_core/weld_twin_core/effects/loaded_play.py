@@ -65,6 +65,7 @@ class LoadedPlay(Effect):
     name = 'loaded_play'
     traits = Traits(
         title='play under load',
+        meaning='play whose side the load decides',
         entered="the joint's gear",
         depends_on='load',
         common=False,

@@ -23,6 +23,7 @@ class MeasurementScale(Effect):
     name = 'measurement_scale'
     traits = Traits(
         title='scale error of the instrument',
+        meaning="the instrument's millimetre is too long or too short",
         entered='the scale of the instrument',
         depends_on='place',
         place='instrument',

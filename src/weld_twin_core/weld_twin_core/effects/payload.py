@@ -59,6 +59,7 @@ class Payload(Effect):
     name = 'payload'
     traits = Traits(
         title='wrong payload',
+        meaning='the load at the flange is not what was declared',
         entered='load',
         depends_on='load',
         place='load',

@@ -42,7 +42,12 @@ class PedestalTilt(Effect):
 
     name = 'pedestal_tilt'
     traits = Traits(
-        title='leaning pedestal', entered='program', depends_on='load', place='base', common=False
+        title='leaning pedestal',
+        meaning="the pedestal under the robot bends under the arm's weight",
+        entered='program',
+        depends_on='load',
+        place='base',
+        common=False,
     )
     of = 'robot'
     stage = Stage.LINK

@@ -75,6 +75,7 @@ class Quantization(Effect):
     name = 'quantization'
     traits = Traits(
         title='encoder resolution',
+        meaning='a joint is read in steps',
         entered='the encoder',
         depends_on='angle',
         common=False,

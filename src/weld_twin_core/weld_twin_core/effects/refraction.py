@@ -58,6 +58,7 @@ class Refraction(Effect):
     name = 'refraction'
     traits = Traits(
         title='bent line of sight',
+        meaning='warm air bends the beam of the instrument',
         entered='warm air bent the line of sight',
         depends_on='place',
         place='instrument',

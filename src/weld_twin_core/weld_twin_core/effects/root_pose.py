@@ -38,6 +38,7 @@ class RootPose(FrameError):
     traits = replace(
         FrameError.traits,
         title='root error of the positioner',
+        meaning='the positioner stands elsewhere than its root frame says',
         entered='root',
         depends_on='constant',
         place='base',

@@ -88,7 +88,10 @@ class ServoLag(MemoryEffect):
 
     name = 'servo_lag'
     traits = Traits(
-        title='servo lag', entered="the drive's gains and feed-forward", depends_on='speed'
+        title='servo lag',
+        meaning='the drive trails behind its command',
+        entered="the drive's gains and feed-forward",
+        depends_on='speed',
     )
     of = 'joint'
     stage = Stage.SERVO

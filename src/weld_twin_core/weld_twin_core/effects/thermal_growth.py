@@ -39,6 +39,7 @@ class ThermalGrowth(Effect):
     name = 'thermal_growth'
     traits = Traits(
         title='thermal growth',
+        meaning='the links grow with temperature',
         entered='warming up, or of the temperature in the cell',
         depends_on='temperature',
         demand=1,

@@ -23,6 +23,7 @@ class TimeDelay(Effect):
     name = 'time_delay'
     traits = Traits(
         title='clock delay',
+        meaning='the measurements are stamped too late, or too early, by a constant time',
         entered='its clocks',
         depends_on='speed',
         place='clock',

@@ -157,6 +157,7 @@ class TransmissionRipple(Effect):
     name = 'transmission_ripple'
     traits = Traits(
         title='transmission ripple',
+        meaning='a gear turns unevenly, in waves over its turn',
         entered='program',
         depends_on='angle',
         demand=1,

@@ -72,6 +72,7 @@ class Vibration(MemoryEffect):
     name = 'vibration'
     traits = Traits(
         title='vibration',
+        meaning='a joint swings after it was accelerated',
         entered='how the motion is planned, and of stiffness',
         depends_on='acceleration',
     )

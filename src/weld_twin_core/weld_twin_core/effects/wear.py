@@ -38,7 +38,12 @@ class Wear(Effect):
 
     name = 'wear'
     traits = Traits(
-        title='tool wear', entered='tool', depends_on='time', place='tool', common=False
+        title='tool wear',
+        meaning='the tip of the tool wears away',
+        entered='tool',
+        depends_on='time',
+        place='tool',
+        common=False,
     )
     of = 'robot'
     stage = Stage.LINK

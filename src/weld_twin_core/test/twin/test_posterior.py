@@ -51,8 +51,8 @@ def drawn(robot, effects, steps, recording):
         tool[:3, 3] += step[6:9]
         moved, at = [], 12
         for effect in effects:
-            now = effect.coordinates()
-            moved.append(effect.with_coordinates(now + step[at : at + now.size]))
+            now = effect.fit.coordinates()
+            moved.append(effect.fit.with_coordinates(now + step[at : at + now.size]))
             at += now.size
         twin = Twin(robot.with_frames(base=base, tool=tool), tuple(moved))
         out.append(twin.poses(recording))

@@ -82,7 +82,7 @@ class Directions:
     @cached_property
     def sizes(self) -> tuple[int, ...]:
         """Return the number of coordinates of every effect."""
-        return tuple(effect.coordinates().size for effect in self.effects)
+        return tuple(effect.fit.coordinates().size for effect in self.effects)
 
     @property
     def count(self) -> int:
@@ -109,7 +109,7 @@ class Directions:
     def fitted(self) -> Array:
         """Return the coordinates of the fitted model; those of frames and curves are zero."""
         curves = sum(k.size for k in self.knots)
-        own = [effect.coordinates() for effect in self.effects]
+        own = [effect.fit.coordinates() for effect in self.effects]
         return np.concatenate([np.zeros(self.frame_count), *own, np.zeros(curves)])
 
     def columns(self, features: Features, setup: int, *, framed: bool = True) -> Array:

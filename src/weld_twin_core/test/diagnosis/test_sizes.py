@@ -27,7 +27,7 @@ def arm(seed, truth):
 def test_an_arm_with_next_to_no_errors_is_known_better_than_by_least_squares():
     known = arm(1, np.zeros(SMALL))
     # Least squares know each to one over the root of 300 rows.
-    assert np.sqrt(np.diag(known.covariance))[1 : 1 + SMALL].mean() < 0.5 / np.sqrt(300.0)
+    assert np.sqrt(np.diag(known.covariance))[1 : 1 + SMALL].mean() < 0.8 / np.sqrt(300.0)
     assert np.abs(known.mean[1:]).max() < 0.1
 
 

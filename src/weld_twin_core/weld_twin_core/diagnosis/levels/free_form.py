@@ -20,7 +20,7 @@ from ..algebra.definite import Index
 from ..algebra.fit import Fit, design
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
-from ..unseen.chance import Candidates, chance_gain
+from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import steadiness, ways_to_divide
 from .groups import Group, all_groups, wandering_groups, whole_arm_groups
 
@@ -329,13 +329,16 @@ class Choosing:
         held = [np.full(self.places[m.group].size, m.ridge) for m in members]
         return index.astype(int), np.concatenate([self.fixed_precision, *held])
 
-    def beside(self, members: Sequence[Member]) -> Candidates:
-        """Return all that could enter beside some members."""
+    def by_chance(self, members: Sequence[Member], gain: float, steady: float) -> bool:
+        """Return whether the best that could enter beside some members gains as much of noise."""
+        if not may_be_chance(self.ways[0].target.size, gain):
+            return False
         index, precision = self._columns_of(members)
         columns, taken = self.ways[0].columns, {m.group for m in members}
         groups = (columns[place] for k, place in enumerate(self.places) if k not in taken)
         ways = [way.labels for way in self.ways]
-        return Candidates(columns[index], precision, groups, RIDGES, ways)
+        every = Candidates(columns[index], precision, groups, RIDGES, ways)
+        return gain < chance_gain(every, steady)
 
     def errors(self, members: Sequence[Member]) -> list[Array]:
         """Return the squared error of a model on every fold, for each way to divide."""
@@ -392,7 +395,7 @@ def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:
         steady = min(steadiness(a, b) for a, b in zip(now, errors, strict=True))
         if gain < beliefs.group_share or steady < beliefs.group_steady:
             break
-        if gain < chance_gain(work.beside(members), gain, beliefs.group_steady):
+        if work.by_chance(members, gain, beliefs.group_steady):
             break
         members.append(member)
         now = errors

@@ -16,6 +16,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from ...arm.robot import Robot
+from ...arrays import Array
 from ...effects.effect import Effect, Stage
 from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
@@ -24,7 +25,7 @@ from ..algebra.fit import design
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..unseen.chance import Candidates, chance_gain
+from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import gain, least_gain, ways_to_divide
 from ..unseen.unseen_stretches import Unseen
 from .shrinkage import believed, groups, learned_precision, predicted
@@ -103,13 +104,18 @@ def fitted_together(
 def _by_chance(none: Search, many: Search) -> bool:
     """Return whether many small errors predict no more of few stations than they would of noise."""
     fitted = Unseen.of(many.problem, many.scale, many.final, many.precision)
-    bare = Unseen.of(many.problem, many.scale, none.final, none.precision)
+    bare = Unseen.of(none.problem, none.scale, none.final, none.precision)
     told = least_gain(
         [
-            gain(one.squares(one.whole), more.squares(more.whole), more.trusted_labels())
+            gain(
+                *(one.squares(one.whole), more.squares(_unseen(many, more))),
+                *(one.trusted_labels(), more.trusted_labels()),
+            )
             for one, more in zip(bare.every_way(), fitted.every_way(), strict=True)
         ]
     )
+    if not may_be_chance(fitted.residual.size, told.share):
+        return False
     columns, frames = fitted.columns.written_out(), fitted.frames
     size = np.sqrt(np.maximum(fitted.precision, 1e-300))[:, None]
     # All of them at once, at the sizes learned and at others: sizes are learned from noise, too.
@@ -120,7 +126,7 @@ def _by_chance(none: Search, many: Search) -> bool:
         LEARNED,
         ways_to_divide(many.problem),
     )
-    return told.share <= chance_gain(tried, told.share, 0.0)
+    return told.share <= chance_gain(tried, 0.0)
 
 
 def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:
@@ -283,12 +289,15 @@ def _one_number(kind: type[Effect]) -> bool:
 def unseen_rms(found: Search) -> float:
     """Return the RMS [m] on stretches and on regions of posture left out, both together."""
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    model, anew = found.final.model, _relearned(found)
-    ways = [
-        each.rms(predicted(each, model, found.work.beliefs) if anew else each.whole)
-        for each in unseen.every_way()
-    ]
+    ways = [each.rms(_unseen(found, each)) for each in unseen.every_way()]
     return float(np.sqrt(np.mean(np.square(ways))))
+
+
+def _unseen(found: Search, each: Unseen) -> Array:
+    """Return what is left on parts left out, with the sizes of many learned anew for each."""
+    return (
+        predicted(each, found.final.model, found.work.beliefs) if _relearned(found) else each.whole
+    )
 
 
 def _relearned(found: Search) -> bool:

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
+from ..algebra.definite import unit_diagonal
 from ..algebra.noise_floor import spread_of
 from .folds import steadiness
 
@@ -33,6 +34,8 @@ part, which is what is asked for."""
 CLEAR = 80.0
 """Rows times logarithm of the fall, from which on nothing is drawn: the best of a hundred groups of ten
 columns reaches a chi-square of 45 once in ten thousand times."""
+DAMPING = 1e-11
+"""Of columns that repeat others, far below what a fit can tell."""
 SEED = 3
 """Of the drawings: the same recordings give the same answer."""
 
@@ -77,9 +80,9 @@ def left_out(columns: Array, precision: Array, labels: Array | None, targets: Ar
     targets : array, shape (K, rows)
 
     """
-    system = columns @ columns.T + np.diag(precision)
-    system[np.diag_indices_from(system)] *= 1.0 + 1e-11
-    hat = columns.T @ np.linalg.solve(system, columns)
+    system, size = unit_diagonal(columns @ columns.T + np.diag(precision), DAMPING)
+    unit = columns / size[:, None]
+    hat = unit.T @ np.linalg.solve(system, unit)
     out = targets - targets @ hat
     for part in () if labels is None else np.unique(labels):
         rows = np.flatnonzero(labels == part)
@@ -93,24 +96,22 @@ def noise(rows: int) -> Array:
     return np.random.default_rng(SEED).standard_normal((DRAWS, rows))
 
 
-def chance_gain(candidates: Candidates, gain: float, steady: float) -> float:
+def may_be_chance(rows: int, gain: float) -> bool:
+    """Return whether the best of many candidates could have gained a share of so many rows of noise."""
+    return rows <= FEW and -rows * float(np.log(max(1.0 - gain, 1e-300))) <= CLEAR
+
+
+def chance_gain(candidates: Candidates, steady: float) -> float:
     """
     Return the share of noise that the best of all candidates hardly ever predicts.
 
-    Zero where there are so many rows, or so much is gained, that nothing has to be drawn.
-
     Parameters
     ----------
-    gain : float
-        What was gained.
     steady : float
         Standard errors that a gain must have to count.
 
     """
-    rows = candidates.fixed.shape[1]
-    if rows > FEW or -rows * np.log(max(1.0 - gain, 1e-300)) > CLEAR:
-        return 0.0
-    targets = noise(rows)
+    targets = noise(candidates.fixed.shape[1])
     before = [
         _squares(left_out(candidates.fixed, candidates.precision, labels, targets), labels)
         for labels in candidates.ways
@@ -135,7 +136,7 @@ def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, kno
     Return how many times wider than a floor what is left of noise on unseen parts is at the most.
 
     A fit of few stations takes up part of the noise, so that it leaves too little where it was fitted
-    and too much elsewhere. One where there are many rows.
+    and too much elsewhere.
 
     Parameters
     ----------
@@ -147,10 +148,7 @@ def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, kno
         Whether the floor is known apart from what the fit leaves.
 
     """
-    rows = columns.shape[1]
-    if rows > FEW:
-        return 1.0
-    targets = noise(rows)
+    targets = noise(columns.shape[1])
     unseen = [(left_out(columns, precision, w, targets) ** 2).mean(axis=1) for w in ways]
     floors = np.ones(len(targets))
     if not known:

@@ -20,7 +20,7 @@ from ...arrays import Array
 from ...twin.features import Features
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
-from .chance import Candidates, chance_gain
+from .chance import Candidates, chance_gain, may_be_chance
 from .unseen_stretches import RIDGES, Unseen
 
 KNOTS = 8
@@ -67,12 +67,13 @@ def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
     least, certain = beliefs.dependence_gain, beliefs.dependence_sure
     names = tuple(n for one, n in found[:TOLD] if one.share > least and one.steady > certain)
     chance = 0.0
-    if best.share > beliefs.structure_gain and best.steady > beliefs.blatant_sure:
+    counts = best.share > beliefs.structure_gain and best.steady > beliefs.blatant_sure
+    if counts and may_be_chance(unseen.residual.size, best.share):
         each = (columns for _, columns in groups)
         tried = Candidates(
             unseen.columns.written_out(), unseen.precision, each, RIDGES, [unseen.labels]
         )
-        chance = chance_gain(tried, best.share, beliefs.blatant_sure)
+        chance = chance_gain(tried, beliefs.blatant_sure)
     return Structure(best.rms_m, best.share, best.steady, names, chance)
 
 

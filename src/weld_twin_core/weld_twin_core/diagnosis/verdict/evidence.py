@@ -15,7 +15,7 @@ from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..many.weighed_families import WeighedFamily, weighed_families
 from ..result import Shrink, Site
-from ..unseen.chance import chance_ratio
+from ..unseen.chance import chance_ratio, may_be_chance
 from ..unseen.folds import ways_to_divide
 from ..unseen.leftover_structure import Structure
 from ..unseen.unseen_stretches import Unseen
@@ -130,6 +130,9 @@ def gathered(
 
 
 def _leverage(unseen: Unseen, floor: NoiseFloor) -> float:
+    """Return the ratio to the floor that noise hardly ever exceeds; one where there are many rows."""
+    if not may_be_chance(unseen.residual.size, 0.0):
+        return 1.0
     ways = ways_to_divide(unseen.problem)
     columns = unseen.columns.written_out()
     return chance_ratio(columns, unseen.precision, ways, known=floor.independent)

@@ -163,10 +163,11 @@ def _without_cell(
     from .compensating.drawn_cells import HOMES
     from .compensating.without_cell import judged
 
-    kinds = [*HOMES]
+    kinds, done = [*HOMES], {row['arm'] for row in known.without}
     return [
         beside.submit(judged, kinds[k % len(kinds)], seed + 1 + k, OF_AN_ARM)
-        for k in range(len(known.without) // OF_AN_ARM, -(-goals // OF_AN_ARM))
+        for k in range(-(-goals // OF_AN_ARM))
+        if seed + 1 + k not in done
     ]
 
 
@@ -263,7 +264,7 @@ def summary(
         'totals': totals,
         'robots': robots,
         'without_cell': {
-            'arms': len(without) // OF_AN_ARM,
+            'arms': len({row['arm'] for row in without}),
             'robots': {
                 name: counted([r for r in without if r['robot'] == name])
                 for name in _names(without)

@@ -49,7 +49,7 @@ def judged(name: str, seed: int, goals: int) -> list[dict[str, Any]]:
         start = Start(goal.q[0], False, rng.choice([-1.0, 1.0], robot.n))
         found, best = (corrected_goal(each, goal, LIMITS, start) for each in (model, true))
         before = _off(true, goal, goal, start)
-        row = {'robot': name, 'after': '', 'inside': inside, 'before_m': before}
+        row = {'robot': name, 'arm': seed, 'after': '', 'inside': inside, 'before_m': before}
         row['best_m'] = before if isinstance(best, Refusal) else best.after
         if isinstance(found, Refusal):
             row |= {'verdict': 'refused', 'after_m': before, 'bound_m': None}

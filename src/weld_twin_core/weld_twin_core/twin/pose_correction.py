@@ -39,7 +39,7 @@ CLOSED = 1e-11
 OPEN = 1e-9
 """Error [m, rad] that a solution must not have: that of `compensate`."""
 EXACT = 2e-10
-"""Largest error [m] that what is told between two looks should have."""
+"""Largest error [m], of way and turn, that what is told between two looks should have."""
 REACH = (2e-5, 5e-4, 1e-2)
 """Least, first and largest distance [m] between two exact looks; a turn counts half a metre a radian."""
 ONWARD = 0.97
@@ -168,7 +168,7 @@ class PoseCorrection:
             return
         way, size = _away(before, looked.pose)
         told = _told(before, self._bend, way, size)
-        off = float(np.linalg.norm((told - looked.values)[:3]))
+        off = _size((told - looked.values)[:6])
         if size > REACH[0]:
             self._bend = (looked.slope - before.slope) / size
             self._way = way
@@ -258,7 +258,12 @@ def _standing(q: Array) -> JointMotion:
 def _away(at: Looked, pose: Array) -> tuple[Array, float]:
     """Return the way from a look to a pose, shape (6,), and its size [m]."""
     way = between(at.pose, pose)
-    return way, sqrt(way[:3] @ way[:3]) + LEVER * sqrt(way[3:] @ way[3:])
+    return way, _size(way)
+
+
+def _size(way: Array) -> float:
+    """Return the size of a way and turn (6,) [m]."""
+    return sqrt(way[:3] @ way[:3]) + LEVER * sqrt(way[3:] @ way[3:])
 
 
 def _told(at: Looked, bend: Array, way: Array, size: float) -> Array:

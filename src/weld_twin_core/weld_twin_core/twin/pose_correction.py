@@ -157,8 +157,7 @@ class PoseCorrection:
             It cannot be reached.
 
         """
-        assert self._at is not None
-        return self.first(pose, _told(self._at, self._bend, *_away(self._at, pose))[6:])
+        return self.first(pose, self.joints(pose))
 
     def adopt(self, looked: Looked | None) -> None:
         """Go on from an exact correction, and learn how far apart such looks may be; None forgets."""
@@ -200,6 +199,11 @@ class PoseCorrection:
         onward = _onward(self._way, way)
         reach = self._reach if onward else min(self._reach, REACH[1])
         return _told(self._at, self._bend, way, size)[:6], size / reach
+
+    def joints(self, pose: Array) -> Array:
+        """Return the joints of what is commanded for a pose, shape (n,), told by the latest look."""
+        assert self._at is not None
+        return _told(self._at, self._bend, *_away(self._at, pose))[6:]
 
     def refusal(self, looked: Looked, limits: GoalLimits) -> str:
         """Return why a pose must not be corrected; empty where it may."""

@@ -130,6 +130,19 @@ def test_the_shadow_tells_and_sends_nothing():
     assert np.linalg.norm(given.added[:3]) > 1e-4
 
 
+def test_a_leap_that_no_joint_can_follow_is_not_passed_on():
+    run = Run(stream())
+    run.go(60)
+    leap = np.zeros((4, 4))
+    leap[1, 3] = 0.1
+    run.pose = run.pose + leap  # in one step of a stream that stands where the arm stands
+    given = run.go(1)
+    assert given.pose is None
+    assert 'limit of velocity' in given.why
+    run.pose = run.pose - leap
+    assert run.go(60).pose is not None
+
+
 def test_poses_that_break_a_limit_of_a_joint_end_the_correction():
     run = Run(stream(passing=True))
     run.go(60)

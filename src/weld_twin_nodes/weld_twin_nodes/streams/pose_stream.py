@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.twin.goal_correction import SMOOTH_PEAK, SMOOTH_SPEED, GoalLimits
@@ -30,6 +31,8 @@ DOUBT_EVERY = 0.02
 """Way [m] after which it is asked anew how sure the model is; that changes slowly."""
 SHORT = 1e-6
 """Ramp [m, rad] that is none."""
+SHORTEST = 0.01
+"""Time [s] that two poses are at least taken to be apart: stamps may be some milliseconds off."""
 SPAN = 0.05
 """Shortest time [s] over which speeds of joints are taken from exact looks."""
 
@@ -113,6 +116,7 @@ class PoseStream:
         self._ramp: _Ramp | None = None
         self._held = np.zeros(6)
         self._rest_pose: Array | None = None
+        self._at, self._since = np.eye(4), np.inf
         self._rest_since = self._last = -np.inf
         self._next: Array | None = None
         self._sizes = self._doubts = 0.0
@@ -143,7 +147,7 @@ class PoseStream:
         """
         if not 0.0 <= now - self._last <= SILENT:
             self.forget()
-        self._last = now
+        self._since, self._last = now - self._last, now
         rest = self._rested(pose, now)
         if self._fresh is not None and (rest >= REST or self._mode != 'corrected'):
             self._exchange(self._fresh)
@@ -205,10 +209,13 @@ class PoseStream:
                 return None, self._refused
         added, far = self.correction.added(pose)
         if far > FAR:
+            before = self.correction.joints(self._at)
             self._look(pose, now)
+            self._refused = self._refused or self._leapt(before)
             if self._refused:
                 return None, self._refused
             added, far = self.correction.added(pose)
+        self._at = pose
         if far > LOOK:
             self._next = pose
         return added, ''
@@ -255,18 +262,20 @@ class PoseStream:
         bend = np.zeros_like(speed) if before[2] is None else (speed - before[2]) / span
         self._speeds = now, looked.q, speed
         most = np.minimum(robot.max_acceleration, self._limits.acceleration)
-        for value, limit, name in (
-            (speed, robot.max_velocity, 'velocity'),
-            (bend, most, 'acceleration'),
-        ):
-            over = np.abs(value) - limit
-            if over.max() > 0.0:
-                i = int(over.argmax())
-                return (
-                    f'these poses break the limit of {name} of {robot.joint_names[i]}: '
-                    f'{abs(value[i]):.3g}, the limit is {limit[i]:.3g}'
-                )
-        return ''
+        return _over(np.abs(speed), robot.max_velocity, 'velocity', robot) or _over(
+            np.abs(bend), most, 'acceleration', robot
+        )
+
+    def _leapt(self, before: Array) -> str:
+        """Return that joints, from where they were at the pose before, cannot follow so far a step."""
+        looked, robot = self.correction.looked, self.correction.model.robot
+        assert looked is not None
+        return _over(
+            np.abs(looked.q - before) / max(self._since, SHORTEST),
+            robot.max_velocity,
+            'velocity',
+            robot,
+        )
 
     # What is sent ----------------------------------------------------------------------------
 
@@ -326,3 +335,15 @@ class PoseStream:
         if at is None or np.abs(pose - at).max() > STILL:
             self._rest_pose, self._rest_since = pose, now
         return now - self._rest_since
+
+
+def _over(values: Array, limits: Array, name: str, robot: Robot) -> str:
+    """Return that a joint breaks its limit; empty where none does."""
+    over = values - limits
+    if over.max() <= 0.0:
+        return ''
+    i = int(over.argmax())
+    return (
+        f'these poses break the limit of {name} of {robot.joint_names[i]}: {values[i]:.3g}, the limit '
+        f'is {limits[i]:.3g}'
+    )

@@ -292,7 +292,7 @@ HEAD = (
     'before, mm',
     'after',
     'true causes',
-    'bound told',
+    'bound reported',
     'within it',
 )
 

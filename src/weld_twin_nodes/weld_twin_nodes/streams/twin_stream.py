@@ -93,7 +93,7 @@ class JointStream:
 
     def _take_twin(self) -> None:
         """Ask the joint states for efforts where effects take them; see whether clocks differ."""
-        self.intake.joints.efforts = any(effect.by_effort for effect in self._twin.effects)
+        self.intake.joints.efforts = any(effect.twin.by_effort for effect in self._twin.effects)
         self._clocks_differ = bool(self._twin.of_stage(Stage.CLOCK))
 
     def reset(self) -> None:

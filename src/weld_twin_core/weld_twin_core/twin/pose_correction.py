@@ -102,7 +102,11 @@ class PoseCorrection:
         self._sides = SIDE * np.concatenate(
             [np.zeros((1, robot.n)), np.eye(robot.n), -np.eye(robot.n)]
         )
-        self._forget()
+        self._begin()
+
+    def _begin(self) -> None:
+        """Know nothing yet of how what is added bends."""
+        self._reach, self._bend, self._way = REACH[1], np.zeros((1, 1)), np.zeros(6)
 
     @property
     def looked(self) -> Looked | None:
@@ -163,7 +167,7 @@ class PoseCorrection:
         """Go on from an exact correction, and learn how far apart such looks may be; None forgets."""
         before, self._at = self._at, looked
         if before is None or looked is None:
-            self._forget()
+            self._begin()
             return
         way, size = _away(before, looked.pose)
         told = _told(before, self._bend, way, size)
@@ -175,9 +179,6 @@ class PoseCorrection:
         best = size * float(np.cbrt(EXACT / max(off, 1e-2 * EXACT)))
         best = min(best, 1.5 * self._reach) if off < EXACT else best
         self._reach = float(np.clip(best, REACH[0], REACH[2]))
-
-    def _forget(self) -> None:
-        self._reach, self._bend, self._way = REACH[1], np.zeros((1, 1)), np.zeros(6)
 
     def added(self, pose: Array) -> tuple[Array, float]:
         """
@@ -252,7 +253,7 @@ class PoseCorrection:
 def _rise(poses: Array) -> Array:
     """Return d pose / d joint, shape (6, n), of a pose and those with joints to either side of it."""
     ahead, behind = np.split(poses[1:], 2)
-    return between(behind, ahead).T / (2.0 * SIDE)
+    return np.asarray(between(behind, ahead).T / (2.0 * SIDE))
 
 
 def _standing(q: Array) -> JointMotion:

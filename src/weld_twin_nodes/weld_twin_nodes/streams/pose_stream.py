@@ -231,8 +231,9 @@ class PoseStream:
         self._refused = found.refusal(looked, self._limits) or self._too_quick(looked, now)
         self._tried = now
         found.adopt(looked)
-        at = pose[:3, 3]
-        self._doubtful = self._doubted is None or np.linalg.norm(at - self._doubted) > DOUBT_EVERY
+        before = self._doubted
+        way = np.inf if before is None else np.linalg.norm(pose[:3, 3] - before)
+        self._doubtful = bool(way > DOUBT_EVERY)
 
     def _doubt(self) -> None:
         """Ask how sure the model is of the latest look, against how large the correction is."""

@@ -93,7 +93,7 @@ class PoseCorrection:
 
     def __init__(self, model: ProgramModel, tool: Array) -> None:
         still, robot = model.without_memory() or model, model.robot
-        self.model = model
+        self.model, self.tool = model, tool
         self._arm = model.arm(tool)
         self._twin = still.twin(tool)
         self._back = np.linalg.inv(robot.T_world_base)

@@ -38,6 +38,7 @@ from weld_twin_msgs_py.messages.topics import (
 
 from ..offline.loaded_model import LoadedModel, loaded
 from ..streams.arm_state import ArmState
+from ..streams.looks_beside import LooksBeside
 from ..streams.pose_stream import PoseStream
 from ..streams.supervision import Supervision
 from .cell_frames import base_frame
@@ -83,6 +84,7 @@ class Compensator(ManagedNode):
         self._watch = Supervision()
         self._listened, self._most_age = False, self.setting('max_age')
         self._stream: PoseStream | None = None
+        self._looks = LooksBeside()
         self._judge = GoalJudge(self)
         self._out = self.offer(POSE_OUT)
         self._correction = self.offer(CORRECTION, awaited=False)
@@ -144,6 +146,7 @@ class Compensator(ManagedNode):
         """End what is worked out beside; what became of goals is written before."""
         self._audit.close()
         self._judge.close()
+        self._looks.close()
         if self._relay is not None:
             self._relay.close()
         super().destroy_node()
@@ -267,6 +270,7 @@ class Compensator(ManagedNode):
             limits_of(self),
             passing=self.setting('on_refusal') == 'pass',
             shadow=not self.setting('apply'),
+            beside=self._looks,
         )
 
     def _on_pose(self, message: Any) -> None:

@@ -51,19 +51,7 @@ class _Search(Search):
     kind: type[Backlash]
 
     def small(self, view: View, joint: str | None, most: int) -> list[Backlash]:
-        """
-        Return a gap that is all but closed.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it sits on.
-        most : int
-            How many numbers the measurements can hold apart.
-
-        """
+        """Return a gap that is all but closed."""
         return [self.kind(str(joint), CLOSED)]
 
 
@@ -174,20 +162,7 @@ class Backlash(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield play of a small, a usual and a large width: how it engages depends on width.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield play of a small, a usual and a large width: how it engages depends on width."""
         for width in (5e-5, 5e-4, 2e-3):
             yield cls(str(joint), width)
 

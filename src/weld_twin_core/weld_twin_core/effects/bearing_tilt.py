@@ -46,18 +46,7 @@ class _Search(Search):
     kind: type[BearingTilt]
 
     def small(self, view: View, joint: str | None, most: int) -> list[BearingTilt]:
-        """
-        Return the wave of once per turn: among many small errors the second is far below them.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-            The joint it sits on.
-        most : int
-            How many numbers the measurements can hold apart; it takes four.
-
-        """
+        """Return the wave of once per turn: among many small errors the second is far below them."""
         return [self.kind(str(joint))]
 
     def joined(self, other: BearingTilt) -> BearingTilt:
@@ -125,10 +114,6 @@ class BearingTilt(Effect):
         """
         Refuse an effect this robot cannot have.
 
-        Parameters
-        ----------
-        robot : Robot
-
         Raises
         ------
         ModelError
@@ -168,18 +153,7 @@ class BearingTilt(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Any]:
-        """
-        Yield the wave of once per turn, and both waves.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-            The joint it would sit on.
-        pull : array, shape (N,), optional
-            Not needed.
-
-        """
+        """Yield the wave of once per turn, and both waves."""
         yield cls(str(joint))
         yield cls(str(joint), second=np.zeros(4))
 

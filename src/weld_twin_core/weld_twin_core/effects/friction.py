@@ -210,20 +210,7 @@ class Friction(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield friction of short and long pre-sliding, even and uneven.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield friction of short and long pre-sliding, even and uneven."""
         unit = SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
         for travel in (1e-4, 6e-4):
             for asymmetry in (0.0, A_LITTLE):

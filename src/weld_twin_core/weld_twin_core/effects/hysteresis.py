@@ -149,37 +149,14 @@ class Hysteresis(MemoryEffect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: at stations the loop has closed, and is backlash.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on.
-
-        """
+        """Return why the data cannot show it: at stations the loop has closed, and is backlash."""
         if view.static:
             return 'static stations only show which way a joint came, as backlash does'
         return super().applicable(view, joint)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield a short, a usual and a long loop.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield a short, a usual and a long loop."""
         unit = SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
         for travel in (0.01, 0.04, 0.16):
             yield cls(str(joint), 0.0, travel * unit)

@@ -134,30 +134,12 @@ class JointCompliance(Effect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show this effect at all, or None when they can.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-
-        """
+        """Return why the data cannot show this effect at all, or None when they can."""
         return None if view.effort is not None else super().applicable(view, joint)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield the spring, by measured effort where it is there.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-        pull : array, shape (N,), optional
-            Not looked at: there is one spring.
-
-        """
+        """Yield the spring, by measured effort where it is there."""
         if view.effort is None:
             yield cls(str(joint))
         else:

@@ -154,37 +154,14 @@ class LinkWarmUp(Effect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: stations that are only counted tell no time.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint whose link it would be.
-
-        """
+        """Return why the data cannot show it: stations that are only counted tell no time."""
         if view.static and _counted(view.t):
             return 'the stations carry no times'
         return super().applicable(view, joint)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield a fast, a usual and a slow warm-up, and one that follows a temperature that varies.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield a fast, a usual and a slow warm-up, and one that follows a temperature that varies."""
         i = view.robot.index(str(joint))
         if view.robot.a[i] == 0.0 and view.robot.d[i] == 0.0:
             return

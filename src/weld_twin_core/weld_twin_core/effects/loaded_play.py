@@ -38,15 +38,7 @@ class _Search(Search):
     kind: type[LoadedPlay]
 
     def constants(self, view: View, joint: str | None) -> Iterable[Effect]:
-        """
-        Yield play of a gear that slides easily, where the load keeps it on one flank.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-
-        """
+        """Yield play of a gear that slides easily, where the load keeps it on one flank."""
         torque = load(view, view.robot.index(str(joint)))
         held = SHARES[0] * float(np.abs(torque).max(initial=0.0))
         if held > 0.0 and not _changes(torque, held):
@@ -111,20 +103,7 @@ class LoadedPlay(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield play of a gear that slides easily, and of one that sticks.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield play of a gear that slides easily, and of one that sticks."""
         torque = load(view, view.robot.index(str(joint)))
         most = float(np.abs(torque).max(initial=0.0))
         for share in SHARES:

@@ -123,17 +123,6 @@ class Quantization(Effect):
         A staircase of step s is a wave of 1/s cycles per radian: the spectrum of the residual's
         pull over joint position shows every step at once. A grid of steps would need tens of
         thousands, for a small error of the step runs out of phase over the joint's travel.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
         """
         if pull is None:
             return

@@ -209,20 +209,7 @@ class ServoLag(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> list[ServoLag]:
-        """
-        Return a fast and a slow lag; between them the response is nearly proportional.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Return a fast and a slow lag; between them the response is nearly proportional."""
         if view.static:
             return []
         plain = [cls(str(joint), tau) for tau in (2e-3, 3e-2)]

@@ -184,20 +184,7 @@ class Vibration(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield modes from 2 to 40 Hz, as far as the joint stream's rate can show them.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield modes from 2 to 40 Hz, as far as the joint stream's rate can show them."""
         if view.static or view.t.size < 3:
             return
         highest = HIGHEST / float(np.median(np.diff(view.t)))

@@ -30,7 +30,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .associative_scan import last_true, play
 from .effect import Effect, MemoryEffect
-from .hooks import Asked, Fit, Search, Traits
+from .hooks import FitHooks, Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -45,7 +45,7 @@ RV = (
 """What makers of reducers allow."""
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     kind: type[Backlash]
@@ -55,7 +55,7 @@ class _Search(Search):
         return [self.kind(str(joint), CLOSED)]
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: Backlash
@@ -104,8 +104,8 @@ class Backlash(MemoryEffect):
     )
     options = ('form',)
     needs = frozenset({'order'})
-    search = Asked(_Search)
-    fit = Asked(_Fit)
+    search = Hooked(_Search)
+    fit = Hooked(_Fit)
 
     def check(self, robot: Robot) -> None:
         """Refuse an unknown form and a negative width."""

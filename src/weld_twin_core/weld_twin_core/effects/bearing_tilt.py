@@ -33,13 +33,13 @@ from ..errors import ModelError
 from .base_leans import base_leans
 from .carriage import summed
 from .effect import Effect
-from .hooks import Asked, Search, Traits
+from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import turn
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     effect: BearingTilt
@@ -108,7 +108,7 @@ class BearingTilt(Effect):
             ),
         ),
     )
-    search = Asked(_Search)
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """

@@ -27,7 +27,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, MemoryEffect
-from .hooks import Asked, Fit, Traits
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -41,7 +41,7 @@ A_LITTLE = 1e-9
 """Asymmetry of friction that may become uneven in a fit."""
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: Friction
@@ -154,7 +154,7 @@ class Friction(MemoryEffect):
     )
     options = ('release',)
     needs = frozenset({'velocity', 'time'})
-    fit = Asked(_Fit)
+    fit = Hooked(_Fit)
 
     def _bent(self, view: View, state: Any) -> tuple[Array, Array, Array, Any]:
         """Return z and u stacked, shape (..., 2, N), the steps, what is lost, what to carry."""

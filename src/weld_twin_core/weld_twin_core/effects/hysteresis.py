@@ -31,7 +31,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, MemoryEffect
-from .hooks import Asked, Fit, Traits
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -41,7 +41,7 @@ SLIDING = 0.1
 """Metres of a joint that slides which are looked at as a radian of one that turns."""
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: Hysteresis
@@ -116,7 +116,7 @@ class Hysteresis(MemoryEffect):
         ),
     )
     needs = frozenset({'order'})
-    fit = Asked(_Fit)
+    fit = Hooked(_Fit)
 
     def _loop(self, q: Array, state: Any) -> tuple[Array, Array, Any]:
         """Return z, the steps, and what to carry."""

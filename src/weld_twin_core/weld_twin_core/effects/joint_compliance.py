@@ -23,7 +23,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError
 from .effect import Effect
-from .hooks import Asked, Search, Traits, Twin
+from .hooks import Hooked, SearchHooks, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import metres, radians, size
@@ -33,7 +33,7 @@ LOAD_OF_EFFORT = {'effort': -1.0, 'effort_reversed': 1.0}
 STATICS = ('equilibrium', 'first_order', *LOAD_OF_EFFORT)
 
 
-class _Twin(Twin):
+class _Twin(TwinHooks):
     """What the twin asks of it."""
 
     effect: JointCompliance
@@ -49,7 +49,7 @@ class _Twin(Twin):
         return self.effect.statics in LOAD_OF_EFFORT
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     effect: JointCompliance
@@ -98,8 +98,8 @@ class JointCompliance(Effect):
     )
     needs = frozenset({'load'})
     options = ('statics',)
-    twin = Asked(_Twin)
-    search = Asked(_Search)
+    twin = Hooked(_Twin)
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """Refuse unknown statics."""

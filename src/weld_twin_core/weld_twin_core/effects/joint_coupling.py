@@ -12,13 +12,13 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect
-from .hooks import Asked, Search, Traits
+from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     effect: JointCoupling
@@ -63,7 +63,7 @@ class JointCoupling(Effect):
         ),
     )
     options = ('source',)
-    search = Asked(_Search)
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """Refuse an unknown source, and a joint coupled with itself."""

@@ -20,7 +20,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError
 from .effect import Effect
-from .hooks import Asked, Fit, Traits
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -33,7 +33,7 @@ EVEN = 1e-6
 """Share of their spacing by which stamps of stations differ where they are only counted."""
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: LinkWarmUp
@@ -95,7 +95,7 @@ class LinkWarmUp(Effect):
     )
     options = ('follows',)
     needs = frozenset({'time'})
-    fit = Asked(_Fit)
+    fit = Hooked(_Fit)
 
     def check(self, robot: Robot) -> None:
         """Refuse a temperature to follow that is not two numbers, or does not rise."""

@@ -21,7 +21,7 @@ from ..errors import ModelError
 from .backlash import RV
 from .curve import load
 from .effect import Effect
-from .hooks import Asked, Search, Traits
+from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -32,7 +32,7 @@ CHANGED = 0.3
 """Share of half the play by which the joint must come off its flank: less looks like an offset."""
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     kind: type[LoadedPlay]
@@ -79,7 +79,7 @@ class LoadedPlay(Effect):
     )
     options = ('torque',)
     needs = frozenset({'load'})
-    search = Asked(_Search)
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """Refuse a gear that friction does not hold at all: its flank would jump."""

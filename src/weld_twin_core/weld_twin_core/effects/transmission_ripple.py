@@ -16,7 +16,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .backlash import RV
 from .effect import Effect
-from .hooks import Asked, Fit, Search, Traits, Twin, Waves, highest_order
+from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks, Waves, highest_order
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
@@ -34,7 +34,7 @@ MANY_ORDERS, SPARSE = 8, 3
 many powers as orders there may be: a sine takes as long as some five products."""
 
 
-class _Twin(Twin):
+class _Twin(TwinHooks):
     """What the twin asks of it."""
 
     effect: TransmissionRipple
@@ -45,7 +45,7 @@ class _Twin(Twin):
         return {('q', view.robot.index(self.effect.joint)): total}
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     effect: TransmissionRipple
@@ -81,7 +81,7 @@ class _Search(Search):
         return replace(self.effect, **parts)
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: TransmissionRipple
@@ -163,9 +163,9 @@ class TransmissionRipple(Effect):
         Parameter('order', '1/rev', size=0, lower=0.0, differentiable=False, linear=False),
         Parameter('phase', 'rad', size=0, linear=False),
     )
-    twin = Asked(_Twin)
-    search = Asked(_Search)
-    fit = Asked(_Fit)
+    twin = Hooked(_Twin)
+    search = Hooked(_Search)
+    fit = Hooked(_Fit)
 
     def __post_init__(self) -> None:
         super().__post_init__()

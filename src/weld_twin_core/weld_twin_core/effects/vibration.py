@@ -20,7 +20,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import linear
 from .effect import Effect, MemoryEffect
-from .hooks import Asked, Fit, Traits
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -32,7 +32,7 @@ HIGHEST = 0.4
 """Frequency times the step in time of the joint stream that a search goes up to."""
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: Vibration
@@ -114,7 +114,7 @@ class Vibration(MemoryEffect):
         ),
     )
     needs = frozenset({'velocity', 'time'})
-    fit = Asked(_Fit)
+    fit = Hooked(_Fit)
 
     def _mode(self) -> tuple[Array, Array]:
         """Return the complex pole and the damped angular frequency [1/s]."""

@@ -3,10 +3,10 @@
 """
 What an effect may tell of itself beyond `displace` and `gradient`; everything has a default.
 
-`Traits` is a record of what it is. `TwinHooks`, `SearchHooks` and `FitHooks` are groups of questions, one for
-each part of the program that asks: the twin, the search, and the fit. An effect that has more to tell
-than the default derives a group and names it, as in ``fit = Hooked(MyFit)``. None of those who ask
-knows any effect by name. The page of effects lists all in a table.
+`Traits` is a record of what it is. `TwinHooks`, `SearchHooks` and `FitHooks` are groups of questions,
+one for each part of the program that asks: the twin, the search, and the fit. An effect that has more
+to tell than the default derives a group and names it, as in ``fit = Hooked(MyFit)``. None of those who
+ask knows any effect by name. The page of effects lists all in a table.
 """
 
 from __future__ import annotations

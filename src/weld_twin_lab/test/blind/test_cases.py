@@ -24,7 +24,7 @@ from weld_twin_lab.blind.recorded_motion import motion
 pytest.importorskip('mujoco')
 
 from weld_twin_lab.blind.blind_cell import (
-    Cell,
+    BlindCell,
     Take,
     as_recording,
     deviation,
@@ -47,7 +47,7 @@ def robot():
 
 @pytest.fixture(scope='module')
 def cell(robot):
-    return Cell(robot, Tracker(rate=60.0, sigma=SIGMA, jitter=2e-5, joint_rate=125.0))
+    return BlindCell(robot, Tracker(rate=60.0, sigma=SIGMA, jitter=2e-5, joint_rate=125.0))
 
 
 @pytest.fixture(scope='module')
@@ -161,14 +161,14 @@ def test_an_aligned_base_hides_what_a_base_does():
 def test_the_floor_is_the_noise_and_outliers_are_set_apart(robot, taken):
     tracker = Tracker(rate=60.0, sigma=SIGMA, outlier_share=0.05, outlier_size=3e-3)
     cause = {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 1e-3}
-    left, outliers = floor(Cell(robot, tracker), [cause], taken)
+    left, outliers = floor(BlindCell(robot, tracker), [cause], taken)
     np.testing.assert_allclose(left, np.sqrt(3.0) * SIGMA, rtol=0.1)
     assert 5 <= len(outliers) <= 40
 
 
 def test_jitter_is_part_of_the_floor(robot, taken):
     still, shaken = (
-        floor(Cell(robot, Tracker(rate=60.0, sigma=SIGMA, jitter=jitter)), [], taken)[0]
+        floor(BlindCell(robot, Tracker(rate=60.0, sigma=SIGMA, jitter=jitter)), [], taken)[0]
         for jitter in (0.0, 1e-3)
     )
     assert shaken > 1.5 * still
@@ -183,7 +183,7 @@ def test_an_ambiguous_construction_is_what_its_like_can_be(name, arm):
     robot = catalog.load(arm).with_frames(tool=tool)
     rng = np.random.default_rng(8)
     moved = motion('free', robot, 6.0, rng)
-    cell = Cell(robot, Tracker(rate=60.0, sigma=SIGMA))
+    cell = BlindCell(robot, Tracker(rate=60.0, sigma=SIGMA))
     taken = Take(Command(moved.t, moved.q), 1)
     built = construct(name, robot, 6.0, rng)
     off = deviation(cell, built.causes, taken).ravel()

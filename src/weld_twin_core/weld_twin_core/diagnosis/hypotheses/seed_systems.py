@@ -144,9 +144,24 @@ class SeedSystems:
             Products of all columns with the model's, and with the residual.
 
         """
-        pull = own @ residual
-        rss = float(residual @ residual)
-        normal = own @ own.T
+        return self.given(own @ own.T, own @ residual, float(residual @ residual), products)
+
+    def given(self, normal: Array, pull: Array, rss: float, products: Array) -> SeedSystems:
+        """
+        Return the systems with columns projected out of which the products are known.
+
+        Parameters
+        ----------
+        normal : array, shape (P, P)
+            Products of the columns.
+        pull : array, shape (P,)
+            Their products with the residual.
+        rss : float
+            Sum of squares of the residual.
+        products : array, shape (all columns, P + 1)
+            Products of all columns with them, and with the residual.
+
+        """
         live = np.flatnonzero(normal.diagonal() > EMPTY)
         scaled, size = unit_diagonal(normal[np.ix_(live, live)], 1e-12)
         cross = products[:, live] / size

@@ -574,7 +574,7 @@ def test_a_link_that_follows_a_temperature_grows_as_it_does(arm, make_recording)
     same = effect('thermal_growth', coefficient=2e-4, links=['j2'])
     poses = [Twin(arm, (each,)).poses(recording).position for each in (one, same)]
     np.testing.assert_allclose(*poses, atol=1e-12)
-    assert one.on == 'temperature' and len(one.fitted()) == 1
+    assert one.on == 'temperature' and len(one.fit.fitted()) == 1
     for wrong in ([20.0], [20.0, 0.0], 'warm'):
         with pytest.raises(ModelError, match='follows must be'):
             effect('link_warm_up', joint='j2', follows=wrong).check(arm)

@@ -30,7 +30,7 @@ NOT_OF_A_MACHINE = {('measurement_noise', 'sigma')}
 
 def parameters():
     bundled = [k for k in REGISTRY.values() if k.__module__.startswith('weld_twin')]
-    return {(kind.name, p.name) for kind in bundled if kind.cause for p in kind.parameters}
+    return {(kind.name, p.name) for kind in bundled if kind.traits.cause for p in kind.parameters}
 
 
 def test_every_parameter_of_every_cause_has_a_range_and_a_source():
@@ -81,8 +81,8 @@ def test_spreads_and_ranges_go_with_the_fit_coordinates():
         values = {'joint': 'elbow_joint'} if kind.of in ('joint', 'link') else {}
         effect = kind(**values)
         low, high = ranges(robot, effect)
-        assert spreads(robot, effect).shape == low.shape == effect.coordinates().shape
-        assert (low <= effect.coordinates()).all() and (effect.coordinates() <= high).all()
+        assert spreads(robot, effect).shape == low.shape == effect.fit.coordinates().shape
+        assert (low <= effect.fit.coordinates()).all() and (effect.fit.coordinates() <= high).all()
 
 
 def test_a_joint_that_slides_has_metres():

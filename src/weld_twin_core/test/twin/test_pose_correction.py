@@ -61,7 +61,7 @@ def test_poses_between_two_looks_are_as_good():
             off = forward(real_arm(), joints[None])[0] - pose
             worst = max(worst, float(np.abs(off[:3, 3]).max()))
         if far > 0.7:
-            found.adopt(found.exact(pose, found.looked))
+            found.adopt(found.exact(pose))
             looks += 1
     assert worst < 2e-9
     assert looks < len(poses) / 10

@@ -33,9 +33,42 @@ from ..errors import ModelError
 from .base_leans import base_leans
 from .carriage import summed
 from .effect import Effect
+from .hooks import Asked, Search, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import turn
+
+
+class _Search(Search):
+    """What the search asks of it."""
+
+    effect: BearingTilt
+    kind: type[BearingTilt]
+
+    def small(self, view: View, joint: str | None, most: int) -> list[BearingTilt]:
+        """
+        Return the wave of once per turn: among many small errors the second is far below them.
+
+        Parameters
+        ----------
+        view : View
+        joint : str or None
+            The joint it sits on.
+        most : int
+            How many numbers the measurements can hold apart; it takes four.
+
+        """
+        return [self.kind(str(joint))]
+
+    def joined(self, other: BearingTilt) -> BearingTilt:
+        """Return the waves of both in one."""
+        both = [one.second for one in (self.effect, other) if np.size(one.second)]
+        lean = np.asarray(self.effect.lean) + np.asarray(other.lean)
+        return replace(self.effect, lean=lean, second=sum(map(np.asarray, both)) if both else ())
+
+    def fits(self, robot: Robot, joint: str | None) -> bool:
+        """Return whether the joint turns."""
+        return joint is not None and not robot.prismatic[robot.index(joint)]
 
 
 @register
@@ -52,13 +85,16 @@ class BearingTilt(Effect):
     second: Value = ()
 
     name = 'bearing_tilt'
-    title = 'axis wobble'
-    entered = 'program'
-    depends_on = 'angle'
+    traits = Traits(
+        title='axis wobble',
+        meaning='an axis leans as it turns, once or twice per turn',
+        entered='program',
+        depends_on='angle',
+        common=False,
+        by_motion=True,
+    )
     of = 'joint'
     stage = Stage.LINK
-    common = False
-    by_motion = True
     parameters = (
         Parameter(
             'lean',
@@ -83,6 +119,7 @@ class BearingTilt(Effect):
             ),
         ),
     )
+    search = Asked(_Search)
 
     def check(self, robot: Robot) -> None:
         """
@@ -146,40 +183,13 @@ class BearingTilt(Effect):
         yield cls(str(joint))
         yield cls(str(joint), second=np.zeros(4))
 
-    @classmethod
-    def small(cls, view: View, joint: str | None, most: int) -> list[BearingTilt]:
-        """
-        Return the wave of once per turn: among many small errors the second is far below them.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-            The joint it sits on.
-        most : int
-            How many numbers the measurements can hold apart; it takes four.
-
-        """
-        return [cls(str(joint))]
-
-    def joined(self, other: BearingTilt) -> BearingTilt:
-        """Return the waves of both in one."""
-        both = [one.second for one in (self, other) if np.size(one.second)]
-        lean = np.asarray(self.lean) + np.asarray(other.lean)
-        return replace(self, lean=lean, second=sum(map(np.asarray, both)) if both else ())
-
     def to_mapping(self) -> dict[str, Any]:
         """Return the entry of an effects file; without a second wave, none is told."""
         out = super().to_mapping()
         return out if np.size(self.second) else {k: v for k, v in out.items() if k != 'second'}
 
-    @classmethod
-    def fits(cls, robot: Robot, joint: str | None) -> bool:
-        """Return whether the joint turns."""
-        return joint is not None and not robot.prismatic[robot.index(joint)]
-
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         lean = float(np.linalg.norm(np.asarray(self.lean)))
         return (
             f'Look at the bearing of {self.site}: its axis leans by {turn(lean)} once per turn; '

@@ -12,9 +12,21 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect
+from .hooks import Asked, Search, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
+
+
+class _Search(Search):
+    """What the search asks of it."""
+
+    effect: JointCoupling
+
+    @property
+    def moved_by(self) -> str:
+        """Return the source: its angle is what comes through."""
+        return self.effect.source or self.effect.joint
 
 
 @register
@@ -27,11 +39,14 @@ class JointCoupling(Effect):
     ratio: Value = 0.0
 
     name = 'joint_coupling'
-    title = 'coupling'
-    entered = 'ratio'
-    by_motion = True
-    demand = 2
-    depends_on = 'angle'
+    traits = Traits(
+        title='coupling',
+        meaning='turning one joint turns another a little',
+        entered='ratio',
+        depends_on='angle',
+        demand=2,
+        by_motion=True,
+    )
     of = 'joint'
     stage = Stage.JOINT
     parameters = (
@@ -48,11 +63,7 @@ class JointCoupling(Effect):
         ),
     )
     options = ('source',)
-
-    @property
-    def moved_by(self) -> str:
-        """Return the source: its angle is what comes through."""
-        return self.source or self.joint
+    search = Asked(_Search)
 
     def check(self, robot: Robot) -> None:
         """Refuse an unknown source, and a joint coupled with itself."""
@@ -94,9 +105,9 @@ class JointCoupling(Effect):
                 yield cls(str(joint), view.robot.joint_names[k], 0.0)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         source = self.source
-        ratio = self.plain('ratio')
+        ratio = self._plain('ratio')
         return (
             f'Enter a coupling of {source} into {self.site}: {number(90.0 * ratio)} deg for every 90 '
             'deg.'

@@ -68,7 +68,7 @@ def spreads(robot: Robot, effect: Effect) -> Array:
     if isinstance(effect, TransmissionRipple):
         each = plausible(robot, effect.name, 'amplitude', effect.site)
         # Sine and cosine share the amplitude.
-        return np.full(effect.coordinates().size, each.sd / np.sqrt(2.0))
+        return np.full(effect.fit.coordinates().size, each.sd / np.sqrt(2.0))
     return np.array([each.sd for each in _each(robot, effect)])
 
 
@@ -76,7 +76,7 @@ def ranges(robot: Robot, effect: Effect) -> tuple[Array, Array]:
     """Return the least and the most of every fit coordinate, each shape (K,)."""
     if isinstance(effect, TransmissionRipple):
         most = plausible(robot, effect.name, 'amplitude', effect.site).high
-        full = np.full(effect.coordinates().size, most)
+        full = np.full(effect.fit.coordinates().size, most)
         return -full, full
     found = _each(robot, effect)
     return np.array([each.low for each in found]), np.array([each.high for each in found])
@@ -103,7 +103,9 @@ def beyond(robot: Robot, effect: Effect) -> list[tuple[str, float, float]]:
 
 def _each(robot: Robot, effect: Effect) -> list[Plausible]:
     specs = effect.components()
-    return [plausible(robot, effect.name, specs[k][0].name, effect.site) for k in effect.fitted()]
+    return [
+        plausible(robot, effect.name, specs[k][0].name, effect.site) for k in effect.fit.fitted()
+    ]
 
 
 def _narrowed(found: Plausible, given: Mapping[str, float] | None) -> Plausible:

@@ -28,6 +28,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -55,13 +56,16 @@ class Refraction(Effect):
     instrument: Sequence[float] | None = None
 
     name = 'refraction'
-    title = 'bent line of sight'
-    entered = 'warm air bent the line of sight'
-    depends_on = 'place'
-    place = 'instrument'
+    traits = Traits(
+        title='bent line of sight',
+        meaning='warm air bends the beam of the instrument',
+        entered='warm air bent the line of sight',
+        depends_on='place',
+        place='instrument',
+        common=False,
+    )
     of = 'robot'
     stage = Stage.POSE
-    common = False
     parameters = (
         Parameter(
             'warming',
@@ -134,7 +138,7 @@ class Refraction(Effect):
         return super().applicable(view, joint)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         each = ', '.join(number(float(v)) for v in np.asarray(self.warming))
         return (
             'Stir the air along the line of sight, shield it from heat or stand the instrument '

@@ -18,6 +18,7 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View, single
 from .wording import base_frame
@@ -34,14 +35,16 @@ class SetupSettling(Effect):
     start: float = 0.0
 
     name = 'setup_settling'
-    title = 'settling set-up'
-    entered = 'how the set-up is held'
-    depends_on = 'time'
-    place = 'base'
+    traits = Traits(
+        title='settling set-up',
+        entered='how the set-up is held',
+        depends_on='time',
+        place='base',
+        cause=False,
+        of_setup=True,
+    )
     of = 'robot'
     stage = Stage.LINK
-    cause = False
-    of_setup = True
     parameters = (
         Parameter(
             'xyz',
@@ -100,7 +103,7 @@ class SetupSettling(Effect):
                 yield cls(time_constant=share * span, start=float(view.t[0]))
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Let the set-up settle before measuring: it started {base_frame(self.vector()[:6])} from '
             'where it ended.'

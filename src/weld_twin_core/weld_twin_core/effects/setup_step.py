@@ -17,6 +17,7 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View, single
 from .wording import base_frame
@@ -35,14 +36,16 @@ class SetupStep(Effect):
     time: float = 0.0
 
     name = 'setup_step'
-    title = 'moved set-up'
-    entered = 'base'
-    depends_on = 'time'
-    place = 'base'
+    traits = Traits(
+        title='moved set-up',
+        entered='base',
+        depends_on='time',
+        place='base',
+        cause=False,
+        of_setup=True,
+    )
     of = 'robot'
     stage = Stage.LINK
-    cause = False
-    of_setup = True
     parameters = (
         Parameter(
             'xyz',
@@ -98,8 +101,8 @@ class SetupStep(Effect):
                 yield cls(time=float(0.5 * (view.t[k - 1] + view.t[k])))
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Fasten the set-up: it moved by {base_frame(-self.vector()[:6])} at '
-            f'{self.plain("time"):.4g} s; measure what came before and after apart.'
+            f'{self._plain("time"):.4g} s; measure what came before and after apart.'
         )

@@ -16,6 +16,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -36,13 +37,16 @@ class Wear(Effect):
     slowing: Value = 0.0
 
     name = 'wear'
-    title = 'tool wear'
-    entered = 'tool'
-    depends_on = 'time'
-    place = 'tool'
+    traits = Traits(
+        title='tool wear',
+        meaning='the tip of the tool wears away',
+        entered='tool',
+        depends_on='time',
+        place='tool',
+        common=False,
+    )
     of = 'robot'
     stage = Stage.LINK
-    common = False
     parameters = (
         Parameter(
             'rate',
@@ -110,8 +114,8 @@ class Wear(Effect):
             yield cls(0.0, slowed / span)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
-        hour = self.plain('rate') * 3.6e6
+        """Return what to mend, in words; see `Effect.remedy`."""
+        hour = self._plain('rate') * 3.6e6
         return (
             f'Renew or measure the tip of the tool: along its axis it draws back by {number(hour)} mm '
             'per hour.'

@@ -169,7 +169,9 @@ def _kinds(robot: Robot, recording: Recording, told: Sequence[Effect]) -> Kinds:
         kind = REGISTRY[name]
         if recording.measured is None and name in ('measurement_scale', 'drift'):
             continue
-        if not kind.cause or (kind.stage.name in ('SERVO', 'CLOCK') and recording.joints.static):
+        if not kind.traits.cause or (
+            kind.stage.name in ('SERVO', 'CLOCK') and recording.joints.static
+        ):
             continue
         sites = robot.joint_names if kind.of in ('joint', 'link') else (None,)
         for site in sites:
@@ -205,7 +207,7 @@ def _turned(robot: Robot, effects: Sequence[Effect]) -> Iterator[tuple[Effect, i
     """Yield the components that a fit turns."""
     for effect in effects:
         for k, (parameter, _) in enumerate(effect.components()):
-            if parameter.differentiable or not effect.fitted():
+            if parameter.differentiable or not effect.fit.fitted():
                 yield effect, k
 
 

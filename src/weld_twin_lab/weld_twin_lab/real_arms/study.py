@@ -79,7 +79,7 @@ def told_claims(said: Mapping[str, Any]) -> list[dict[str, Any]]:
     """
     out: dict[tuple[str, ...], dict[str, Any]] = {}
     for cause in said['causes']:
-        names = [n for n in cause['names'] if n[0] in REGISTRY and REGISTRY[n[0]].cause]
+        names = [n for n in cause['names'] if n[0] in REGISTRY and REGISTRY[n[0]].traits.cause]
         if cause['probability'] <= TOLD or cause['rest'] or not names:
             continue
         many = said['families'] and all(p > TOLD for _, _, p in names)
@@ -117,12 +117,12 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         'tracebacks': sum(e['traceback'] is not None for e in entries),
         'unknown': sum(e['status'] == 'unknown' for e in done),
         'unsound': sum(e['status'] == 'unsound' for e in done),
-        'told a cause borne out against all that is told': sum(
+        'reported a cause borne out against all that is reported': sum(
             worth(e, 'against_told') for e in entries
         ),
         'told a cause borne out against all kinds': sum(worth(e, 'against_all') for e in entries),
         'claims': len(claims),
-        'claims borne out against all that is told': sum(
+        'claims borne out against all that is reported': sum(
             _holds(c, 'against_told') for c in claims
         ),
         'claims borne out against all kinds': sum(_holds(c, 'against_all') for c in claims),
@@ -141,7 +141,7 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def table(entries: Sequence[Mapping[str, Any]]) -> str:
     """Return all rows and the figures as a page of Markdown."""
     lines = [
-        '| row | status | told; borne out against all that is told: bold | left beside '
+        '| row | status | reported; borne out against all that is reported: bold | left beside '
         '| error over the best plain fit |',
         '|---|---|---|---|---|',
     ]

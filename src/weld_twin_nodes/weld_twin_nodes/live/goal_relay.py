@@ -59,6 +59,7 @@ class _Running:
     def __init__(self, below: Any, token: object, outcome: Future) -> None:
         self.below, self.token, self.outcome = below, token, outcome
         self.above: Any = None
+        self.cancelling: Future | None = None
         self.away: float | None = None
 
 
@@ -175,6 +176,8 @@ class GoalRelay:
         running = self._pending.pop(id(above.request))
         running.above = above
         found = await running.outcome
+        if running.cancelling is not None:  # the result may overtake the answer to the cancel
+            await running.cancelling
         self._running.remove(running)
         if isinstance(found, str):
             above.abort()
@@ -199,7 +202,9 @@ class GoalRelay:
         running = running or self._pending.get(id(above.request))
         if running is None:
             return CancelResponse.REJECT
+        running.cancelling = cancelling = Future()
         answer = await self._answered(running.below.cancel_goal_async())
+        cancelling.set_result(None)
         taken = answer is not None and bool(answer.goals_canceling)
         return CancelResponse.ACCEPT if taken else CancelResponse.REJECT
 

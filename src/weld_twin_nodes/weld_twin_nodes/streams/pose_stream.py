@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from math import sqrt
 from typing import NamedTuple
 
@@ -56,18 +54,6 @@ class Given(NamedTuple):
     why: str = ''
 
 
-class Found(NamedTuple):
-    """An exact look, why the pose must not be corrected, and how sure the model is where asked [m]."""
-
-    looked: Looked | None
-    why: str = ''
-    doubt: float | None = None
-
-
-Work = Callable[[], Found]
-"""What is to be worked out."""
-
-
 class _Ramp(NamedTuple):
     """A change of what is added while the stream is held at one pose."""
 
@@ -100,9 +86,6 @@ class PoseStream:
         What is refused passes as it came; else nothing is sent.
     shadow : bool
         Nothing is sent; what would be added is told.
-    later : callable, optional
-        Takes work that is not to keep the stream waiting, and returns a function that tells whether
-        it is done and what came of it; left out, it is done at once.
 
     """
 
@@ -113,11 +96,9 @@ class PoseStream:
         *,
         passing: bool = False,
         shadow: bool = False,
-        later: Callable[[Work], Callable[[], Found | None]] | None = None,
     ) -> None:
         self.correction, self._limits = correction, limits
-        self._passing, self._shadow, self._later = passing, shadow, later
-        self._coming: Callable[[], Found | None] | None = None
+        self._passing, self._shadow = passing, shadow
         self._fresh: PoseCorrection | None = None
         self.forget()
 
@@ -134,9 +115,9 @@ class PoseStream:
         self._rest_pose: Array | None = None
         self._rest_since = self._last = -np.inf
         self._next: Array | None = None
-        self._coming = None
         self._sizes = self._doubts = 0.0
         self._doubted: Array | None = None
+        self._doubtful = False
         self._speeds: tuple[float, Array, Array | None] | None = None
 
     @property
@@ -166,7 +147,6 @@ class PoseStream:
         rest = self._rested(pose, now)
         if self._fresh is not None and (rest >= REST or self._mode != 'corrected'):
             self._exchange(self._fresh)
-        self._adopt_coming(now)
         added, why = self._wanted(pose, now, rest, arm, withdrawn)
         if self._shadow:
             self._mode = 'none' if added is None else 'corrected'
@@ -185,22 +165,17 @@ class PoseStream:
         return self._begin_ramp(pose, now, added, 'corrected')
 
     def settle(self) -> None:
-        """Do what was put off until the pose was sent: look where the straight line ends."""
-        known, pose = self.correction.looked, self._next
-        self._next = None
-        if pose is None or known is None or self._coming is not None:
-            return
-        work = partial(self._found, partial(self.correction.exact, pose, known))
-        if self._later is None:
-            done = work()
-            self._coming = lambda: done
-        else:
-            self._coming = self._later(work)
+        """Do what was put off until the pose was sent, one thing after each: the next pose is near."""
+        pose, self._next = self._next, None
+        if pose is not None:
+            self._look(pose, self._last)
+        elif self._doubtful and not self._refused:
+            self._doubt()
 
     def _exchange(self, fresh: PoseCorrection) -> None:
         """Take another correction; what was added stays until it is faded over."""
         self.correction, self._fresh = fresh, None
-        self._coming = self._next = self._speeds = self._doubted = None
+        self._next = self._speeds = self._doubted = None
         self._refused, self._sizes, self._doubts = '', 0.0, 0.0
         if self._mode == 'corrected':
             self._mode = 'held'
@@ -223,15 +198,14 @@ class PoseStream:
             self._tried, self._speeds = now, None
             if arm is None:
                 return None, 'where the arm stands is not known: no joint states are heard'
-            self._adopt(self._found(partial(self.correction.first, pose, arm)), now)
+            self._look(pose, now, arm)
+            if not self._refused:
+                self._doubt()
             if self._refused:
                 return None, self._refused
         added, far = self.correction.added(pose)
         if far > FAR:
-            known = self.correction.looked
-            assert known is not None
-            self._coming = None
-            self._adopt(self._found(partial(self.correction.exact, pose, known)), now)
+            self._look(pose, now)
             if self._refused:
                 return None, self._refused
             added, far = self.correction.added(pose)
@@ -239,46 +213,33 @@ class PoseStream:
             self._next = pose
         return added, ''
 
-    def _found(self, solve: Callable[[], Looked]) -> Found:
-        """Return an exact look with why it is refused, or why there is none."""
+    def _look(self, pose: Array, now: float, arm: Array | None = None) -> None:
+        """Look at a pose exactly, from joints near it or from the look before, and judge it."""
+        found = self.correction
         try:
-            looked = solve()
+            looked = found.exact(pose) if arm is None else found.first(pose, arm)
         except DataError as error:
-            return Found(None, str(error))
-        return Found(looked, self.correction.refusal(looked, self._limits), self._asked(looked))
-
-    def _asked(self, looked: Looked) -> float | None:
-        """Return how sure the model is of a look [m], where that is to be asked anew."""
-        at = looked.pose[:3, 3]
-        if self._doubted is not None and np.linalg.norm(at - self._doubted) < DOUBT_EVERY:
-            return None
-        self._doubted = at
-        return self.correction.doubt(looked)
-
-    def _adopt_coming(self, now: float) -> None:
-        """Take a look that was put off, once it is there."""
-        found = None if self._coming is None else self._coming()
-        if found is not None:
-            self._coming = None
-            self._adopt(found, now)
-
-    def _adopt(self, found: Found, now: float) -> None:
-        looked, why, doubt = found
-        if looked is None:
-            self._refused = why
+            self._refused = str(error)
             return
-        why = why or self._too_quick(looked, now)
-        if doubt is not None:
-            self._sizes += float(looked.added[:3] @ looked.added[:3])
-            self._doubts += doubt**2
-            if self._sizes < self._doubts:
-                why = why or (
-                    f'the model is less sure of these poses ({doubt * 1e3:.3f} mm) than the '
-                    'correction is large'
-                )
-        self._refused = why
+        self._refused = found.refusal(looked, self._limits) or self._too_quick(looked, now)
         self._tried = now
-        self.correction.adopt(looked)
+        found.adopt(looked)
+        at = pose[:3, 3]
+        self._doubtful = self._doubted is None or np.linalg.norm(at - self._doubted) > DOUBT_EVERY
+
+    def _doubt(self) -> None:
+        """Ask how sure the model is of the latest look, against how large the correction is."""
+        looked, self._doubtful = self.correction.looked, False
+        if looked is None:
+            return
+        doubt, self._doubted = self.correction.doubt(looked), looked.pose[:3, 3]
+        self._sizes += float(looked.added[:3] @ looked.added[:3])
+        self._doubts += doubt**2
+        if self._sizes < self._doubts:
+            self._refused = (
+                f'the model is less sure of these poses ({doubt * 1e3:.3f} mm) than the correction '
+                'is large'
+            )
 
     def _too_quick(self, looked: Looked, now: float) -> str:
         """Return that joints, or what is added, change faster than they may."""

@@ -121,7 +121,7 @@ def effective_rows(
     share = effective_share(found.residual, problem.rows, problem.samples) ** trust
     count = share * found.residual.size
     # What entered first explains most, and so does what its formula misses.
-    misfit = beliefs.misfit * (found.model.found[0].ideal if found.model.found else 1.0)
+    misfit = beliefs.misfit * (found.model.found[0].fit.ideal if found.model.found else 1.0)
     explained = max(bare_rss - found.rss, 0.0) / max(found.rss, 1e-300) * count
     return float(count / (1.0 + misfit**2 * explained / beliefs.misfit_directions))
 
@@ -274,7 +274,7 @@ def settled(
 def names(model: Model) -> list[tuple[str, str | None, int]]:
     """Return what tells one set of found effects from another."""
     return sorted(
-        ((e.name, e.site, e.coordinates().size) for e in model.found),
+        ((e.name, e.site, e.fit.coordinates().size) for e in model.found),
         key=lambda item: (item[0], item[1] or '', item[2]),
     )
 

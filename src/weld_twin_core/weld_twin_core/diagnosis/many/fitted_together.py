@@ -98,7 +98,7 @@ def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:
     """Return the kinds left out of every step, from the least that is fitted to the most."""
     steps = [_beyond(demand) for demand, least in enumerate(BEAR) if stations >= least]
     # First without curves: what a handful of stations bears is the geometry under load.
-    curves = tuple(name for name, kind in REGISTRY.items() if kind.bends)
+    curves = tuple(name for name, kind in REGISTRY.items() if kind.traits.bends)
     steps = steps[-1:] if stations >= PLENTY else [(*steps[0], *curves), *steps]
     if not problem.untracked:
         return steps
@@ -122,7 +122,7 @@ def _carrying(
     judged on the others, this left 0.31 mm instead of 0.33 mm in the mean, and 0.49 mm instead of
     0.84 mm at the worst place of the three with the largest rest.
     """
-    waves = {name for name, kind in REGISTRY.items() if kind.waves is not None}
+    waves = {name for name, kind in REGISTRY.items() if kind.traits.waves is not None}
     less = tuple(name for name in less if name not in waves)
     return _together(found, (*exclude, *less), beliefs, progress, orders=ONCE)
 
@@ -143,8 +143,14 @@ def _without_creep(
     the recording the creep goes on and the arm does not. On a grid of a real arm that was measured
     plane by plane, its first fifth predicted the rest to 0.83 mm with a creep and to 0.12 without.
     """
-    creeps = {e.name for e in best.final.model.found if e.depends_on == 'time' and not e.dated}
-    creeps -= {name for name, kind in REGISTRY.items() if kind.of_setup or kind.common}
+    creeps = {
+        e.name
+        for e in best.final.model.found
+        if e.traits.depends_on == 'time' and not e.traits.dated
+    }
+    creeps -= {
+        name for name, kind in REGISTRY.items() if kind.traits.of_setup or kind.traits.common
+    }
     if not creeps:
         return best, left
     trial = _together(found, (*exclude, *creeps), beliefs, progress)
@@ -224,7 +230,7 @@ def _too_large(robot: Robot, effect: Effect) -> bool:
 
 def _beyond(demand: int) -> tuple[str, ...]:
     """Return the kinds that demand more of the stations, left out of a step."""
-    return tuple(name for name, kind in REGISTRY.items() if kind.demand > demand)
+    return tuple(name for name, kind in REGISTRY.items() if kind.traits.demand > demand)
 
 
 def _but_scales(less: tuple[str, ...]) -> tuple[str, ...]:

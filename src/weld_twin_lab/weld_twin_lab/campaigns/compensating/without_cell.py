@@ -20,15 +20,20 @@ from weld_twin_core.twin.reversals import approached
 from weld_twin_core.twin.twin import Twin
 from weld_twin_nodes.offline.correcting import program_model
 
-from .drawn_cells import cell_of, drawn_goal, learned, true_effects
+from .drawn_cells import cell_of, drawn_goal, drawn_rest, learned, true_effects
 
 LIMITS = GoalLimits(acceleration=20.0)
 """As a compensator has them that is told nothing else."""
 
 
 def judged(name: str, seed: int, goals: int) -> list[dict[str, Any]]:
-    """Return what becomes of the goals of one arm that stands where each of them begins."""
+    """
+    Return what becomes of the goals of one arm that stands where each of them begins.
+
+    Beside its causes it has what every real arm has: joints that are off by a little anywhere.
+    """
     robot, causes, rng = cell_of(name, seed)
+    causes += drawn_rest(robot, rng)
     with TemporaryDirectory() as place:
         file = Path(place) / 'diagnosis.json'
         file.write_text(learned(robot, causes, rng).text)

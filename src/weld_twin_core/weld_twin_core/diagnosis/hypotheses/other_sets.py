@@ -138,14 +138,18 @@ class Sets:
 
     def _equations(self, columns: list[int]) -> tuple[Array, Array]:
         """Return the normal equations of the frames and some columns."""
-        new = [c for c in columns if c not in self._cross]
-        if new:
-            rows = self.library.products(np.stack([self.library.column(c) for c in new]))
-            self._cross.update(zip(new, rows.T, strict=True))
+        self._know(columns)
         cross = self.products[columns, :-1]
         own = np.array([self._cross[c][columns] for c in columns]).reshape(2 * (len(columns),))
         normal = np.block([[self.normal, cross.T], [cross, own]])
         return normal, np.concatenate([self.pull, self.products[columns, -1]])
+
+    def _know(self, columns: Sequence[int]) -> None:
+        """Work out the products of some columns with all others, where that was not done."""
+        new = [c for c in dict.fromkeys(columns) if c not in self._cross]
+        if new:
+            rows = self.library.products(np.stack([self.library.column(c) for c in new]))
+            self._cross.update(zip(new, rows.T, strict=True))
 
     def of(self, wanted: Sequence[_Site]) -> list[Choice]:
         """Return some units as a set, each with the seed that serves it best beside the others."""
@@ -158,7 +162,9 @@ class Sets:
 
     def without(self, start: list[Choice], never: _Site) -> list[Choice]:
         """Return the best set that begins with another and lacks a unit."""
-        begun = [[*start, first] for first in self._entering(start, never)[:BEGUN]]
+        entering = self._entering(start, never)[:BEGUN]
+        self._know(_columns(entering))
+        begun = [[*start, first] for first in entering]
         more = {_names(one): one for one in (self._grown(one, never, 1) for one in begun)}
         best = sorted(more.values(), key=self.worth)[-COMPLETED:]
         return max((self._grown(one, never, LONGEST) for one in best), key=self.worth, default=[])

@@ -22,7 +22,10 @@ from .reader import BagReader
 
 Image = tuple[int, str, np.ndarray | Marks]
 """Stamp [ns], camera, and rows of target, point, u and v; or corners of tags by their labels."""
-READ: Mapping[str, Callable[[Any], np.ndarray | Marks]] = {IMAGE_POINTS.type: points, TAGS: corners}
+READ: Mapping[str, Callable[[Any], np.ndarray | Marks]] = {
+    IMAGE_POINTS.type: points,
+    TAGS: corners,
+}
 """What takes the points out of a message of either type."""
 
 

@@ -74,15 +74,18 @@ class Left:
     def high(self) -> bool:
         """Return whether what remains rises above a floor that was measured apart."""
         told = self.evidence
-        above = max(self.beliefs.above, told.leverage)
-        return told.independent and told.after > above * told.floor
+        return told.independent and self.rises(self.beliefs.above)
 
     @property
     def wide(self) -> bool:
         """Return whether what remains is far wider than a floor that only the fit shows."""
         told = self.evidence
-        above = max(self.beliefs.far_above, told.leverage)
-        return not told.independent and told.after > above * told.floor
+        return not told.independent and self.rises(self.beliefs.far_above)
+
+    def rises(self, times: float) -> bool:
+        """Return whether what remains is so many times the floor, and more than chance makes it."""
+        told = self.evidence
+        return told.after > max(times, told.leverage) * told.floor
 
     @property
     def above_noise(self) -> bool:
@@ -179,7 +182,7 @@ def _of_nothing(left: Left) -> Verdict:
             'what remains is far wider spread than noise, though it depends on nothing looked at'
         )
         return Verdict('unknown', (), (reason,))
-    if not told.independent and told.after > beliefs.above * told.floor:
+    if not told.independent and left.rises(beliefs.above):
         reason = (
             'nothing is found, but what remains is not spread as noise is, and nothing on these '
             'recordings shows the noise by itself: repeat some poses'

@@ -85,7 +85,7 @@ def _add_setup(parser: argparse.ArgumentParser) -> None:
     add('--changed', 'BAG', 'WHAT', text, many=True, rare=True)
     text = 'what measured: at960, radian, vantage, handyprobe, romer, dial, ..., or its largest '
     text += 'permissible error in mm, such as 0.015+0.006/m; @3 behind it: 3 m away'
-    add('--instrument', 'NAME', text)
+    add('--instrument', 'NAME', text, rare=True)
     text = 'describes what the contacts of the bags touched, where they were not imported with it'
     add('--contacts', 'ARTEFACT.yaml', text, rare=True)
     text = 'if data or set-up are wrong and one correction explains it, make it and go on'
@@ -110,7 +110,7 @@ def _add_sheet(parser: argparse.ArgumentParser) -> None:
     add('--joint-names', 'A|J|FILE', text, default='', rare=True)
     text = 'say how sure the corrected robot is there: a program, a bag, or a box X,Y,Z:X,Y,Z (corners '
     text += 'in the base frame, mm)'
-    add('--region', 'R', text)
+    add('--region', 'R', text, rare=True)
     text = 'whose controller it is, if the name of the robot does not tell'
     add('--controller', text, choices=BRANDS, rare=True)
     add('--pdf', 'print the page to report.pdf, to sign; needs Chromium')

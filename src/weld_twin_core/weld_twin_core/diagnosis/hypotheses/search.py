@@ -101,9 +101,10 @@ def effective_rows(
     """
     Return the number of independent rows that a fit's evidence may count.
 
-    Two things make a residual less telling than its count: autocorrelation, and physics richer
-    than the model. An explained sum of squares E leaves about ``beliefs.misfit``^2 E of misfit in some
-    ``beliefs.misfit_directions`` directions, and any further column may pick that up by chance.
+    Frames that are fitted along take rows away. Two more things make a residual less telling than its
+    count: autocorrelation, and physics richer than the model. An explained sum of squares E leaves
+    about ``beliefs.misfit``^2 E of misfit in some ``beliefs.misfit_directions`` directions, and any
+    further column may pick that up by chance.
 
     ``trust`` is how far to believe the autocorrelation, as its exponent: while causes are still
     missing from the model, it is theirs.
@@ -119,7 +120,7 @@ def effective_rows(
 
     """
     share = effective_share(found.residual, problem.rows, problem.samples) ** trust
-    count = share * found.residual.size
+    count = share * max(found.residual.size - problem.frame_count, 1)
     # What entered first explains most, and so does what its formula misses.
     misfit = beliefs.misfit * (found.model.found[0].fit.ideal if found.model.found else 1.0)
     explained = max(bare_rss - found.rss, 0.0) / max(found.rss, 1e-300) * count

@@ -92,7 +92,7 @@ def forward(
         systems = work.beside(now.model, now.residual)
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
         # only the fit with a choice tells how many rows were independent.
-        ranked = ranking(systems, work.library.units, float(now.residual.size))
+        ranked = ranking(systems, work.library.units, _rows(work, now))
         ranked = [c for c in ranked if c.nats > work.beliefs.enter_nats and not _repeats(c, taken)]
         if not ranked:
             break
@@ -106,6 +106,11 @@ def forward(
         now = best.fit
         tick(f'{best.unit} (+{best.nats:.0f} nats)')
     return steps
+
+
+def _rows(work: Workspace, now: Fit) -> float:
+    """Return the number of rows that are left once the frames are fitted."""
+    return float(now.residual.size - work.problem.frame_count)
 
 
 def _repeats(choice: Choice, taken: list[tuple[str, str | None]]) -> bool:
@@ -180,7 +185,7 @@ def _without_stand_in(work: Workspace, choice: Choice, result: Fit) -> Fit:
         return result
     alone = fit(work.problem, possible_part(result.model), work.scale, None, 5)
     systems = work.beside(alone.model, alone.residual)
-    ranked = ranking(systems, work.library.units, float(alone.residual.size))
+    ranked = ranking(systems, work.library.units, _rows(work, alone))
     others = [c for c in ranked if c.unit.site not in sites and not _repeats(c, _sites(alone))]
     fits = [fitted_with(work, alone.model, other.effect()) for other in others[:SHORTLIST]]
     return min((alone, *fits), key=lambda f: f.rss)

@@ -90,7 +90,7 @@ def fitted_together(
     if not better:
         better = left < CHOSEN * few and _many(found, best, beliefs)
     better = better and (found.crowded or not _one_and_crumbs(best, beliefs))
-    if not (found.final.model.found or found.crowded) and _by_chance(found, best):
+    if not (found.final.model.found or found.crowded) and _by_chance(found, best, beliefs):
         return found
     if better and found.problem.untracked and PLACES - 1 <= found.problem.places < PLENTY_PLACES:
         trial = _carrying(found, exclude, steps[0], beliefs, progress)
@@ -101,7 +101,7 @@ def fitted_together(
     return replace(found, many=best) if left < CHOSEN * few else found
 
 
-def _by_chance(none: Search, many: Search) -> bool:
+def _by_chance(none: Search, many: Search, beliefs: Beliefs) -> bool:
     """Return whether many small errors predict no more of few stations than they would of noise."""
     fitted = Unseen.of(many.problem, many.scale, many.final, many.precision)
     bare = Unseen.of(none.problem, none.scale, none.final, none.precision)
@@ -116,6 +116,8 @@ def _by_chance(none: Search, many: Search) -> bool:
     )
     if not may_be_chance(fitted.residual.size, told.share):
         return False
+    if told.steady < beliefs.group_steady:
+        return True
     columns, frames = fitted.columns.written_out(), fitted.frames
     size = np.sqrt(np.maximum(fitted.precision, 1e-300))[:, None]
     # All of them at once, at the sizes learned and at others: sizes are learned from noise, too.

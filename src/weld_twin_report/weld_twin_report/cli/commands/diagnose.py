@@ -33,6 +33,7 @@ from weld_twin_nodes.cli.parsing import Adder
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
+    from weld_twin_core.arrays import Array
     from weld_twin_core.diagnosis import Diagnosis
     from weld_twin_core.diagnosis.advice import Limits
     from weld_twin_core.recording import Recording
@@ -175,30 +176,18 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
     from weld_twin_core.diagnosis.algebra.problem import frames_named
     from weld_twin_core.diagnosis.frames.changes import families_named
     from weld_twin_core.errors import ModelError
-    from weld_twin_msgs_py.bags import read_recording
-    from weld_twin_msgs_py.files.instruments import instrument, measured_by
+    from weld_twin_nodes.offline.region import region
     from weld_twin_nodes.offline.set_up_changes import told
 
-    measures = instrument(args.instrument) if args.instrument else None
     align, excluded = frames_named(args.align, '--align'), _families(args.exclude_effect)
     changing = families_named(args.may_change, '--may-change')
     if changing and len(args.bags) < 2:
         raise ModelError('--may-change compares recordings; give two or more bags of one arm')
     changes = _changes(args)
     twin = twin_of(robot_of(args), args.effects_known)
-    topics = topics_of(args)
+    judged = region(twin.robot, args.region)[0] if args.region else None
     with _progress() as tell:
-        recordings = []
-        for path in (*args.bags, *args.holdout):
-            tell(f'reading {path}')
-            # Two clocks are for the checks of the data to name.
-            recording = read_recording(
-                path, twin.robot, topics, one_clock=False, needs_measurements=True
-            )
-            recording = _described(recording, args.contacts)
-            if measures is not None:
-                recording = measured_by(recording, measures, own_frame='base' in align)
-            recordings.append(recording)
+        recordings = _read(args, twin.robot, 'base' in align, tell)
         count = len(args.bags)
         fitted, more = told(_bounded(recordings[:count]), changes, twin.robot)
         found = diagnose(
@@ -213,21 +202,35 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             limits=_limits(args),
             progress=tell,
         )
-    return _in_region(found, args.region, twin.robot, fitted[0])
+    return found if judged is None else _in_region(found, args.region, judged, fitted[0])
 
 
-def _in_region(
-    found: Diagnosis, told: str | None, robot: Robot, recording: Recording
-) -> Diagnosis:
+def _read(
+    args: argparse.Namespace, robot: Robot, own_frame: bool, tell: Callable[[str], None]
+) -> list[Recording]:
+    """Return all recordings, as artefact and instrument are told."""
+    from weld_twin_msgs_py.bags import read_recording
+    from weld_twin_msgs_py.files.instruments import instrument, measured_by
+
+    what = instrument(args.instrument) if args.instrument else None
+    topics, out = topics_of(args), list[Recording]()
+    for path in (*args.bags, *args.holdout):
+        tell(f'reading {path}')
+        # Two clocks are for the checks of the data to name.
+        found = read_recording(path, robot, topics, one_clock=False, needs_measurements=True)
+        found = _described(found, args.contacts)
+        out.append(found if what is None else measured_by(found, what, own_frame=own_frame))
+    return out
+
+
+def _in_region(found: Diagnosis, told: str, judged: Array, recording: Recording) -> Diagnosis:
     """Return the diagnosis with what to expect in a region that was asked for."""
     from weld_twin_core.effects.setup_motion import of_the_robot
     from weld_twin_core.twin.posterior import usual_sigma
     from weld_twin_core.twin.twin import Twin
-    from weld_twin_nodes.offline.region import region
 
-    if told is None or found.posterior is None:
+    if found.posterior is None:
         return found
-    judged, _ = region(robot, told)
     twin = Twin(found.model.twin(0).robot, of_the_robot(found.model.known + found.model.found))
     sigma = usual_sigma(found.posterior, twin, recording, judged)
     return replace(found, posterior=replace(found.posterior, region=(told, sigma)))

@@ -230,7 +230,7 @@ def _others(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> lis
         if other and sets.worth(other) > least:
             own = _fitted(work, now, other)
             if not implausible(own.model):
-                out.append(Other(site, own, _ahead(work, own, now, effective)))
+                out.append(Other(site, own, ahead(work, own, now, effective)))
     return out
 
 
@@ -244,11 +244,19 @@ def _fitted(work: Workspace, now: Fit, chosen: Sequence[Choice]) -> Fit:
     return fit(work.problem, now.model.with_found(found), work.scale, None, 8)
 
 
-def _ahead(work: Workspace, own: Fit, now: Fit, effective: Callable[[Fit], float]) -> float:
+def ahead(work: Workspace, own: Fit, now: Fit, effective: Callable[[Fit], float]) -> float:
     """
     Return by how much evidence [nats] one set is ahead of another.
 
     An effect more costs what it costs to enter: that two errors happen to be one is seldom.
+
+    Parameters
+    ----------
+    own, now : Fit
+        The one and the other, on the workspace's problem and scale.
+    effective : callable
+        Number of independent rows of a fit.
+
     """
     trials = {unit.site: float(np.log(unit.trials)) for unit in work.library.units}
 

@@ -213,7 +213,8 @@ def _read(
     from weld_twin_msgs_py.files.instruments import instrument, measured_by
 
     what = instrument(args.instrument) if args.instrument else None
-    topics, out = topics_of(args), list[Recording]()
+    topics = topics_of(args)
+    out: list[Recording] = []
     for path in (*args.bags, *args.holdout):
         tell(f'reading {path}')
         # Two clocks are for the checks of the data to name.

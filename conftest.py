@@ -50,6 +50,8 @@ after the other and would else end last; 5 is a third of the weight."""
 
 SOLVED = 'test/diagnosis: solved('
 """Folder, and what its files call for a diagnosis that is made once in a process."""
+HOUSE = 'test/house'
+"""Folder whose tests read all sources, each once in a process."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -74,7 +76,7 @@ def pytest_xdist_make_scheduler(config, log):
     Files with the mark `cells` stand in two lines, those that record or install and the others, so
     that no more than two cells of nodes compete for the processor. Any other file goes to the next
     process that is free, and stays whole, so that its fixtures are made once; files that ask
-    `SOLVED` for the same diagnoses stay together.
+    `SOLVED` for the same diagnoses stay together, and so do those of the `HOUSE`.
     """
     from xdist.scheduler import LoadScopeScheduling
 
@@ -83,6 +85,8 @@ def pytest_xdist_make_scheduler(config, log):
         def _split_scope(self, nodeid):
             file = nodeid.partition('::')[0]
             text = (config.rootpath / file).read_text(encoding='utf-8')
+            if file.startswith(HOUSE):
+                return HOUSE
             if f'mark.{CELLS}' not in text:
                 folder, call = SOLVED.split(': ')
                 return SOLVED if file.startswith(folder) and call in text else file

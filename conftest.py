@@ -29,16 +29,26 @@ def pytest_collection_finish():
 
 
 CELLS = 'cells'
+WHOLE = ('contacts', 'diagnosis', 'report', 'soundness')
+"""Folders whose tests make whole diagnoses, or open pages."""
 
 
 def pytest_collection_modifyitems(items):
     """
     Put the tests that start nodes first, which wait more than they work; then files with slow ones.
 
-    So that nothing that takes long is begun last. The folders come as pyproject.toml lists them.
+    Then whole diagnoses, so that nothing that takes long is begun last. The folders come as
+    pyproject.toml lists them.
     """
-    slow = {item.path for item in items if item.get_closest_marker('slow')}
-    items.sort(key=lambda item: (item.get_closest_marker(CELLS) is None, item.path not in slow))
+    first = {item.path for item in items if item.get_closest_marker('slow')}
+    whole = {item.path for item in items if item.path.parent.name in WHOLE}
+    items.sort(
+        key=lambda item: (
+            item.get_closest_marker(CELLS) is None,
+            item.path not in first,
+            item.path not in whole,
+        )
+    )
 
 
 FIRST_LINE = ('/recording/', '/install/')

@@ -26,7 +26,7 @@ from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..unseen.chance import Candidates, chance_gain, may_be_chance
-from ..unseen.folds import gain, least_gain, ways_to_divide
+from ..unseen.folds import ways_to_divide
 from ..unseen.unseen_stretches import Unseen
 from .shrinkage import believed, groups, learned_precision, predicted
 from .small_errors import many_small
@@ -90,7 +90,7 @@ def fitted_together(
     if not better:
         better = left < CHOSEN * few and _many(found, best, beliefs)
     better = better and (found.crowded or not _one_and_crumbs(best, beliefs))
-    if not (found.final.model.found or found.crowded) and _by_chance(found, best, beliefs):
+    if not (found.final.model.found or found.crowded) and _by_chance(found, best):
         return found
     if better and found.problem.untracked and PLACES - 1 <= found.problem.places < PLENTY_PLACES:
         trial = _carrying(found, exclude, steps[0], beliefs, progress)
@@ -101,23 +101,12 @@ def fitted_together(
     return replace(found, many=best) if left < CHOSEN * few else found
 
 
-def _by_chance(none: Search, many: Search, beliefs: Beliefs) -> bool:
+def _by_chance(none: Search, many: Search) -> bool:
     """Return whether many small errors predict no more of few stations than they would of noise."""
     fitted = Unseen.of(many.problem, many.scale, many.final, many.precision)
-    bare = Unseen.of(none.problem, none.scale, none.final, none.precision)
-    told = least_gain(
-        [
-            gain(
-                *(one.squares(one.whole), more.squares(_unseen(many, more))),
-                *(one.trusted_labels(), more.trusted_labels()),
-            )
-            for one, more in zip(bare.every_way(), fitted.every_way(), strict=True)
-        ]
-    )
-    if not may_be_chance(fitted.residual.size, told.share):
+    share = 1.0 - (unseen_rms(many) / max(unseen_rms(none), 1e-12)) ** 2
+    if not may_be_chance(fitted.residual.size, share):
         return False
-    if told.steady < beliefs.group_steady:
-        return True
     columns, frames = fitted.columns.written_out(), fitted.frames
     size = np.sqrt(np.maximum(fitted.precision, 1e-300))[:, None]
     # All of them at once, at the sizes learned and at others: sizes are learned from noise, too.
@@ -128,7 +117,7 @@ def _by_chance(none: Search, many: Search, beliefs: Beliefs) -> bool:
         LEARNED,
         ways_to_divide(many.problem),
     )
-    return told.share <= chance_gain(tried, 0.0)
+    return share <= chance_gain(tried, -np.inf, pooled=True)
 
 
 def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:

@@ -101,7 +101,7 @@ def may_be_chance(rows: int, gain: float) -> bool:
     return rows <= FEW and -rows * float(np.log(max(1.0 - gain, 1e-300))) <= CLEAR
 
 
-def chance_gain(candidates: Candidates, steady: float) -> float:
+def chance_gain(candidates: Candidates, steady: float, *, pooled: bool = False) -> float:
     """
     Return the share of noise that the best of all candidates hardly ever predicts.
 
@@ -109,6 +109,8 @@ def chance_gain(candidates: Candidates, steady: float) -> float:
     ----------
     steady : float
         Standard errors that a gain must have to count.
+    pooled : bool
+        Whether all ways to divide count together, and not the one that shows least.
 
     """
     targets = noise(candidates.fixed.shape[1])
@@ -121,13 +123,13 @@ def chance_gain(candidates: Candidates, steady: float) -> float:
         columns = np.concatenate([candidates.fixed, group])
         for ridge in candidates.ridges:
             held = np.concatenate([candidates.precision, np.full(len(group), ridge)])
-            least = np.full(len(targets), np.inf)
+            shares = []
             for labels, was in zip(candidates.ways, before, strict=True):
                 after = _squares(left_out(columns, held, labels, targets), labels)
                 share = 1.0 - after.sum(axis=1) / was.sum(axis=1)
                 sure = np.array([steadiness(*pair) for pair in zip(was, after, strict=True)])
-                least = np.minimum(least, np.where(sure >= steady, share, 0.0))
-            best = np.maximum(best, least)
+                shares.append(np.where(sure >= steady, share, 0.0))
+            best = np.maximum(best, (np.mean if pooled else np.min)(shares, axis=0))
     return float(best.max())
 
 

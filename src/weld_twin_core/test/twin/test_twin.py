@@ -173,6 +173,11 @@ DRAWN = {
 DRAWN = usual(DRAWN)
 
 
+BUILDS = ('standard', 'modified gantry', 'positioner', 'modified positioner')
+"""Either convention, with and without an axis that slides and joints behind the workpiece."""
+
+
+@pytest.mark.parametrize('robot', BUILDS, indirect=True)
 @pytest.mark.parametrize('name', DRAWN)
 def test_draws_of_an_effect_are_a_loop_over_draws(name, robot, make_recording, stamps):
     # Three draws would be as many as coordinates: a wrong broadcast would go unnoticed.

@@ -39,7 +39,7 @@ CLOSED = 1e-11
 OPEN = 1e-9
 """Error [m, rad] that a solution must not have: that of `compensate`."""
 EXACT = 2e-10
-"""Largest error [m] that what is told between two looks should have."""
+"""Largest error [m], of way and turn, that what is told between two looks should have."""
 REACH = (2e-5, 5e-4, 1e-2)
 """Least, first and largest distance [m] between two exact looks; a turn counts half a metre a radian."""
 ONWARD = 0.97
@@ -93,7 +93,7 @@ class PoseCorrection:
 
     def __init__(self, model: ProgramModel, tool: Array) -> None:
         still, robot = model.without_memory() or model, model.robot
-        self.model = model
+        self.model, self.tool = model, tool
         self._arm = model.arm(tool)
         self._twin = still.twin(tool)
         self._back = np.linalg.inv(robot.T_world_base)
@@ -102,7 +102,11 @@ class PoseCorrection:
         self._sides = SIDE * np.concatenate(
             [np.zeros((1, robot.n)), np.eye(robot.n), -np.eye(robot.n)]
         )
-        self._forget()
+        self._begin()
+
+    def _begin(self) -> None:
+        """Know nothing yet of how what is added bends."""
+        self._reach, self._bend, self._way = REACH[1], np.zeros((1, 1)), np.zeros(6)
 
     @property
     def looked(self) -> Looked | None:
@@ -157,18 +161,17 @@ class PoseCorrection:
             It cannot be reached.
 
         """
-        assert self._at is not None
-        return self.first(pose, _told(self._at, self._bend, *_away(self._at, pose))[6:])
+        return self.first(pose, self.joints(pose))
 
     def adopt(self, looked: Looked | None) -> None:
         """Go on from an exact correction, and learn how far apart such looks may be; None forgets."""
         before, self._at = self._at, looked
         if before is None or looked is None:
-            self._forget()
+            self._begin()
             return
         way, size = _away(before, looked.pose)
         told = _told(before, self._bend, way, size)
-        off = float(np.linalg.norm((told - looked.values)[:3]))
+        off = _size((told - looked.values)[:6])
         if size > REACH[0]:
             self._bend = (looked.slope - before.slope) / size
             self._way = way
@@ -176,9 +179,6 @@ class PoseCorrection:
         best = size * float(np.cbrt(EXACT / max(off, 1e-2 * EXACT)))
         best = min(best, 1.5 * self._reach) if off < EXACT else best
         self._reach = float(np.clip(best, REACH[0], REACH[2]))
-
-    def _forget(self) -> None:
-        self._reach, self._bend, self._way = REACH[1], np.zeros((1, 1)), np.zeros(6)
 
     def added(self, pose: Array) -> tuple[Array, float]:
         """
@@ -200,6 +200,11 @@ class PoseCorrection:
         onward = _onward(self._way, way)
         reach = self._reach if onward else min(self._reach, REACH[1])
         return _told(self._at, self._bend, way, size)[:6], size / reach
+
+    def joints(self, pose: Array) -> Array:
+        """Return the joints of what is commanded for a pose, shape (n,), told by the latest look."""
+        assert self._at is not None
+        return _told(self._at, self._bend, *_away(self._at, pose))[6:]
 
     def refusal(self, looked: Looked, limits: GoalLimits) -> str:
         """Return why a pose must not be corrected; empty where it may."""
@@ -248,7 +253,7 @@ class PoseCorrection:
 def _rise(poses: Array) -> Array:
     """Return d pose / d joint, shape (6, n), of a pose and those with joints to either side of it."""
     ahead, behind = np.split(poses[1:], 2)
-    return between(behind, ahead).T / (2.0 * SIDE)
+    return np.asarray(between(behind, ahead).T / (2.0 * SIDE))
 
 
 def _standing(q: Array) -> JointMotion:
@@ -258,7 +263,12 @@ def _standing(q: Array) -> JointMotion:
 def _away(at: Looked, pose: Array) -> tuple[Array, float]:
     """Return the way from a look to a pose, shape (6,), and its size [m]."""
     way = between(at.pose, pose)
-    return way, sqrt(way[:3] @ way[:3]) + LEVER * sqrt(way[3:] @ way[3:])
+    return way, _size(way)
+
+
+def _size(way: Array) -> float:
+    """Return the size of a way and turn (6,) [m]."""
+    return sqrt(way[:3] @ way[:3]) + LEVER * sqrt(way[3:] @ way[3:])
 
 
 def _told(at: Looked, bend: Array, way: Array, size: float) -> Array:

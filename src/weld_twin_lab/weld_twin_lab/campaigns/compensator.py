@@ -13,8 +13,8 @@ import argparse
 import json
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
@@ -75,40 +75,58 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     from .compensating.drawn_cells import HOMES
 
     with messages_importable(), _beside() as beside:
+        from .compensating.drawn_cells import right_and_wrong
         from .compensating.trial import other_arm
 
         known = _before(args)
         each = -(-args.goals // len(HOMES))
-        _in_cells(args, each, known, beside, tell)
+        models = {
+            name: beside.submit(right_and_wrong, name, args.seed)
+            for name in unfinished(known, each)
+        }
+        without = _without_cell(args.without_cell, args.seed, known, beside)
+        _in_cells(args, each, known, models, tell)
         other = other_arm(args.seed)
         tell(other)
         poses = race(args, tell)
-        more = without_cell(args.without_cell, args.seed, beside, tell)
-    found = summary(known.rows, known.changes, other, poses, more)
-    return {**found, 'seed': args.seed, 'goals': known.rows}
+        for own in without:
+            known.without.extend(own.result())
+            tell(f'{len(known.without)} goals without a cell: {_told(known.without)}')
+            _keep(args, known, 0.0)
+    return _made(args, known, other, poses)
 
 
 def _in_cells(
     args: argparse.Namespace,
     each: int,
     known: Known,
-    beside: Executor,
+    models: Mapping[str, Future[Any]],
     tell: Callable[[str], None],
 ) -> None:
     """Try every arm that is not through yet; what the next one needs is learned meanwhile."""
-    from .compensating.drawn_cells import right_and_wrong
     from .compensating.trial import tried
-    from .keeping.result_file import write_result
 
     begun = time.monotonic()
-    names = unfinished(known, each)
-    models = {name: beside.submit(right_and_wrong, name, args.seed) for name in names}
-    for name in names:
-        for said in tried(name, args.seed, each, models[name].result(), known):
+    for name, model in models.items():
+        for said in tried(name, args.seed, each, model.result(), known):
             tell(f'{name}: {said}')
-            made = {**summary(*known, '', None), 'seed': args.seed, 'goals': known.rows}
-            write_result(args.out, 'compensator', time.monotonic() - begun, made)
+            _keep(args, known, time.monotonic() - begun)
         tell(f'{name}: {_told([row for row in known.rows if row["robot"] == name])}')
+
+
+def _made(
+    args: argparse.Namespace, known: Known, other: str, poses: dict[str, Any] | None
+) -> dict[str, Any]:
+    """Return what goes into the file."""
+    found = summary(known.rows, known.changes, other, poses, known.without)
+    return {**found, 'seed': args.seed, 'goals': known.rows, 'goals_without': known.without}
+
+
+def _keep(args: argparse.Namespace, known: Known, seconds: float) -> None:
+    """Write what is known so far, for `--go-on`."""
+    from .keeping.result_file import write_result
+
+    write_result(args.out, 'compensator', seconds, _made(args, known, '', None))
 
 
 def unfinished(known: Known, each: int) -> list[str]:
@@ -138,24 +156,19 @@ def _beside() -> Iterator[Executor]:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def without_cell(
-    goals: int, seed: int, beside: Executor, tell: Callable[[str], None]
-) -> dict[str, Any] | None:
-    """Return what goals come to that are judged without nodes, by kind of arm and in all."""
+def _without_cell(
+    goals: int, seed: int, known: Known, beside: Executor
+) -> list[Future[list[dict[str, Any]]]]:
+    """Begin to judge goals without nodes, arm after arm, those that are not known yet."""
     from .compensating.drawn_cells import HOMES
     from .compensating.without_cell import judged
 
-    kinds = [*HOMES]
-    doing = [
+    kinds, done = [*HOMES], {row['arm'] for row in known.without}
+    return [
         beside.submit(judged, kinds[k % len(kinds)], seed + 1 + k, OF_AN_ARM)
         for k in range(-(-goals // OF_AN_ARM))
+        if seed + 1 + k not in done
     ]
-    rows: list[dict[str, Any]] = []
-    for own in doing:
-        rows += own.result()
-        tell(f'{len(rows)} goals without a cell: {_told(rows)}')
-    arms = {name: counted([row for row in rows if row['robot'] == name]) for name in _names(rows)}
-    return {'arms': len(doing), 'robots': arms, 'totals': counted(rows)} if rows else None
 
 
 def _before(args: argparse.Namespace) -> Known:
@@ -164,13 +177,13 @@ def _before(args: argparse.Namespace) -> Known:
 
     file = Path(args.out)
     if not args.go_on or not file.exists():
-        return Known([], [])
+        return Known([], [], [])
     found = json.loads(file.read_text(encoding='utf-8'))
     if found['seed'] != args.seed:
         raise DataError(
             f"the goals of '{file}' were drawn with --seed {found['seed']}; go on with it"
         )
-    return Known(found['goals'], found['changes'])
+    return Known(found['goals'], found['changes'], found['goals_without'])
 
 
 def _told(rows: Sequence[dict[str, Any]]) -> str:
@@ -219,7 +232,7 @@ def summary(
     changes: Sequence[dict[str, Any]],
     other: str,
     poses: dict[str, Any] | None,
-    without: dict[str, Any] | None = None,
+    without: Sequence[dict[str, Any]] = (),
 ) -> dict[str, Any]:
     """Return what all of it comes to, and whether it passed."""
     calm = [row for row in rows if not row['after']]
@@ -227,7 +240,8 @@ def summary(
     totals = counted(calm)
     robots = {name: counted([r for r in calm if r['robot'] == name]) for name in _names(rows)}
     after = {kind: counted([r for r in rows if r['after'] == kind]) for kind in kinds if kind}
-    told = [totals] if without is None else [totals, without['totals']]
+    beside = counted(without)
+    told = [totals, beside]
     held = sum(one['held'] for one in told) / max(sum(one['bounds'] for one in told), 1)
     goals = {
         'none worse': not any(worse(row) for row in rows)
@@ -248,8 +262,15 @@ def summary(
         'reached': goals,
         'held': held,
         'totals': totals,
-        'without_cell': without,
         'robots': robots,
+        'without_cell': {
+            'arms': len({row['arm'] for row in without}),
+            'robots': {
+                name: counted([r for r in without if r['robot'] == name])
+                for name in _names(without)
+            },
+            'totals': beside,
+        },
         'after_a_change': after,
         'changes': list(changes),
         'other_arm': other,
@@ -280,8 +301,8 @@ def table(result: dict[str, Any]) -> str:
     """Return the tables of the page: the arms, the changes, the race of poses."""
     arms = [*result['robots'].items(), ('all', result['totals'])]
     lines = [markdown.table(HEAD, *(_row(name, one) for name, one in arms)), _changes(result)]
-    more = result.get('without_cell')
-    if more is not None:
+    more = result['without_cell']
+    if more['arms']:
         arms = [*more['robots'].items(), ('all', more['totals'])]
         lines.append(markdown.table(HEAD, *(_row(name, one) for name, one in arms)))
     poses = result['poses']

@@ -21,7 +21,7 @@ from weld_twin_core.twin.goal_correction import CorrectedGoal, Refusal
 from weld_twin_core.twin.pose_correction import PoseCorrection
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.assembly import Intake, Role
-from weld_twin_msgs_py.assembly.frame_names import MeasuringFrame
+from weld_twin_msgs_py.assembly.frame_names import PlannedFrame
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_write import PoseEncoder, TwistEncoder
 from weld_twin_msgs_py.messages.goals import corrected_trajectory
@@ -38,6 +38,7 @@ from weld_twin_msgs_py.messages.topics import (
 
 from ..offline.loaded_model import LoadedModel, loaded
 from ..streams.arm_state import ArmState
+from ..streams.looks_beside import LooksBeside
 from ..streams.pose_stream import PoseStream
 from ..streams.supervision import Supervision
 from .cell_frames import base_frame
@@ -83,11 +84,12 @@ class Compensator(ManagedNode):
         self._watch = Supervision()
         self._listened, self._most_age = False, self.setting('max_age')
         self._stream: PoseStream | None = None
+        self._looks = LooksBeside()
         self._judge = GoalJudge(self)
         self._out = self.offer(POSE_OUT)
         self._correction = self.offer(CORRECTION, awaited=False)
         self._audit = GoalAudit(self)
-        self._frame = MeasuringFrame(self.setting('base_frame'))
+        self._frame = PlannedFrame(self.setting('base_frame'))
         self._encoders: dict[str, tuple[PoseEncoder, TwistEncoder]] = {}
         self.add_on_set_parameters_callback(self._check)
         self.create_service(Trigger, '~/reload', self._reload)
@@ -144,6 +146,7 @@ class Compensator(ManagedNode):
         """End what is worked out beside; what became of goals is written before."""
         self._audit.close()
         self._judge.close()
+        self._looks.close()
         if self._relay is not None:
             self._relay.close()
         super().destroy_node()
@@ -267,6 +270,7 @@ class Compensator(ManagedNode):
             limits_of(self),
             passing=self.setting('on_refusal') == 'pass',
             shadow=not self.setting('apply'),
+            beside=self._looks,
         )
 
     def _on_pose(self, message: Any) -> None:
@@ -291,11 +295,9 @@ class Compensator(ManagedNode):
         position, rotation = from_messages.pose(message)
         stamp = from_messages.stamp_ns(message)
         encode, encode_twist = self._encoder(message.header.frame_id)
-        now = time.monotonic()
-        arm = self._arm.where(now, self._most_age)
-        # Of poses that come in a burst, the stamps tell how far they are apart; where they are set.
-        at = stamp * 1e-9 or now
-        given = stream.take(transform(rotation, position), at, arm, self._withdrawn())
+        arm = self._arm.where(time.monotonic(), self._most_age)
+        # Of poses that come in a burst, the stamps tell how far they are apart.
+        given = stream.take(transform(rotation, position), stamp * 1e-9, arm, self._withdrawn())
         if given.pose is not None:
             self._out.publish(encode(stamp, given.pose[:3, 3], given.pose[:3, :3]))
         if given.added is not None and self._listened:

@@ -98,6 +98,7 @@ class GoalRelay:
         self._pending: dict[int, _Running] = {}
         self._running: list[_Running] = []
         self._turns: deque[Future] = deque()
+        self._stops = 0
         self._server = ActionServer(
             node,
             kind,
@@ -115,20 +116,26 @@ class GoalRelay:
         self._client.destroy()
 
     async def _take(self, goal: Any) -> GoalResponse:
-        """Decide on a goal when those before it are decided on, and send it on."""
-        turn = Future()
+        """Decide on a goal after those before it, and send it on; an order to stop waits for none."""
+        if not goal.trajectory.points:
+            self._stops += 1
+            return await self._sent_on(goal, self._stops)
+        turn, stops = Future(), self._stops
         before = self._turns[-1] if self._turns else None
         self._turns.append(turn)
         try:
             if before is not None:
                 await before
-            return await self._sent_on(goal)
+            return await self._sent_on(goal, stops)
         finally:
             self._turns.remove(turn)
             turn.set_result(None)
 
-    async def _sent_on(self, goal: Any) -> GoalResponse:
+    async def _sent_on(self, goal: Any, stops: int) -> GoalResponse:
         decision = await self._decide(goal)
+        if self._stops != stops:
+            decision.settled('an order to stop came before it was sent on')
+            return GoalResponse.REJECT
         if decision.goal is None:
             decision.settled('')
             return GoalResponse.REJECT

@@ -27,6 +27,6 @@ setup(
     maintainer_email='maintainers@example.org',
     description="A robot's positional accuracy as arrays: kinematics, effects, twin, diagnosis.",
     license='Apache-2.0',
-    long_description=Path('README.md').read_text(encoding='utf-8'),
+    long_description=(Path(__file__).resolve().parent / 'README.md').read_text(encoding='utf-8'),
     long_description_content_type='text/markdown',
 )

@@ -35,6 +35,6 @@ setup(
     maintainer_email='maintainers@example.org',
     description='Proof of the welding robot digital twin: blind check, plant, benchmarks, campaigns.',
     license='Apache-2.0',
-    long_description=Path('README.md').read_text(encoding='utf-8'),
+    long_description=(Path(__file__).resolve().parent / 'README.md').read_text(encoding='utf-8'),
     long_description_content_type='text/markdown',
 )

@@ -35,7 +35,7 @@ setup(
     maintainer_email='maintainers@example.org',
     description='Messages, bags, robot files and tables in and out of arrays.',
     license='Apache-2.0',
-    long_description=Path('README.md').read_text(encoding='utf-8'),
+    long_description=(Path(__file__).resolve().parent / 'README.md').read_text(encoding='utf-8'),
     long_description_content_type='text/markdown',
     entry_points={
         'ament_copyright.license': [

@@ -39,7 +39,7 @@ setup(
     maintainer_email='maintainers@example.org',
     description='Nodes and command line of the welding robot digital twin.',
     license='Apache-2.0',
-    long_description=Path('README.md').read_text(encoding='utf-8'),
+    long_description=(Path(__file__).resolve().parent / 'README.md').read_text(encoding='utf-8'),
     long_description_content_type='text/markdown',
     entry_points={
         'console_scripts': [

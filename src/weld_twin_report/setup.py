@@ -37,6 +37,6 @@ setup(
     maintainer_email='maintainers@example.org',
     description='Diagnoses as people read them: pages, history, fleet and server of the twin.',
     license='Apache-2.0',
-    long_description=Path('README.md').read_text(encoding='utf-8'),
+    long_description=(Path(__file__).resolve().parent / 'README.md').read_text(encoding='utf-8'),
     long_description_content_type='text/markdown',
 )

@@ -30,7 +30,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .associative_scan import last_true, play
 from .effect import Effect, MemoryEffect
-from .hooks import Asked, Fit, Search, Traits
+from .hooks import FitHooks, Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -45,29 +45,17 @@ RV = (
 """What makers of reducers allow."""
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     kind: type[Backlash]
 
     def small(self, view: View, joint: str | None, most: int) -> list[Backlash]:
-        """
-        Return a gap that is all but closed.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it sits on.
-        most : int
-            How many numbers the measurements can hold apart.
-
-        """
+        """Return a gap that is all but closed."""
         return [self.kind(str(joint), CLOSED)]
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: Backlash
@@ -116,8 +104,8 @@ class Backlash(MemoryEffect):
     )
     options = ('form',)
     needs = frozenset({'order'})
-    search = Asked(_Search)
-    fit = Asked(_Fit)
+    search = Hooked(_Search)
+    fit = Hooked(_Fit)
 
     def check(self, robot: Robot) -> None:
         """Refuse an unknown form and a negative width."""
@@ -174,20 +162,7 @@ class Backlash(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield play of a small, a usual and a large width: how it engages depends on width.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield play of a small, a usual and a large width: how it engages depends on width."""
         for width in (5e-5, 5e-4, 2e-3):
             yield cls(str(joint), width)
 

@@ -33,31 +33,20 @@ from ..errors import ModelError
 from .base_leans import base_leans
 from .carriage import summed
 from .effect import Effect
-from .hooks import Asked, Search, Traits
+from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import turn
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     effect: BearingTilt
     kind: type[BearingTilt]
 
     def small(self, view: View, joint: str | None, most: int) -> list[BearingTilt]:
-        """
-        Return the wave of once per turn: among many small errors the second is far below them.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-            The joint it sits on.
-        most : int
-            How many numbers the measurements can hold apart; it takes four.
-
-        """
+        """Return the wave of once per turn: among many small errors the second is far below them."""
         return [self.kind(str(joint))]
 
     def joined(self, other: BearingTilt) -> BearingTilt:
@@ -119,15 +108,11 @@ class BearingTilt(Effect):
             ),
         ),
     )
-    search = Asked(_Search)
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """
         Refuse an effect this robot cannot have.
-
-        Parameters
-        ----------
-        robot : Robot
 
         Raises
         ------
@@ -168,18 +153,7 @@ class BearingTilt(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Any]:
-        """
-        Yield the wave of once per turn, and both waves.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-            The joint it would sit on.
-        pull : array, shape (N,), optional
-            Not needed.
-
-        """
+        """Yield the wave of once per turn, and both waves."""
         yield cls(str(joint))
         yield cls(str(joint), second=np.zeros(4))
 

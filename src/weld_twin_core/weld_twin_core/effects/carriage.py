@@ -13,11 +13,11 @@ from ..arm.robot import Robot
 from ..arm.vectors import components, cross, pad
 from ..arrays import Array
 from .effect import Effect
-from .hooks import Asked, Search, Traits
+from .hooks import Hooked, SearchHooks, Traits
 from .view import View
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     def fits(self, robot: Robot, joint: str | None) -> bool:
@@ -35,7 +35,7 @@ class GuideError(Effect):
         by_motion=True,
         lacking='is of a joint that slides, and {site!r} turns',
     )
-    search = Asked(_Search)
+    search = Hooked(_Search)
 
 
 def carriage_axes(view: View, i: int) -> tuple[Array, Array, Array]:

@@ -20,7 +20,7 @@ from ..arrays import Array
 from .constant import ChannelError, FrameError, frame_parameters
 from .effect import Effect
 from .geometry import JointOffset
-from .hooks import Asked, Traits, Twin
+from .hooks import Hooked, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import base_frame, frame, radians
@@ -68,7 +68,7 @@ class Sudden(Effect):
         ]
 
 
-class _Twin(Twin):
+class _Twin(TwinHooks):
     """What the twin asks of it."""
 
     effect: JointSlip
@@ -110,7 +110,7 @@ class JointSlip(Sudden, ChannelError):
             sliding=Plausible.even(5e-3, 0.1, 'derived: a tooth of a belt or a rack'),
         ),
     )
-    twin = Asked(_Twin)
+    twin = Hooked(_Twin)
 
     def remedy(self, robot: Robot) -> str:
         """Return what to mend, in words; see `Effect.remedy`."""

@@ -21,7 +21,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
-from .hooks import OF_GROUP, TRAITS, Asked, Fit, Search, Traits, Twin, gathered
+from .hooks import OF_GROUP, TRAITS, FitHooks, Hooked, SearchHooks, Traits, TwinHooks, gathered
 from .parametric import Parametric
 from .view import Parameter, Stage, Value, View
 from .wording import travel
@@ -77,9 +77,9 @@ class Effect(Parametric, ABC):
     """Inputs beyond joint position: velocity, order, time, wrench, load, temperature."""
     traits: ClassVar[Traits] = Traits()
     """What it is: its words, where it is entered, what brings it out, who looks for it."""
-    twin: ClassVar[Asked[Twin]] = Asked(Twin)
-    search: ClassVar[Asked[Search]] = Asked(Search)
-    fit: ClassVar[Asked[Fit]] = Asked(Fit)
+    twin: ClassVar[Hooked[TwinHooks]] = Hooked(TwinHooks)
+    search: ClassVar[Hooked[SearchHooks]] = Hooked(SearchHooks)
+    fit: ClassVar[Hooked[FitHooks]] = Hooked(FitHooks)
     """What the twin, the search and the fit ask of it; a kind that has more to say derives them."""
 
     def __init_subclass__(cls, **more: Any) -> None:

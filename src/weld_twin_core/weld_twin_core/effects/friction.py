@@ -27,7 +27,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, MemoryEffect
-from .hooks import Asked, Fit, Traits
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -41,7 +41,7 @@ A_LITTLE = 1e-9
 """Asymmetry of friction that may become uneven in a fit."""
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: Friction
@@ -154,7 +154,7 @@ class Friction(MemoryEffect):
     )
     options = ('release',)
     needs = frozenset({'velocity', 'time'})
-    fit = Asked(_Fit)
+    fit = Hooked(_Fit)
 
     def _bent(self, view: View, state: Any) -> tuple[Array, Array, Array, Any]:
         """Return z and u stacked, shape (..., 2, N), the steps, what is lost, what to carry."""
@@ -210,20 +210,7 @@ class Friction(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield friction of short and long pre-sliding, even and uneven.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield friction of short and long pre-sliding, even and uneven."""
         unit = SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
         for travel in (1e-4, 6e-4):
             for asymmetry in (0.0, A_LITTLE):

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
-from .hooks import Asked, Traits, Twin
+from .hooks import Hooked, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View, single
 from .wording import number
 
 
-class _Twin(Twin):
+class _Twin(TwinHooks):
     """What the twin asks of it."""
 
     effect: GearRatio
@@ -60,7 +60,7 @@ class GearRatio(Effect):
             ),
         ),
     )
-    twin = Asked(_Twin)
+    twin = Hooked(_Twin)
 
     def displace(self, view: View) -> Shift:
         """Return scale * theta on the joint."""

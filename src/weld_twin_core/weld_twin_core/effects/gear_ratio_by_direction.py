@@ -139,20 +139,7 @@ class GearRatioByDirection(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield a quick and a slow change of flanks where the joint went both ways over its angle.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield a quick and a slow change of flanks where the joint went both ways over its angle."""
         i = view.robot.index(str(joint))
         unit = SLIDING if view.robot.prismatic[i] else 1.0
         angle = view.joint(i)

@@ -3,10 +3,10 @@
 """
 What an effect may tell of itself beyond `displace` and `gradient`; everything has a default.
 
-`Traits` is a record of what it is. `Twin`, `Search` and `Fit` are groups of questions, one group for
-each part of the program that asks: the twin, the search, and the fit. An effect that has more to tell
-than the default derives a group and names it, as in ``fit = Asked(MyFit)``. None of those who ask
-knows any effect by name. The page of effects lists all in a table.
+`Traits` is a record of what it is. `TwinHooks`, `SearchHooks` and `FitHooks` are groups of questions,
+one for each part of the program that asks: the twin, the search, and the fit. An effect that has more
+to tell than the default derives a group and names it, as in ``fit = Hooked(MyFit)``. None of those who
+ask knows any effect by name. The page of effects lists all in a table.
 """
 
 from __future__ import annotations
@@ -93,17 +93,17 @@ class Traits:
     `bend`."""
 
 
-class Group:
+class Hooks:
     """Questions to a kind of effect, or to an effect."""
 
     def __init__(self, kind: Any, effect: Any) -> None:
         self.kind, self.effect = kind, effect
 
 
-G = TypeVar('G', bound=Group, covariant=True)
+G = TypeVar('G', bound=Hooks, covariant=True)
 
 
-class Asked(Generic[G]):
+class Hooked(Generic[G]):
     """An attribute of effects that is a group of questions to the effect it is asked of."""
 
     def __init__(self, group: type[G]) -> None:
@@ -114,7 +114,7 @@ class Asked(Generic[G]):
         return self.group(kind, effect)
 
 
-class Twin(Group):
+class TwinHooks(Hooks):
     """What the twin asks, and who takes an effect to another recording."""
 
     @property
@@ -157,7 +157,7 @@ class Twin(Group):
         return 0.0
 
 
-class Search(Group):
+class SearchHooks(Hooks):
     """What the search asks, with the fit of many small errors."""
 
     def fits(self, robot: Robot, joint: str | None) -> bool:
@@ -185,7 +185,7 @@ class Search(Group):
     @property
     def joins(self) -> bool:
         """Return whether two of a kind on one joint are one effect."""
-        return type(self).joined is not Search.joined
+        return type(self).joined is not SearchHooks.joined
 
     def joined(self, other: Any) -> Any:
         """Return this effect and another of its kind and joint as one; None where one has to do."""
@@ -226,7 +226,7 @@ class Search(Group):
         return max(1, self.orders().size)
 
 
-class Fit(Group):
+class FitHooks(Hooks):
     """
     What a least-squares fit asks: the coordinates that it turns, and where it starts.
 
@@ -311,10 +311,10 @@ class Fit(Group):
     @property
     def searched(self) -> bool:
         """Return whether a fit of it has to search for its start among its `starts`."""
-        return type(self).starts is not Fit.starts
+        return type(self).starts is not FitHooks.starts
 
 
-GROUPS: dict[str, type[Group]] = {'twin': Twin, 'search': Search, 'fit': Fit}
+GROUPS: dict[str, type[Hooks]] = {'twin': TwinHooks, 'search': SearchHooks, 'fit': FitHooks}
 """Groups of questions by the attribute of an effect that answers them."""
 TRAITS = frozenset(each.name for each in fields(Traits))
 OF_GROUP = {k: at for at, g in GROUPS.items() for k in vars(g) if not k.startswith('_')}
@@ -342,7 +342,7 @@ def gathered(kind: Any) -> None:
     for at in {OF_GROUP[k] for k in asked}:
         base = type(getattr(kind, at))
         body = {k: _forward(v) for k, v in asked.items() if OF_GROUP[k] == at}
-        setattr(kind, at, Asked(type(f'{kind.__name__}{base.__name__}', (base,), body)))
+        setattr(kind, at, Hooked(type(f'{kind.__name__}{base.__name__}', (base,), body)))
     for name in (*traits, *asked):
         delattr(kind, name)
 

@@ -31,7 +31,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, MemoryEffect
-from .hooks import Asked, Fit, Traits
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -41,7 +41,7 @@ SLIDING = 0.1
 """Metres of a joint that slides which are looked at as a radian of one that turns."""
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: Hysteresis
@@ -116,7 +116,7 @@ class Hysteresis(MemoryEffect):
         ),
     )
     needs = frozenset({'order'})
-    fit = Asked(_Fit)
+    fit = Hooked(_Fit)
 
     def _loop(self, q: Array, state: Any) -> tuple[Array, Array, Any]:
         """Return z, the steps, and what to carry."""
@@ -149,37 +149,14 @@ class Hysteresis(MemoryEffect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: at stations the loop has closed, and is backlash.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on.
-
-        """
+        """Return why the data cannot show it: at stations the loop has closed, and is backlash."""
         if view.static:
             return 'static stations only show which way a joint came, as backlash does'
         return super().applicable(view, joint)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield a short, a usual and a long loop.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield a short, a usual and a long loop."""
         unit = SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
         for travel in (0.01, 0.04, 0.16):
             yield cls(str(joint), 0.0, travel * unit)

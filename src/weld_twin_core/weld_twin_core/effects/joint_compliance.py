@@ -23,7 +23,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError
 from .effect import Effect
-from .hooks import Asked, Search, Traits, Twin
+from .hooks import Hooked, SearchHooks, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import metres, radians, size
@@ -33,7 +33,7 @@ LOAD_OF_EFFORT = {'effort': -1.0, 'effort_reversed': 1.0}
 STATICS = ('equilibrium', 'first_order', *LOAD_OF_EFFORT)
 
 
-class _Twin(Twin):
+class _Twin(TwinHooks):
     """What the twin asks of it."""
 
     effect: JointCompliance
@@ -49,7 +49,7 @@ class _Twin(Twin):
         return self.effect.statics in LOAD_OF_EFFORT
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     effect: JointCompliance
@@ -98,8 +98,8 @@ class JointCompliance(Effect):
     )
     needs = frozenset({'load'})
     options = ('statics',)
-    twin = Asked(_Twin)
-    search = Asked(_Search)
+    twin = Hooked(_Twin)
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """Refuse unknown statics."""
@@ -134,30 +134,12 @@ class JointCompliance(Effect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show this effect at all, or None when they can.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-
-        """
+        """Return why the data cannot show this effect at all, or None when they can."""
         return None if view.effort is not None else super().applicable(view, joint)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield the spring, by measured effort where it is there.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-        pull : array, shape (N,), optional
-            Not looked at: there is one spring.
-
-        """
+        """Yield the spring, by measured effort where it is there."""
         if view.effort is None:
             yield cls(str(joint))
         else:

@@ -12,13 +12,13 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect
-from .hooks import Asked, Search, Traits
+from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     effect: JointCoupling
@@ -63,7 +63,7 @@ class JointCoupling(Effect):
         ),
     )
     options = ('source',)
-    search = Asked(_Search)
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """Refuse an unknown source, and a joint coupled with itself."""
@@ -85,20 +85,7 @@ class JointCoupling(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield one instance per neighbour along the chain, where gears share a housing.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield one instance per neighbour along the chain, where gears share a housing."""
         i = view.robot.index(str(joint))
         for k in (i - 1, i + 1):
             if 0 <= k < view.robot.n:

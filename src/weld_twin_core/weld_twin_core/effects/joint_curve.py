@@ -15,7 +15,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .curve import QUANTITIES, basis, basis_slope, check_knots
 from .effect import Effect
-from .hooks import Asked, Fit, Search, Traits, Twin
+from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
@@ -26,7 +26,7 @@ LEAST_KNOTS, MOST_KNOTS = 2, 8
 """Fewest and most intervals of such a curve: one would be a line, more than eight are waves."""
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     kind: type[JointCurve]
@@ -42,7 +42,7 @@ class _Search(Search):
         )
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: JointCurve
@@ -52,7 +52,7 @@ class _Fit(Fit):
         return [(self.effect.name, self.effect.joint)] * self.coordinates().size
 
 
-class _Twin(Twin):
+class _Twin(TwinHooks):
     """What the twin asks of it."""
 
     effect: JointCurve
@@ -99,9 +99,9 @@ class JointCurve(Effect):
     stage = Stage.LINK
     parameters = (Parameter('values', 'rad', size=0, typical=2e-4),)
     options = ('knots', 'over', 'channel')
-    search = Asked(_Search)
-    fit = Asked(_Fit)
-    twin = Asked(_Twin)
+    search = Hooked(_Search)
+    fit = Hooked(_Fit)
+    twin = Hooked(_Twin)
 
     def check(self, robot: Robot) -> None:
         """Refuse an unknown joint, quantity or channel, and knots that do not increase."""

@@ -20,7 +20,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError
 from .effect import Effect
-from .hooks import Asked, Fit, Traits
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -33,7 +33,7 @@ EVEN = 1e-6
 """Share of their spacing by which stamps of stations differ where they are only counted."""
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: LinkWarmUp
@@ -95,7 +95,7 @@ class LinkWarmUp(Effect):
     )
     options = ('follows',)
     needs = frozenset({'time'})
-    fit = Asked(_Fit)
+    fit = Hooked(_Fit)
 
     def check(self, robot: Robot) -> None:
         """Refuse a temperature to follow that is not two numbers, or does not rise."""
@@ -154,37 +154,14 @@ class LinkWarmUp(Effect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: stations that are only counted tell no time.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint whose link it would be.
-
-        """
+        """Return why the data cannot show it: stations that are only counted tell no time."""
         if view.static and _counted(view.t):
             return 'the stations carry no times'
         return super().applicable(view, joint)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield a fast, a usual and a slow warm-up, and one that follows a temperature that varies.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield a fast, a usual and a slow warm-up, and one that follows a temperature that varies."""
         i = view.robot.index(str(joint))
         if view.robot.a[i] == 0.0 and view.robot.d[i] == 0.0:
             return

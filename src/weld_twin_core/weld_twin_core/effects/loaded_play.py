@@ -21,7 +21,7 @@ from ..errors import ModelError
 from .backlash import RV
 from .curve import load
 from .effect import Effect
-from .hooks import Asked, Search, Traits
+from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -32,21 +32,13 @@ CHANGED = 0.3
 """Share of half the play by which the joint must come off its flank: less looks like an offset."""
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     kind: type[LoadedPlay]
 
     def constants(self, view: View, joint: str | None) -> Iterable[Effect]:
-        """
-        Yield play of a gear that slides easily, where the load keeps it on one flank.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-
-        """
+        """Yield play of a gear that slides easily, where the load keeps it on one flank."""
         torque = load(view, view.robot.index(str(joint)))
         held = SHARES[0] * float(np.abs(torque).max(initial=0.0))
         if held > 0.0 and not _changes(torque, held):
@@ -87,7 +79,7 @@ class LoadedPlay(Effect):
     )
     options = ('torque',)
     needs = frozenset({'load'})
-    search = Asked(_Search)
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """Refuse a gear that friction does not hold at all: its flank would jump."""
@@ -111,20 +103,7 @@ class LoadedPlay(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield play of a gear that slides easily, and of one that sticks.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield play of a gear that slides easily, and of one that sticks."""
         torque = load(view, view.robot.index(str(joint)))
         most = float(np.abs(torque).max(initial=0.0))
         for share in SHARES:

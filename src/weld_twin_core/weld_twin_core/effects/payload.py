@@ -13,7 +13,7 @@ from ..arm.dynamics import payload_slope, payload_torque
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
-from .hooks import Asked, Traits, Twin
+from .hooks import Hooked, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -36,7 +36,7 @@ def mass_range(robot: Robot) -> tuple[float, float]:
     return -robot.payload_mass - BELOW * own, OWN_WEIGHT * own - robot.payload_mass
 
 
-class _Twin(Twin):
+class _Twin(TwinHooks):
     """What the twin asks of it."""
 
     effect: Payload
@@ -92,7 +92,7 @@ class Payload(Effect):
             ),
         ),
     )
-    twin = Asked(_Twin)
+    twin = Hooked(_Twin)
 
     def displace(self, view: View) -> Shift:
         """Return the extra torque on the 'tau' channel of every joint."""

@@ -83,17 +83,7 @@ class PedestalTilt(Effect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: the moment has to change.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            None: it is of the whole robot.
-
-        """
+        """Return why the data cannot show it: the moment has to change."""
         reason = super().applicable(view, joint)
         if reason is not None:
             return reason

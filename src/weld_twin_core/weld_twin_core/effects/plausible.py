@@ -24,15 +24,18 @@ from .registry import REGISTRY
 from .transmission_ripple import TransmissionRipple
 from .view import Plausible
 
-TABLE: dict[tuple[str, str], Plausible] = {
-    (effect.name, parameter.name): parameter.range
-    for effect in REGISTRY.values()
-    for parameter in effect.parameters
-    if parameter.range is not None
-}
-"""By bundled effect and parameter."""
 UNKNOWN = Plausible(np.inf, -np.inf, np.inf, 'derived: nothing is known')
 """What is plausible where an effect does not say."""
+
+
+def table() -> dict[tuple[str, str], Plausible]:
+    """Return what every parameter of every effect may be, by effect and parameter."""
+    return {
+        (effect.name, parameter.name): parameter.range
+        for effect in REGISTRY.values()
+        for parameter in effect.parameters
+        if parameter.range is not None
+    }
 
 
 def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = None) -> Plausible:

@@ -13,7 +13,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
-from .hooks import Asked, Fit, Search, Traits
+from .hooks import FitHooks, Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -29,7 +29,7 @@ MOST = 2000
 """Steps tried at once at most, which bounds memory."""
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     def trials(self, view: View, joint: str | None) -> float:
@@ -38,7 +38,7 @@ class _Search(Search):
         return max(1.0, travel / FINEST)
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: Quantization
@@ -100,8 +100,8 @@ class Quantization(Effect):
             sliding=Plausible(1e-5, 0.0, 1e-3, 'derived: a millimetre is no scale'),
         ),
     )
-    search = Asked(_Search)
-    fit = Asked(_Fit)
+    search = Hooked(_Search)
+    fit = Hooked(_Fit)
 
     def displace(self, view: View) -> Shift:
         """Return rounded minus exact position."""
@@ -123,17 +123,6 @@ class Quantization(Effect):
         A staircase of step s is a wave of 1/s cycles per radian: the spectrum of the residual's
         pull over joint position shows every step at once. A grid of steps would need tens of
         thousands, for a small error of the step runs out of phase over the joint's travel.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
         """
         if pull is None:
             return

@@ -118,17 +118,7 @@ class Refraction(Effect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: it has to be known where the instrument stands.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            None: it is of the whole robot.
-
-        """
+        """Return why the data cannot show it: it has to be known where the instrument stands."""
         nearest = np.linalg.norm(view.frames.position, axis=-1).min(initial=np.inf)
         if nearest < NEAREST:
             return (

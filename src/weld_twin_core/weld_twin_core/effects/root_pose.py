@@ -12,13 +12,13 @@ from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix
 from ..arrays import Array
 from .constant import FrameError, frame_parameters
-from .hooks import Asked, Search
+from .hooks import Hooked, SearchHooks
 from .registry import register
 from .view import Plausible, Value
 from .wording import frame, placed
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     def fits(self, robot: Robot, joint: str | None) -> bool:
@@ -49,7 +49,7 @@ class RootPose(FrameError):
         Plausible.even(5e-3, 0.1, 'derived: a root that was measured by touch, or by hand'),
         Plausible.even(5e-3, 0.1, 'derived: five millimetres on a metre'),
     )
-    search = Asked(_Search)
+    search = Hooked(_Search)
 
     def stands(self, robot: Robot, base: Array) -> tuple[Array, Array]:
         """

@@ -24,7 +24,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .associative_scan import linear
 from .effect import MemoryEffect
-from .hooks import Asked, Fit, Traits
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
@@ -41,7 +41,7 @@ SHORTEST = 1e-9
 """Time constant [s] that a loop has at the least."""
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: ServoLag
@@ -112,7 +112,7 @@ class ServoLag(MemoryEffect):
     )
     options = ('damping',)
     needs = frozenset({'velocity', 'time'})
-    fit = Asked(_Fit)
+    fit = Hooked(_Fit)
 
     def _coefficients(self, dt: Array) -> tuple[Array, Array]:
         """Return the decay over a step and the weight of the input's change over it."""
@@ -209,20 +209,7 @@ class ServoLag(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> list[ServoLag]:
-        """
-        Return a fast and a slow lag; between them the response is nearly proportional.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Return a fast and a slow lag; between them the response is nearly proportional."""
         if view.static:
             return []
         plain = [cls(str(joint), tau) for tau in (2e-3, 3e-2)]

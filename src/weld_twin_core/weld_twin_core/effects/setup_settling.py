@@ -83,20 +83,7 @@ class SetupSettling(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield time constants from a twentieth to half of the recording.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield time constants from a twentieth to half of the recording."""
         span = float(view.elapsed[-1])
         if span > 0.0:
             for share in (0.05, 0.12, 0.25, 0.5):

@@ -81,20 +81,7 @@ class SetupStep(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield steps at evenly spread samples, none at the very ends.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield steps at evenly spread samples, none at the very ends."""
         index = np.linspace(0, view.t.size - 1, TIMES + 2).round().astype(int)[1:-1]
         for k in np.unique(index):
             if k > 0:

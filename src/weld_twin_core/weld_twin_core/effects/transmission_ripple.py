@@ -16,7 +16,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .backlash import RV
 from .effect import Effect
-from .hooks import Asked, Fit, Search, Traits, Twin, Waves, highest_order
+from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks, Waves, highest_order
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
@@ -34,7 +34,7 @@ MANY_ORDERS, SPARSE = 8, 3
 many powers as orders there may be: a sine takes as long as some five products."""
 
 
-class _Twin(Twin):
+class _Twin(TwinHooks):
     """What the twin asks of it."""
 
     effect: TransmissionRipple
@@ -45,7 +45,7 @@ class _Twin(Twin):
         return {('q', view.robot.index(self.effect.joint)): total}
 
 
-class _Search(Search):
+class _Search(SearchHooks):
     """What the search asks of it."""
 
     effect: TransmissionRipple
@@ -56,19 +56,7 @@ class _Search(Search):
         return [self.kind(joint, 0.0, float(order), 0.0) for order in orders]
 
     def small(self, view: View, joint: str | None, most: int) -> list[TransmissionRipple]:
-        """
-        Return one ripple of all orders up to the highest that the measurements can hold apart.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it sits on.
-        most : int
-            How many orders.
-
-        """
+        """Return one ripple of all orders up to the highest that the measurements can hold apart."""
         orders = np.arange(1.0, min(MAX_ORDER, most) + 1.0)
         zero = np.zeros(orders.size)
         return [self.kind(str(joint), zero, orders, zero)] if orders.size else []
@@ -78,15 +66,7 @@ class _Search(Search):
         return np.atleast_1d(np.asarray(self.effect.order, dtype=np.float64))
 
     def with_orders(self, orders: Array) -> TransmissionRipple:
-        """
-        Return the ripple of these orders and no others.
-
-        Parameters
-        ----------
-        orders : array, shape (K,)
-            In cycles per turn; those that the ripple does not have yet are of no size.
-
-        """
+        """Return the ripple of these orders and no others."""
         own, pairs = self.orders(), self.effect.fit.coordinates().reshape(-1, 2)
         wanted = [pairs[own == order].sum(axis=0) for order in orders]
         like = TransmissionRipple(self.effect.joint, np.zeros(len(wanted)), orders, 0.0)
@@ -101,7 +81,7 @@ class _Search(Search):
         return replace(self.effect, **parts)
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: TransmissionRipple
@@ -183,9 +163,9 @@ class TransmissionRipple(Effect):
         Parameter('order', '1/rev', size=0, lower=0.0, differentiable=False, linear=False),
         Parameter('phase', 'rad', size=0, linear=False),
     )
-    twin = Asked(_Twin)
-    search = Asked(_Search)
-    fit = Asked(_Fit)
+    twin = Hooked(_Twin)
+    search = Hooked(_Search)
+    fit = Hooked(_Fit)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -248,20 +228,7 @@ class TransmissionRipple(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Return one instance per integer order that the joint's range of motion can tell.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Return one instance per integer order that the joint's range of motion can tell."""
         told = highest_order(view.joint(view.robot.index(str(joint))))
         return cls.search.lines(str(joint), np.arange(1.0, min(MAX_ORDER, int(told)) + 1.0))
 

@@ -20,7 +20,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import linear
 from .effect import Effect, MemoryEffect
-from .hooks import Asked, Fit, Traits
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -32,7 +32,7 @@ HIGHEST = 0.4
 """Frequency times the step in time of the joint stream that a search goes up to."""
 
 
-class _Fit(Fit):
+class _Fit(FitHooks):
     """What the fit asks of it."""
 
     effect: Vibration
@@ -114,7 +114,7 @@ class Vibration(MemoryEffect):
         ),
     )
     needs = frozenset({'velocity', 'time'})
-    fit = Asked(_Fit)
+    fit = Hooked(_Fit)
 
     def _mode(self) -> tuple[Array, Array]:
         """Return the complex pole and the damped angular frequency [1/s]."""
@@ -184,20 +184,7 @@ class Vibration(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield modes from 2 to 40 Hz, as far as the joint stream's rate can show them.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield modes from 2 to 40 Hz, as far as the joint stream's rate can show them."""
         if view.static or view.t.size < 3:
             return
         highest = HIGHEST / float(np.median(np.diff(view.t)))

@@ -96,19 +96,7 @@ class Wear(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield a tip that wears evenly, and one that has slowed down by the end.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            None: it is of the whole robot.
-        pull : array, shape (N,), optional
-            Not looked at.
-
-        """
+        """Yield a tip that wears evenly, and one that has slowed down by the end."""
         span = max(float(np.max(view.elapsed, initial=0.0)), 1.0)
         for slowed in SLOWED:
             yield cls(0.0, slowed / span)

@@ -234,6 +234,8 @@ class Posterior:
         that were recorded and of those that the joints' limits allow.
     prior_std : array, shape (P,), optional
         Standard deviation of every coordinate before the data.
+    region : (str, float), optional
+        A region that was asked for, as it was told, and the same standard deviation there [m].
 
     """
 
@@ -246,6 +248,7 @@ class Posterior:
     recorded_m: float = 0.0
     anywhere_m: float = 0.0
     prior_std: Array | None = None
+    region: tuple[str, float] | None = None
 
     def __post_init__(self) -> None:
         count = self.directions.count
@@ -501,4 +504,5 @@ def as_dict(posterior: Posterior) -> dict[str, Any]:
         'left_open': list(posterior.left_open),
         'sigma_recorded_m': posterior.recorded_m,
         'sigma_anywhere_m': posterior.anywhere_m,
+        **({} if posterior.region is None else {'region': list(posterior.region)}),
     }

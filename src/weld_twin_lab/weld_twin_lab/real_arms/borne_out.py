@@ -30,7 +30,7 @@ from weld_twin_core.effects.plausible import plausible
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.twin import Twin
 
-from .rows import Row, size
+from .rows import ArmRow, size
 
 TINY = 1e-12
 """Least error [m] divided by."""
@@ -96,14 +96,14 @@ class Borne:
 
 
 def borne_out(
-    row: Row, told: Sequence[Effect], claims: Sequence[Sequence[str]]
+    row: ArmRow, told: Sequence[Effect], claims: Sequence[Sequence[str]]
 ) -> tuple[dict[str, Borne], list[tuple[Borne, Borne]]]:
     """
     Return what unseen data say of every kind, and of every claim.
 
     Parameters
     ----------
-    row : Row
+    row : ArmRow
     told : sequence of Effect
         What a diagnosis tells, as it found it: shapes that are not straight are taken from it.
     claims : sequence of sequence of str
@@ -152,7 +152,7 @@ def thinned(recording: Recording) -> Recording:
     return recording.with_measured(recording.measured.take(keep))
 
 
-def _aligned(recording: Recording, row: Row) -> Robot:
+def _aligned(recording: Recording, row: ArmRow) -> Robot:
     """Return the robot with its frames where they fit best."""
     problem, model = aligned(recording, row.robot, row.align, ())
     model = refined(problem, model) if row.align else model
@@ -222,7 +222,7 @@ class _Columns:
     width: int
 
     @classmethod
-    def of(cls, robot: Robot, row: Row, recording: Recording, kinds: Kinds) -> _Columns:
+    def of(cls, robot: Robot, row: ArmRow, recording: Recording, kinds: Kinds) -> _Columns:
         at = None if recording.measured is None else recording.measured.t
         poses = Twin(robot).poses(recording, at)
         labels = None

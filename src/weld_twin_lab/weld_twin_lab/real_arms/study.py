@@ -22,7 +22,7 @@ from ..real_robots.unseen_stations import residual
 from ..transfer.crash import traceback_told
 from ..transfer.plain import PLAIN, plain_fit
 from .borne_out import Borne, borne_out
-from .rows import Row, halves, plans, row, size
+from .rows import ArmRow, halves, plans, row, size
 
 TOLD = 0.5
 """Probability from which on a cause counts as told: it is likelier right than wrong."""
@@ -206,7 +206,7 @@ def _accused(entry: Mapping[str, Any]) -> bool:
     )
 
 
-def _tried(recording: Recording, one: Row) -> tuple[Diagnosis | None, str | None]:
+def _tried(recording: Recording, one: ArmRow) -> tuple[Diagnosis | None, str | None]:
     try:
         return diagnose([recording], one.robot, align=one.align, experiment=False), None
     except Exception:  # what is counted here is exactly what nobody expected
@@ -239,7 +239,7 @@ def _said(found: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _unseen(one: Row, found: Diagnosis) -> dict[str, float] | None:
+def _unseen(one: ArmRow, found: Diagnosis) -> dict[str, float] | None:
     """Return the RMS error [m] of plain fits and of the diagnosis on what was not fitted."""
     if one.other is None or found.status == 'unsound':
         return None

@@ -297,7 +297,7 @@ class CauseAnswer:
         if unnamed(self.cause):
             told = look_at(self.diagnosis, self.k)
         elif not effects:
-            return ['Measure as told under "What to measure next".']
+            return ['Measure as said under "What to measure next".']
         else:
             twins = same_words(self.diagnosis, *(Site(e.name, e.site) for e in effects))
             ways = filter(None, [*dict.fromkeys(map(gearing, effects)), self._warning])

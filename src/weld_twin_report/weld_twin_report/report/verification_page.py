@@ -23,7 +23,7 @@ _STATES = {
     'partly': 'went away in part',
     'grew': 'is larger than before, or was corrected the wrong way round',
     'over': 'was corrected too far, or has changed since',
-    'open': 'cannot be told from this recording',
+    'open': 'does not show in this recording',
 }
 _SCALE = 1.15
 """Width of the drawing in units of the largest figure in it."""

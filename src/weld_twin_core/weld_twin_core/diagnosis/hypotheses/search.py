@@ -18,6 +18,7 @@ from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..result import Site
 from .library import Library, build
+from .other_sets import reconsidered
 from .rivals import Rival, rivals
 from .selection import (
     Workspace,
@@ -252,9 +253,11 @@ def settled(
 ) -> tuple[Fit, tuple[tuple[Rival, ...], ...]]:
     """Return the fit in which every effect is the best in its place, and its rivals."""
     for attempt in range(SWAPS + 1):
+        now, others = reconsidered(work, now, effective)
+        progress('other sets weighed')
         slots = []
         for k, effect in enumerate(now.model.found):
-            slots.append(rivals(work, now, k, effective))
+            slots.append(rivals(work, now, k, effective, others))
             progress(f'rivals of {Site(effect.name, effect.site)} weighed')
             leader = slots[-1][0]
             if leader.fit is not now and attempt < SWAPS:

@@ -24,6 +24,8 @@ from ..algebra.fit import design
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
+from ..unseen.chance import Candidates, chance_gain
+from ..unseen.folds import gain, least_gain, ways_to_divide
 from ..unseen.unseen_stretches import Unseen
 from .shrinkage import believed, groups, learned_precision, predicted
 from .small_errors import many_small
@@ -48,6 +50,9 @@ CREEPS = 1.0
 FEW_COLUMNS = 200
 """Coordinates up to which sizes are learned anew for every part that is left out: with more there are
 so many stations that sizes hardly hang on some of them, and it would take minutes."""
+LEARNED = (0.1, 1.0, 10.0, 100.0)
+"""Precisions of sizes that many errors could have had, in units of those learned: from three times as
+large to a tenth."""
 CHOSEN = 1.2
 """Effects chosen one by one were chosen on the stations left out as well: what they leave there
 counts a fifth more where the many are many. From draws of 15 to 60 stations of two real arms."""
@@ -83,8 +88,9 @@ def fitted_together(
     better = found.crowded or left < (1.0 if chosen else beliefs.better) * few
     if not better:
         better = left < CHOSEN * few and _many(found, best, beliefs)
-    if better and not found.crowded and _one_and_crumbs(best, beliefs):
-        better = False
+    better = better and (found.crowded or not _one_and_crumbs(best, beliefs))
+    if not (found.final.model.found or found.crowded) and _by_chance(found, best):
+        return found
     if better and found.problem.untracked and PLACES - 1 <= found.problem.places < PLENTY_PLACES:
         trial = _carrying(found, exclude, steps[0], beliefs, progress)
         if found.problem.places < PLACES or unseen_rms(trial) < left:
@@ -92,6 +98,29 @@ def fitted_together(
     if better:
         return best
     return replace(found, many=best) if left < CHOSEN * few else found
+
+
+def _by_chance(none: Search, many: Search) -> bool:
+    """Return whether many small errors predict no more of few stations than they would of noise."""
+    fitted = Unseen.of(many.problem, many.scale, many.final, many.precision)
+    bare = Unseen.of(many.problem, many.scale, none.final, none.precision)
+    told = least_gain(
+        [
+            gain(one.squares(one.whole), more.squares(more.whole), more.trusted_labels())
+            for one, more in zip(bare.every_way(), fitted.every_way(), strict=True)
+        ]
+    )
+    columns, frames = fitted.columns.written_out(), fitted.frames
+    size = np.sqrt(np.maximum(fitted.precision, 1e-300))[:, None]
+    # All of them at once, at the sizes learned and at others: sizes are learned from noise, too.
+    tried = Candidates(
+        columns[:frames],
+        fitted.precision[:frames],
+        [columns[frames:] / size[frames:]],
+        LEARNED,
+        ways_to_divide(many.problem),
+    )
+    return told.share <= chance_gain(tried, told.share, 0.0)
 
 
 def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:

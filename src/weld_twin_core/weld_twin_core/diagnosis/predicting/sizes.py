@@ -67,7 +67,7 @@ class Prior:
 
     middle: Array
     width: Array
-    group: Array
+    group: NDArray[np.int_]
     gears: NDArray[np.bool_]
 
 

@@ -371,7 +371,7 @@ class PoseStream:
         if arm is None:
             self._refused = UNHEARD
             return None
-        there = between(pose, self.correction.arm_poses(arm[None])[0])
+        there = between(pose, self.correction.arm_pose(arm))
         far = [float(np.linalg.norm(part)) for part in np.split(there, 2)]
         if far[0] <= NEAR[0] and far[1] <= NEAR[1]:
             return there

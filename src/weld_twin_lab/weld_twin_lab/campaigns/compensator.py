@@ -302,7 +302,7 @@ def table(result: dict[str, Any]) -> str:
     arms = [*result['robots'].items(), ('all', result['totals'])]
     lines = [markdown.table(HEAD, *(_row(name, one) for name, one in arms)), _changes(result)]
     more = result['without_cell']
-    if more['arms']:
+    if more and more['robots']:
         arms = [*more['robots'].items(), ('all', more['totals'])]
         lines.append(markdown.table(HEAD, *(_row(name, one) for name, one in arms)))
     poses = result['poses']

@@ -14,7 +14,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
@@ -85,12 +85,13 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
             for name in unfinished(known, each)
         }
         without = _without_cell(args.without_cell, args.seed, known, beside)
-        _in_cells(args, each, known, models, tell)
+        _in_cells(args, each, known, models, without, tell)
         other = other_arm(args.seed)
         tell(other)
         poses = race(args, tell)
-        for own in without:
-            known.without.extend(own.result())
+        while without:
+            wait(without, return_when=FIRST_COMPLETED)
+            _gather(without, known)
             tell(f'{len(known.without)} goals without a cell: {_told(known.without)}')
             _keep(args, known, 0.0)
     return _made(args, known, other, poses)
@@ -101,6 +102,7 @@ def _in_cells(
     each: int,
     known: Known,
     models: Mapping[str, Future[Any]],
+    without: list[Future[Any]],
     tell: Callable[[str], None],
 ) -> None:
     """Try every arm that is not through yet; what the next one needs is learned meanwhile."""
@@ -110,6 +112,7 @@ def _in_cells(
     for name, model in models.items():
         for said in tried(name, args.seed, each, model.result(), known):
             tell(f'{name}: {said}')
+            _gather(without, known)
             _keep(args, known, time.monotonic() - begun)
         tell(f'{name}: {_told([row for row in known.rows if row["robot"] == name])}')
 
@@ -120,6 +123,13 @@ def _made(
     """Return what goes into the file."""
     found = summary(known.rows, known.changes, other, poses, known.without)
     return {**found, 'seed': args.seed, 'goals': known.rows, 'goals_without': known.without}
+
+
+def _gather(without: list[Future[Any]], known: Known) -> None:
+    """Take over the goals without a cell that are judged."""
+    for own in [each for each in without if each.done()]:
+        without.remove(own)
+        known.without.extend(own.result())
 
 
 def _keep(args: argparse.Namespace, known: Known, seconds: float) -> None:

@@ -114,6 +114,8 @@ class PoseStream:
             beside.follow(correction)
         self._passing, self._shadow = passing, shadow
         self._fresh: PoseCorrection | None = None
+        self._first: tuple[Array, Array] | None = None
+        self._opening = False
         self.forget()
 
     def renew(self, correction: PoseCorrection) -> None:

@@ -247,10 +247,8 @@ def summary(
     """Return what all of it comes to, and whether it passed."""
     calm = [row for row in rows if not row['after']]
     kinds = list(dict.fromkeys(row['after'] for row in rows))
-    totals = counted(calm)
-    robots = {name: counted([r for r in calm if r['robot'] == name]) for name in _names(rows)}
+    totals, beside = counted(calm), counted(without)
     after = {kind: counted([r for r in rows if r['after'] == kind]) for kind in kinds if kind}
-    beside = counted(without)
     told = [totals, beside]
     held = sum(one['held'] for one in told) / max(sum(one['bounds'] for one in told), 1)
     goals = {
@@ -272,13 +270,10 @@ def summary(
         'reached': goals,
         'held': held,
         'totals': totals,
-        'robots': robots,
+        'robots': _by_arm(calm),
         'without_cell': {
             'arms': len({row['arm'] for row in without}),
-            'robots': {
-                name: counted([r for r in without if r['robot'] == name])
-                for name in _names(without)
-            },
+            'robots': _by_arm(without),
             'totals': beside,
         },
         'after_a_change': after,
@@ -288,8 +283,9 @@ def summary(
     }
 
 
-def _names(rows: Sequence[dict[str, Any]]) -> list[str]:
-    return list(dict.fromkeys(row['robot'] for row in rows))
+def _by_arm(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    names = dict.fromkeys(row['robot'] for row in rows)
+    return {name: counted([row for row in rows if row['robot'] == name]) for name in names}
 
 
 HEAD = (

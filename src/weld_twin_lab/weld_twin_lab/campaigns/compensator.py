@@ -247,18 +247,15 @@ def summary(
     """Return what all of it comes to, and whether it passed."""
     calm = [row for row in rows if not row['after']]
     kinds = list(dict.fromkeys(row['after'] for row in rows))
+    unchanged = [c for c in changes if c['change'] == NOTHING]
     totals, beside = counted(calm), counted(without)
     after = {kind: counted([r for r in rows if r['after'] == kind]) for kind in kinds if kind}
-    told = [totals, beside]
-    held = sum(one['held'] for one in told) / max(sum(one['bounds'] for one in told), 1)
+    held = (totals['held'] + beside['held']) / ((totals['bounds'] + beside['bounds']) or 1)
     goals = {
-        'none worse': not any(worse(row) for row in rows)
-        and not sum(one['worse'] for one in told),
+        'none worse': not any(worse(row) for row in (*rows, *without)),
         'corrected where it pays': totals['of_them_corrected'] >= CORRECTED * totals['to_correct'],
-        'changes noticed': all(c['noticed'] for c in changes if c['change'] != NOTHING),
-        'nothing noticed without a change': not any(
-            c['noticed'] for c in changes if c['change'] == NOTHING
-        ),
+        'changes noticed': all(c['noticed'] for c in changes if c not in unchanged),
+        'nothing noticed without a change': not any(c['noticed'] for c in unchanged),
         'nothing corrected after a change': all(not row['corrected'] for row in after.values()),
         'model of another arm refused': other.startswith('exit code 2'),
         'bound holds': HELD[0] <= held <= HELD[1],

@@ -78,6 +78,9 @@ def test_package_xml_and_setup_py_agree(package):
     assert xml.findtext('description') == told['description'].value
     assert xml.findtext('license') == told['license'].value == 'Apache-2.0'
     assert xml.findtext('export/build_type') == 'ament_python'
+    assert told['python_requires'].value == PROJECT['requires-python']
+    own = ROOT / 'src' / package / 'LICENSE'  # a wheel of one package brings it along
+    assert own.read_bytes() == (ROOT / 'LICENSE').read_bytes()
 
 
 @pytest.mark.parametrize('package', PACKAGES)

@@ -19,6 +19,7 @@ from ..arm.rotation import angle_between, rotation_matrix
 from ..arrays import Array
 from ..effects.effect import MemoryEffect
 from ..errors import DataError
+from ..kernels.single_pose import SinglePose
 from ..kernels.single_turn import turn_between, turn_matrix
 from ..motion.inverse.newton import least_step
 from ..recording import JointMotion
@@ -95,6 +96,7 @@ class PoseCorrection:
         still, robot = model.without_memory() or model, model.robot
         self.model, self.tool = model, tool
         self._arm = model.arm(tool)
+        self._single = SinglePose(self._arm)
         self._twin = still.twin(tool)
         self._back = np.linalg.inv(robot.T_world_base)
         self._still = still
@@ -147,8 +149,8 @@ class PoseCorrection:
             if not size < OPEN:
                 raise DataError('the pose cannot be reached from where the arm stands')
         back = least_step(rise, np.eye(6), SINGULAR).T
-        apart = _rise(self.arm_poses(beside)) - rise
-        added = between(pose, self.arm_poses(q[None])[0])
+        apart = _rise(forward(self._arm, beside)) - rise
+        added = between(pose, self.arm_pose(q))
         return Looked(pose, np.concatenate([added, q]), np.concatenate([apart @ back, back]))
 
     def exact(self, pose: Array) -> Looked:
@@ -239,9 +241,9 @@ class PoseCorrection:
         )
         return float(np.sqrt(np.trace(spread[0, :3, :3])))
 
-    def arm_poses(self, q: Array) -> Array:
-        """Return where the controller has the tool, ``T_base_tool`` of postures (M, n), (M, 4, 4)."""
-        return forward(self._arm, q)
+    def arm_pose(self, q: Array) -> Array:
+        """Return where the controller has the tool, ``T_base_tool`` (4, 4), of a posture (n,)."""
+        return self._single(q)
 
     def _real_poses(self, q: Array) -> Array:
         position, rotation = self._twin.poses(self._still.recording(_standing(q)))

@@ -14,7 +14,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
@@ -85,12 +85,13 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
             for name in unfinished(known, each)
         }
         without = _without_cell(args.without_cell, args.seed, known, beside)
-        _in_cells(args, each, known, models, tell)
+        _in_cells(args, each, known, models, without, tell)
         other = other_arm(args.seed)
         tell(other)
         poses = race(args, tell)
-        for own in without:
-            known.without.extend(own.result())
+        while without:
+            wait(without, return_when=FIRST_COMPLETED)
+            _gather(without, known)
             tell(f'{len(known.without)} goals without a cell: {_told(known.without)}')
             _keep(args, known, 0.0)
     return _made(args, known, other, poses)
@@ -101,6 +102,7 @@ def _in_cells(
     each: int,
     known: Known,
     models: Mapping[str, Future[Any]],
+    without: list[Future[Any]],
     tell: Callable[[str], None],
 ) -> None:
     """Try every arm that is not through yet; what the next one needs is learned meanwhile."""
@@ -110,6 +112,7 @@ def _in_cells(
     for name, model in models.items():
         for said in tried(name, args.seed, each, model.result(), known):
             tell(f'{name}: {said}')
+            _gather(without, known)
             _keep(args, known, time.monotonic() - begun)
         tell(f'{name}: {_told([row for row in known.rows if row["robot"] == name])}')
 
@@ -120,6 +123,13 @@ def _made(
     """Return what goes into the file."""
     found = summary(known.rows, known.changes, other, poses, known.without)
     return {**found, 'seed': args.seed, 'goals': known.rows, 'goals_without': known.without}
+
+
+def _gather(without: list[Future[Any]], known: Known) -> None:
+    """Take over the goals without a cell that are judged."""
+    for own in [each for each in without if each.done()]:
+        without.remove(own)
+        known.without.extend(own.result())
 
 
 def _keep(args: argparse.Namespace, known: Known, seconds: float) -> None:
@@ -237,20 +247,15 @@ def summary(
     """Return what all of it comes to, and whether it passed."""
     calm = [row for row in rows if not row['after']]
     kinds = list(dict.fromkeys(row['after'] for row in rows))
-    totals = counted(calm)
-    robots = {name: counted([r for r in calm if r['robot'] == name]) for name in _names(rows)}
+    unchanged = [c for c in changes if c['change'] == NOTHING]
+    totals, beside = counted(calm), counted(without)
     after = {kind: counted([r for r in rows if r['after'] == kind]) for kind in kinds if kind}
-    beside = counted(without)
-    told = [totals, beside]
-    held = sum(one['held'] for one in told) / max(sum(one['bounds'] for one in told), 1)
+    held = (totals['held'] + beside['held']) / ((totals['bounds'] + beside['bounds']) or 1)
     goals = {
-        'none worse': not any(worse(row) for row in rows)
-        and not sum(one['worse'] for one in told),
+        'none worse': not any(worse(row) for row in (*rows, *without)),
         'corrected where it pays': totals['of_them_corrected'] >= CORRECTED * totals['to_correct'],
-        'changes noticed': all(c['noticed'] for c in changes if c['change'] != NOTHING),
-        'nothing noticed without a change': not any(
-            c['noticed'] for c in changes if c['change'] == NOTHING
-        ),
+        'changes noticed': all(c['noticed'] for c in changes if c not in unchanged),
+        'nothing noticed without a change': not any(c['noticed'] for c in unchanged),
         'nothing corrected after a change': all(not row['corrected'] for row in after.values()),
         'model of another arm refused': other.startswith('exit code 2'),
         'bound holds': HELD[0] <= held <= HELD[1],
@@ -262,13 +267,10 @@ def summary(
         'reached': goals,
         'held': held,
         'totals': totals,
-        'robots': robots,
+        'robots': _by_arm(calm),
         'without_cell': {
             'arms': len({row['arm'] for row in without}),
-            'robots': {
-                name: counted([r for r in without if r['robot'] == name])
-                for name in _names(without)
-            },
+            'robots': _by_arm(without),
             'totals': beside,
         },
         'after_a_change': after,
@@ -278,8 +280,9 @@ def summary(
     }
 
 
-def _names(rows: Sequence[dict[str, Any]]) -> list[str]:
-    return list(dict.fromkeys(row['robot'] for row in rows))
+def _by_arm(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    names = dict.fromkeys(row['robot'] for row in rows)
+    return {name: counted([row for row in rows if row['robot'] == name]) for name in names}
 
 
 HEAD = (
@@ -302,7 +305,7 @@ def table(result: dict[str, Any]) -> str:
     arms = [*result['robots'].items(), ('all', result['totals'])]
     lines = [markdown.table(HEAD, *(_row(name, one) for name, one in arms)), _changes(result)]
     more = result['without_cell']
-    if more['arms']:
+    if more and more['robots']:
         arms = [*more['robots'].items(), ('all', more['totals'])]
         lines.append(markdown.table(HEAD, *(_row(name, one) for name, one in arms)))
     poses = result['poses']

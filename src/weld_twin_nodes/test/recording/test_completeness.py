@@ -83,6 +83,13 @@ def finish(cell, process):
     return process.code
 
 
+def ended(cell, process):
+    """Return how long a node takes to end [s]."""
+    begun = time.monotonic()
+    assert finish(cell, process) == 0
+    return time.monotonic() - begun
+
+
 def numbers(bag):
     with BagReader(bag) as reader:
         found = reader.messages([JOINT_STATES.name])
@@ -165,13 +172,13 @@ def test_a_recorder_ends_soon_though_its_neighbours_stand_still(cell, tmp_path):
     heard_of(cell, process)
     twin.signal(signal.SIGSTOP)
     analyzer.signal(signal.SIGSTOP)
-    begun = time.monotonic()
     try:
-        assert finish(cell, process) == 0
-        assert time.monotonic() - begun < 3.0
+        spent = ended(cell, process)
     finally:
         twin.signal(signal.SIGCONT)
         analyzer.signal(signal.SIGCONT)
+    # How long a node takes to end with nobody in its way is the machine's own, and its load's.
+    assert spent - ended(cell, analyzer) < 2.7
     assert '/forward_kinematics_twin has not told what it sent' in process.log
     assert bag_info(tmp_path / 'bag') is not None
 

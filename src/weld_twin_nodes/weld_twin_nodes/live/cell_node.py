@@ -123,6 +123,7 @@ class CellNode(Node):
             self, self._parameter_overrides, {self.resolve_topic_name(name) for name in named}
         )
         beside = self.setting('joints_beside') if self.has_parameter('joints_beside') else ''
+        self._moving_beside = 0
         self._carrying_nothing = tuple(name.strip() for name in beside.split(','))
 
     @classmethod
@@ -400,9 +401,12 @@ class CellNode(Node):
             self.health.remarks.append(sentence)
             self.get_logger().info(sentence)
 
-    def _tell_beside(self, beside: Beside) -> None:
+    def tell_beside(self, beside: Beside) -> None:
         """Tell of joints that move and are none of the robot's: one may carry it."""
-        sentence = beside.warning(self._carrying_nothing) if beside.moving else ''
+        if len(beside.moving) == self._moving_beside:
+            return
+        self._moving_beside = len(beside.moving)
+        sentence = beside.warning(self._carrying_nothing)
         if sentence and self.health.lasting.get(BESIDE) != sentence:
             self.get_logger().warning(sentence)
             self.health.lasting[BESIDE] = sentence
@@ -498,7 +502,7 @@ class CellNode(Node):
         for intake in self.intakes():
             for sentence in intake.remarks:
                 self.remark(sentence)
-            self._tell_beside(intake.joints.beside)
+            self.tell_beside(intake.joints.beside)
         for source in self._sources:
             source.adapt()
             self.health.inputs[source.name].matched = source.matched()

@@ -84,7 +84,7 @@ class Compensator(ManagedNode):
         self._watch = Supervision()
         self._listened, self._most_age = False, self.setting('max_age')
         self._stream: PoseStream | None = None
-        self._looks = LooksBeside()
+        self._looks: LooksBeside | None = None
         self._judge = GoalJudge(self)
         self._out = self.offer(POSE_OUT)
         self._correction = self.offer(CORRECTION, awaited=False)
@@ -146,7 +146,8 @@ class Compensator(ManagedNode):
         """End what is worked out beside; what became of goals is written before."""
         self._audit.close()
         self._judge.close()
-        self._looks.close()
+        if self._looks is not None:
+            self._looks.close()
         if self._relay is not None:
             self._relay.close()
         super().destroy_node()
@@ -238,6 +239,10 @@ class Compensator(ManagedNode):
         self._listened = self._correction.get_subscription_count() > 0
         if self._stream is not None and self._around is not self._streamed:
             self._stream.renew(self._pose_correction())
+        if self._looks is not None and self._looks.lost:
+            self.remark(
+                'the process for exact looks has ended; this node makes them between poses'
+            )
         if self._model is not None:
             self._outdated = self._model.outdated(self.setting('max_model_age'))
         why = self._withdrawn() if self._active else ''
@@ -265,6 +270,8 @@ class Compensator(ManagedNode):
         correction = self._pose_correction()
         for name in correction.left_out:
             self.remark(f'{name} is not corrected in poses, which do not tell what comes next')
+        if self._looks is None or self._looks.lost:
+            self._looks = LooksBeside()
         self._stream = PoseStream(
             correction,
             limits_of(self),

@@ -121,6 +121,7 @@ class LiveDiagnosis(ManagedNode):
 
     def _take(self, role: Role, message: Any) -> None:
         self._window.take(role, message)
+        self.tell_beside(self._window.intake.joints.beside)
 
     def time_went_back(self) -> None:
         """Forget the window."""

@@ -9,6 +9,7 @@ that process, which ends when nobody holds the other end of its socket any more.
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 import subprocess
@@ -147,6 +148,10 @@ def serve(link: Connection) -> None:
 def main() -> int:
     """Serve the socket that was handed over."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the node, which ends this
+    how = os.sched_getscheduler(0)
+    if how in (os.SCHED_FIFO, os.SCHED_RR):  # beside a node in real time poses go first
+        given = os.sched_getparam(0).sched_priority
+        os.sched_setscheduler(0, how, os.sched_param(max(given - 1, 1)))
     serve(Connection(int(sys.argv[1])))
     return 0
 

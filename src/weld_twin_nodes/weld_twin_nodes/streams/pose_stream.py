@@ -114,6 +114,8 @@ class PoseStream:
             beside.follow(correction)
         self._passing, self._shadow = passing, shadow
         self._fresh: PoseCorrection | None = None
+        self._first: tuple[Array, Array] | None = None
+        self._opening = False
         self.forget()
 
     def renew(self, correction: PoseCorrection) -> None:
@@ -371,7 +373,7 @@ class PoseStream:
         if arm is None:
             self._refused = UNHEARD
             return None
-        there = between(pose, self.correction.arm_poses(arm[None])[0])
+        there = between(pose, self.correction.arm_pose(arm))
         far = [float(np.linalg.norm(part)) for part in np.split(there, 2)]
         if far[0] <= NEAR[0] and far[1] <= NEAR[1]:
             return there

@@ -84,6 +84,11 @@ class Parametric:
 
     def components(self) -> list[tuple[Parameter, int | None]]:
         """Return every scalar component: its parameter and its index, None for a plain number."""
+        return self._components
+
+    # A search asks the same instance hundreds of times, and its fields never change.
+    @cached_property
+    def _components(self) -> list[tuple[Parameter, int | None]]:
         out: list[tuple[Parameter, int | None]] = []
         for parameter in self.parameters:
             if self._is_number(parameter):
@@ -99,15 +104,26 @@ class Parametric:
         return self.vector().shape[:-1]
 
     def vector(self) -> Array:
-        """Return all components as one vector, shape (P,), or (D, P) with draws."""
+        """Return all components as one vector, shape (P,), or (D, P) with draws; not to be written."""
+        return self._vector
+
+    @cached_property
+    def _vector(self) -> Array:
         values = [getattr(self, p.name) for p in self.parameters]
-        if all(isinstance(value, float) for value in values) and values:
-            return np.array(values)  # most effects, and a search asks very often
-        parts = [
-            np.asarray(getattr(self, p.name), dtype=np.float64)[... if k is None else (..., k)]
-            for p, k in self.components()
-        ]
-        return np.stack(np.broadcast_arrays(*parts), axis=-1) if parts else np.zeros(0)
+        if all(isinstance(value, float) for value in values):
+            out = np.array(values, dtype=np.float64)  # most effects
+        else:
+            parts = [
+                np.asarray(getattr(self, p.name), dtype=np.float64)[... if k is None else (..., k)]
+                for p, k in self.components()
+            ]
+            out = np.stack(np.broadcast_arrays(*parts), axis=-1)
+        out.setflags(write=False)
+        return out
+
+    @cached_property
+    def _turned(self) -> list[int]:
+        return self.fitted()
 
     def with_vector(self: P, vector: Array) -> P:
         """Return the same with other components, shape (P,) or draws (D, P)."""
@@ -144,20 +160,20 @@ class Parametric:
 
     def coordinates(self) -> Array:
         """Return the fit coordinates, shape (K,)."""
-        return np.asarray(self.vector()[self.fitted()])
+        return np.asarray(self.vector()[self._turned])
 
     def with_coordinates(self: P, values: Array) -> P:
         """Return the same at other fit coordinates, kept inside the physical bounds."""
         vector = np.array(self.vector())
         specs = self.components()
-        for k, value in zip(self.fitted(), values, strict=True):
+        for k, value in zip(self._turned, values, strict=True):
             vector[k] = min(max(float(value), specs[k][0].lower), specs[k][0].upper)
         return self.with_vector(vector)
 
     def coordinate_scales(self) -> Array:
         """Return the typical size of every fit coordinate, shape (K,)."""
         specs = self.components()
-        return np.array([specs[k][0].typical for k in self.fitted()])
+        return np.array([specs[k][0].typical for k in self._turned])
 
     def errors(self, std: Array) -> dict[str, Any]:
         """
@@ -172,7 +188,7 @@ class Parametric:
         out: dict[str, Any] = {}
         values = iter(None if np.isnan(value) else float(value) for value in std)
         specs = self.components()
-        for parameter, index in (specs[k] for k in self.fitted()):
+        for parameter, index in (specs[k] for k in self._turned):
             if index is None:
                 out[parameter.name] = next(values)
             else:

@@ -30,7 +30,7 @@ from .arm.rotation import rotation_matrix, skew
 from .arrays import Array
 from .cameras.bodies import Bodies, bodies
 from .cameras.lens import UNKNOWNS, Lens
-from .cameras.sightings import Fitted, Sightings
+from .cameras.sightings import Fitted, Sightings, Target
 from .errors import DataError
 from .pose_noise import Common, PoseNoise
 from .recording import Measurements, Recording
@@ -63,6 +63,11 @@ SINGULAR = 1e9
 BEYOND = 1.1
 """Of the size of an image, from where on a pixel is outside: where the size is not told it follows
 from the centre, which is off by some per cent."""
+LOOSEST, LOOSER = 10.0, 1.5
+"""Times what was said that the points of a target may turn out to be off, and from where on that is
+believed: a printed board of a few dozen points errs by half more by chance in its figure at most."""
+LEARNED = 3
+"""Times that it is learned how well points are known; the last changes it by a few per cent."""
 SHOWN = 1.0
 """Deviations by which an unknown of one deviation must move all poses together to be kept."""
 
@@ -81,6 +86,8 @@ class Adjusted(NamedTuple):
         How far each lens is from the given one, in spreads of `FOCAL` and the others.
     pixel : float [px]
         Noise of a pixel's coordinate that is left.
+    known : tuple of float [m]
+        How well the points of each target turned out to be known.
 
     """
 
@@ -88,6 +95,7 @@ class Adjusted(NamedTuple):
     lenses: tuple[Lens, ...]
     off: Array
     pixel: float
+    known: tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +179,12 @@ class _State:
         first = at + 6 * len(self.start.free) + sizes[seen.target] + 3 * seen.point
         put(first, of_corner, every)
         return np.asarray(whole * self.sizes)
+
+    def with_targets(self, targets: tuple[Target, ...]) -> _State:
+        """Return the state with other spreads of the points of targets; nothing moves."""
+        before = self.sizes
+        state = replace(self, seen=replace(self.seen, targets=targets))
+        return replace(state, unknowns=self.unknowns * before / state.sizes)
 
     def moved(self, step: Array, tool: Array) -> _State:
         """Return the state after a step of unknowns (Z,), in spreads, and of the tool (M, 6)."""
@@ -305,8 +319,37 @@ def adjusted(seen: Sightings) -> Adjusted:
     for _ in range(REWEIGHTED):
         weight, _ = _weights(state, told)
         state = _descended(_Point.at(state, weight)).state
+    state = _loosened(state, told)
     weight, noise = _weights(state, told)
     return _told(_Point.at(state, weight), noise)
+
+
+def _loosened(state: _State, told: Array) -> _State:
+    """
+    Return the state with points of targets as well known as the images say, never better.
+
+    Each target has one spread of its points, which makes the images likeliest (evidence); points
+    that no image shows say nothing of it.
+    """
+    said = [target.sigma for target in state.seen.targets]
+    for _ in range(LEARNED):
+        weight, _ = _weights(state, told)
+        normal = _Point.at(state, weight).reduced.normal
+        known = 1.0 - np.diag(np.linalg.inv(normal + np.eye(len(normal))))
+        at = state.unknowns.size - sum(t.points.size for t in state.seen.targets)
+        targets = []
+        for target, first in zip(state.seen.targets, said, strict=True):
+            own = slice(at, at + target.points.size)
+            at = own.stop
+            off = float((state.unknowns[own] ** 2).sum()) / max(float(known[own].sum()), 1e-9)
+            sigma = min(max(target.sigma * off**0.5, first), LOOSEST * first)
+            targets.append(replace(target, sigma=sigma))
+        pairs = list(zip(targets, said, strict=True))
+        if all(target.sigma < LOOSER * first for target, first in pairs):
+            return state
+        state = state.with_targets(tuple(targets))
+        state = _descended(_Point.at(state, weight)).state
+    return state
 
 
 def seen_by(recording: Recording, seen: Sightings) -> Recording:
@@ -334,6 +377,12 @@ def seen_by(recording: Recording, seen: Sightings) -> Recording:
     for camera, lens in zip(seen.cameras, found.lenses, strict=True):
         longer = 100.0 * (lens.focal / camera.lens.focal - 1.0).mean()
         notes.append(f'camera {camera.name!r}: the images have the focal length {longer:+.2f} %')
+    notes += [
+        f'points of target {target.name!r} are off by {1e3 * sigma:.2f} mm, not by '
+        f'{1e3 * target.sigma:.2f} mm as was said'
+        for target, sigma in zip(seen.targets, found.known, strict=True)
+        if sigma > LOOSER * target.sigma
+    ]
     return replace(
         recording,
         images=replace(seen, fitted=Fitted(found.pixel, found.off)),
@@ -429,7 +478,8 @@ def _told(point: _Point, noise: float) -> Adjusted:
         common=Common(change, kept @ mean),
     )
     off = state.unknowns[: UNKNOWNS * len(state.lenses)].reshape(-1, UNKNOWNS)
-    return Adjusted(measured, state.lenses, off, noise)
+    known = tuple(target.sigma for target in state.seen.targets)
+    return Adjusted(measured, state.lenses, off, noise, known)
 
 
 def _of_tool(

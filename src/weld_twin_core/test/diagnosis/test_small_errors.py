@@ -82,7 +82,7 @@ def test_a_gear_seen_over_little_travel_has_a_curve(robot):
     seen, other = (stations(robot, half, rough, seed) for seed in (3, 4))
     plain = fitted(seen, robot, 'base', *GEOMETRY, 'transmission_ripple')
     curved = fitted(seen, robot, 'base', *GEOMETRY, 'transmission_ripple', 'joint_curve')
-    assert not any(effect.orders().size for effect in curved.found)
+    assert not any(effect.search.orders().size for effect in curved.found)
     assert off(curved, other) < 0.6 * off(plain, other)
 
 
@@ -105,7 +105,9 @@ def test_a_joint_with_waves_has_no_curve_beside_them(robot):
     [
         name
         for name, kind in sorted(REGISTRY.items())
-        if kind.of == 'joint' and kind.cause and kind.fits(wt.load('ur5'), 'elbow_joint')
+        if kind.of == 'joint'
+        and kind.traits.cause
+        and kind.search.fits(wt.load('ur5'), 'elbow_joint')
     ],
 )
 def test_a_search_never_makes_an_effect_outside_its_bounds(robot, name):
@@ -113,7 +115,7 @@ def test_a_search_never_makes_an_effect_outside_its_bounds(robot, name):
     recording = stations(robot, [0.5] * 6, (), count=12)
     view = wt.Twin(robot).evaluate(recording, recording.joints.t).view
     for seed in REGISTRY[name].seeds(view, 'elbow_joint'):
-        count = len(seed.coordinates())
+        count = len(seed.fit.coordinates())
         for sign in (1.0, -1.0):
             seed.from_atoms(sign * 1e-4 * np.ones(count)).check(robot)
 
@@ -171,7 +173,9 @@ def test_one_wrong_scale_is_not_ten_wrong_links(robot):
     scaled = stations(robot, 0.9, [MeasurementScale(1e-3)], count=60)
     problem, start = aligned([scaled], robot, '', ())
     few = search(problem, start, (), Beliefs(), lambda text: None)
-    without = tuple(name for name in REGISTRY if REGISTRY[name].waves or REGISTRY[name].bends)
+    without = tuple(
+        name for name in REGISTRY if REGISTRY[name].traits.waves or REGISTRY[name].traits.bends
+    )
     fit, scale, precision = many_small(problem, start, without, Beliefs(), lambda text: None)
     many = replace(few, final=fit, scale=scale, precision=precision, slots=(), dense=True)
     assert [effect.name for effect in few.final.model.found] == ['measurement_scale']

@@ -14,9 +14,11 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.rotation import quaternion_from_matrix
+from weld_twin_core.cameras import Camera, Lens
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_msgs_py.bags import bag_info, read_recording
 from weld_twin_msgs_py.messages.topics import TopicNames
+from weld_twin_msgs_py.tables import read_target
 
 ROBOT = load('ur5')
 N = 12
@@ -60,6 +62,24 @@ MSG: mocap4r2_msgs/Marker
 int64 index
 geometry_msgs/Point translation
 """
+TAGS = """\
+std_msgs/Header header
+apriltag_msgs/AprilTagDetection[] detections
+================================================================================
+MSG: apriltag_msgs/AprilTagDetection
+string family
+int32 id
+int32 hamming
+float32 goodness
+float32 decision_margin
+apriltag_msgs/Point centre
+apriltag_msgs/Point[4] corners
+float64[9] homography
+================================================================================
+MSG: apriltag_msgs/Point
+float64 x
+float64 y
+"""
 
 
 class Cell:
@@ -71,6 +91,7 @@ class Cell:
             ('control_msgs/msg/JointTrajectoryControllerState', STATE),
             ('control_msgs/msg/DynamicJointState', DYNAMIC),
             ('mocap4r2_msgs/msg/RigidBodies', BODIES),
+            ('apriltag_msgs/msg/AprilTagDetectionArray', TAGS),
         ):
             types = get_types_from_msg(text, name)
             self.store.register({k: v for k, v in types.items() if k not in self.store.types})
@@ -303,3 +324,58 @@ def test_stamps_stay_those_of_the_headers(cell, tmp_path):
         cell.joints(k)
     t = read_recording(cell.write(tmp_path), ROBOT).joints.t
     assert all(b - a == pytest.approx(0.1, abs=1e-9) for a, b in pairwise(t))
+
+
+FOCAL, SIDE = 1200.0, 0.06
+MIDDLES = {7: (0.0, 0.0, 0.0), 11: (0.1, 0.02, 0.0)}
+AGAINST_THE_CLOCK = ((-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))
+"""Corners of a tag as its detector counts them, x to the right and y down, in half sides."""
+
+
+def test_tags_that_a_camera_found_tell_poses(tmp_path):
+    cell = Cell()
+    eye = np.eye(4)
+    eye[:3, 3] = [0.1, -0.2, 2.5]
+    eye[:3, :3] = np.diag([1.0, -1.0, -1.0])
+    boards = []
+    for k in range(N):
+        cell.joints(k)
+        board = np.linalg.inv(eye) @ forward(ROBOT, Q[k])
+        # Wherever the flange looks, the board on it faces the camera that looks down.
+        board[:3, :3] = np.diag([1.0, 1.0, 1.0]) + 0.1 * np.cross(np.eye(3), [1.0, 0.3, -k])
+        board[:3, :3] = np.linalg.qr(board[:3, :3])[0] * [-1.0, -1.0, -1.0]
+        board[:3, :3] *= np.sign(np.linalg.det(board[:3, :3]))
+        boards.append(board)
+        found = []
+        for tag, middle in {**MIDDLES, 99: (0.3, 0.0, 0.0)}.items():
+            corners = [(*(0.5 * SIDE * np.array(c)), 0.0) for c in AGAINST_THE_CLOCK]
+            there = (np.array(corners) + middle) @ board[:3, :3].T + board[:3, 3]
+            places = FOCAL * there[:, :2] / there[:, 2:] + [640.0, 480.0]
+            found.append(
+                cell.make(
+                    'apriltag_msgs/msg/AprilTagDetection',
+                    family='tag36h11',
+                    id=tag,
+                    hamming=0,
+                    goodness=0.0,
+                    decision_margin=80.0,
+                    centre=cell.make('apriltag_msgs/msg/Point', x=0.0, y=0.0),
+                    corners=[cell.make('apriltag_msgs/msg/Point', x=x, y=y) for x, y in places],
+                    homography=np.zeros(9),
+                )
+            )
+        kind = 'apriltag_msgs/msg/AprilTagDetectionArray'
+        cell.add('/detections', kind, k, header=cell.header(k, 'eye'), detections=found)
+    (tmp_path / 'tags.yaml').write_text(
+        f'board: tags\nsize: {SIDE}\ntags: {{7: [0, 0, 0], 11: [0.1, 0.02, 0]}}\n'
+    )
+    names = TopicNames(
+        images='/detections',
+        cameras=(Camera('eye', Lens([FOCAL, FOCAL], [640.0, 480.0], [])),),
+        targets=(read_target('tags', tmp_path / 'tags.yaml'),),
+    )
+    recording = read_recording(cell.write(tmp_path), ROBOT, names)
+    assert recording.images is not None and len(recording.images.pixel) == 8 * N
+    made = np.array(boards)
+    np.testing.assert_allclose(recording.measured.position, made[:, :3, 3], atol=2e-4)
+    np.testing.assert_allclose(recording.measured.rotation, made[:, :3, :3], atol=2e-3)

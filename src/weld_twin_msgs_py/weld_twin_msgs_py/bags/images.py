@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,11 +16,17 @@ from weld_twin_core.recording import Recording
 
 from ..messages.from_messages import stamp_ns
 from ..messages.image_points import FIELDS, points
+from ..messages.tag_detections import TAGS, Marks, corners
 from ..messages.topics import IMAGE_POINTS, TopicNames
 from .reader import BagReader
 
-Image = tuple[int, str, np.ndarray]
-"""Stamp [ns], camera, and rows of target, point, u and v."""
+Image = tuple[int, str, np.ndarray | Marks]
+"""Stamp [ns], camera, and rows of target, point, u and v; or corners of tags by their labels."""
+READ: Mapping[str, Callable[[Any], np.ndarray | Marks]] = {
+    IMAGE_POINTS.type: points,
+    TAGS: corners,
+}
+"""What takes the points out of a message of either type."""
 
 
 def images(bag: BagReader, names: TopicNames) -> list[Image]:
@@ -36,15 +42,15 @@ def images(bag: BagReader, names: TopicNames) -> list[Image]:
     kind, count = bag.topics.get(names.images, ('', 0))
     if not count:
         return []
-    if kind != IMAGE_POINTS.type:
+    if kind not in READ:
         raise DataError(
             f"topic '{names.images}' has the type {kind}, but points in images are of "
-            f'{IMAGE_POINTS.type}'
+            f'{" or ".join(READ)}'
         )
     out: list[Image] = []
     for topic, _, _, message in bag.messages([names.images]):
         try:
-            out.append((stamp_ns(message), message.header.frame_id, points(message)))
+            out.append((stamp_ns(message), message.header.frame_id, READ[kind](message)))
         except DataError as error:
             raise DataError(f"message {len(out)} of '{topic}': {error}") from None
     return sorted(out, key=lambda image: image[0])
@@ -76,15 +82,21 @@ def looking(
     stamps = sorted({ns for ns, _, _ in each})
     number = {ns: k for k, ns in enumerate(stamps)}
     columns: list[np.ndarray] = []
-    for ns, camera, rows in each:
+    for ns, camera, found in each:
         if camera not in cameras:
             raise DataError(
                 f"the bag has images of camera '{camera}', which is not described; give it with "
                 f'--camera {camera}=FILE'
             )
+        rows = _labelled(found, targets) if isinstance(found, list) else found
         place = np.full(len(rows), float(list(cameras).index(camera)))
         columns.append(np.column_stack([np.full(len(rows), float(number[ns])), place, rows]))
     whole = np.concatenate(columns)
+    if not len(whole):
+        raise DataError(
+            'the images show no point of a target that is described; give the target with its '
+            'tags: --target NAME=FILE'
+        )
     image, camera_, target = (whole[:, k].astype(int) for k in range(3))
     if whole.size and not 0 <= target.min() <= target.max() < len(targets):
         raise DataError(
@@ -106,6 +118,17 @@ def looking(
             whole[:, 4:6],
         ),
     )
+
+
+def _labelled(found: Marks, targets: Mapping[str, Target]) -> np.ndarray:
+    """Return rows of `FIELDS` of corners by their labels; those of tags elsewhere are left out."""
+    known = {
+        text: (float(k), float(call))
+        for k, one in enumerate(targets.values())
+        for text, call in zip(one.labels, numbered(one), strict=True)
+    }
+    rows = [(*known[text], u, v) for text, u, v in found if text in known]
+    return np.array(rows, dtype=float).reshape(-1, len(FIELDS))
 
 
 def _described(

@@ -16,14 +16,17 @@ from weld_twin_core.cameras.sightings import PLACED
 from weld_twin_core.errors import DataError
 
 from ..files.yaml_file import read_yaml
+from ..messages.tag_detections import label
 from .cells import read_cells
 from .header import unit_of
 from .unit_guess import METRES, factor
 
 LENSES = ('plumb_bob', 'rational_polynomial')
 """Models of distortion that are understood; coefficients in the order of OpenCV."""
-BOARDS = ('charuco', 'chessboard')
+BOARDS = ('charuco', 'chessboard', 'tags')
 """Boards whose points follow from a few numbers."""
+ROUND = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
+"""Corners of a tag in its side, clockwise from the upper left: x to the right, y down."""
 AXES = ('x', 'y', 'z')
 
 
@@ -121,7 +124,8 @@ def read_board(path: Path | str) -> Mapping[str, Any]:
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(
             f"board file '{path}' cannot be understood: {_missing(error)}; it needs "
-            f'board: {" | ".join(BOARDS)}, squares: [columns, rows] and square: in metres'
+            f'board: {" | ".join(BOARDS)}, squares: [columns, rows] and square: in metres, or of '
+            'tags their size: and tags: by number'
         ) from None
     except DataError as error:
         raise DataError(f"board file '{path}': {error}") from None
@@ -130,17 +134,22 @@ def read_board(path: Path | str) -> Mapping[str, Any]:
 
 def board_points(entry: Mapping[str, Any]) -> dict[str, Array]:
     """
-    Return the inner corners of a board in its own frame, by the numbers OpenCV gives them [m].
+    Return the points of a board in its own frame by their labels [m].
+
+    Inner corners have the numbers that OpenCV gives them, corners of tags those of `label`.
 
     Parameters
     ----------
     entry : mapping
         ``board`` (charuco or chessboard), ``squares`` (columns and rows of squares) and
-        ``square`` (their side [m]).
+        ``square`` (their side [m]); or ``board: tags``, ``tags`` (the middle of each by its
+        number [m], or a single number) and ``size`` (side of the black square [m]).
 
     """
     if entry['board'] not in BOARDS:
         raise DataError(f'board is {entry["board"]!r}; a board is {" or ".join(BOARDS)}')
+    if entry['board'] == 'tags':
+        return _tag_points(entry['tags'], float(entry['size']))
     columns, rows = (int(count) for count in entry['squares'])
     side = float(entry['square'])
     if min(columns, rows) < 3 or not side > 0.0:
@@ -149,6 +158,18 @@ def board_points(entry: Mapping[str, Any]) -> dict[str, Array]:
     return {
         str(k): np.array([k % wide + 1.0, k // wide + 1.0, 0.0]) * side
         for k in range(wide * (rows - 1))
+    }
+
+
+def _tag_points(tags: Any, size: float) -> dict[str, Array]:
+    """Return the corners of tags in one plane, upright, by their labels [m]."""
+    if not size > 0.0:
+        raise DataError('size of the tags must be a positive side of the black square [m]')
+    middles = tags if isinstance(tags, Mapping) else {tags: [0.0, 0.0, 0.0]}
+    return {
+        label(int(tag), k): np.array(middle, dtype=float) + size * np.array([*corner, 0.0])
+        for tag, middle in middles.items()
+        for k, corner in enumerate(ROUND)
     }
 
 

@@ -79,3 +79,22 @@ def test_what_is_no_board_file_is_told_in_one_sentence(tmp_path, weld_twin):
     )
     assert ran.code == 2
     assert "'squares' is missing" in ran.err
+
+
+def test_tags_in_images_become_a_table_of_their_corners(tmp_path, weld_twin):
+    cv2 = pytest.importorskip('cv2')
+    family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+    image = np.full((400, 700), 255, dtype=np.uint8)
+    for tag, left in ((5, 80), (23, 400)):
+        image[100:300, left : left + 200] = cv2.aruco.generateImageMarker(family, tag, 200)
+    cv2.imwrite(str(tmp_path / 'a.png'), image)
+    (tmp_path / 'tags.yaml').write_text('board: tags\nsize: 0.05\ntags: {5: [0, 0, 0]}\n')
+    table = tmp_path / 'pixels.csv'
+    weld_twin('detect', tmp_path / 'a.png', '--board', tmp_path / 'tags.yaml', '--out', table)
+    rows = {row['point']: row for row in csv.DictReader(table.open())}
+    # Clockwise from the upper left; the tag that is not of the board is left out.
+    places = {'5.0': (80, 100), '5.1': (280, 100), '5.2': (280, 300), '5.3': (80, 300)}
+    assert set(rows) == set(places)
+    for text, place in places.items():
+        seen = [float(rows[text]['u [px]']), float(rows[text]['v [px]'])]
+        assert np.linalg.norm(np.subtract(place, seen) - 0.5) < 1.0

@@ -25,9 +25,10 @@ PARTS = {
     'joint': 'JointState, DynamicJointState or JointTrajectoryControllerState (TOPIC:feedback)',
     'pose': 'PoseStamped, PoseWithCovarianceStamped, TransformStamped, /tf:FRAME, or a '
     'JointTrajectoryControllerState, of which the pose of the feedback is taken',
+    'image': 'PointCloud2 of target, point, u, v; or AprilTagDetectionArray',
 }
 """What the topics may hold besides the usual; after a colon, the part that is meant."""
-TOPIC_OPTIONS = ('joint', 'pose', 'point', 'wrench', 'temperature')
+TOPIC_OPTIONS = ('joint', 'pose', 'point', 'image', 'wrench', 'temperature')
 TOPICS = (
     *('namespace', 'joint_prefix', 'joint_map', 'measured_inverse', 'use_effort'),
     *('camera', 'target'),
@@ -144,7 +145,7 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
     from weld_twin_msgs_py.messages.topics import TopicNames
 
     given = {name: getattr(args, f'{name}_topic') for name in TOPIC_OPTIONS}
-    given['joints'] = given.pop('joint')
+    given['joints'], given['images'] = given.pop('joint'), given.pop('image')
     named = {name: value for name, value in given.items() if value}
     pairs = []
     for text in args.joint_map:

@@ -11,9 +11,13 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.errors import DataError, ModelError
+from weld_twin_msgs_py.messages.tag_detections import label
+from weld_twin_msgs_py.tables.camera_files import board_points
 
 DICTIONARY = 'DICT_5X5_100'
 """Markers of a ChArUco board of which nothing is said."""
+APRILTAG = 'DICT_APRILTAG_36h11'
+"""Tags of which nothing is said: the family that apriltag_ros looks for first."""
 MARKED = 0.75
 """Side of a marker in that of its square, where nothing is said: what OpenCV's samples print."""
 WINDOW = (11, 11)
@@ -33,7 +37,8 @@ def detector(board: Mapping[str, Any]) -> Callable[[Path], Corners]:
     ----------
     board : mapping
         ``board`` (charuco or chessboard), ``squares`` [columns, rows], ``square`` [m], and of a
-        ChArUco board ``marker`` [m] and ``dictionary``, as OpenCV calls it.
+        ChArUco board ``marker`` [m] and ``dictionary``, as OpenCV calls it; or ``board: tags``,
+        their numbers and ``dictionary``.
 
     Raises
     ------
@@ -49,12 +54,7 @@ def detector(board: Mapping[str, Any]) -> Callable[[Path], Corners]:
         raise ModelError(
             "weld-twin detect needs OpenCV: install it with pip install 'weld_twin[camera]'"
         ) from None
-    columns, rows = (int(count) for count in board['squares'])
-    found = (
-        _chessboard(cv2, columns - 1, rows - 1)
-        if board['board'] == 'chessboard'
-        else _charuco(cv2, columns, rows, board)
-    )
+    found = _finder(cv2, board)
 
     def corners(path: Path) -> Corners:
         image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
@@ -66,11 +66,46 @@ def detector(board: Mapping[str, Any]) -> Callable[[Path], Corners]:
     return corners
 
 
-def _charuco(cv2: Any, columns: int, rows: int, board: Mapping[str, Any]) -> Callable[[Any], Any]:
-    name = str(board.get('dictionary', DICTIONARY))
+def _finder(cv2: Any, board: Mapping[str, Any]) -> Callable[[Any], Any]:
+    """Return what finds labels and places of a board's points in an image."""
+    if board['board'] == 'tags':
+        return _tags(cv2, board)
+    columns, rows = (int(count) for count in board['squares'])
+    if board['board'] == 'chessboard':
+        return _chessboard(cv2, columns - 1, rows - 1)
+    return _charuco(cv2, columns, rows, board)
+
+
+def _markers(cv2: Any, board: Mapping[str, Any], usual: str) -> Any:
+    """Return the dictionary of a board's markers."""
+    name = str(board.get('dictionary', usual))
     if not hasattr(cv2.aruco, name):
-        raise ModelError(f'OpenCV has no dictionary {name!r}; one is {DICTIONARY}')
-    markers = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+        raise ModelError(f'OpenCV has no dictionary {name!r}; one is {usual}')
+    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+
+
+def _tags(cv2: Any, board: Mapping[str, Any]) -> Callable[[Any], Any]:
+    known = set(board_points(board))
+    finely = cv2.aruco.DetectorParameters()
+    finely.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    finder = cv2.aruco.ArucoDetector(_markers(cv2, board, APRILTAG), finely)
+
+    def find(image: Any) -> Any:
+        where, numbers, _ = finder.detectMarkers(image)
+        labels = [] if numbers is None else numbers.ravel().tolist()
+        each = [
+            (label(tag, k), place)
+            for tag, four in zip(labels, where, strict=True)
+            for k, place in enumerate(four.reshape(-1, 2))
+            if label(tag, k) in known
+        ]
+        return [text for text, _ in each], [place for _, place in each]
+
+    return find
+
+
+def _charuco(cv2: Any, columns: int, rows: int, board: Mapping[str, Any]) -> Callable[[Any], Any]:
+    markers = _markers(cv2, board, DICTIONARY)
     side = float(board['square'])
     marker = float(board.get('marker', MARKED * side))
     made = cv2.aruco.CharucoBoard((columns, rows), side, marker, markers)

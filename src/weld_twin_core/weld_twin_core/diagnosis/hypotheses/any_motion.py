@@ -36,7 +36,7 @@ SEED = 7
 
 def constant(kind: type[Effect]) -> bool:
     """Return whether a kind is a cause that never changes."""
-    return kind.cause and kind.depends_on == 'constant'
+    return kind.traits.cause and kind.traits.depends_on == 'constant'
 
 
 def of_no_size(site: Site) -> Effect:
@@ -47,7 +47,7 @@ def of_no_size(site: Site) -> Effect:
 def settable(robot: Robot, exclude: frozenset[str]) -> Iterator[Effect]:
     """Yield every error of no size that a person can set."""
     for name, kind in REGISTRY.items():
-        if kind.set_at_controller and name not in exclude:
+        if kind.traits.set_at_controller and name not in exclude:
             for joint in joints_of(kind, robot):
                 yield of_no_size(Site(name, joint))
 
@@ -86,7 +86,7 @@ def never_parted(
     for group in sets:
         known = [site for site in group if site.effect in REGISTRY]
         left = [site for site in known if constant(REGISTRY[site.effect])]
-        left.sort(key=lambda site: not REGISTRY[site.effect].set_at_controller)
+        left.sort(key=lambda site: not REGISTRY[site.effect].traits.set_at_controller)
         while len(left) > 1:
             first = of_no_size(left[0])
             same = [left[0], *(s for s in left[1:] if always(robot, first, of_no_size(s), align))]

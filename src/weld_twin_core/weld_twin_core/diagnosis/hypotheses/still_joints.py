@@ -27,10 +27,10 @@ REASON = 'the joint hardly moves'
 
 def hardly_moves(features: list[Features], effect: Effect) -> bool:
     """Return whether an effect sits on a joint, or has a source, that hardly moves."""
-    if effect.moved_by is None:
+    if effect.search.moved_by is None:
         return False
     robot = features[0].twin.robot
-    i = robot.index(effect.moved_by)
+    i = robot.index(effect.search.moved_by)
     travel = max(m.reach[1][i] for m in features) - min(m.reach[0][i] for m in features)
     return bool(travel < (STILL_SLIDE if robot.prismatic[i] else STILL))
 

@@ -181,7 +181,7 @@ def _parts(found: Search, k: int, exclude: Sequence[str]) -> list[Effect]:
     """
     effects = found.small.model.found
     own, taken = effects[k], {(e.name, e.site) for e in effects}
-    if not constant(type(own)) or own.coordinates().size < MOST_PARTS:
+    if not constant(type(own)) or own.fit.coordinates().size < MOST_PARTS:
         return []
     robot = found.baseline.model.robot
     frames = [frame_columns(robot, name) for name in sorted(found.work.problem.align)]
@@ -239,7 +239,11 @@ def _settable_first(found: Search, exclude: frozenset[str]) -> Search:
     taken = {(e.name, e.site) for e in effects}
     chosen: dict[int, Site] = {}
     for k, own in enumerate(effects[: len(found.slots)]):
-        if not constant(type(own)) or own.set_at_controller or own.coordinates().size > 1:
+        if (
+            not constant(type(own))
+            or own.traits.set_at_controller
+            or own.fit.coordinates().size > 1
+        ):
             continue
         for other in settable(robot, exclude):
             site = Site(other.name, other.site)
@@ -273,7 +277,7 @@ def _led_by(slot: tuple[Rival, ...], site: Site, small: Fit) -> tuple[Rival, ...
 
 def _causes(names: Sequence[str]) -> list[type[Effect]]:
     """Return the kinds that are a cause."""
-    return [REGISTRY[name] for name in names if name in REGISTRY and REGISTRY[name].cause]
+    return [REGISTRY[name] for name in names if name in REGISTRY and REGISTRY[name].traits.cause]
 
 
 def _same_anywhere(
@@ -295,8 +299,8 @@ def _constants_here(
     for joint in _with_next(found.baseline.model.robot, joints):
         view = features[moved_most(features, joint)].view
         for kind in REGISTRY.values():
-            if kind.cause and kind.of == 'joint' and kind.applicable(view, joint) is None:
-                yield from kind.constants(view, joint)
+            if kind.traits.cause and kind.of == 'joint' and kind.applicable(view, joint) is None:
+                yield from kind.search.constants(view, joint)
                 yield from _at_rest(features, kind, joint)
 
 
@@ -326,7 +330,7 @@ def _whitened(found: Search, features: list[Features], effect: Effect) -> Array:
 
 def _at_rest(features: list[Features], kind: type[Effect], joint: str) -> list[Effect]:
     """Return instances that are no more than a constant, as the joint they need hardly moves."""
-    if not kind.by_motion or kind.stage in (Stage.SERVO, Stage.PLAY):
+    if not kind.traits.by_motion or kind.stage in (Stage.SERVO, Stage.PLAY):
         return []
     seeds = list(kind.seeds(features[moved_most(features, joint)].view, joint))[:FEW]
     return [seed for seed in seeds if hardly_moves(features, seed)]
@@ -351,7 +355,7 @@ def _candidates(robot: Robot, kinds: Sequence[str], align: frozenset[str]) -> It
     view = anywhere(robot).view
     for name in kinds:
         kind = REGISTRY[name]
-        if kind.fitted_with in align:
+        if kind.traits.fitted_with in align:
             continue
         for joint in joints_of(kind, robot):
             # A robot without a positioner has no foot of one, whatever is taken out.

@@ -24,7 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add = Adder(parser)
     add('images', 'IMAGE', 'images, or a folder of them', nargs='+')
     text = (
-        'charuco or chessboard: kind, squares, their side, and markers, as docs/cameras.md has it'
+        'charuco, chessboard or tags: kind, squares, their side, and markers, as docs/cameras.md has '
+        'it'
     )
     add('--board', 'FILE.yaml', text, required=True)
     add('--camera', 'NAME', 'what the table calls the camera', default='camera')

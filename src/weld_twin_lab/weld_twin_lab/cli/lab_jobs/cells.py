@@ -1,0 +1,55 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Are causes told in whole cells, and from pixels, as on one arm under a tracker?
+
+Sealed cells of the plant: an arm, one on a track beside a positioner, two arms; then stations
+seen by two cameras and by a tracker. With --data, a real arm is told from its pixels and judged by a
+tracker. Writes cells.json and cells.md; a run that was interrupted goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+from ...study import Study, option, options, study
+
+add_arguments = options(
+    option('--cells', 14, 'N', 'sealed cells of every kind (default: 14)'),
+    option('--cameras', 40, 'N', 'sealed arms before cameras (default: 40)'),
+    option('--seed', 0, 'S', 'the first that is drawn (default: 0)'),
+    option('--data', None, 'DIR', 'published recordings: holds motoman_left'),
+    pool=True,
+)
+
+
+@study
+def run(study: Study) -> bool:
+    """Run what is not done yet, write the result, print the table."""
+    from weld_twin_nodes.offline.task_pool import Task
+
+    from ...blind.diagnosing import engine_digest
+    from ...blind.simulator import require_simulator
+    from ...cells.case import beside_a_camera, sealed
+    from ...cells.drawn import KINDS
+    from ...cells.real_pixels import PARTS, part
+    from ...cells.table import AS_TRACKED, named_as_tracked, page
+    from ...study import head
+
+    require_simulator()
+    args, engine = study.args, engine_digest()
+    seeds = range(args.seed, args.seed + args.cells)
+    sets = (
+        [Task(sealed, (kind, seed, engine), kind) for seed in seeds for kind in KINDS],
+        [
+            Task(beside_a_camera, (seed, engine), 'camera')
+            for seed in range(args.seed, args.seed + args.cameras)
+        ],
+        [Task(part, (args.data, k, engine), 'pixels') for k in range(PARTS)] if args.data else [],
+    )
+    every = study.tasks([task for tasks in sets for task in tasks], 'telling whole cells')
+    told, at = [], 0
+    for tasks in sets:
+        told.append(every[at : at + len(tasks)])
+        at += len(tasks)
+    cells, pixels, real = told
+    content = head('cells/1', seed=args.seed, cells=cells, pixels=pixels, real=real)
+    study.write('cells', content, page(cells, pixels, real))
+    return named_as_tracked(pixels) >= AS_TRACKED

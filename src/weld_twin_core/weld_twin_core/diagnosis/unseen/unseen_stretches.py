@@ -471,7 +471,7 @@ def _taken(problem: Problem, scale: Scale, fit: Fit) -> Array:
 def _solved(solve: Solver, size: Array, right: Array) -> Array:
     """Return the solution of scaled normal equations, shape as the right-hand side (P, ...)."""
     unit = size if right.ndim == 1 else size[:, None]
-    return solve(right / unit) / unit
+    return np.asarray(solve(right / unit) / unit)
 
 
 def _spread(normal: Array) -> Array:

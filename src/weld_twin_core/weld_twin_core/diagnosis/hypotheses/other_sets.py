@@ -116,12 +116,12 @@ class Sets:
         )  # fmt: skip
 
     def worth(self, chosen: Sequence[Choice]) -> float:
-        """Return the evidence [nats] of a set against the frames alone."""
+        """Return the evidence [nats] of a set against the frames alone; each unit costs its entry."""
         columns = _columns(chosen)
-        trials = sum(float(np.log(choice.unit.trials)) for choice in chosen)
+        cost = sum(float(np.log(choice.unit.trials)) + self.enter_nats for choice in chosen)
         gain = _gain(*self._equations(columns)) - self._bare_gain
         left = self.rss - self._bare_gain
-        return evidence(left, gain, float(len(columns)), self.count) - trials
+        return evidence(left, gain, float(len(columns)), self.count) - cost
 
     @cached_property
     def _bare_gain(self) -> float:
@@ -190,7 +190,7 @@ class Sets:
         while chosen:
             less = [chosen[:k] + chosen[k + 1 :] for k in range(len(chosen))]
             best = max(less, key=self.worth)
-            if self.worth(chosen) - self.worth(best) >= self.enter_nats:
+            if self.worth(chosen) >= self.worth(best):
                 break
             chosen = best
         return chosen
@@ -230,7 +230,7 @@ def _others(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> lis
         if other and sets.worth(other) > least:
             own = _fitted(work, now, other)
             if not implausible(own.model):
-                out.append(Other(site, own, _ahead(work, own, now, effective)))
+                out.append(Other(site, own, ahead(work, own, now, effective)))
     return out
 
 
@@ -244,13 +244,28 @@ def _fitted(work: Workspace, now: Fit, chosen: Sequence[Choice]) -> Fit:
     return fit(work.problem, now.model.with_found(found), work.scale, None, 8)
 
 
-def _ahead(work: Workspace, own: Fit, now: Fit, effective: Callable[[Fit], float]) -> float:
-    """Return by how much evidence [nats] one set is ahead of another."""
+def ahead(work: Workspace, own: Fit, now: Fit, effective: Callable[[Fit], float]) -> float:
+    """
+    Return by how much evidence [nats] one set is ahead of another.
+
+    An effect more costs what it costs to enter: that two errors happen to be one is seldom.
+
+    Parameters
+    ----------
+    own, now : Fit
+        The one and the other, on the workspace's problem and scale.
+    effective : callable
+        Number of independent rows of a fit.
+
+    """
     trials = {unit.site: float(np.log(unit.trials)) for unit in work.library.units}
-    cost = [sum(trials.get(site, 0.0) for site in _sites(each)) for each in (own, now)]
+
+    def cost(found: Fit) -> float:
+        return sum(trials.get(site, 0.0) + work.beliefs.enter_nats for site in _sites(found))
+
     more = float(own.coordinates.size - now.coordinates.size)
     count = effective(min((now, own), key=lambda f: f.rss))
-    return evidence(now.rss, now.rss - own.rss, more, count) - cost[0] + cost[1]
+    return evidence(now.rss, now.rss - own.rss, more, count) - cost(own) + cost(now)
 
 
 def _columns(chosen: Sequence[Choice]) -> list[int]:

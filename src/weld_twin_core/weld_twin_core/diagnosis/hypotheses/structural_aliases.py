@@ -43,6 +43,7 @@ from .any_motion import (
     settable,
 )
 from .library import build
+from .other_sets import ahead
 from .rivals import Rival, contenders, nats_in_place, weighed
 from .search import Search, refitted
 from .selection import Workspace, backward, fitted_with, implausible
@@ -165,7 +166,7 @@ def _lead(found: Search, other: Rival) -> _Lead | None:
     kept = {(e.name, e.site) for e in own.model.found}
     if (other.site.effect, other.site.joint) not in kept:
         return None
-    nats = nats_in_place(now, own, found.effective(now))
+    nats = ahead(work, own, now, found.effective)
     if nats <= work.beliefs.enter_nats:
         return None
     replaced = [(e.name, e.site) not in kept for e in now.model.found]

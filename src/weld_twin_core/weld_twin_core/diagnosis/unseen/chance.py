@@ -139,7 +139,7 @@ class _Part(NamedTuple):
     def of(cls, rest: Array, left: Array, rows: Index) -> _Part:
         """Return rows of what a fit leaves of unit rows, (rows, rows), and of targets, (rows, K)."""
         undone = np.linalg.pinv(rest[np.ix_(rows, rows)], rcond=FLAT, hermitian=True)
-        return cls(rows, undone, undone @ left[rows])
+        return cls(rows, np.asarray(undone, dtype=np.float64), undone @ left[rows])
 
 
 def _shares(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core.diagnosis.hypotheses.structural_aliases import same_error
+from weld_twin_core.diagnosis.hypotheses.any_motion import same_error
 from weld_twin_core.effects import effect_from_mapping
 
 NOISE = 2e-5

@@ -107,7 +107,7 @@ def root_frame(robot: Robot, shift: Shift = NO_SHIFT) -> tuple[Array, Array]:
 
 def _nothing(value: Any) -> bool:
     """Return whether a value is the number zero, as half the values of most arms are."""
-    return np.ndim(value) == 0 and value == 0.0
+    return isinstance(value, float) and value == 0.0
 
 
 def _slid(point: Array, axis: Array, length: Any) -> Array:
@@ -142,13 +142,7 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
     root_rotation, root_point = base_rotation, base_point
     rows: list[RowAxes] = []
     ends: list[tuple[Array, ...]] = []
-    for i in range(robot.n):
-        values: dict[str, Any] = {key: getattr(robot, key)[i] for key in ROW_CHANNELS}
-        moved = 'd' if robot.prismatic[i] else 'theta'
-        values[moved] = values[moved] + q[..., i]
-        for key, channel in ((moved, ('q', i)), *((key, (key, i)) for key in ROW_CHANNELS)):
-            if channel in shift:
-                values[key] = values[key] + shift[channel]
+    for i, values in enumerate(_row_values(robot, q, shift)):
         order = ROW_ORDER[robot.convention]
         if i < robot.behind:
             ends.append((*triad, p))
@@ -170,6 +164,19 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
         root_point,
         tuple(ends),
     )
+
+
+def _row_values(robot: Robot, q: Array, shift: Shift) -> list[dict[str, Any]]:
+    """Return the values of every row, with joint positions and displacements in them."""
+    out: list[dict[str, Any]] = [dict(row) for row in robot.row_values]
+    moved = ['d' if slides else 'theta' for slides in robot.prismatic.tolist()]
+    for i, values in enumerate(out):
+        values[moved[i]] = values[moved[i]] + q[..., i]
+    for (name, i), value in shift.items():
+        key = moved[i] if name == 'q' else name
+        if key in ROW_CHANNELS:
+            out[i][key] = out[i][key] + value
+    return out
 
 
 def _beyond(rotation: Array, point: Array, frame: tuple[Array, Array]) -> tuple[Array, Array]:

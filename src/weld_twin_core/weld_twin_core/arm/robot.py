@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, readonly
 from ..errors import DataError, ModelError
+from .channels import ROW_CHANNELS
 from .controller_frames import ControllerFrames, frame_of, pose_mapping
 
 CONVENTIONS = ('standard', 'modified')
@@ -259,6 +260,12 @@ class Robot:
                 f'robot {self.name!r} has no joint {joint!r}; its joints are '
                 + ', '.join(self.joint_names)
             ) from None
+
+    @cached_property
+    def row_values(self) -> list[dict[str, float]]:
+        """Return the values of every row by their channels, as plain numbers."""
+        each = zip(*(getattr(self, key).tolist() for key in ROW_CHANNELS), strict=True)
+        return [dict(zip(ROW_CHANNELS, values, strict=True)) for values in each]
 
     def with_frames(self, *, base: Array | None = None, tool: Array | None = None) -> Robot:
         """

@@ -84,6 +84,11 @@ class Parametric:
 
     def components(self) -> list[tuple[Parameter, int | None]]:
         """Return every scalar component: its parameter and its index, None for a plain number."""
+        return self._components
+
+    # A search asks the same instance hundreds of times, and its fields never change.
+    @cached_property
+    def _components(self) -> list[tuple[Parameter, int | None]]:
         out: list[tuple[Parameter, int | None]] = []
         for parameter in self.parameters:
             if self._is_number(parameter):
@@ -99,15 +104,22 @@ class Parametric:
         return self.vector().shape[:-1]
 
     def vector(self) -> Array:
-        """Return all components as one vector, shape (P,), or (D, P) with draws."""
+        """Return all components as one vector, shape (P,), or (D, P) with draws; not to be written."""
+        return self._vector
+
+    @cached_property
+    def _vector(self) -> Array:
         values = [getattr(self, p.name) for p in self.parameters]
-        if all(isinstance(value, float) for value in values) and values:
-            return np.array(values)  # most effects, and a search asks very often
-        parts = [
-            np.asarray(getattr(self, p.name), dtype=np.float64)[... if k is None else (..., k)]
-            for p, k in self.components()
-        ]
-        return np.stack(np.broadcast_arrays(*parts), axis=-1) if parts else np.zeros(0)
+        if all(isinstance(value, float) for value in values):
+            out = np.array(values, dtype=np.float64)  # most effects
+        else:
+            parts = [
+                np.asarray(getattr(self, p.name), dtype=np.float64)[... if k is None else (..., k)]
+                for p, k in self.components()
+            ]
+            out = np.stack(np.broadcast_arrays(*parts), axis=-1)
+        out.setflags(write=False)
+        return out
 
     def with_vector(self: P, vector: Array) -> P:
         """Return the same with other components, shape (P,) or draws (D, P)."""

@@ -23,6 +23,9 @@ PEAKS = 3
 """Steps that a search starts from; beside the right one stand its half and its double."""
 PHASE = 1.0 / 16.0
 """Periods by which neighbours on the first grid of steps differ at the far end of the travel."""
+QUICK = (5, 9, 15, 25, 27, 45)
+"""Lengths, doubled often enough, whose spectrum is quick: that of a power of two, a million, lies so
+in memory that it takes three times as long, a good part of a diagnosis of some stations."""
 ZOOM, ZOOMS = 16, 3
 """Steps tried to either side at each closer look, and how many looks there are."""
 MOST = 2000
@@ -132,8 +135,11 @@ class Quantization(Effect):
             return
         cell = 0.25 * FINEST
         bins = np.rint((q - q.min()) / cell).astype(int)
-        size = 1 << (4 * (int(bins.max()) + 1) - 1).bit_length()
-        power = np.abs(np.fft.rfft(np.bincount(bins, pull, minlength=size))) ** 2
+        least = 4 * (int(bins.max()) + 1)
+        lengths = QUICK if view.static else (1,)
+        size = min(odd << (-(-least // odd) - 1).bit_length() for odd in lengths)
+        spectrum = np.fft.rfft(np.bincount(bins, pull, minlength=size))
+        power = np.abs(spectrum[: int(size * cell / FINEST) + 2]) ** 2
         step = size * cell / np.maximum(np.arange(power.size), 1)
         power[(step < FINEST) | (step > min(COARSEST, 0.5 * travel))] = 0.0
         for _ in range(PEAKS):

@@ -228,5 +228,7 @@ def single(channel: Channel, value: Array | float, view: View) -> Shift:
     view : View
 
     """
+    if np.ndim(value) == 0:
+        return {channel: np.full(view.t.shape, value)}
     wanted = np.broadcast_shapes(np.shape(value), view.t.shape)
     return {channel: np.broadcast_to(value, wanted)}

@@ -73,6 +73,11 @@ class Features:
         return view.displaced(load_torque(view), keep_frames=True)
 
     @cached_property
+    def reach(self) -> tuple[Array, Array]:
+        """Return the least and the most of every joint at the measurements, shape (n,) each."""
+        return self.view.q.min(axis=0), self.view.q.max(axis=0)
+
+    @cached_property
     def joint_view(self) -> View:
         """Return what effects with memory see: the joint stream on its own stamps."""
         return self.twin.joint_view(self.recording)

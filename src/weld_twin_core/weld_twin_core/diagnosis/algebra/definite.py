@@ -9,7 +9,7 @@ scale, as radians and metres in one matrix differ by orders of magnitude.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -135,6 +135,33 @@ def _put(square: Array, matrix: Array, *, lower: bool) -> None:
             square[here, beyond] = matrix[here, beyond]
 
 
+def factored(matrix: Array) -> Callable[[Array], Array]:
+    """
+    Return what solves for one right-hand side, shape (P,), or several, shape (P, R).
+
+    Parameters
+    ----------
+    matrix : array, shape (P, P)
+        Symmetric, in C order; overwritten.
+
+    Raises
+    ------
+    LinAlgError
+        The matrix is not positive definite.
+
+    """
+    if not matrix.size:
+        return np.array
+    factor, failed = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+    if failed:
+        raise LinAlgError('the matrix is not positive definite')
+
+    def solve(right: Array) -> Array:
+        return np.asarray(dpotrs(factor, right, lower=1)[0])
+
+    return solve
+
+
 def well_conditioned(matrix: Array, least: float) -> bool:
     """
     Return whether the least eigenvalue is above a share of the largest for certain.
@@ -163,22 +190,13 @@ def solved(matrix: Array, right: Array) -> tuple[Array, Array] | None:
     right : array, shape (P,)
 
     """
-    factor, failed = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+    factor, failed = dpotrf(matrix.T, lower=1, clean=1, overwrite_a=1)
     if failed:
         return None
     solution, _ = dpotrs(factor, right, lower=1)
     inverse, _ = dtrtri(factor, lower=1, overwrite_c=1)
-    return solution, _squared_rows(inverse.T)
-
-
-def _squared_rows(upper: Array) -> Array:
-    """Return the sum of squares of every row of an upper triangle, whatever lies below it."""
-    out = np.empty(len(upper))
-    for start in range(0, len(upper), STRIP):
-        strip = upper[start : start + STRIP, start:]
-        parts = np.triu(strip[:, :STRIP]), strip[:, STRIP:]
-        out[start : start + STRIP] = sum(np.einsum('ij,ij->i', part, part) for part in parts)
-    return out
+    upper = inverse.T  # rows that lie together
+    return solution, np.einsum('ik,ik->i', upper, upper)
 
 
 def unit_diagonal(normal: Array, damping: float = 0.0) -> tuple[Array, Array]:

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import LinAlgError
 
 from ...arrays import Array
-from .definite import unit_diagonal
+from .definite import factored, unit_diagonal
 from .designed import designed
 from .independent_rows import measured_axes, robust_spread
 from .prior import effect_precision, frame_prior
@@ -237,7 +237,7 @@ def solve_scaled(normal: Array, right: Array, damping: float) -> Array:
     scaled, _ = unit_diagonal(normal[np.ix_(live, live)], max(damping, 1e-11))
     wanted = right[live] / size[live]
     try:
-        out[live] = cho_solve(cho_factor(scaled), wanted) / size[live]
+        out[live] = factored(scaled.copy())(wanted) / size[live]
     except LinAlgError:
         out[live] = np.linalg.lstsq(scaled, wanted, rcond=1e-12)[0] / size[live]
     return out

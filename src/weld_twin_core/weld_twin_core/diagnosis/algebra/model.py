@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,11 @@ class Scale:
     position: float
     orientation: float
     weights: tuple[Array, ...]
+
+    @cached_property
+    def roots(self) -> list[Array]:
+        """Return the square root of every weight."""
+        return [np.sqrt(weight) for weight in self.weights]
 
 
 class Change(NamedTuple):

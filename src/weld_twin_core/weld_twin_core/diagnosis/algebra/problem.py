@@ -108,7 +108,7 @@ class Problem:
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
 
-    @property
+    @cached_property
     def rows(self) -> tuple[int, ...]:
         """Return the scalar rows per sample of each recording: 6 for poses, 3 for points."""
         seen = (self.contact(k) for k in range(len(self.recordings)))
@@ -248,7 +248,7 @@ class Problem:
             ]
         return self._taken[scale] if self.touched else []
 
-    @property
+    @cached_property
     def samples(self) -> tuple[int, ...]:
         """Return the number of measurements of each recording."""
         return tuple(_measured(r).t.size for r in self.recordings)
@@ -356,7 +356,7 @@ class Problem:
         if root is not None:
             turned = (root @ turned[..., None])[..., 0]
         out = np.empty(turned.shape)
-        np.multiply(turned, np.sqrt(scale.weights[k])[:, None] * unit, out=out)
+        np.multiply(turned, scale.roots[k][:, None] * unit, out=out)
         return out
 
     def informed(self, k: int, part: Array, scale: Scale) -> Array:

@@ -19,9 +19,9 @@ from ..beliefs import Beliefs
 from ..calibration.calibrated import Stated, calibrated
 from ..frames.aligned import NOT_TOLD, not_told
 from ..frames.changes import told, untold
+from ..hypotheses.any_motion import never_parted
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
-from ..hypotheses.structural_aliases import never_parted
 from ..levels.causes import causes, contributions
 from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
@@ -139,7 +139,7 @@ def _compared(found: Search, examined: Examined, verdict: Verdict) -> dict[str, 
         'changed': changed(found, named),
         'may_change': named,
         'unsound': examined.told(found.final.model.found),
-        'same': never_parted(found, verdict.sets),
+        'same': never_parted(found.baseline.model.robot, found.work.problem.align, verdict.sets),
     }
 
 

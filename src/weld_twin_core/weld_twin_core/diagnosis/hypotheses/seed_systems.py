@@ -321,7 +321,7 @@ class Choice:
     @property
     def columns(self) -> Index:
         """Return the numbers of the columns that earn their place."""
-        return self.alike.columns[self.row][self.chosen]
+        return np.asarray(self.alike.columns[self.row][self.chosen])
 
     def effect(self) -> Effect:
         """Return the effect that the least-squares coefficients stand for."""

@@ -31,9 +31,8 @@ def hardly_moves(features: list[Features], effect: Effect) -> bool:
         return False
     robot = features[0].twin.robot
     i = robot.index(effect.search.moved_by)
-    positions = [maker.view.joint(i) for maker in features]
-    travel = max(float(np.max(q)) for q in positions) - min(float(np.min(q)) for q in positions)
-    return travel < (STILL_SLIDE if robot.prismatic[i] else STILL)
+    travel = max(m.reach[1][i] for m in features) - min(m.reach[0][i] for m in features)
+    return bool(travel < (STILL_SLIDE if robot.prismatic[i] else STILL))
 
 
 def narrow(recordings: Sequence[Recording], robot: Robot) -> tuple[str, ...]:

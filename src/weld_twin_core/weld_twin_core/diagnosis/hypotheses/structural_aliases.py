@@ -1,10 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Constant errors that no motion tells apart, whatever the data: they follow from the arm itself.
+What else may be the same error as what was found: on any motion, on this one, or taken out.
 
-The offset of the first link lifts the tool exactly as a higher base does. Such a pair is told as
-a set even where one of the two was taken out of the library, the simplest member first.
+Errors that no motion tells apart (`any_motion`) are told as a set even where one of the two was taken
+out of the library, the simplest member first.
 
 Families that were taken out are still held against what is found, in its place: a hose may do on
 these motions what a load does. Where one of them fits as well, no data can vouch for the name
@@ -25,13 +25,23 @@ from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect, Stage
 from ...effects.registry import REGISTRY
-from ...recording import JointMotion, Recording
 from ...twin.features import Features, joints_of
-from ...twin.twin import Twin
-from ..algebra.alias import outside, share_outside, span_of
+from ..algebra.alias import share_outside, span_of
 from ..algebra.fit import Fit, fit
 from ..beliefs import Beliefs
 from ..result import Site
+from .any_motion import (
+    SAME,
+    always,
+    anywhere,
+    columns,
+    constant,
+    frame_columns,
+    inside,
+    of_no_size,
+    same_error,
+    settable,
+)
 from .library import build
 from .other_sets import ahead
 from .rivals import Rival, contenders, nats_in_place, weighed
@@ -39,12 +49,6 @@ from .search import Search, refitted
 from .selection import Workspace, backward, fitted_with, implausible
 from .still_joints import hardly_moves, moved_most
 
-POSTURES = 40
-"""Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""
-LEVER = 0.5
-"""Metres of tool motion that a radian of turn counts as; it only scales a comparison."""
-SAME = 1e-6
-"""Share of an error that may lie outside what another one spans; far above rounding."""
 SAME_AT_REST = 0.04
 """The same of what is done by a joint at rest: as far as that may travel [rad], a wave that comes once
 per turn departs from a constant."""
@@ -55,8 +59,6 @@ FEW = 2
 one does, as all stand still."""
 MOST_PARTS = 6
 """Coordinates of a frame: what one of its size is made up of is looked for."""
-SEED = 7
-"""Of the postures: any generic set gives the same answer."""
 
 
 def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beliefs) -> Search:
@@ -117,7 +119,7 @@ def _also(
     constants = [
         rival.site
         for rival in slot
-        if rival.probability >= work.beliefs.listed and _constant(REGISTRY[rival.site.effect])
+        if rival.probability >= work.beliefs.listed and constant(REGISTRY[rival.site.effect])
     ]
     seeds = [
         *_same_anywhere(found, constants, exclude),
@@ -180,16 +182,16 @@ def _parts(found: Search, k: int, exclude: Sequence[str]) -> list[Effect]:
     """
     effects = found.small.model.found
     own, taken = effects[k], {(e.name, e.site) for e in effects}
-    if not _constant(type(own)) or own.fit.coordinates().size < MOST_PARTS:
+    if not constant(type(own)) or own.fit.coordinates().size < MOST_PARTS:
         return []
     robot = found.baseline.model.robot
-    frames = [_frame_columns(robot, name) for name in sorted(found.work.problem.align)]
+    frames = [frame_columns(robot, name) for name in sorted(found.work.problem.align)]
     fitted = span_of(np.concatenate(frames)) if frames else None
-    span, out = np.concatenate([_columns(robot, own), *frames]), []
-    for each in _settable(robot, frozenset(exclude)):
-        rows = _columns(robot, each)
+    span, out = np.concatenate([columns(robot, own), *frames]), []
+    for each in settable(robot, frozenset(exclude)):
+        rows = columns(robot, each)
         seen = rows.any() and (fitted is None or share_outside(rows, fitted).min() > SAME)
-        if (each.name, each.site) not in taken and seen and _inside(rows, span):
+        if (each.name, each.site) not in taken and seen and inside(rows, span):
             out.append(each)
     return out
 
@@ -239,12 +241,12 @@ def _settable_first(found: Search, exclude: frozenset[str]) -> Search:
     chosen: dict[int, Site] = {}
     for k, own in enumerate(effects[: len(found.slots)]):
         if (
-            not _constant(type(own))
+            not constant(type(own))
             or own.traits.set_at_controller
             or own.fit.coordinates().size > 1
         ):
             continue
-        for other in _settable(robot, exclude):
+        for other in settable(robot, exclude):
             site = Site(other.name, other.site)
             if (other.name, other.site) not in taken and always(robot, own, other, align):
                 effects[k], chosen[k] = other, site
@@ -265,14 +267,6 @@ def _settable_first(found: Search, exclude: frozenset[str]) -> Search:
     return replace(refitted(found, small), slots=slots)
 
 
-def _settable(robot: Robot, exclude: frozenset[str]) -> Iterator[Effect]:
-    """Yield every error of no size that a person can set."""
-    for name, kind in REGISTRY.items():
-        if kind.traits.set_at_controller and name not in exclude:
-            for joint in joints_of(kind, robot):
-                yield _of(Site(name, joint))
-
-
 def _led_by(slot: tuple[Rival, ...], site: Site, small: Fit) -> tuple[Rival, ...]:
     """Return a slot with one site before all others, as likely as the likeliest."""
     most = max(slot, key=lambda rival: rival.probability)
@@ -287,18 +281,14 @@ def _causes(names: Sequence[str]) -> list[type[Effect]]:
     return [REGISTRY[name] for name in names if name in REGISTRY and REGISTRY[name].traits.cause]
 
 
-def _constant(kind: type[Effect]) -> bool:
-    return kind.traits.cause and kind.traits.depends_on == 'constant'
-
-
 def _same_anywhere(
     found: Search, constants: Sequence[Site], exclude: Sequence[str]
 ) -> Iterator[Effect]:
     """Yield the excluded errors that some constants are on any motion."""
     robot, align = found.baseline.model.robot, found.work.problem.align
-    kinds = [kind.name for kind in _causes(exclude) if _constant(kind)]
+    kinds = [kind.name for kind in _causes(exclude) if constant(kind)]
     for other in _candidates(robot, kinds, align) if constants else ():
-        if any(same_error(robot, _of(own), other) for own in constants):
+        if any(same_error(robot, of_no_size(own), other) for own in constants):
             yield other
 
 
@@ -326,9 +316,9 @@ def _unused(found: Search, features: list[Features], slot: Sequence[Rival], seed
     sizes = np.linalg.eigvalsh(own @ own.T)
     used = [int((sizes >= SAME_AT_REST**2 * sizes[-1]).sum())]
     for rival in slot:
-        if _constant(REGISTRY[rival.site.effect]):
-            other = _whitened(found, features, _of(rival.site))
-            used += [len(other)] if _inside(other, own, SAME_AT_REST) else []
+        if constant(REGISTRY[rival.site.effect]):
+            other = _whitened(found, features, of_no_size(rival.site))
+            used += [len(other)] if inside(other, own, SAME_AT_REST) else []
     return len(own) - min(used)
 
 
@@ -362,13 +352,8 @@ def _best_of_each(more: Iterable[Rival]) -> list[Rival]:
     return list(out.values())
 
 
-def _of(site: Site) -> Effect:
-    """Return an effect of no size at a site."""
-    return REGISTRY[site.effect](**({'joint': site.joint} if site.joint is not None else {}))
-
-
 def _candidates(robot: Robot, kinds: Sequence[str], align: frozenset[str]) -> Iterator[Effect]:
-    view = _anywhere(robot).view
+    view = anywhere(robot).view
     for name in kinds:
         kind = REGISTRY[name]
         if kind.traits.fitted_with in align:
@@ -376,99 +361,4 @@ def _candidates(robot: Robot, kinds: Sequence[str], align: frozenset[str]) -> It
         for joint in joints_of(kind, robot):
             # A robot without a positioner has no foot of one, whatever is taken out.
             if kind.applicable(view, joint) is None:
-                yield _of(Site(name, joint))
-
-
-def same_error(robot: Robot, one: Effect, other: Effect) -> bool:
-    """
-    Return whether one of two constant errors can always do what the other does.
-
-    Parameters
-    ----------
-    robot : Robot
-    one, other : Effect
-        Their families and joints count, not their values.
-
-    """
-    a, b = _columns(robot, one), _columns(robot, other)
-    return _inside(a, b) or _inside(b, a)
-
-
-def never_parted(found: Search, sets: Sequence[Sequence[Site]]) -> tuple[tuple[Site, ...], ...]:
-    """
-    Return which sites are one error on any motion, what a person can set first.
-
-    Parameters
-    ----------
-    found : Search
-    sets : sequence of sequence of Site
-        What the data cannot tell apart.
-
-    """
-    robot, align = found.baseline.model.robot, found.work.problem.align
-    out = []
-    for group in sets:
-        known = [site for site in group if site.effect in REGISTRY]
-        left = [site for site in known if _constant(REGISTRY[site.effect])]
-        left.sort(key=lambda site: not REGISTRY[site.effect].traits.set_at_controller)
-        while len(left) > 1:
-            first = _of(left[0])
-            same = [left[0], *(s for s in left[1:] if always(robot, first, _of(s), align))]
-            left = [site for site in left if site not in same]
-            if len(same) > 1:
-                out.append(tuple(same))
-    return tuple(out)
-
-
-def always(robot: Robot, one: Effect, other: Effect, align: frozenset[str]) -> bool:
-    """
-    Return whether two constant errors do the same on any motion, each all that the other does.
-
-    Parameters
-    ----------
-    robot : Robot
-    one, other : Effect
-        Their families and joints count, not their values.
-    align : frozenset of str
-        Frames that are fitted, 'base' and 'tool': what these take up tells nobody apart.
-
-    """
-    a, b = _columns(robot, one), _columns(robot, other)
-    frames = [_frame_columns(robot, name) for name in sorted(align)]
-    if frames:
-        span = span_of(np.concatenate(frames))
-        if min(share_outside(rows, span).min() for rows in (a, b)) < SAME:
-            return False  # A frame is what they are.
-        a, b = (outside(rows, span) for rows in (a, b))
-    return _inside(a, b) and _inside(b, a)
-
-
-def _columns(robot: Robot, effect: Effect) -> Array:
-    """Return what an error does to the tool in many postures, one row per component."""
-    return _levered(_anywhere(robot).columns(effect))
-
-
-def _frame_columns(robot: Robot, name: str) -> Array:
-    """Return what a frame does to the tool in many postures, shape (6, rows)."""
-    maker = _anywhere(robot)
-    return _levered(np.stack([maker.column((name, k)) for k in range(6)]))
-
-
-def _anywhere(robot: Robot) -> Features:
-    """Return the twin in postures all over its range."""
-    low = np.maximum(robot.lower, -np.pi)
-    high = np.minimum(robot.upper, np.pi)
-    q = low + (high - low) * np.random.default_rng(SEED).random((POSTURES, robot.n))
-    motion = JointMotion(np.arange(float(POSTURES)), q, static=True)
-    return Features(Twin(robot), Recording('postures', motion), motion.t)
-
-
-def _levered(columns: Array) -> Array:
-    out = np.array(columns)
-    out[:, 3:] *= LEVER
-    return out.reshape(out.shape[0], -1)
-
-
-def _inside(rows: Array, span: Array, share: float = SAME) -> bool:
-    """Return whether every row lies in the span of others, but for a share of it."""
-    return bool(rows.any(axis=1).all() and (share_outside(rows, span_of(span)) < share).all())
+                yield of_no_size(Site(name, joint))

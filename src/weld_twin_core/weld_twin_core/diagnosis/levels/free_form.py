@@ -12,11 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.definite import Index
+from ..algebra.definite import Index, factored
 from ..algebra.fit import Fit, design
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
@@ -216,15 +215,26 @@ class Folds:
         )
 
     def errors(self, index: Index, precision: Array) -> Array:
-        """Return the squared error on every fold of the columns fitted on the others, (B,)."""
+        """
+        Return the squared error on every fold of the columns fitted on the others, (..., B).
+
+        Parameters
+        ----------
+        index : array of int, shape (p,)
+        precision : array, shape (..., p)
+            Prior precisions, each tried.
+
+        """
         if not index.size:
-            return self.squares
+            return np.broadcast_to(self.squares, (*precision.shape[:-1], self.squares.size))
         self._ask(index)
         mine = self._normals[:, index[:, None], index]
         pulls = self._rights[:, index]
-        others = mine.sum(axis=0) + np.diag(precision) - mine
+        held = np.eye(index.size) * precision[..., None, None, :]
+        others = mine.sum(axis=0) - mine + held
         x = np.linalg.solve(others, (pulls.sum(axis=0) - pulls)[..., None])[..., 0]
-        explained = np.einsum('bp,bp->b', x, 2.0 * pulls - np.einsum('bpq,bq->bp', mine, x))
+        moved = (mine @ x[..., None])[..., 0]
+        explained = np.einsum('...bp,...bp->...b', x, 2.0 * pulls - moved)
         return np.asarray(self.squares - explained)
 
     def _ask(self, index: Index) -> None:
@@ -300,17 +310,16 @@ class Choosing:
         index, precision = self._columns_of(members)
         columns, right = self.ways[0].columns, self._right
         beside = columns @ columns[index].T
-        own = cho_factor(beside[index] + np.diag(precision))
-        rest = right - beside @ cho_solve(own, right[index])
+        solve = factored(beside[index] + np.diag(precision))
+        own, rest = solve(beside.T), right - beside @ solve(right[index])
         taken = {m.group for m in members}
         falls = {}
         for k, place in enumerate(self.places):
             if k in taken:
                 continue
-            cross = beside[place].T
-            left = self._alone[k] - cross.T @ cho_solve(own, cross)
+            left = self._alone[k] - beside[place] @ own[:, place]
             left[np.diag_indices_from(left)] += RIDGES[1]
-            falls[k] = float(rest[place] @ cho_solve(cho_factor(left), rest[place]))
+            falls[k] = float(rest[place] @ np.linalg.solve(left, rest[place]))
         return sorted(falls, key=lambda k: -falls[k])[:SHORTLIST]
 
     @cached_property
@@ -344,6 +353,15 @@ class Choosing:
         """Return the squared error of a model on every fold, for each way to divide."""
         index, precision = self._columns_of(members)
         return [way.errors(index, precision) for way in self.ways]
+
+    def ridged(self, members: Sequence[Member], group: int) -> tuple[Member, list[Array]]:
+        """Return a group beside the members at its best ridge, and the errors on every fold."""
+        index, precision = self._columns_of([*members, Member(group, 0.0)])
+        held = np.tile(precision, (len(RIDGES), 1))
+        held[:, -self.places[group].size :] = np.array(RIDGES)[:, None]
+        ways = [way.errors(index, held) for way in self.ways]
+        best = int(np.argmin(np.max([way.sum(axis=1) for way in ways], axis=0)))
+        return Member(group, RIDGES[best]), [way[best] for way in ways]
 
 
 def choosing(
@@ -404,12 +422,7 @@ def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:
 
 def _entrants(work: Choosing, members: list[Member]) -> list[tuple[Member, list[Array]]]:
     """Return the groups that fit best beside the members, at their best ridge, and the errors."""
-    out = []
-    for k in work.shortlist(members):
-        tries = [Member(k, ridge) for ridge in RIDGES]
-        pairs = [(m, work.errors([*members, m])) for m in tries]
-        out.append(min(pairs, key=lambda pair: max(e.sum() for e in pair[1])))
-    return out
+    return [work.ridged(members, group) for group in work.shortlist(members)]
 
 
 def _worst_gain(before: list[Array], after: list[Array]) -> float:

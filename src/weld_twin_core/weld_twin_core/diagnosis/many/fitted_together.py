@@ -205,8 +205,11 @@ def _members(found: Search, beliefs: Beliefs) -> int:
     """Return how many effects move the tool by much of what all of them leave."""
     unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
     least = beliefs.member * unseen.rms(unseen.whole)
-    sizes = np.array([unseen.rms(part) for part in unseen.targets[1:]])
-    return int((sizes > least).sum())
+    # Of errors so small the columns tell what each does, without a run of the twin for each.
+    x = np.concatenate([np.zeros(unseen.frames), found.final.coordinates])
+    each = (unseen.columns.chosen(np.arange(part.start, part.stop)) for part in unseen.parts)
+    moved = (own.mixed(x[part]) for own, part in zip(each, unseen.parts, strict=True))
+    return sum(unseen.rms(rows) > least for rows in moved)
 
 
 def _together(

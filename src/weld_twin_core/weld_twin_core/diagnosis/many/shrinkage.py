@@ -16,6 +16,8 @@ References
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -91,7 +93,8 @@ def learned_precision(
     tied = labels >= 0
     usual = _usual(scales, believed)
     variance, most = _first_variances(labels, usual)
-    learned_of = np.flatnonzero(learn | ~np.isfinite(most))
+    members, count = labels[tied], variance.size
+    learned_of = (learn | ~np.isfinite(most)) & (np.bincount(members, minlength=count) > 0)
     noise, room = 1.0, np.empty_like(normal)
     for _ in range(ROUNDS):
         precision = _precision(tied, variance, labels, usual)
@@ -99,12 +102,10 @@ def learned_precision(
         determined = np.clip(1.0 - precision * spread, 0.0, 1.0)
         left = rss - 2.0 * right @ mean + mean @ normal @ mean
         noise = max(left / max(rows - determined.sum(), 1.0), 1e-6)
-        for k in learned_of:
-            mine = labels == k
-            if mine.any():
-                share = max(float(determined[mine].sum()), 1e-3)
-                learned = float((mean[mine] ** 2).sum()) / share
-                variance[k] = min(max(learned, LEAST_VARIANCE), most[k])
+        share = np.maximum(np.bincount(members, determined[tied], count), 1e-3)
+        learned = np.bincount(members, mean[tied] ** 2, count) / share
+        learned = np.minimum(np.maximum(learned, LEAST_VARIANCE), most)
+        variance = np.where(learned_of, learned, variance)
     precision = _precision(tied, variance, labels, usual) / scales**2
     # The fit works in whitened rows, so a prior counts against the noise actually there.
     return precision * noise, float(determined.sum())
@@ -139,11 +140,12 @@ def _solved(
 
     ``room``, shape (K, K), is worked in. As much is put on the diagonal as columns that repeat need.
     """
-    size = np.abs(normal.diagonal() / noise + precision)
+    diagonal = room.reshape(-1)[:: len(room) + 1]
     for more in JITTER:
         np.divide(normal, noise, out=room)
-        extra = more * (size + more * size.max(initial=1.0))
-        room[np.diag_indices_from(room)] += precision + extra
+        diagonal += precision
+        size = np.abs(diagonal)
+        diagonal += more * (size + more * size.max(initial=1.0))
         found = solved(room, right / noise)
         if found is not None:
             return found
@@ -200,49 +202,67 @@ def _learned(
     normal, right = columns.normal(), columns.times(residual)
     normal[:frames, :frames] += np.diag(frame_ridge)
     right[:frames] -= frame_ridge * off
-    x, rss = coordinates(model), float(residual @ residual)
-    learned = _solved_anew(model, beliefs, normal, right, rss, residual.size, learn=learn)
-    precision, freedom, step = learned
+    sizes, rss = Sizes.of(model, beliefs), float(residual @ residual)
+    precision, freedom, step = sizes.learned(normal, right, rss, residual.size, learn=learn)
     trial = stepped(problem, model, step)
     moved, x_moved = problem.whitened(problem.residuals(trial), scale), coordinates(trial)
-    if moved @ moved + precision @ x_moved**2 > residual @ residual + precision @ x**2:
+    if moved @ moved + precision @ x_moved**2 > rss + precision @ sizes.now**2:
         trial = fit(problem, model, scale, precision, iterations=2).model
     return trial, precision, freedom + frames
 
 
-def _solved_anew(
-    model: Model,
-    beliefs: Beliefs,
-    normal: Array,
-    right: Array,
-    rss: float,
-    rows: int,
-    *,
-    learn: bool = True,
-) -> tuple[Array, float, Array]:
+@dataclass(frozen=True, eq=False)
+class Sizes:
     """
-    Return the prior precision learned, the freedom that it leaves, and the step to where it leads.
+    What is known of the sizes of a model's coordinates before they are learned, shapes (K,).
 
-    Parameters
+    Attributes
     ----------
-    normal, right, rss, rows
-        Normal equations of the frames, with what is believed of these, and of all coordinates.
+    now : array
+        The coordinates.
+    labels, scales : array
+        As `groups` returns them.
+    believed : array
+        Prior precision; see `believed`.
 
     """
-    labels, scales = groups(model.found, beliefs)
-    x = coordinates(model)
-    frames = len(right) - x.size
-    precision, freedom = learned_precision(
-        *_projected(*_target(normal, right, rss, x), frames),
-        rows - frames,
-        labels,
-        scales,
-        believed(model),
-        learn=learn,
-    )
-    ridge = np.concatenate([np.zeros(frames), precision])
-    pull = ridge * np.concatenate([np.zeros(frames), x])
-    return precision, freedom, solve_scaled(normal + np.diag(ridge), right - pull, 1e-9)
+
+    now: Array
+    labels: Array
+    scales: Array
+    believed: Array
+
+    @classmethod
+    def of(cls, model: Model, beliefs: Beliefs) -> Sizes:
+        """Return what is known of a model's coordinates."""
+        return cls(coordinates(model), *groups(model.found, beliefs), believed(model))
+
+    def learned(
+        self, normal: Array, right: Array, rss: float, rows: int, *, learn: bool = True
+    ) -> tuple[Array, float, Array]:
+        """
+        Return the prior precision learned, the freedom that it leaves, and the step to where it leads.
+
+        Parameters
+        ----------
+        normal, right, rss, rows
+            Normal equations of the frames, with what is believed of these, and of all coordinates.
+        learn : bool
+            See `learned_precision`.
+
+        """
+        frames = len(right) - self.now.size
+        precision, freedom = learned_precision(
+            *_projected(*_target(normal, right, rss, self.now), frames),
+            rows - frames,
+            self.labels,
+            self.scales,
+            self.believed,
+            learn=learn,
+        )
+        ridge = np.concatenate([np.zeros(frames), precision])
+        pull = ridge * np.concatenate([np.zeros(frames), self.now])
+        return precision, freedom, solve_scaled(normal + np.diag(ridge), right - pull, 1e-9)
 
 
 def predicted(unseen: Unseen, model: Model, beliefs: Beliefs) -> Array:
@@ -260,11 +280,11 @@ def predicted(unseen: Unseen, model: Model, beliefs: Beliefs) -> Array:
     whole, force = np.sum(normals, axis=0), np.sum(rights, axis=0)
     whole[:frames, :frames] += np.diag(unseen.precision[:frames])
     force[:frames] -= unseen.pull[:frames]
-    out = np.array(residual)
+    sizes, out = Sizes.of(model, beliefs), np.array(residual)
     for part, rows, normal, right in zip(parts, spans, normals, rights, strict=True):
         here = residual[rows]
         rss, count = float(residual @ residual - here @ here), residual.size - here.size
-        *_, step = _solved_anew(model, beliefs, whole - normal, force - right, rss, count)
+        *_, step = sizes.learned(whole - normal, force - right, rss, count)
         out[rows] -= part.mixed(step)
     return out
 

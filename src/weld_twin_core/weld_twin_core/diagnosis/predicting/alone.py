@@ -18,7 +18,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Array
 from ...effects import REGISTRY
 from ...effects.constant import ChannelError, FrameError
 from ...effects.effect import Effect
@@ -28,20 +27,15 @@ from ...twin.features import joints_of
 from ..algebra.fit import fit, robust_scale, trusted
 from ..algebra.model import Alone
 from ..algebra.prior import effect_precision, frame_offset
-from ..algebra.problem import Model, Problem, Scale
+from ..algebra.problem import Model, Problem
 from ..result import Shrink
-from ..unseen.folds import posture_regions
+from ..unseen.unseen_stretches import Unseen
 
 ROWS = 900
-"""Rows that the constants are fitted on: three hundred positions show frames and some zeros well, and
-each fold costs a fit."""
-FOLDS = 8
-"""Stretches that take their turn in being left out, as for the whole model."""
+"""Rows that the constants are fitted on: three hundred positions show frames and some zeros well."""
 LEAST_GAIN = 0.95
 """Ratio of what is left below which constants of their own are taken: less is a matter of the
 stretches, and numbers that mean the arm itself are worth more than a few per cent."""
-OUT = 1e-12
-"""Weight of a sample that is left out of a fit, against 1."""
 STEPS = 2
 """Steps of a fit that starts nearby; constants are nearly linear."""
 
@@ -80,13 +74,14 @@ def alone(problem: Problem, model: Model, shrink: Shrink, *, many: bool = False)
         return out
     start = _freed(constants, many=many)
     scale = replace(scale, position=max(scale.position, recorded / np.sqrt(3.0)))
-    tried = max(_left_out(problem, start, scale, good, rows) for rows in _folds(problem))
+    precision = effect_precision(start)
+    own = fit(problem, start, scale, precision, STEPS)
+    ways = Unseen.of(problem, scale, own, precision).every_way()
+    tried = max(each.rms(each.whole) for each in ways)
     if tried >= LEAST_GAIN * unseen:
         return out
-    own = _fitted(problem, start, scale)
-    return Alone(
-        _changes(constants, own), _rms(problem, own, good), tried, whole, shrink.rms_after_m
-    )
+    changes = _changes(constants, own.model)
+    return Alone(changes, _rms(problem, own.model, good), tried, whole, shrink.rms_after_m)
 
 
 def _left(model: Model) -> tuple[Effect, ...]:
@@ -120,47 +115,6 @@ def _freed(constants: Model, *, many: bool) -> Model:
     if many:
         return constants.with_found((*constants.found, *more))
     return replace(constants, known=constants.found, found=more)
-
-
-def _fitted(problem: Problem, start: Model, scale: Scale) -> Model:
-    return fit(problem, start, scale, effect_precision(start), STEPS).model
-
-
-def _left_out(
-    problem: Problem,
-    start: Model,
-    scale: Scale,
-    good: Sequence[NDArray[np.bool_]],
-    rows: Array,
-) -> float:
-    """Return what constants of their own leave on parts left out in turn, RMS [m]."""
-    labels = _of_samples(problem, rows)
-    squares: list[Array] = []
-    for fold in np.unique(np.concatenate(labels)):
-        weights = tuple(
-            np.where(own == fold, OUT * w, w) for w, own in zip(scale.weights, labels, strict=True)
-        )
-        parts = problem.residuals(_fitted(problem, start, replace(scale, weights=weights)))
-        squares += [
-            (part[:3, (own == fold) & fine] ** 2).sum(axis=0)
-            for part, own, fine in zip(parts, labels, good, strict=True)
-        ]
-    return float(np.sqrt(np.concatenate(squares).mean()))
-
-
-def _folds(problem: Problem) -> list[Array]:
-    """Return which part every row is in, by stretches, and by postures of stations at rest."""
-    by_stretch = problem.block_labels(FOLDS)
-    return [by_stretch, posture_regions(problem)] if problem.at_rest else [by_stretch]
-
-
-def _of_samples(problem: Problem, rows: Array) -> list[Array]:
-    """Return the part of every sample from that of every row, (M,) per recording."""
-    out, at = [], 0
-    for c, m in zip(problem.rows, problem.samples, strict=True):
-        out.append(rows[at : at + c * m : c])
-        at += c * m
-    return out
 
 
 def _rms(problem: Problem, model: Model, good: Sequence[NDArray[np.bool_]]) -> float:

@@ -22,9 +22,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ..algebra.definite import unit_diagonal
+from ..algebra.definite import FLAT, Index, unit_diagonal
 from ..algebra.noise_floor import spread_of
-from .folds import steadiness
 
 DRAWS = 100
 """Drawings of noise. What none of them reaches noise reaches once in a hundred times."""
@@ -80,15 +79,20 @@ def left_out(columns: Array, precision: Array, labels: Array | None, targets: Ar
     targets : array, shape (K, rows)
 
     """
-    system, size = unit_diagonal(columns @ columns.T + np.diag(precision), DAMPING)
-    unit = columns / size[:, None]
-    hat = unit.T @ np.linalg.solve(system, unit)
+    hat = _hat(columns, precision)
     out = targets - targets @ hat
     for part in () if labels is None else np.unique(labels):
         rows = np.flatnonzero(labels == part)
         own = np.eye(rows.size) - hat[np.ix_(rows, rows)]
-        out[:, rows] = np.linalg.lstsq(own, out[:, rows].T, rcond=1e-9)[0].T
+        out[:, rows] = np.linalg.lstsq(own, out[:, rows].T, rcond=FLAT)[0].T
     return np.asarray(out)
+
+
+def _hat(columns: Array, precision: Array) -> Array:
+    """Return the matrix that makes a fit of targets, shape (rows, rows)."""
+    system, size = unit_diagonal(columns @ columns.T + np.diag(precision), DAMPING)
+    unit = columns / size[:, None]
+    return np.asarray(unit.T @ np.linalg.solve(system, unit))
 
 
 def noise(rows: int) -> Array:
@@ -113,24 +117,62 @@ def chance_gain(candidates: Candidates, steady: float, *, pooled: bool = False) 
         Whether all ways to divide count together, and not the one that shows least.
 
     """
-    targets = noise(candidates.fixed.shape[1])
-    before = [
-        _squares(left_out(candidates.fixed, candidates.precision, labels, targets), labels)
+    rows = candidates.fixed.shape[1]
+    rest = np.eye(rows) - _hat(candidates.fixed, candidates.precision)
+    left = rest @ noise(rows).T
+    ways = [
+        [_Part.of(rest, left, np.flatnonzero(labels == b)) for b in np.unique(labels)]
         for labels in candidates.ways
     ]
-    best = np.zeros(len(targets))
+    best = 0.0
     for group in candidates.groups:
-        columns = np.concatenate([candidates.fixed, group])
-        for ridge in candidates.ridges:
-            held = np.concatenate([candidates.precision, np.full(len(group), ridge)])
-            shares = []
-            for labels, was in zip(candidates.ways, before, strict=True):
-                after = _squares(left_out(columns, held, labels, targets), labels)
-                share = 1.0 - after.sum(axis=1) / was.sum(axis=1)
-                sure = np.array([steadiness(*pair) for pair in zip(was, after, strict=True)])
-                shares.append(np.where(sure >= steady, share, 0.0))
-            best = np.maximum(best, (np.mean if pooled else np.min)(shares, axis=0))
-    return float(best.max())
+        each = [_shares(parts, group, rest, left, candidates.ridges, steady) for parts in ways]
+        best = max(best, float((np.mean if pooled else np.min)(each, axis=0).max()))
+    return best
+
+
+class _Part(NamedTuple):
+    """Rows that are left out together, what undoes their own part in a fit, and what it leaves there."""
+
+    rows: Index
+    undone: Array
+    left: Array
+
+    @classmethod
+    def of(cls, rest: Array, left: Array, rows: Index) -> _Part:
+        """Return rows of what a fit leaves of unit rows, (rows, rows), and of targets, (rows, K)."""
+        undone = np.linalg.pinv(rest[np.ix_(rows, rows)], rcond=FLAT, hermitian=True)
+        return cls(rows, np.asarray(undone, dtype=np.float64), undone @ left[rows])
+
+
+def _shares(
+    parts: Sequence[_Part],
+    group: Array,
+    rest: Array,
+    left: Array,
+    ridges: Sequence[float],
+    steady: float,
+) -> Array:
+    """
+    Return the share of every target that a group predicts at every ridge, shape (R, K).
+
+    None where it is not steady. Columns beside a fit that is there already change it by no more than
+    their own number of directions.
+    """
+    beside = group @ rest
+    normal, pull = beside @ group.T, group @ left
+    held = np.array(ridges)[:, None, None] * np.eye(len(group))
+    after = []
+    for part in parts:
+        own = beside[:, part.rows]
+        near = part.undone @ own.T
+        x = np.linalg.solve(normal - own @ near + held, pull - own @ part.left)
+        after.append(((part.left - near @ x) ** 2).sum(axis=1))
+    before = np.stack([(part.left**2).sum(axis=0) for part in parts])
+    fall = before[:, None] - np.stack(after)
+    error = fall.std(axis=0, ddof=1) / np.sqrt(len(parts)) if len(parts) > 1 else np.inf
+    sure = fall.mean(axis=0) >= steady * error
+    return np.asarray(np.where(sure, fall.sum(axis=0) / before.sum(axis=0), 0.0))
 
 
 def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, known: bool) -> float:
@@ -138,7 +180,7 @@ def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, kno
     Return how many times wider than a floor what is left of noise on unseen parts is at the most.
 
     A fit of few stations takes up part of the noise, so that it leaves too little where it was fitted
-    and too much elsewhere.
+    and too much elsewhere. One where there are many rows.
 
     Parameters
     ----------
@@ -150,7 +192,10 @@ def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, kno
         Whether the floor is known apart from what the fit leaves.
 
     """
-    targets = noise(columns.shape[1])
+    rows = columns.shape[1]
+    if rows > FEW:
+        return 1.0
+    targets = noise(rows)
     unseen = [(left_out(columns, precision, w, targets) ** 2).mean(axis=1) for w in ways]
     floors = np.ones(len(targets))
     if not known:
@@ -158,8 +203,3 @@ def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, kno
             [spread_of(each) for each in left_out(columns, precision, None, targets)]
         )
     return float((np.sqrt(np.max(unseen, axis=0)) / floors).max())
-
-
-def _squares(residual: Array, labels: Array) -> Array:
-    """Return the squared error of every part, shape (K, parts)."""
-    return np.stack([(residual[:, labels == b] ** 2).sum(axis=1) for b in np.unique(labels)], 1)

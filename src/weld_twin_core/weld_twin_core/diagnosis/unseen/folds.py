@@ -132,10 +132,14 @@ def gain(before: Array, after: Array, labels: Array, after_labels: Array | None 
     """
     others = labels if after_labels is None else after_labels
     names = np.intersect1d(labels, others)
-    one = np.array([before[labels == n].mean() for n in names])
-    two = np.array([after[others == n].mean() for n in names])
+    one, two = _means(before, labels)[names], _means(after, others)[names]
     was, left = float(before.mean()), float(after.mean())
     return Gain((was - left) / max(was, 1e-300), steadiness(one, two), was - left, left**0.5)
+
+
+def _means(values: Array, labels: Array) -> Array:
+    """Return the mean of every part, by its number; those of parts that are not there mean nothing."""
+    return np.asarray(np.bincount(labels, values) / np.maximum(np.bincount(labels), 1))
 
 
 def least_gain(ways: Sequence[Gain]) -> Gain:

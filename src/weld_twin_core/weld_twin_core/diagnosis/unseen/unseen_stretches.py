@@ -20,11 +20,11 @@ from functools import cache, cached_property, partial
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..algebra.atoms import Rows, rows_of
-from ..algebra.definite import Index, Triangle, inverses, unit_diagonal
+from ..algebra.definite import Index, Triangle, factored, inverses, unit_diagonal
 from ..algebra.designed import Design, designed
 from ..algebra.fit import Fit, trusted
 from ..algebra.prior import frame_prior
@@ -217,7 +217,7 @@ class Unseen:
         if index.size == self.columns.count > MANY:
             return self._inverses[b].times
         system, size = unit_diagonal(self._system(b, index), DAMPING)
-        return partial(_solved, cho_factor(system, overwrite_a=True), size)
+        return partial(_solved, factored(system), size)
 
     def _mix(self, kept: Sequence[int]) -> Array:
         """Return which targets a model of some effects is to explain, shape (1 + K,)."""
@@ -319,7 +319,7 @@ class Unseen:
         for b in range(len(self._spans)):
             left = self._system(b, every)
             system, size = unit_diagonal(left.copy(), DAMPING)
-            step = cho_solve(cho_factor(system), self._right(b, mix) / size) / size
+            step = factored(system)(self._right(b, mix) / size) / size
             more = np.maximum(_spread(left) - whole, ROUNDED * whole)
             ratios[b] = step**2 / np.maximum(more, 1e-300)
         told = np.minimum(ratios, MOST_STEPS).mean(axis=0)
@@ -336,8 +336,7 @@ class Unseen:
         for root, part in zip(self.problem.roots, self.problem.by_sample(residual), strict=True):
             rows = part[:, :3] if root is None else part * np.sqrt(3.0 / part.shape[1])
             out.append((rows**2).sum(axis=1) * self.scale.position**2)
-        weights = self._trusted(list(self.scale.weights))
-        return np.concatenate(self._trusted(out)) / np.concatenate(weights)
+        return np.concatenate(self._trusted(out)) / self._trusted_weights
 
     def rms(self, residual: Array) -> float:
         """Return the RMS position error over trusted samples, [m]."""
@@ -354,10 +353,18 @@ class Unseen:
         rows = self.problem.by_sample(self.labels)
         return np.concatenate([part[:, 0] for part in self._trusted(rows)])
 
+    @cached_property
+    def _good(self) -> list[NDArray[np.bool_]]:
+        """Return which samples are trusted, (M,) per recording."""
+        return trusted(self.scale.weights)
+
+    @cached_property
+    def _trusted_weights(self) -> Array:
+        return np.concatenate(self._trusted(list(self.scale.weights)))
+
     def _trusted(self, parts: list[Array]) -> list[Array]:
         """Return the rows of trusted samples, (m, c) per recording."""
-        pairs = zip(parts, trusted(self.scale.weights), strict=True)
-        return [part[good] for part, good in pairs]
+        return [part[good] for part, good in zip(parts, self._good, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -380,10 +387,14 @@ class Base:
             Of unit mean square.
 
         """
-        unseen = self.unseen
-        labels, before = unseen.trusted_labels(), unseen.squares(self.residual)
+        labels, before = self._known
         tried = self.extended(extra, RIDGES)
-        return max(gain(before, unseen.squares(after), labels) for after in tried)
+        return max(gain(before, self.unseen.squares(after), labels) for after in tried)
+
+    @cached_property
+    def _known(self) -> tuple[Array, Array]:
+        """Return stretch and squared error of every trusted sample."""
+        return self.unseen.trusted_labels(), self.unseen.squares(self.residual)
 
     def extended(self, extra: Array, ridges: Sequence[float]) -> list[Array]:
         """
@@ -411,8 +422,8 @@ class Base:
                 solved = self.solvers[b](np.column_stack([cross, right]))
                 square = square - cross.T @ solved[:, :-1]
                 pull = pull - cross.T @ solved[:, -1]
-            eye = np.eye(here.shape[0])
-            more = np.stack([np.linalg.solve(square + (r + 1e-9) * eye, pull) for r in ridges])
+            held = square + (np.array(ridges)[:, None, None] + 1e-9) * np.eye(here.shape[0])
+            more = np.linalg.solve(held, pull[:, None])[..., 0]
             outs[:, rows] -= more @ here
             if self.index.size:
                 outs[:, rows] -= mine.mixed(solved[:, -1] - more @ solved[:, :-1].T)
@@ -457,16 +468,16 @@ def _taken(problem: Problem, scale: Scale, fit: Fit) -> Array:
     return np.array(left).reshape(-1, fit.residual.size) - fit.residual
 
 
-def _solved(factor: tuple[Array, bool], size: Array, right: Array) -> Array:
+def _solved(solve: Solver, size: Array, right: Array) -> Array:
     """Return the solution of scaled normal equations, shape as the right-hand side (P, ...)."""
     unit = size if right.ndim == 1 else size[:, None]
-    return np.asarray(cho_solve(factor, right / unit) / unit)
+    return np.asarray(solve(right / unit) / unit)
 
 
 def _spread(normal: Array) -> Array:
     """Return the variance of every coordinate, (P,), in units of noise."""
     system, size = unit_diagonal(normal.copy(), DAMPING)
-    return np.asarray(np.diag(cho_solve(cho_factor(system), np.eye(size.size))) / size**2)
+    return np.asarray(np.diag(factored(system)(np.eye(size.size))) / size**2)
 
 
 def _tether(model: Model) -> Array:

@@ -1,0 +1,151 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Constant errors that no motion tells apart: they follow from the arm itself.
+
+The offset of the first link lifts the tool exactly as a higher base does. Errors are compared by what
+they do to the tool in postures all over the arm's range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from ...arm.robot import Robot
+from ...arrays import Array
+from ...effects.effect import Effect
+from ...effects.registry import REGISTRY
+from ...recording import JointMotion, Recording
+from ...twin.features import Features, joints_of
+from ...twin.twin import Twin
+from ..algebra.alias import outside, share_outside, span_of
+from ..result import Site
+
+POSTURES = 40
+"""Postures drawn over the joints' ranges; some ten would do for the 24 constants of six axes."""
+LEVER = 0.5
+"""Metres of tool motion that a radian of turn counts as; it only scales a comparison."""
+SAME = 1e-6
+"""Share of an error that may lie outside what another one spans; far above rounding."""
+SEED = 7
+"""Of the postures: any generic set gives the same answer."""
+
+
+def constant(kind: type[Effect]) -> bool:
+    """Return whether a kind is a cause that never changes."""
+    return kind.traits.cause and kind.traits.depends_on == 'constant'
+
+
+def of_no_size(site: Site) -> Effect:
+    """Return an effect of no size at a site."""
+    return REGISTRY[site.effect](**({'joint': site.joint} if site.joint is not None else {}))
+
+
+def settable(robot: Robot, exclude: frozenset[str]) -> Iterator[Effect]:
+    """Yield every error of no size that a person can set."""
+    for name, kind in REGISTRY.items():
+        if kind.traits.set_at_controller and name not in exclude:
+            for joint in joints_of(kind, robot):
+                yield of_no_size(Site(name, joint))
+
+
+def same_error(robot: Robot, one: Effect, other: Effect) -> bool:
+    """
+    Return whether one of two constant errors can always do what the other does.
+
+    Parameters
+    ----------
+    robot : Robot
+    one, other : Effect
+        Their families and joints count, not their values.
+
+    """
+    a, b = columns(robot, one), columns(robot, other)
+    return inside(a, b) or inside(b, a)
+
+
+def never_parted(
+    robot: Robot, align: frozenset[str], sets: Sequence[Sequence[Site]]
+) -> tuple[tuple[Site, ...], ...]:
+    """
+    Return which sites are one error on any motion, what a person can set first.
+
+    Parameters
+    ----------
+    robot : Robot
+    align : frozenset of str
+        Frames that are fitted, 'base' and 'tool'.
+    sets : sequence of sequence of Site
+        What the data cannot tell apart.
+
+    """
+    out = []
+    for group in sets:
+        known = [site for site in group if site.effect in REGISTRY]
+        left = [site for site in known if constant(REGISTRY[site.effect])]
+        left.sort(key=lambda site: not REGISTRY[site.effect].traits.set_at_controller)
+        while len(left) > 1:
+            first = of_no_size(left[0])
+            same = [left[0], *(s for s in left[1:] if always(robot, first, of_no_size(s), align))]
+            left = [site for site in left if site not in same]
+            if len(same) > 1:
+                out.append(tuple(same))
+    return tuple(out)
+
+
+def always(robot: Robot, one: Effect, other: Effect, align: frozenset[str]) -> bool:
+    """
+    Return whether two constant errors do the same on any motion, each all that the other does.
+
+    Parameters
+    ----------
+    robot : Robot
+    one, other : Effect
+        Their families and joints count, not their values.
+    align : frozenset of str
+        Frames that are fitted, 'base' and 'tool': what these take up tells nobody apart.
+
+    """
+    a, b = columns(robot, one), columns(robot, other)
+    frames = [frame_columns(robot, name) for name in sorted(align)]
+    if frames:
+        span = span_of(np.concatenate(frames))
+        if min(share_outside(rows, span).min() for rows in (a, b)) < SAME:
+            return False  # A frame is what they are.
+        a, b = (outside(rows, span) for rows in (a, b))
+    return inside(a, b) and inside(b, a)
+
+
+def columns(robot: Robot, effect: Effect) -> Array:
+    """Return what an error does to the tool in many postures, one row per component."""
+    return _levered(anywhere(robot).columns(effect))
+
+
+def frame_columns(robot: Robot, name: str) -> Array:
+    """Return what a frame does to the tool in many postures, shape (6, rows)."""
+    maker = anywhere(robot)
+    return _levered(np.stack([maker.column((name, k)) for k in range(6)]))
+
+
+@lru_cache(maxsize=2)
+def anywhere(robot: Robot) -> Features:
+    """Return the twin in postures all over its range."""
+    low = np.maximum(robot.lower, -np.pi)
+    high = np.minimum(robot.upper, np.pi)
+    q = low + (high - low) * np.random.default_rng(SEED).random((POSTURES, robot.n))
+    motion = JointMotion(np.arange(float(POSTURES)), q, static=True)
+    return Features(Twin(robot), Recording('postures', motion), motion.t)
+
+
+def _levered(columns: Array) -> Array:
+    out = np.array(columns)
+    out[:, 3:] *= LEVER
+    return out.reshape(out.shape[0], -1)
+
+
+def inside(rows: Array, span: Array, share: float = SAME) -> bool:
+    """Return whether every row lies in the span of others, but for a share of it."""
+    return bool(rows.any(axis=1).all() and (share_outside(rows, span_of(span)) < share).all())

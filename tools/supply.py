@@ -42,6 +42,13 @@ PYTHONS = re.compile(r'-((py2\.)?py3|(py|cp)31[0-4])-(none|abi3|cp31[0-4])-|-cp3
 """Wheels for the Pythons that are supported, from 3.10 to 3.14."""
 PLATFORMS = re.compile(r'(any|manylinux\w*(\.manylinux\w*)*_x86_64)\.whl$')
 """Wheels for the platform that ROS 2 is on PyPI for; elsewhere the lock is not used."""
+SENTENCES = {
+    'MIT': 'Permission is hereby granted, free of charge',
+    'Apache-2.0': 'Apache License Version 2.0',
+    'BSD': 'Redistributions of source code must retain',
+    'Qhull': 'Qhull, Copyright',
+}
+"""Licences by a sentence that stands in their text, for packages whose metadata name none."""
 _HEAD = f"""\
 # What `make` installs, with SHA-256, for Linux on x86_64 with Python {OLDEST} to 3.14.
 # Made by `python tools/supply.py lock`. Above each package stands what it is needed for.
@@ -152,7 +159,7 @@ def installed() -> list[tuple[str, str, str]]:
 
 
 def licence(package: metadata.Distribution) -> str:
-    """Return the licence that a package names: an expression, its classifiers, or its first line."""
+    """Return the licence of a package: as its metadata, its package.xml or its licence file say."""
     told = package.metadata
     if told.get('License-Expression'):
         return str(told['License-Expression'])
@@ -162,7 +169,24 @@ def licence(package: metadata.Distribution) -> str:
         if text.startswith('License :: ') and text != 'License :: OSI Approved'
     ]
     first = (told.get('License') or '').strip().split('\n')[0][:60]
-    return ' or '.join(classifiers) or first or 'not told'
+    return ' or '.join(classifiers) or first or of_ros(package) or of_file(package) or 'not told'
+
+
+def of_ros(package: metadata.Distribution) -> str:
+    """Return the licences that the package.xml of a ROS package names."""
+    name = re.sub('^ros-(jazzy-)?', '', package.metadata['Name'].replace('_', '-'))
+    path = Path(sys.prefix) / 'share' / name.replace('-', '_') / 'package.xml'
+    text = path.read_text(encoding='utf-8') if path.is_file() else ''
+    return ' and '.join(re.findall(r'<license[^>]*>\s*(.*?)\s*</license>', text))
+
+
+def of_file(package: metadata.Distribution) -> str:
+    """Return the licence whose sentence stands in a package's licence file."""
+    for file in package.files or []:
+        if re.search('licen[cs]e|copying', file.name, re.IGNORECASE):
+            text = ' '.join(Path(str(file.locate())).read_text(encoding='utf-8').split())
+            return next((name for name, words in SENTENCES.items() if words in text), '')
+    return ''
 
 
 def sbom() -> None:

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a machine can have, as the effects say it: the rows of the page's two tables."""
+"""What a machine can have, and what is wrong then, as the effects say it: the rows of tables."""
 
 from __future__ import annotations
 
@@ -18,6 +18,12 @@ def range_rows(*, sliding: bool) -> list[tuple[str, ...]]:
         for p in kind.parameters
         if (found := p.sliding if sliding else p.range) is not None
     ]
+
+
+def cause_rows() -> list[tuple[str, str]]:
+    """Return a row for every cause that a diagnosis may name, by what people call it."""
+    traits = [kind.traits for kind in REGISTRY.values() if kind.traits.cause]
+    return sorted((each.title, each.meaning) for each in traits)
 
 
 def _row(found: Plausible) -> tuple[str, ...]:

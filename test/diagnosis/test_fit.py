@@ -57,7 +57,7 @@ def case(name):
     """Return problem, scale, and a start some way off the truth."""
     true, align, static = CASES[name]
     problem, model = tiny(true, align=align, static=static, count=80)
-    start = tuple(e.with_coordinates(0.8 * e.coordinates()) for e in true)
+    start = tuple(e.fit.with_coordinates(0.8 * e.fit.coordinates()) for e in true)
     return problem, known_scale(problem), model.with_found(start), true
 
 
@@ -79,11 +79,11 @@ def test_the_fit_is_the_minimum_that_another_optimiser_finds(name):
         ftol=1e-12,
         gtol=1e-10,
     )
-    free = np.zeros(sum(e.coordinates().size for e in start.found))
+    free = np.zeros(sum(e.fit.coordinates().size for e in start.found))
     found = fit(problem, start, scale, free)
     assert found.rss == pytest.approx(2.0 * other.cost, rel=1e-4)
     expected = stepped(problem, start, other.x * unit)
-    at = np.concatenate([e.coordinates() for e in expected.found])
+    at = np.concatenate([e.fit.coordinates() for e in expected.found])
     error = errors_of(problem, found.model, scale, free)
     np.testing.assert_allclose((found.coordinates - at) / error, 0.0, atol=0.05)
     # frames and effects trade places within the noise; where the tool goes is what must agree
@@ -113,7 +113,7 @@ def test_columns_are_the_slopes_of_what_the_twin_predicts(name):
 def test_the_truth_lies_within_the_standard_errors(name):
     problem, scale, start, true = case(name)
     found = fit(problem, start, scale)
-    off = found.coordinates - np.concatenate([e.coordinates() for e in true])
+    off = found.coordinates - np.concatenate([e.fit.coordinates() for e in true])
     assert (np.abs(off) < 4.0 * errors_of(problem, found.model, scale)).all()
 
 

@@ -143,7 +143,7 @@ def test_sizes_learned_predict_nearly_as_well_as_sizes_known_and_better_than_non
         problem, model = tiny(true, seed, count=20, noise=1e-4, turned=False)
         fresh, _ = tiny(true, seed + 50, count=200, noise=0.0, turned=False)
         scale = known_scale(problem, position=1e-4)
-        start = model.with_found(tuple(e.with_coordinates(np.zeros(1)) for e in true))
+        start = model.with_found(tuple(e.fit.with_coordinates(np.zeros(1)) for e in true))
         fits = (
             shrunk_fit(problem, start, scale, Beliefs())[0],
             fit(problem, start, scale, precision),
@@ -172,7 +172,7 @@ def test_with_priors_the_slope_of_the_fit_balances_their_pull(align):
         costs = []
         for sign in (1.0, -1.0):
             x = found.coordinates + sign * step * np.eye(3)[k]
-            moved = tuple(e.with_coordinates(x[j : j + 1]) for j, e in enumerate(offsets))
+            moved = tuple(e.fit.with_coordinates(x[j : j + 1]) for j, e in enumerate(offsets))
             residual = problem.whitened(problem.residuals(found.model.with_found(moved)), scale)
             costs.append(residual @ residual)
         slope = (costs[0] - costs[1]) / (2.0 * step)

@@ -60,7 +60,7 @@ def test_what_the_data_do_not_show_has_no_standard_error():
 def test_a_parameter_on_its_bound_has_no_standard_error():
     true = effect('backlash', joint='elbow_joint', width=0.0)
     problem, model = tiny((true,), static=False)
-    found = model.with_found((true, OFFSET.with_coordinates(np.array([1e-9]))))
+    found = model.with_found((true, OFFSET.fit.with_coordinates(np.array([1e-9]))))
     scale = known_scale(problem)
     play, offset = standard_errors(problem, found, scale, np.zeros(0), 1.0)
     assert play == {} and offset['offset'] > 0.0

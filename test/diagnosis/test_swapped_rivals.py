@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What was found stays found where a rival looks better and is then not worth its own numbers."""
+"""What takes the place of what was found: what earns it by its own numbers, alone or in company."""
 
 from diagnosis_cells import effect, tiny
 
@@ -23,7 +23,7 @@ def test_a_rival_that_earns_no_place_takes_none_from_what_was_found(monkeypatch)
     problem, model = tiny(TRUE)
     work, now, _ = search._workspace(problem, model.with_found(TRUE), (), Beliefs())
 
-    def rivals(work, now, k, effective):
+    def rivals(work, now, k, effective, others):
         own = Rival(Site(now.model.found[k].name, now.model.found[k].site), 6.2, now, 0.4)
         if k == 0:
             return (own,)
@@ -34,4 +34,14 @@ def test_a_rival_that_earns_no_place_takes_none_from_what_was_found(monkeypatch)
     monkeypatch.setattr(search, 'rivals', rivals)
     kept, slots = search.settled(work, now, lambda found: float(found.residual.size), str)
     assert [e.name for e in kept.model.found] == ['joint_offset', 'link_length']
+    assert len(slots) == 2
+
+
+def test_what_stands_for_several_gives_way_to_them():
+    problem, model = tiny(TRUE)
+    stand_ins = (effect('base_pose'), effect('tool_pose'))
+    work, now, _ = search._workspace(problem, model.with_found(stand_ins), (), Beliefs())
+    kept, slots = search.settled(work, now, lambda found: float(found.residual.size), str)
+    assert {(e.name, e.site) for e in kept.model.found} == {(e.name, e.site) for e in TRUE}
+    assert kept.rss < 0.1 * now.rss
     assert len(slots) == 2

@@ -196,7 +196,7 @@ def test_a_diagnosis_that_is_over_holds_no_memory():
     arm = load('ur5')
     before = fits()
     true = [{'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 2e-3}]
-    answer = diagnose([recorded(arm, true, 3)], arm)
+    answer = diagnose([recorded(arm, true, 3, seconds=6.0)], arm)
     assert answer.effects
     del answer
     assert fits() <= before

@@ -10,8 +10,14 @@ import pytest
 import yaml
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.effects import REGISTRY, MemoryEffect, effects_from_list
-from weld_twin_core.effects.hooks import Hooks
+from weld_twin_core.effects import (
+    REGISTRY,
+    Effect,
+    JointOffset,
+    MemoryEffect,
+    effects_from_list,
+)
+from weld_twin_core.effects.hooks import OF_GROUP, TRAITS
 from weld_twin_core.twin.twin import Twin
 
 PAGE = (Path(__file__).parents[2] / 'docs' / 'effects.md').read_text(encoding='utf-8')
@@ -57,13 +63,37 @@ def test_the_page_says_what_the_effect_is(name):
 def hooks():
     """Return the hooks that the page lists."""
     table = PAGE.partition('## What else an effect may tell')[2]
-    return re.findall(r'^\| `(\w+)` \|', table, flags=re.MULTILINE)
+    return re.findall(r'^\| `([\w.]+)` \|', table, flags=re.MULTILINE)
 
 
 def test_the_page_lists_every_hook_once():
-    told = set(vars(Hooks)) | set(Hooks.__annotations__)
-    contract = {'of', 'stage', 'site', 'at', 'on', 'key'}  # what every effect has, not a hook
-    assert sorted(hooks()) == sorted(k for k in told - contract if not k.startswith('_'))
+    own = {'gradient', 'needs', 'applicable', 'seeds', 'atoms', 'from_atoms', 'remedy'}
+    grouped = {f'{group}.{name}' for name, group in OF_GROUP.items()}
+    assert sorted(hooks()) == sorted(own | grouped | {f'traits.{name}' for name in TRAITS})
+
+
+def test_an_effect_has_few_names():
+    declared = {'name', 'of', 'stage', 'parameters'}
+    assert len({k for k in dir(Effect) if not k.startswith('_')} | declared) <= 30
+
+
+def test_hooks_where_version_0_1_had_them_still_tell():
+    with pytest.warns(DeprecationWarning, match='Sag: depends_on, small, turned'):
+
+        class Sag(JointOffset):
+            depends_on = 'load'
+
+            @classmethod
+            def small(cls, view, joint, most):
+                return [cls(joint, 1e-9)] * most
+
+            def turned(self):
+                return 'other side'
+
+    (one, _) = Sag.search.small(None, 'elbow', 2)
+    assert (Sag.traits.depends_on, Sag.traits.title) == ('load', JointOffset.traits.title)
+    assert (one.offset, one.site, one.fit.turned()) == (1e-9, 'elbow', 'other side')
+    assert (one.on, one.depends_on, one.coordinates().tolist()) == ('load', 'load', [1e-9])
 
 
 def robot():
@@ -79,7 +109,7 @@ def test_the_files_on_the_page_can_be_used():
 
 
 def test_the_example_of_an_own_effect_runs():
-    (block,) = re.findall(r'```python\n(.*?)```', PAGE, re.DOTALL)
+    block = '\n'.join(re.findall(r'```python\n(.*?)```', PAGE, re.DOTALL))
     known = dict(REGISTRY)
     try:
         exec(compile(block, 'effects.md', 'exec'), {'__name__': 'example'})

@@ -28,6 +28,9 @@ NEAR = np.radians([8, -85, 100, 5, 70, -3])
 OFF = np.array([0.0, 8e-4, 0.0, -9e-4, 0.0, 0.0])
 """How much further joints 2 and 4 stand than they read [rad]."""
 NOISE = 2e-5
+_POINT = 1e3 * tool_pose(ROBOT, NEAR, TOOL, np.zeros(6))[:3, 3]
+BOX = ':'.join(','.join(f'{v:.0f}' for v in _POINT + side) for side in (-80.0, 80.0))
+"""About where the tool is measured, in the base frame [mm]."""
 KEPT, NOT_KEPT = 0, 4
 
 
@@ -60,9 +63,9 @@ def cell(tmp_path_factory):
     few = ('transmission_ripple', 'bearing_tilt', 'joint_coupling', 'hose_pull', 'loaded_play')
     said = weld_twin(
         *('diagnose', folder / 'before', '--robot', folder / 'robot.yaml'),
-        *('--out', folder / 'found', '--exclude-effect', *few),
+        *('--out', folder / 'found', '--region', BOX, '--exclude-effect', *few),
     )
-    assert said.code == 0, said.err
+    assert said.code == 0 and f"In the region '{BOX}'" in said.out.replace('\n', ' '), said.err
     said = weld_twin(
         *('correct', MADE / FILES[0], '--robot', folder / 'robot.yaml'),
         *('--model', folder / 'found' / 'diagnosis.json', '--out', folder / 'better'),
@@ -244,14 +247,14 @@ def test_a_plan_promises_in_a_region_what_the_diagnosis_warns_of(cell):
     said = plan_more(cell)
     assert said.code == 0, said.err
     assert f'be off by {posterior["sigma_anywhere_m"] * 1e3:.2g} mm elsewhere' in said.out
-    point = 1e3 * tool_pose(ROBOT, NEAR, TOOL, 0.0 * OFF)[:3, 3]
-    corners = (','.join(f'{v:.0f}' for v in point + side) for side in (-80.0, 80.0))
-    for region in (MADE / FILES[0], cell / 'before', ':'.join(corners)):
+    for region in (MADE / FILES[0], cell / 'before', BOX):
         said = plan_more(cell, '--region', region)
         assert said.code == 0, said.err
         rows = [line.split() for line in said.out.splitlines() if line.split()[0].isdigit()]
         left = [float(row[2]) for row in rows if row[1].replace('.', '').isdigit()]
         assert left[-1] <= left[0] < 1e3 * posterior['sigma_anywhere_m']
+    told, sigma = posterior['region']
+    assert told == BOX and f'may be off by {sigma * 1e3:.2g} mm in the region' in said.out
 
 
 @pytest.mark.parametrize('region', ['nowhere', '1,2,3', '0,0,0:-1,1,1', '90000,0,0:91000,1,1'])

@@ -316,6 +316,19 @@ def test_two_goals_at_once_reach_the_controller_in_their_order(planner):
     planner.result(asked[1].result())
 
 
+def test_an_order_to_stop_waits_for_no_goal_and_none_from_before_is_sent_after_it(planner):
+    stop, count = planner.kind.Goal(), len(planner.controller.goals)
+    stop.trajectory.joint_names = NAMES
+    long = planner.client.send_goal_async(planner.goal(sway(10.0, count=4000)))
+    asked = planner.client.send_goal_async(stop)
+    planner.cell.wait(asked.done, 'the answer to the stop')
+    assert not long.done()
+    planner.cell.wait(long.done, 'the answer to the goal')
+    assert (asked.result().accepted, long.result().accepted) == (True, False)
+    assert [len(goal.trajectory.points) for goal in planner.controller.goals[count:]] == [0]
+    planner.cell.wait(lambda: 'order to stop came' in planner.audit[-1]['why'], 'the reason')
+
+
 def test_a_model_exchanged_meanwhile_counts_from_the_next_goal_on(planner):
     handle, before = planner.send(planner.goal(sway(4.0)))
     write_model(planner.model, 0.5 * OFF)

@@ -40,7 +40,7 @@ def fitted(recording, robot, effects=(), align='', sigma=SIGMA):
     """Return the fit of effects that start at zero."""
     problem, model = aligned(recording, robot, align, ())
     scale = Scale(sigma, 1.0, tuple(np.ones(m) for m in problem.samples))
-    free = np.full(sum(e.coordinates().size for e in effects), 1e-12)
+    free = np.full(sum(e.fit.coordinates().size for e in effects), 1e-12)
     return problem, fit(problem, model.with_found(tuple(effects)), scale, free)
 
 

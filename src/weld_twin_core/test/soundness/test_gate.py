@@ -37,12 +37,18 @@ def seen(robot, recording, align=('base', 'tool'), apply=False):
     return examine(Given((recording,), robot, frozenset(align)), apply=apply)
 
 
-def only(robot, recording, align=('base', 'tool')):
-    """Return kind and place of the one mistake that is found, and see that it can be undone."""
+def mended(robot, recording, align=('base', 'tool')):
+    """Return what is found and the one mistake in it, and see that it can be undone."""
     found = seen(robot, recording, align, apply=True)
     (item,) = found.unsound
     assert item.applied and found.posed is not None
     assert found.posed[1].mended == (item.sentence,)
+    return found, item
+
+
+def only(robot, recording, align=('base', 'tool')):
+    """Return kind and place of the one mistake that is found."""
+    _, item = mended(robot, recording, align)
     return item.kind, item.at
 
 
@@ -80,8 +86,8 @@ def test_a_base_turned_by_half_a_turn_where_it_is_not_fitted(ur5, run):
 @pytest.mark.parametrize('degrees', [90.0, -90.0, 180.0])
 def test_joint_1_off_by_a_turn_is_a_base_that_stands_turned_and_both_are_told(ur5, run, degrees):
     bad = rejointed(run, run.joints.q + [np.radians(degrees), 0, 0, 0, 0, 0])
-    assert only(ur5, bad, align=()) == ('base_turned', ('base',))
-    (item,) = seen(ur5, bad, align=()).unsound
+    _, item = mended(ur5, bad, align=())
+    assert (item.kind, item.at) == ('base_turned', ('base',))
     assert item.alike == (('constant_angle', ('shoulder_pan_joint',)),)
 
 
@@ -91,8 +97,9 @@ def test_joint_1_off_by_a_turn_is_a_base_that_stands_turned_and_both_are_told(ur
 def test_a_base_that_stands_turned_axis_onto_axis_is_turned_back(ur5, run, axis, degrees):
     turn = Rotation.from_euler(axis, degrees, degrees=True)
     bad = remeasured(run, position=run.measured.position @ turn.as_matrix().T)
-    assert only(ur5, bad, align=()) == ('base_turned', ('base',))
-    base = seen(ur5, bad, align=(), apply=True).given.robot.T_world_base
+    found, item = mended(ur5, bad, align=())
+    assert (item.kind, item.at) == ('base_turned', ('base',))
+    base = found.given.robot.T_world_base
     np.testing.assert_allclose(base[:3, :3], turn.as_matrix(), atol=1e-12)
 
 

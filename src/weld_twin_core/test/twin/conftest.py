@@ -3,6 +3,8 @@
 """Robots and recordings of the core's tests, and kinematics written a second time, plainly."""
 
 import math
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.recording import JointMotion, Recording, Signal
+
+sys.path.insert(0, str(Path(__file__).parent))  # what lies beside the tests can be imported
 
 UR5_ROWS = [
     (0.0, np.pi / 2, 0.089159),

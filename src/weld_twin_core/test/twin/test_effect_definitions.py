@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
+from usual_effects import OF_CELLS, bundled
 
 from weld_twin_core.effects import REGISTRY, effect_from_mapping
 from weld_twin_core.errors import ModelError
@@ -334,8 +335,6 @@ DEFINITIONS = {
 IN_TIME = {'backlash', 'servo_lag', 'vibration', 'time_delay', 'clock_rate'}
 LOST_MOTION = {'friction', 'hysteresis', 'gear_ratio_by_direction'}
 """Tested in test_lost_motion."""
-OF_CELLS = {'root_pose', 'guide_bend', 'guide_tilt'}
-"""Of robots beside a positioner, or on a track; tested in test_cells."""
 
 
 def effect(name, **values):
@@ -348,9 +347,10 @@ def with_helpers(name, effects):
     return tuple(effects) + tuple(spring if name in ('payload', 'hose_pull') else [])
 
 
-def test_every_registered_effect_is_tested_here():
-    bundled = {name for name, kind in REGISTRY.items() if kind.__module__.startswith('weld_twin')}
-    assert bundled == set(DEFINITIONS) | IN_TIME | LOST_MOTION | OF_CELLS
+def test_every_effect_is_tested_here_or_held_against_the_plant():
+    plant = pytest.importorskip('weld_twin_lab.plant.plant')
+    held = set(DEFINITIONS) | IN_TIME | LOST_MOTION | OF_CELLS
+    assert {kind.name for kind in bundled()} <= held | plant.KNOWN
 
 
 @pytest.mark.parametrize('name', DEFINITIONS)
@@ -574,7 +574,7 @@ def test_a_link_that_follows_a_temperature_grows_as_it_does(arm, make_recording)
     same = effect('thermal_growth', coefficient=2e-4, links=['j2'])
     poses = [Twin(arm, (each,)).poses(recording).position for each in (one, same)]
     np.testing.assert_allclose(*poses, atol=1e-12)
-    assert one.on == 'temperature' and len(one.fitted()) == 1
+    assert one.on == 'temperature' and len(one.fit.fitted()) == 1
     for wrong in ([20.0], [20.0, 0.0], 'warm'):
         with pytest.raises(ModelError, match='follows must be'):
             effect('link_warm_up', joint='j2', follows=wrong).check(arm)

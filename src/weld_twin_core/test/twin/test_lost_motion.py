@@ -120,10 +120,10 @@ def test_slow_motion_hardly_winds_up(arm):
 
 def test_a_fit_leaves_even_friction_even():
     even, uneven = Friction('j2', 1e-3, travel=2e-4), Friction('j2', 1e-3, 0.1, 2e-4)
-    assert even.coordinates().tolist() == [1e-3, 2e-4]
-    moved = even.with_coordinates(np.array([2e-3, 3e-4]))
+    assert even.fit.coordinates().tolist() == [1e-3, 2e-4]
+    moved = even.fit.with_coordinates(np.array([2e-3, 3e-4]))
     assert moved.vector().tolist() == [2e-3, 0.0, 3e-4]
-    moved = uneven.with_coordinates(np.array([2e-3, 0.2, 3e-4]))
+    moved = uneven.fit.with_coordinates(np.array([2e-3, 0.2, 3e-4]))
     assert moved.vector().tolist() == [2e-3, 0.2, 3e-4]
     assert uneven.errors(np.array([1e-5, 0.05, 1e-5])) == {
         'windup': 1e-5,

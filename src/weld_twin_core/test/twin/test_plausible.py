@@ -19,7 +19,7 @@ from weld_twin_core.effects import (
     register,
 )
 from weld_twin_core.effects.payload import mass_range
-from weld_twin_core.effects.plausible import TABLE, beyond, plausible, ranges, spreads
+from weld_twin_core.effects.plausible import beyond, plausible, ranges, spreads, table
 from weld_twin_core.errors import ModelError
 
 UR5 = catalog.load('ur5')
@@ -30,14 +30,14 @@ NOT_OF_A_MACHINE = {('measurement_noise', 'sigma')}
 
 def parameters():
     bundled = [k for k in REGISTRY.values() if k.__module__.startswith('weld_twin')]
-    return {(kind.name, p.name) for kind in bundled if kind.cause for p in kind.parameters}
+    return {(kind.name, p.name) for kind in bundled if kind.traits.cause for p in kind.parameters}
 
 
 def test_every_parameter_of_every_cause_has_a_range_and_a_source():
     curves = {key for key in parameters() if 'curve' in key[0]}
-    assert parameters() - FREE - NOT_OF_A_MACHINE - curves <= set(TABLE)
-    assert all(each.low < each.high and each.sd > 0.0 for each in TABLE.values())
-    assert all(len(each.source) >= 15 for each in TABLE.values())
+    assert parameters() - FREE - NOT_OF_A_MACHINE - curves <= set(table())
+    assert all(each.low < each.high and each.sd > 0.0 for each in table().values())
+    assert all(len(each.source) >= 15 for each in table().values())
 
 
 def test_a_robot_of_four_kilograms_payload_cannot_lack_ten():
@@ -81,14 +81,14 @@ def test_spreads_and_ranges_go_with_the_fit_coordinates():
         values = {'joint': 'elbow_joint'} if kind.of in ('joint', 'link') else {}
         effect = kind(**values)
         low, high = ranges(robot, effect)
-        assert spreads(robot, effect).shape == low.shape == effect.coordinates().shape
-        assert (low <= effect.coordinates()).all() and (effect.coordinates() <= high).all()
+        assert spreads(robot, effect).shape == low.shape == effect.fit.coordinates().shape
+        assert (low <= effect.fit.coordinates()).all() and (effect.fit.coordinates() <= high).all()
 
 
 def test_a_joint_that_slides_has_metres():
     axis = Robot.from_mapping({'joints': [{'name': 'z', 'type': 'prismatic'}]})
     assert plausible(axis, 'backlash', 'width', 'z').high <= 5e-3
-    assert plausible(axis, 'backlash', 'width', 'z').high < TABLE['backlash', 'width'].high
+    assert plausible(axis, 'backlash', 'width', 'z').high < table()['backlash', 'width'].high
 
 
 def test_a_robot_file_narrows_and_keeps_what_it_says():

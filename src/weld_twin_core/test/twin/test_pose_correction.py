@@ -15,6 +15,8 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.motion.inverse.newton import polish
 from weld_twin_core.motion.paths import default_seam
 from weld_twin_core.motion.planned_motion import plan
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.compensation import compensate
 from weld_twin_core.twin.pose_correction import PoseCorrection, moved
 from weld_twin_core.twin.program_model import ProgramModel
 
@@ -61,10 +63,35 @@ def test_poses_between_two_looks_are_as_good():
             off = forward(real_arm(), joints[None])[0] - pose
             worst = max(worst, float(np.abs(off[:3, 3]).max()))
         if far > 0.7:
-            found.adopt(found.exact(pose, found.looked))
+            found.adopt(found.exact(pose))
             looks += 1
     assert worst < 2e-9
     assert looks < len(poses) / 10
+
+
+def test_a_stream_adds_what_compensate_does_for_an_arm_that_sags_and_ripples():
+    entries = (
+        {'effect': 'joint_compliance', 'joint': 'shoulder_lift_joint', 'compliance': 8e-6},
+        {'effect': 'transmission_ripple', 'joint': 'elbow_joint', 'amplitude': 4e-4, 'order': 3.0},
+        {'effect': 'link_length', 'joint': 'elbow_joint', 'da': 3e-4},
+    )
+    model = ProgramModel(UR5, tuple(effect_from_mapping(entry) for entry in entries))
+    whole = plan(UR5, default_seam(UR5, 'weave'), rate_hz=250.0).motion
+    motion = JointMotion(whole.t[:600], whole.q[:600])
+    meant = forward(UR5, motion.q)
+    expected = forward(UR5, compensate(UR5, model.effects, Recording('weave', motion)).motion.q)
+    found, waited = PoseCorrection(model, UR5.T_flange_tool), 0
+    found.adopt(found.first(meant[0], motion.q[0]))
+    for pose, wanted in zip(meant, expected, strict=True):
+        added, far = found.added(pose)
+        waited += far > 2.0
+        np.testing.assert_allclose(moved(pose, added), wanted, rtol=0.0, atol=2e-9)
+        if far > 0.7:
+            found.adopt(found.exact(pose))
+            looked = moved(pose, found.looked.added)
+            np.testing.assert_allclose(looked, wanted, rtol=0.0, atol=1e-9)
+    assert waited == 0
+    assert np.abs(expected - meant)[:, :3, 3].max() > 1e-4
 
 
 def test_play_is_told_as_left_and_a_pose_out_of_reach_is_said():

@@ -51,8 +51,8 @@ def drawn(robot, effects, steps, recording):
         tool[:3, 3] += step[6:9]
         moved, at = [], 12
         for effect in effects:
-            now = effect.coordinates()
-            moved.append(effect.with_coordinates(now + step[at : at + now.size]))
+            now = effect.fit.coordinates()
+            moved.append(effect.fit.with_coordinates(now + step[at : at + now.size]))
             at += now.size
         twin = Twin(robot.with_frames(base=base, tool=tool), tuple(moved))
         out.append(twin.poses(recording))
@@ -150,9 +150,11 @@ def test_only_the_discrepancy_grows_with_the_distance():
         got[0], np.diag(np.repeat([4e-10, 9e-10], 3)), rtol=1e-12, atol=1e-24
     )
     np.testing.assert_allclose(got[1], got[0], atol=1e-24)
-    # Half way and beyond the reach: a turn about joint 1, which is the world's z.
-    np.testing.assert_allclose(got[2, 5, 5] - 9e-10, 0.25e-8, rtol=1e-9)
-    np.testing.assert_allclose(got[3, 5, 5] - 9e-10, 1e-8, rtol=1e-9)
+    # Half way and beyond the reach: a turn about joint 1, which is the world's z. What is left over
+    # at the tool is half as large again there, and twice as large.
+    np.testing.assert_allclose(got[2, 5, 5] - 1.5**2 * 9e-10, 0.25e-8, rtol=1e-9)
+    np.testing.assert_allclose(got[3, 5, 5] - 2.0**2 * 9e-10, 1e-8, rtol=1e-9)
+    np.testing.assert_allclose(got[3, 2, 2], 2.0**2 * 4e-10, rtol=1e-9)
 
 
 def test_a_covariance_that_cannot_be_is_refused():

@@ -11,7 +11,6 @@ from weld_twin_core.effects import REGISTRY
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.compensation import compensate
 from weld_twin_core.twin.domain import Domain
-from weld_twin_core.twin.trust import trust
 from weld_twin_core.twin.twin import Twin
 
 UR5 = load('ur5')
@@ -23,7 +22,7 @@ def test_all_where_it_was_recorded_and_the_best_share_far_outside():
     q[:, 2] = [1.0, 1.05, 2.0]
     correction = np.tile([3e-4, 0.0, 4e-4], (3, 1))  # half a millimetre
     covariance = np.tile(np.diag([4e-8, 2e-8, 2.5e-9]) * 4.0, (3, 1, 1))  # root of trace 0.5 mm
-    share = trust(DOMAIN, q, correction, covariance)
+    share = DOMAIN.trust(q, correction, covariance)
     assert share[0] == 1.0
     assert 0.5 < share[1] < 1.0
     assert abs(share[2] - 0.5) < 1e-9
@@ -33,7 +32,7 @@ def test_the_share_goes_over_without_a_jump():
     q = np.zeros((2001, 6))
     q[:, 4] = np.linspace(0.9, 1.3, 2001)
     still = np.tile([1e-4, 0.0, 0.0], (2001, 1))
-    share = trust(DOMAIN, q, still, np.tile(np.eye(3) * 1e-6, (2001, 1, 1)))
+    share = DOMAIN.trust(q, still, np.tile(np.eye(3) * 1e-6, (2001, 1, 1)))
     assert np.abs(np.diff(share)).max() < 5e-3
     assert share[-1] < 0.01
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from usual_effects import usual
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects import (
@@ -169,15 +170,14 @@ DRAWN = {
     'refraction': {'warming': [1.0, -2.0, 3.0]},
     'measurement_noise': {'sigma': 1e-4},
 }
-OF_CELLS = {'root_pose', 'guide_bend', 'guide_tilt'}
-"""Tested in test_cells."""
+DRAWN = usual(DRAWN)
 
 
-def test_every_registered_effect_is_drawn_here():
-    bundled = {name for name, kind in REGISTRY.items() if kind.__module__.startswith('weld_twin')}
-    assert bundled == set(DRAWN) | OF_CELLS
+BUILDS = ('standard', 'modified gantry', 'positioner', 'modified positioner')
+"""Either convention, with and without an axis that slides and joints behind the workpiece."""
 
 
+@pytest.mark.parametrize('robot', BUILDS, indirect=True)
 @pytest.mark.parametrize('name', DRAWN)
 def test_draws_of_an_effect_are_a_loop_over_draws(name, robot, make_recording, stamps):
     # Three draws would be as many as coordinates: a wrong broadcast would go unnoticed.

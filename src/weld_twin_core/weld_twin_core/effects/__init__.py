@@ -3,7 +3,8 @@
 """
 The vocabulary of effects: one physical cause per file, one definition for every use.
 
-Importing this package registers the bundled effects; user code adds its own with `register`.
+Importing this package registers the effect of every file in it; user code adds its own with
+`register`.
 Every effect is a frozen dataclass. Its fields are the parameters that the page of effects lists,
 in SI units; effects of a joint or a link take the name of the joint first.
 
@@ -15,6 +16,9 @@ Examples
 {'effect': 'backlash', 'joint': 'elbow_joint', 'width': 0.0005}
 
 """
+
+from importlib import import_module
+from pkgutil import iter_modules
 
 from .backlash import Backlash
 from .bearing_tilt import BearingTilt
@@ -111,3 +115,6 @@ __all__ = [
     'effects_from_list',
     'register',
 ]
+
+for _file in iter_modules(__path__):  # an effect needs no line above to be known by its name
+    import_module(f'.{_file.name}', __name__)

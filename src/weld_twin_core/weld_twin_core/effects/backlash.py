@@ -30,6 +30,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .associative_scan import last_true, play
 from .effect import Effect, MemoryEffect
+from .hooks import FitHooks, Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -44,6 +45,28 @@ RV = (
 """What makers of reducers allow."""
 
 
+class _Search(SearchHooks):
+    """What the search asks of it."""
+
+    kind: type[Backlash]
+
+    def small(self, view: View, joint: str | None, most: int) -> list[Backlash]:
+        """Return a gap that is all but closed."""
+        return [self.kind(str(joint), CLOSED)]
+
+
+class _Fit(FitHooks):
+    """What the fit asks of it."""
+
+    effect: Backlash
+
+    def turned(self) -> Backlash:
+        """Return a gap that the data refuse as the arm resting ahead instead of behind."""
+        if self.coordinates()[0] > CLOSED:
+            return self.effect
+        return replace(self.effect, form='coast', width=CLOSED)
+
+
 @register
 @dataclass(frozen=True, eq=False)
 class Backlash(MemoryEffect):
@@ -54,11 +77,14 @@ class Backlash(MemoryEffect):
     form: str = 'play'
 
     name = 'backlash'
-    title = 'backlash'
-    entered = "the joint's gear"
-    changes_in_use = True
-    demand = 2
-    depends_on = 'direction'
+    traits = Traits(
+        title='backlash',
+        meaning='a gap in a gear (play): at every reversal the motor crosses it, and the arm stays',
+        entered="the joint's gear",
+        depends_on='direction',
+        changes_in_use=True,
+        demand=2,
+    )
     of = 'joint'
     stage = Stage.PLAY
     parameters = (
@@ -78,6 +104,8 @@ class Backlash(MemoryEffect):
     )
     options = ('form',)
     needs = frozenset({'order'})
+    search = Hooked(_Search)
+    fit = Hooked(_Fit)
 
     def check(self, robot: Robot) -> None:
         """Refuse an unknown form and a negative width."""
@@ -134,45 +162,9 @@ class Backlash(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield play of a small, a usual and a large width: how it engages depends on width.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield play of a small, a usual and a large width: how it engages depends on width."""
         for width in (5e-5, 5e-4, 2e-3):
             yield cls(str(joint), width)
-
-    @classmethod
-    def small(cls, view: View, joint: str | None, most: int) -> list[Backlash]:
-        """
-        Return a gap that is all but closed.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it sits on.
-        most : int
-            How many numbers the measurements can hold apart.
-
-        """
-        return [cls(str(joint), CLOSED)]
-
-    def turned(self) -> Backlash:
-        """Return a gap that the data refuse as the arm resting ahead instead of behind."""
-        if self.coordinates()[0] > CLOSED:
-            return self
-        return replace(self, form='coast', width=CLOSED)
 
     def atoms(self, view: View) -> list[Shift]:
         """Return the displacement per unit of width."""
@@ -183,8 +175,8 @@ class Backlash(MemoryEffect):
         return Backlash(self.joint, max(float(coefficients[0]), 0.0), self.form)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
-        play = self.travelled(robot, self.plain('width'))
+        """Return what to mend, in words; see `Effect.remedy`."""
+        play = self._travelled(robot, self._plain('width'))
         if self.form == 'coast':
             return (
                 f'Approach stations with {self.site} always from one side, or preload its gear: '

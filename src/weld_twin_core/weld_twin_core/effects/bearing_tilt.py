@@ -33,9 +33,31 @@ from ..errors import ModelError
 from .base_leans import base_leans
 from .carriage import summed
 from .effect import Effect
+from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import turn
+
+
+class _Search(SearchHooks):
+    """What the search asks of it."""
+
+    effect: BearingTilt
+    kind: type[BearingTilt]
+
+    def small(self, view: View, joint: str | None, most: int) -> list[BearingTilt]:
+        """Return the wave of once per turn: among many small errors the second is far below them."""
+        return [self.kind(str(joint))]
+
+    def joined(self, other: BearingTilt) -> BearingTilt:
+        """Return the waves of both in one."""
+        both = [one.second for one in (self.effect, other) if np.size(one.second)]
+        lean = np.asarray(self.effect.lean) + np.asarray(other.lean)
+        return replace(self.effect, lean=lean, second=sum(map(np.asarray, both)) if both else ())
+
+    def fits(self, robot: Robot, joint: str | None) -> bool:
+        """Return whether the joint turns."""
+        return joint is not None and not robot.prismatic[robot.index(joint)]
 
 
 @register
@@ -52,13 +74,16 @@ class BearingTilt(Effect):
     second: Value = ()
 
     name = 'bearing_tilt'
-    title = 'axis wobble'
-    entered = 'program'
-    depends_on = 'angle'
+    traits = Traits(
+        title='axis wobble',
+        meaning='an axis leans as it turns, once or twice per turn',
+        entered='program',
+        depends_on='angle',
+        common=False,
+        by_motion=True,
+    )
     of = 'joint'
     stage = Stage.LINK
-    common = False
-    by_motion = True
     parameters = (
         Parameter(
             'lean',
@@ -83,14 +108,11 @@ class BearingTilt(Effect):
             ),
         ),
     )
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """
         Refuse an effect this robot cannot have.
-
-        Parameters
-        ----------
-        robot : Robot
 
         Raises
         ------
@@ -131,55 +153,17 @@ class BearingTilt(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Any]:
-        """
-        Yield the wave of once per turn, and both waves.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-            The joint it would sit on.
-        pull : array, shape (N,), optional
-            Not needed.
-
-        """
+        """Yield the wave of once per turn, and both waves."""
         yield cls(str(joint))
         yield cls(str(joint), second=np.zeros(4))
-
-    @classmethod
-    def small(cls, view: View, joint: str | None, most: int) -> list[BearingTilt]:
-        """
-        Return the wave of once per turn: among many small errors the second is far below them.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-            The joint it sits on.
-        most : int
-            How many numbers the measurements can hold apart; it takes four.
-
-        """
-        return [cls(str(joint))]
-
-    def joined(self, other: BearingTilt) -> BearingTilt:
-        """Return the waves of both in one."""
-        both = [one.second for one in (self, other) if np.size(one.second)]
-        lean = np.asarray(self.lean) + np.asarray(other.lean)
-        return replace(self, lean=lean, second=sum(map(np.asarray, both)) if both else ())
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the entry of an effects file; without a second wave, none is told."""
         out = super().to_mapping()
         return out if np.size(self.second) else {k: v for k, v in out.items() if k != 'second'}
 
-    @classmethod
-    def fits(cls, robot: Robot, joint: str | None) -> bool:
-        """Return whether the joint turns."""
-        return joint is not None and not robot.prismatic[robot.index(joint)]
-
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         lean = float(np.linalg.norm(np.asarray(self.lean)))
         return (
             f'Look at the bearing of {self.site}: its axis leans by {turn(lean)} once per turn; '

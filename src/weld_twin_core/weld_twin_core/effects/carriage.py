@@ -13,22 +13,29 @@ from ..arm.robot import Robot
 from ..arm.vectors import components, cross, pad
 from ..arrays import Array
 from .effect import Effect
+from .hooks import Hooked, SearchHooks, Traits
 from .view import View
+
+
+class _Search(SearchHooks):
+    """What the search asks of it."""
+
+    def fits(self, robot: Robot, joint: str | None) -> bool:
+        """Return whether the joint slides."""
+        return joint is not None and bool(robot.prismatic[robot.index(joint)])
 
 
 class GuideError(Effect):
     """An error of a guide; its carriage leaves the straight line by the posture of one joint."""
 
     of = 'joint'
-    depends_on = 'angle'
-    by_motion = True
-    common = False
-    lacking = 'is of a joint that slides, and {site!r} turns'
-
-    @classmethod
-    def fits(cls, robot: Robot, joint: str | None) -> bool:
-        """Return whether the joint slides."""
-        return joint is not None and bool(robot.prismatic[robot.index(joint)])
+    traits = Traits(
+        depends_on='angle',
+        common=False,
+        by_motion=True,
+        lacking='is of a joint that slides, and {site!r} turns',
+    )
+    search = Hooked(_Search)
 
 
 def carriage_axes(view: View, i: int) -> tuple[Array, Array, Array]:

@@ -13,6 +13,7 @@ from ..arm.dynamics import wrench_rotation
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -26,10 +27,13 @@ class CartesianCompliance(Effect):
     compliance: Value = (0.0, 0.0, 0.0)
 
     name = 'cartesian_compliance'
-    title = 'compliance at the tool'
-    entered = 'stiffness and of the force at the tool'
-    depends_on = 'load'
-    place = 'tool'
+    traits = Traits(
+        title='compliance at the tool',
+        meaning='the tool gives way under a force',
+        entered='stiffness and of the force at the tool',
+        depends_on='load',
+        place='tool',
+    )
     of = 'robot'
     stage = Stage.POSE
     parameters = (
@@ -71,7 +75,7 @@ class CartesianCompliance(Effect):
         return [{('pose', j): force[..., j] for j in range(3)} for force in forces]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         values = np.asarray(self.compliance) * 1e5
         each = ', '.join(number(float(v)) for v in values)
         return f'Compensate the yielding of the tool: ({each}) mm per 100 N along its x, y, z.'

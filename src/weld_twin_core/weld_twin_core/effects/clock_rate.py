@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
@@ -24,13 +25,16 @@ class ClockRate(Effect):
     rate: Value = 0.0
 
     name = 'clock_rate'
-    title = 'clock that runs fast or slow'
-    entered = 'its clocks'
-    depends_on = 'time'
-    place = 'clock'
+    traits = Traits(
+        title='clock that runs fast or slow',
+        meaning='the two clocks drift apart',
+        entered='its clocks',
+        depends_on='time',
+        place='clock',
+        common=False,
+    )
     of = 'robot'
     stage = Stage.CLOCK
-    common = False
     parameters = (
         Parameter(
             'rate',
@@ -61,8 +65,8 @@ class ClockRate(Effect):
         return [{('q', i): -view.qd[..., i] * shown for i in range(view.robot.n)}]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
-        ppm = self.plain('rate') * 1e6
+        """Return what to mend, in words; see `Effect.remedy`."""
+        ppm = self._plain('rate') * 1e6
         way = 'fast' if ppm > 0.0 else 'slow'
         return (
             f'Synchronise the clocks of both computers all the time: that of the measurements runs '

@@ -24,8 +24,8 @@ class ChannelError(Effect):
     """How a robot file is wrong that lacks it."""
 
     def remedy(self, robot: Robot) -> str:
-        """Return which number of the robot file to mend; see `Hooks.remedy`."""
-        error = self.plain(self.parameters[0].name)
+        """Return which number of the robot file to mend; see `Effect.remedy`."""
+        error = self._plain(self.parameters[0].name)
         now = float(getattr(robot, self.channel)[robot.index(str(self.site))])
         if self.channel in ('a', 'd'):
             old, new = f'{now * 1e3:.3f} mm', f'{(now + error) * 1e3:.3f} mm'

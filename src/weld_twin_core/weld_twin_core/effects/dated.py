@@ -20,6 +20,7 @@ from ..arrays import Array
 from .constant import ChannelError, FrameError, frame_parameters
 from .effect import Effect
 from .geometry import JointOffset
+from .hooks import Hooked, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import base_frame, frame, radians
@@ -35,9 +36,7 @@ class Sudden(Effect):
     slow change halfway.
     """
 
-    depends_on = 'time'
-    dated = True
-    common = False
+    traits = Traits(depends_on='time', dated=True, common=False)
     options = ('time',)
     needs = frozenset({'time'})
 
@@ -69,6 +68,16 @@ class Sudden(Effect):
         ]
 
 
+class _Twin(TwinHooks):
+    """What the twin asks of it."""
+
+    effect: JointSlip
+
+    def lasting(self) -> JointOffset:
+        """Return the offset that the joint keeps."""
+        return JointOffset(self.effect.joint, self.effect.offset)
+
+
 @register
 @dataclass(frozen=True, eq=False)
 class JointSlip(Sudden, ChannelError):
@@ -79,8 +88,12 @@ class JointSlip(Sudden, ChannelError):
     time: float = 0.0
 
     name = 'joint_slip'
-    title = 'slip'
-    entered = 'zero'
+    traits = replace(
+        Sudden.traits,
+        title='slip',
+        meaning='a joint slipped at one instant, as by a tooth of a belt',
+        entered='zero',
+    )
     of = 'joint'
     stage = Stage.JOINT
     channel = 'q'
@@ -97,26 +110,23 @@ class JointSlip(Sudden, ChannelError):
             sliding=Plausible.even(5e-3, 0.1, 'derived: a tooth of a belt or a rack'),
         ),
     )
-
-    def lasting(self) -> JointOffset:
-        """Return the offset that the joint keeps."""
-        return JointOffset(self.joint, self.offset)
+    twin = Hooked(_Twin)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         at = robot.index(str(self.site))
-        size = self.plain('offset')
+        size = self._plain('offset')
         far = f'{size * 1e3:+.3g} mm' if robot.prismatic[at] else radians(size)
         return (
             f'See to the belt, coupling and encoder of {self.site}: it slipped by {far} at '
-            f't = {self.plain("time"):.4g}; then master it again.'
+            f't = {self._plain("time"):.4g}; then master it again.'
         )
 
 
 class SuddenFrame(Sudden, FrameError):
     """A frame that stands elsewhere from an instant on."""
 
-    of_setup = True
+    traits = replace(Sudden.traits, of_setup=True)
 
 
 @register
@@ -129,9 +139,13 @@ class ToolSlip(SuddenFrame):
     time: float = 0.0
 
     name = 'tool_slip'
-    title = 'slipped tool or reflector'
-    entered = 'tool'
-    place = 'tool'
+    traits = replace(
+        SuddenFrame.traits,
+        title='slipped tool or reflector',
+        meaning='tool or reflector moved on the flange at one instant',
+        entered='tool',
+        place='tool',
+    )
     channel = 'tool'
     parameters = frame_parameters(
         Plausible.even(5e-3, 0.05, 'derived: a holder or a nest that gave way'),
@@ -139,11 +153,11 @@ class ToolSlip(SuddenFrame):
     )
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Fasten the tool or the reflector: it moved by '
             f'{frame(self.vector()[:6], "of the flange", "of the tool")} at '
-            f't = {self.plain("time"):.4g}; measure its centre point again.'
+            f't = {self._plain("time"):.4g}; measure its centre point again.'
         )
 
 
@@ -157,9 +171,13 @@ class InstrumentKnock(SuddenFrame):
     time: float = 0.0
 
     name = 'instrument_knock'
-    title = 'knocked instrument or base'
-    entered = 'the instrument or the base was knocked'
-    place = 'instrument'
+    traits = replace(
+        SuddenFrame.traits,
+        title='knocked instrument or base',
+        meaning='instrument or base was moved at one instant',
+        entered='the instrument or the base was knocked',
+        place='instrument',
+    )
     channel = 'base'
     parameters = frame_parameters(
         Plausible.even(5e-3, 0.1, 'derived: a knock'),
@@ -167,8 +185,8 @@ class InstrumentKnock(SuddenFrame):
     )
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Fasten the instrument and the base: one moved by {base_frame(self.vector()[:6])} at '
-            f't = {self.plain("time"):.4g}; measure what came before and after apart.'
+            f't = {self._plain("time"):.4g}; measure what came before and after apart.'
         )

@@ -9,6 +9,7 @@ import numpy as np
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -22,13 +23,16 @@ class Drift(Effect):
     xyz_rate: Value = (0.0, 0.0, 0.0)
 
     name = 'drift'
-    title = 'drift of the frame'
-    entered = 'what the frame stands on, or of the temperature'
-    depends_on = 'time'
-    place = 'base'
+    traits = Traits(
+        title='drift of the frame',
+        meaning='everything measured creeps with time',
+        entered='what the frame stands on, or of the temperature',
+        depends_on='time',
+        place='base',
+        common=False,
+    )
     of = 'robot'
     stage = Stage.POSE
-    common = False
     parameters = (
         Parameter(
             'xyz_rate',
@@ -54,7 +58,7 @@ class Drift(Effect):
         return [{('pose', k): view.elapsed} for k in range(3)]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         rate = np.asarray(self.xyz_rate) * 3.6e6
         each = ', '.join(number(float(v)) for v in rate)
         return (

@@ -5,14 +5,15 @@ The contract of an effect: parameters that displace channels of the kinematic ch
 
 A new effect is one file: a frozen dataclass with `displace`, and `gradient` where a closed form
 is at hand; `register` makes it known to the injector, the twin, the sensitivity study and the
-diagnosis alike. What else it may tell of itself are the optional hooks of `hooks`.
+diagnosis alike. What else it may tell of itself are the traits and groups of `hooks`.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
-from .hooks import Hooks
+from .hooks import OF_GROUP, TRAITS, FitHooks, Hooked, SearchHooks, Traits, TwinHooks, gathered
+from .parametric import Parametric
 from .view import Parameter, Stage, Value, View
 from .wording import travel
 
@@ -29,15 +31,14 @@ __all__ = ['Effect', 'MemoryEffect', 'Parameter', 'Stage', 'Value', 'View']
 RELATIVE_STEP = 1e-5
 """Step of numerical derivatives, in typical magnitudes of the parameter."""
 
-JOINT_STEP = 1e-5
-"""Step of numerical derivatives by a joint's position [rad or m]: rounding and bend weigh alike."""
-
 SLIDING_UNITS = {'rad': 'm', 'rad/(N m)': 'm/N'}
 """Units of a joint that turns, and those in their place where it slides."""
 
+E = TypeVar('E', bound='Effect')
+
 
 @dataclass(frozen=True, eq=False)
-class Effect(Hooks, ABC):
+class Effect(Parametric, ABC):
     """
     A named physical cause; see `weld_twin_core.effects` for the vocabulary.
 
@@ -69,9 +70,101 @@ class Effect(Hooks, ABC):
 
     """
 
+    of: ClassVar[str]
+    """What it sits on: 'joint', 'link', 'links' or 'robot'."""
+    stage: ClassVar[Stage]
+    needs: ClassVar[frozenset[str]] = frozenset()
+    """Inputs beyond joint position: velocity, order, time, wrench, load, temperature."""
+    traits: ClassVar[Traits] = Traits()
+    """What it is: its words, where it is entered, what brings it out, who looks for it."""
+    twin: ClassVar[Hooked[TwinHooks]] = Hooked(TwinHooks)
+    search: ClassVar[Hooked[SearchHooks]] = Hooked(SearchHooks)
+    fit: ClassVar[Hooked[FitHooks]] = Hooked(FitHooks)
+    """What the twin, the search and the fit ask of it; a kind that has more to say derives them."""
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        gathered(cls)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Return a hook where version 0.1 had it; for one release more."""
+            if name in TRAITS:
+                return getattr(self.traits, name)
+            if name in OF_GROUP:
+                return getattr(getattr(self, OF_GROUP[name]), name)
+            if name in ('plain', 'travelled', 'check_values'):
+                return getattr(self, f'_{name}')
+            raise AttributeError(f'{type(self).__name__} has no attribute {name!r}')
+
     @abstractmethod
     def displace(self, view: View) -> Shift:
         """Return the displaced channels, each shape (..., N)."""
+
+    @property
+    def site(self) -> str | None:
+        """Return the joint the effect sits on, or None for the robot as a whole."""
+        return getattr(self, 'joint', None)
+
+    @property
+    def at(self) -> str:
+        """Return where it sits: the name of its joint, or its place."""
+        if self.traits.place != 'joint':
+            return self.traits.place
+        return 'base' if self.site is None else str(self.site)
+
+    @property
+    def on(self) -> str:
+        """Return what it depends on."""
+        return self.traits.depends_on
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """Return what tells this effect from others of the file: name, joint and options."""
+        extra = tuple(str(getattr(self, k)) for k in self.options if k != 'joint')
+        return (self.name, self.site or '', *extra)
+
+    @classmethod
+    def applicable(cls, view: View, joint: str | None) -> str | None:
+        """Return why the data cannot show this effect at all, or None when they can."""
+        if not cls.search.fits(view.robot, joint):
+            return 'the robot has no part there that it could be an error of'
+        if 'velocity' in cls.needs and view.static:
+            return 'static stations carry no velocity'
+        if 'wrench' in cls.needs and view.wrench is None:
+            return 'no tool wrench was recorded'
+        if 'load' in cls.needs and view.wrench is None and view.robot.mass is None:
+            return 'the robot model has no link masses and no wrench was recorded'
+        if 'temperature' in cls.needs and view.temperature is None:
+            return 'no temperature was recorded'
+        return None
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Any]:
+        """
+        Yield the instances a search starts from; each spans one linear subspace.
+
+        Parameters
+        ----------
+        view : View
+        joint : str or None
+        pull : array, shape (N,), optional
+            How strongly the residual would move the joint at every sample; an effect too fine to
+            search on a grid may look for itself in it.
+
+        """
+        values: Any = {'joint': joint} if cls.of in ('joint', 'link') else {}
+        yield cls(**values)
+
+    def atoms(self, view: View) -> list[Shift]:
+        """Return the linear features of this instance; their combinations start a fit."""
+        return [shift for shift in self.gradient(view) if shift is not None]
+
+    def from_atoms(self: E, coefficients: Array) -> E:
+        """Return the instance that a combination of `atoms` stands for, inside its bounds."""
+        low, high = np.array([(p.lower, p.upper) for p, _ in self.components()]).T
+        return self.with_vector(np.clip(np.asarray(coefficients, dtype=np.float64), low, high))
 
     def gradient(self, view: View) -> list[Shift | None]:
         """
@@ -95,34 +188,25 @@ class Effect(Hooks, ABC):
             out.append({key: (high[key] - low[key]) / width for key in high})
         return out
 
-    def load_slope(self, view: View) -> Array:
-        """
-        Return how the load torques that this adds change with the joints, shape (n, n, ..., N).
-
-        Torque first, then joint. Unless an effect gives the closed form, by central differences.
-        """
-        n = view.robot.n
-        slope = np.zeros((n, n, *view.frames.position.shape[:-1]))
-        for j in range(n):
-            high, low = (
-                self.displace(view.displaced({('q', j): np.full(view.t.shape, step)}))
-                for step in (JOINT_STEP, -JOINT_STEP)
-            )
-            for channel, value in high.items():
-                slope[channel[1], j] = (value - low[channel]) / (2.0 * JOINT_STEP)
-        return slope
-
     def on_slide(self, robot: Robot) -> bool:
         """Return whether it displaces a joint that slides: m where its parameters say rad."""
         at = self.site if self.of == 'joint' else None
         return at in robot.joint_names and bool(robot.prismatic[robot.index(str(at))])
 
-    def travelled(self, robot: Robot, value: float) -> str:
+    def _travelled(self, robot: Robot, value: float) -> str:
         """Return how far its joint moves, in mm where that slides, in degrees where it turns."""
         return travel(value, sliding=self.on_slide(robot))
 
     def remedy(self, robot: Robot) -> str:
-        """Return the parameters to put into the model, as they are; see `Hooks.remedy`."""
+        """
+        Return what to mend where it was found, as one sentence with its size.
+
+        Parameters
+        ----------
+        robot : Robot
+            The nominal model: what is entered in the controller now.
+
+        """
         sizes = ', '.join(
             f'{p.name} {np.array2string(np.asarray(getattr(self, p.name)), precision=4)} '
             f'{self.unit(p, robot)}'
@@ -160,11 +244,10 @@ class Effect(Hooks, ABC):
             if self.site is None:
                 raise ModelError(f'{self.name} needs a joint')
             robot.index(self.site)
-        self.check_values()
-        if self.lacking and not self.fits(robot, self.site):
-            raise ModelError(
-                f'{self.name} {self.lacking.format(site=self.site, robot=robot.name)}'
-            )
+        self._check_values()
+        lacking = self.traits.lacking
+        if lacking and not self.search.fits(robot, self.site):
+            raise ModelError(f'{self.name} {lacking.format(site=self.site, robot=robot.name)}')
 
 
 class MemoryEffect(Effect):

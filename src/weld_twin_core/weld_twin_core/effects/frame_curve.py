@@ -15,6 +15,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .curve import QUANTITIES, basis, check_knots
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
@@ -40,12 +41,9 @@ class FrameCurve(Effect):
     frame: str = 'base'
 
     name = 'frame_curve'
-    title = 'measured motion'
-    entered = 'program'
-    depends_on = 'time'
+    traits = Traits(title='measured motion', entered='program', depends_on='time', cause=False)
     of = 'robot'
     stage = Stage.LINK
-    cause = False
     parameters = (
         Parameter('xyz', 'm', size=0, typical=1e-4),
         Parameter('rotvec', 'rad', size=0, typical=1e-4),
@@ -92,7 +90,7 @@ class FrameCurve(Effect):
         return [{(self.frame, axis): row} for axis in range(6) for row in weights]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Look at the {self.at}: it moves over the {self.on} in a way that no known effect '
             'gives.'

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,18 +27,22 @@ class BasePose(FrameError):
     rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'base_pose'
-    title = 'base pose error'
-    entered = 'base'
-    place = 'base'
+    traits = replace(
+        FrameError.traits,
+        title='base pose error',
+        meaning='the robot stands elsewhere than its base frame says',
+        entered='base',
+        place='base',
+        fitted_with='base',
+    )
     channel = 'base'
-    fitted_with = 'base'
     parameters = frame_parameters(
         Plausible.even(5e-3, 0.5, 'derived: half a metre off is another place'),
         Plausible.even(1e-2, 0.2, 'derived: ten degrees are seen by the eye'),
     )
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         if robot.behind:
             return self._on_the_workpiece(robot)
         moved = base_frame(_of_the_origin(self.vector(), robot))
@@ -75,12 +79,16 @@ class ToolPose(FrameError):
     rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'tool_pose'
-    title = 'tool pose error'
-    entered = 'tool'
-    changes_in_use = True
-    place = 'tool'
+    traits = replace(
+        FrameError.traits,
+        title='tool pose error',
+        meaning='the tool is not where its tool frame says',
+        entered='tool',
+        place='tool',
+        changes_in_use=True,
+        fitted_with='tool',
+    )
     channel = 'tool'
-    fitted_with = 'tool'
     parameters = frame_parameters(
         Plausible.even(
             5e-3,
@@ -92,7 +100,7 @@ class ToolPose(FrameError):
     )
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         flange = controller_frames(robot).flange[:3, :3]
         step = np.concatenate([flange.T @ self.vector()[:3], self.vector()[3:]])
         moved = frame(step, 'of the flange', 'of the tool')

@@ -27,6 +27,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, MemoryEffect
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -38,6 +39,31 @@ UNEVEN = 0.6
 """Asymmetry beyond which one direction would hardly rub at all. A judgement."""
 A_LITTLE = 1e-9
 """Asymmetry of friction that may become uneven in a fit."""
+
+
+class _Fit(FitHooks):
+    """What the fit asks of it."""
+
+    effect: Friction
+
+    def fitted(self) -> list[int]:
+        """Return wind-up and travel, and the asymmetry where there is any."""
+        return [0, 2] if self.effect._even else [0, 1, 2]
+
+    def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
+        """Return friction of all travels: a start that is far off ends beside the best."""
+        if zoom or view.static:
+            return None
+        unit = SLIDING if view.robot.prismatic[view.robot.index(self.effect.joint)] else 1.0
+        travels = unit * np.geomspace(SHORTEST, LONGEST, 7)
+        each = [
+            Friction(self.effect.joint, 1.0, self.effect.asymmetry, float(x), self.effect.release)
+            for x in travels
+        ]
+        many = Friction(
+            self.effect.joint, 1.0, self.effect.asymmetry, travels, self.effect.release
+        )
+        return each, many.run(view)[0]['q', view.robot.index(self.effect.joint)]
 
 
 @register
@@ -57,14 +83,17 @@ class Friction(MemoryEffect):
     release: float = 0.3
 
     name = 'friction'
-    title = 'friction'
-    entered = "the joint's gear, bearings and grease"
-    changes_in_use = True
-    depends_on = 'direction'
+    traits = Traits(
+        title='friction',
+        meaning='a joint lags behind while it moves, and gives that up when it rests',
+        entered="the joint's gear, bearings and grease",
+        depends_on='direction',
+        changes_in_use=True,
+        common=False,
+        by_motion=True,
+    )
     of = 'joint'
     stage = Stage.PLAY
-    common = False
-    by_motion = True
     parameters = (
         Parameter(
             'windup',
@@ -125,6 +154,7 @@ class Friction(MemoryEffect):
     )
     options = ('release',)
     needs = frozenset({'velocity', 'time'})
+    fit = Hooked(_Fit)
 
     def _bent(self, view: View, state: Any) -> tuple[Array, Array, Array, Any]:
         """Return z and u stacked, shape (..., 2, N), the steps, what is lost, what to carry."""
@@ -178,40 +208,13 @@ class Friction(MemoryEffect):
     def _even(self) -> bool:
         return np.ndim(self.asymmetry) == 0 and self.asymmetry == 0.0
 
-    def fitted(self) -> list[int]:
-        """Return wind-up and travel, and the asymmetry where there is any."""
-        return [0, 2] if self._even else [0, 1, 2]
-
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield friction of short and long pre-sliding, even and uneven.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield friction of short and long pre-sliding, even and uneven."""
         unit = SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
         for travel in (1e-4, 6e-4):
             for asymmetry in (0.0, A_LITTLE):
                 yield cls(str(joint), 0.0, asymmetry, travel * unit)
-
-    def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
-        """Return friction of all travels: a start that is far off ends beside the best."""
-        if zoom or view.static:
-            return None
-        unit = SLIDING if view.robot.prismatic[view.robot.index(self.joint)] else 1.0
-        travels = unit * np.geomspace(SHORTEST, LONGEST, 7)
-        each = [Friction(self.joint, 1.0, self.asymmetry, float(x), self.release) for x in travels]
-        many = Friction(self.joint, 1.0, self.asymmetry, travels, self.release)
-        return each, many.run(view)[0]['q', view.robot.index(self.joint)]
 
     def atoms(self, view: View) -> list[Shift]:
         """Return the even part, and the uneven one where there is any: both are linear."""
@@ -233,8 +236,8 @@ class Friction(MemoryEffect):
         return Friction(self.joint, windup, asymmetry, self.travel, self.release)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Give the controller of {self.site} feed-forward against friction, and see to its '
-            f'lubrication: in motion it trails by {self.travelled(robot, self.plain("windup"))}.'
+            f'lubrication: in motion it trails by {self._travelled(robot, self._plain("windup"))}.'
         )

@@ -2,14 +2,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gear ratio: theta -> (1 + scale) theta."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
+from .hooks import Hooked, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View, single
 from .wording import number
+
+
+class _Twin(TwinHooks):
+    """What the twin asks of it."""
+
+    effect: GearRatio
+
+    def slope(self, view: View) -> Shift:
+        """Return the scale."""
+        return single(
+            ('q', view.robot.index(self.effect.joint)), self.effect.number('scale'), view
+        )
 
 
 @register
@@ -21,12 +36,15 @@ class GearRatio(Effect):
     scale: Value = 0.0
 
     name = 'gear_ratio'
-    title = 'gear ratio error'
-    entered = 'ratio'
-    everywhere = True
-    by_motion = True
-    demand = 2
-    depends_on = 'angle'
+    traits = Traits(
+        title='gear ratio error',
+        meaning='a joint turns by a constant factor too far',
+        entered='ratio',
+        depends_on='angle',
+        demand=2,
+        by_motion=True,
+        everywhere=True,
+    )
     of = 'joint'
     stage = Stage.JOINT
     parameters = (
@@ -42,6 +60,7 @@ class GearRatio(Effect):
             ),
         ),
     )
+    twin = Hooked(_Twin)
 
     def displace(self, view: View) -> Shift:
         """Return scale * theta on the joint."""
@@ -53,13 +72,9 @@ class GearRatio(Effect):
         i = view.robot.index(self.joint)
         return [{('q', i): view.joint(i)}]
 
-    def slope(self, view: View) -> Shift:
-        """Return the scale."""
-        return single(('q', view.robot.index(self.joint)), self.number('scale'), view)
-
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
-        scale = self.plain('scale')
+        """Return what to mend, in words; see `Effect.remedy`."""
+        scale = self._plain('scale')
         if self.on_slide(robot):
             return (
                 f'Enter the feed of {self.site} (mm of travel per turn of the motor) times '

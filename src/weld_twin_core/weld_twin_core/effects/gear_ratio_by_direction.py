@@ -23,6 +23,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import last_true, play
 from .effect import Effect, MemoryEffect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
@@ -49,13 +50,16 @@ class GearRatioByDirection(MemoryEffect):
     travel: Value = 1e-4
 
     name = 'gear_ratio_by_direction'
-    title = 'gear ratio that differs by direction'
-    entered = "the joint's gear"
-    depends_on = 'direction'
+    traits = Traits(
+        title='gear ratio that differs by direction',
+        meaning='the same, with another factor each way',
+        entered="the joint's gear",
+        depends_on='direction',
+        common=False,
+        by_motion=True,
+    )
     of = 'joint'
     stage = Stage.PLAY
-    common = False
-    by_motion = True
     parameters = (
         Parameter(
             'difference',
@@ -135,20 +139,7 @@ class GearRatioByDirection(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield a quick and a slow change of flanks where the joint went both ways over its angle.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield a quick and a slow change of flanks where the joint went both ways over its angle."""
         i = view.robot.index(str(joint))
         unit = SLIDING if view.robot.prismatic[i] else 1.0
         angle = view.joint(i)
@@ -162,8 +153,8 @@ class GearRatioByDirection(MemoryEffect):
                 yield made
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
-        difference = self.plain('difference')
+        """Return what to mend, in words; see `Effect.remedy`."""
+        difference = self._plain('difference')
         more, less = ('up', 'down') if difference > 0.0 else ('down', 'up')
         return (
             f'Compensate the gear of {self.site} by direction, or approach seams from one side: on '

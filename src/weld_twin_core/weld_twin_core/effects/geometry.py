@@ -10,7 +10,7 @@ nearly parallel (IEEE CDC 1983).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..arm.robot import Robot
 from .constant import ChannelError
@@ -35,11 +35,15 @@ class JointOffset(ChannelError):
     offset: Value = 0.0
 
     name = 'joint_offset'
-    title = 'zero offset'
-    entered = 'zero'
-    changes_in_use = True
-    everywhere = True
-    set_at_controller = True
+    traits = replace(
+        ChannelError.traits,
+        title='zero offset',
+        meaning="a joint's zero is wrong by a constant angle",
+        entered='zero',
+        changes_in_use=True,
+        set_at_controller=True,
+        everywhere=True,
+    )
     of = 'joint'
     stage = Stage.JOINT
     channel = 'q'
@@ -60,8 +64,8 @@ class JointOffset(ChannelError):
     )
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
-        joint, offset = str(self.site), self.plain('offset')
+        """Return what to mend, in words; see `Effect.remedy`."""
+        joint, offset = str(self.site), self._plain('offset')
         sliding = bool(robot.prismatic[robot.index(joint)])
         return f'{stands(joint, offset, sliding=sliding)} {to_mend(offset, sliding=sliding)}'
 
@@ -69,8 +73,7 @@ class JointOffset(ChannelError):
 class LinkError(ChannelError):
     """A constant error of one number of one DH row."""
 
-    entered = 'model'
-    everywhere = True
+    traits = replace(ChannelError.traits, entered='model', everywhere=True)
     of = 'link'
     stage = Stage.LINK
 
@@ -84,8 +87,12 @@ class LinkLength(LinkError):
     da: Value = 0.0
 
     name = 'link_length'
-    title = 'link length error'
-    changes_in_use = True
+    traits = replace(
+        LinkError.traits,
+        title='link length error',
+        meaning='a length in the model of the robot is wrong',
+        changes_in_use=True,
+    )
     channel = 'a'
     parameters = (
         Parameter(
@@ -110,7 +117,11 @@ class LinkOffset(LinkError):
     dd: Value = 0.0
 
     name = 'link_offset'
-    title = 'link offset error'
+    traits = replace(
+        LinkError.traits,
+        title='link offset error',
+        meaning='an offset along an axis in the model of the robot is wrong',
+    )
     channel = 'd'
     parameters = (
         Parameter(
@@ -135,7 +146,11 @@ class LinkTwist(LinkError):
     dalpha: Value = 0.0
 
     name = 'link_twist'
-    title = 'link twist error'
+    traits = replace(
+        LinkError.traits,
+        title='link twist error',
+        meaning='an angle between two axes in the model of the robot is wrong',
+    )
     channel = 'alpha'
     off = 'the axes are twisted by'
     parameters = (
@@ -157,7 +172,11 @@ class AxisParallelism(LinkError):
     dbeta: Value = 0.0
 
     name = 'axis_parallelism'
-    title = 'axis parallelism error'
+    traits = replace(
+        LinkError.traits,
+        title='axis parallelism error',
+        meaning='two axes that should be parallel are tilted',
+    )
     channel = 'beta'
     off = 'the axes are out of parallel by'
     parameters = (

@@ -9,7 +9,7 @@ a parabola.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,8 +30,12 @@ class GuideBend(GuideError):
     curvature: Value = (0.0, 0.0)
 
     name = 'guide_bend'
-    title = 'bent guide'
-    entered = 'program'
+    traits = replace(
+        GuideError.traits,
+        title='bent guide',
+        meaning='the guide of a joint that slides is no straight line',
+        entered='program',
+    )
     stage = Stage.POSE
     parameters = (
         Parameter(
@@ -64,7 +68,7 @@ class GuideBend(GuideError):
         return [carried(view, i, bow * axis, None) for axis in (x, y)]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         x, y = np.asarray(self.curvature) * 0.125e3
         return (
             f'Align the guide of {self.site}: over a metre it is bent by {size(float(x))} mm along x '

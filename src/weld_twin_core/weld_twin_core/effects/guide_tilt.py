@@ -9,7 +9,7 @@ and its mean over the travel is an error of links.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,8 +30,12 @@ class GuideTilt(GuideError):
     rate: Value = (0.0, 0.0, 0.0)
 
     name = 'guide_tilt'
-    title = 'tilting carriage'
-    entered = 'program'
+    traits = replace(
+        GuideError.traits,
+        title='tilting carriage',
+        meaning='the carriage of a joint that slides turns on its way',
+        entered='program',
+    )
     stage = Stage.POSE
     parameters = (
         Parameter(
@@ -60,7 +64,7 @@ class GuideTilt(GuideError):
         return [carried(view, i, None, view.joint(i) * axis) for axis in axes]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         each = ', '.join(number(float(np.degrees(v))) for v in np.asarray(self.rate))
         return (
             f'Level the guide of {self.site}: its carriage turns by ({each}) deg about x, y, z of '

@@ -1,29 +1,29 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What an effect may tell of itself beyond `displace` and `gradient`; every hook has a default.
+What an effect may tell of itself beyond `displace` and `gradient`; everything has a default.
 
-The search, the fit of many small errors, the standard errors and the verdict ask these hooks and
-nothing else, so that none of them knows any effect by name. The page of effects lists them in a
-table.
+`Traits` is a record of what it is. `TwinHooks`, `SearchHooks` and `FitHooks` are groups of questions,
+one for each part of the program that asks: the twin, the search, and the fit. An effect that has more
+to tell than the default derives a group and names it, as in ``fit = Hooked(MyFit)``. None of those who
+ask knows any effect by name. The page of effects lists all in a table.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterable
-from dataclasses import dataclass
-from typing import Any, ClassVar, TypeVar
+import warnings
+from dataclasses import dataclass, fields, replace
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
-from .parametric import Parametric
-from .view import Stage, View
+from .view import View
 
-H = TypeVar('H', bound='Hooks')
+JOINT_STEP = 1e-5
+"""Step of numerical derivatives by a joint's position [rad or m]: rounding and bend weigh alike."""
 
 
 @dataclass(frozen=True)
@@ -44,98 +44,78 @@ class Waves:
     highest: int
 
 
-@dataclass(frozen=True, eq=False)
-class Hooks(Parametric, ABC):
-    """The optional part of the contract; `Effect` is the rest."""
+@dataclass(frozen=True)
+class Traits:
+    """What an effect is: its words, where it is entered, what brings it out, who looks for it."""
 
-    of: ClassVar[str]
-    """What it sits on: 'joint', 'link', 'links' or 'robot'."""
-    stage: ClassVar[Stage]
-    needs: ClassVar[frozenset[str]] = frozenset()
-    """Inputs beyond joint position: velocity, order, time, wrench, load, temperature."""
-    cause: ClassVar[bool] = True
-    """Whether a diagnosis may name it; noise and the set-up's own motion are nuisance."""
-    title: ClassVar[str] = ''
+    title: str = ''
     """What people call it; left out, its name with spaces."""
-    entered: ClassVar[str] = ''
+    meaning: str = ''
+    """What is wrong with a machine that has it: half a sentence in plain words."""
+    entered: str = ''
     """Which field of a controller takes a correction of it: 'zero', 'base', 'root', 'tool', 'load',
     'model' or 'ratio'; 'program' where none does and the points of a program can be corrected. Else
     what it is a matter of: then there is nothing to enter."""
-    changes_in_use: ClassVar[bool] = False
-    """Whether use changes it: belts are taken off, tools are knocked, gears wear, loads are swapped."""
-    set_at_controller: ClassVar[bool] = False
-    """Whether a person can set it first: told before others that are the same on any motion."""
-    depends_on: ClassVar[str] = 'constant'
+    depends_on: str = 'constant'
     """What it depends on: 'constant', 'angle', 'direction', 'speed', 'acceleration', 'load',
     'temperature', 'time' or 'place' (in the workspace)."""
-    place: ClassVar[str] = 'joint'
+    place: str = 'joint'
     """Where it sits: at its 'joint', or at 'base', 'tool', 'instrument', 'clock' or 'load'."""
-    fitted_with: ClassVar[str | None] = None
+    cause: bool = True
+    """Whether a diagnosis may name it; noise and the set-up's own motion are nuisance."""
+    changes_in_use: bool = False
+    """Whether use changes it: belts are taken off, tools are knocked, gears wear, loads are swapped."""
+    set_at_controller: bool = False
+    """Whether a person can set it first: told before others that are the same on any motion."""
+    fitted_with: str | None = None
     """The frame it is an error of, 'base' or 'tool': no cause where that frame is fitted."""
-    of_setup: ClassVar[bool] = False
+    of_setup: bool = False
     """Whether it belongs to one set-up and not to the robot."""
-    dated: ClassVar[bool] = False
+    dated: bool = False
     """Whether it sets in at an instant, and is a cause only where the data checks found one."""
-    common: ClassVar[bool] = True
+    common: bool = True
     """Whether every arm has a little of it, so that a fit of many small errors takes it along."""
-    demand: ClassVar[int] = 0
+    demand: int = 0
     """What it asks of stations before a fit of many small errors takes it along: 0 as little as
     the geometry, 1 more of them, 2 a great many."""
-    by_motion: ClassVar[bool] = False
+    by_motion: bool = False
     """Whether a joint must move for it to be told from a constant."""
-    everywhere: ClassVar[bool] = False
+    everywhere: bool = False
     """Whether a prediction allows for it on every joint, or clock, where it was not found."""
-    waves: ClassVar[Waves | None] = None
-    """Set by an effect that is a sum of waves in its joint's angle; it also gives `orders`,
+    lacking: str = ''
+    """What is wrong where it does not fit, after its name; ``robot`` and ``site`` are theirs.
+    Without, it is only not looked for there."""
+    waves: Waves | None = None
+    """Set by an effect that is a sum of waves in its joint's angle; its search also gives `orders`,
     `with_orders` and `lines`."""
-
-    bends: ClassVar[bool] = False
-    """Whether it stands for waves of a joint that travels too little for them; then gives
+    bends: bool = False
+    """Whether it stands for waves of a joint that travels too little for them; its search then gives
     `bend`."""
 
-    @abstractmethod
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return d displacement / d component for every component; None where there is none."""
 
-    @property
-    def site(self) -> str | None:
-        """Return the joint the effect sits on, or None for the robot as a whole."""
-        return getattr(self, 'joint', None)
+class Hooks:
+    """Questions to a kind of effect, or to an effect."""
 
-    @property
-    def at(self) -> str:
-        """Return where it sits: the name of its joint, or its `place`."""
-        if self.place != 'joint':
-            return self.place
-        return 'base' if self.site is None else str(self.site)
+    def __init__(self, kind: Any, effect: Any) -> None:
+        self.kind, self.effect = kind, effect
 
-    @property
-    def on(self) -> str:
-        """Return what it depends on."""
-        return self.depends_on
 
-    @property
-    def key(self) -> tuple[str, ...]:
-        """Return what tells this effect from others of the file: name, joint and options."""
-        extra = tuple(str(getattr(self, k)) for k in self.options if k != 'joint')
-        return (self.name, self.site or '', *extra)
+G = TypeVar('G', bound=Hooks, covariant=True)
 
-    @classmethod
-    def _at(cls, joint: str | None, **values: Any) -> Any:
-        if cls.of in ('joint', 'link'):
-            values['joint'] = joint
-        return cls(**values)
 
-    @property
-    def moved_by(self) -> str | None:
-        """Return the joint that must move for it to be seen; None where none has to."""
-        return self.site if self.by_motion else None
+class Hooked(Generic[G]):
+    """An attribute of effects that is a group of questions to the effect it is asked of."""
 
-    def lasting(self) -> Any:
-        """Return what is left of it for the robot ever after; None for what a set-up had."""
-        return None if self.of_setup else self
+    def __init__(self, group: type[G]) -> None:
+        self.group = group
 
-    # The twin: derivatives through effects that act later ---------------------------------------
+    def __get__(self, effect: Any, kind: Any) -> G:
+        """Return the group, with the effect that is asked; with the kind alone, where it is."""
+        return self.group(kind, effect)
+
+
+class TwinHooks(Hooks):
+    """What the twin asks, and who takes an effect to another recording."""
 
     @property
     def settles(self) -> bool:
@@ -151,76 +131,172 @@ class Hooks(Parametric, ABC):
         """Return d displacement / d own joint position, per ('q', i) channel; empty when none."""
         return {}
 
-    # The search ---------------------------------------------------------------------------------
+    def load_slope(self, view: View) -> Array:
+        """
+        Return how the load torques that this adds change with the joints, shape (n, n, ..., N).
 
-    lacking: ClassVar[str] = ''
-    """What is wrong where it does not fit, after its name; ``robot`` and ``site`` are theirs. Without,
-    it is only not looked for there."""
+        Torque first, then joint. Unless an effect gives the closed form, by central differences.
+        """
+        n = view.robot.n
+        slope = np.zeros((n, n, *view.frames.position.shape[:-1]))
+        for j in range(n):
+            high, low = (
+                self.effect.displace(view.displaced({('q', j): np.full(view.t.shape, step)}))
+                for step in (JOINT_STEP, -JOINT_STEP)
+            )
+            for channel, value in high.items():
+                slope[channel[1], j] = (value - low[channel]) / (2.0 * JOINT_STEP)
+        return slope
 
-    @classmethod
-    def fits(cls, robot: Robot, joint: str | None) -> bool:
+    def lasting(self) -> Any:
+        """Return what is left of it for the robot ever after; None for what a set-up had."""
+        return None if self.effect.traits.of_setup else self.effect
+
+    def off_outside(self) -> float:
+        """Return how far its joint may be off where nothing was recorded, [rad or m]."""
+        return 0.0
+
+
+class SearchHooks(Hooks):
+    """What the search asks, with the fit of many small errors."""
+
+    def fits(self, robot: Robot, joint: str | None) -> bool:
         """Return whether a robot, or one of its joints, has what this can be an error of."""
         return True
 
-    @classmethod
-    def applicable(cls, view: View, joint: str | None) -> str | None:
-        """Return why the data cannot show this effect at all, or None when they can."""
-        if not cls.fits(view.robot, joint):
-            return 'the robot has no part there that it could be an error of'
-        if 'velocity' in cls.needs and view.static:
-            return 'static stations carry no velocity'
-        if 'wrench' in cls.needs and view.wrench is None:
-            return 'no tool wrench was recorded'
-        if 'load' in cls.needs and view.wrench is None and view.robot.mass is None:
-            return 'the robot model has no link masses and no wrench was recorded'
-        if 'temperature' in cls.needs and view.temperature is None:
-            return 'no temperature was recorded'
-        return None
+    @property
+    def moved_by(self) -> str | None:
+        """Return the joint that must move for it to be seen; None where none has to."""
+        site: str | None = self.effect.site
+        return site if self.effect.traits.by_motion else None
 
-    @classmethod
-    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Any]:
-        """
-        Yield the instances a search starts from; each spans one linear subspace.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample; an effect too fine to
-            search on a grid may look for itself in it.
-
-        """
-        yield cls._at(joint)
-
-    @classmethod
-    def constants(cls, view: View, joint: str | None) -> Iterable[Any]:
+    def constants(self, view: View, joint: str | None) -> Any:
         """
         Yield instances that are no more than a constant of the joint on this motion.
 
         No search can tell them from one, so none looks for them; they are named beside it.
+        """
+        return ()
+
+    def trials(self, view: View, joint: str | None) -> float:
+        """Return how many instances `seeds` chose among; 0 means as many as it yields."""
+        return 0.0
+
+    @property
+    def joins(self) -> bool:
+        """Return whether two of a kind on one joint are one effect."""
+        return type(self).joined is not SearchHooks.joined
+
+    def joined(self, other: Any) -> Any:
+        """Return this effect and another of its kind and joint as one; None where one has to do."""
+        return None
+
+    def small(self, view: View, joint: str | None, most: int) -> list[Any]:
+        """
+        Return the instances that a fit of many small errors takes along, of hardly any size.
 
         Parameters
         ----------
         view : View
         joint : str or None
+        most : int
+            Pairs of coordinates that the measurements allow every joint.
 
         """
-        return ()
+        return list(self.kind.seeds(view, joint))[:2]
 
-    @classmethod
-    def trials(cls, view: View, joint: str | None) -> float:
-        """Return how many instances `seeds` chose among; 0 means as many as it yields."""
-        return 0.0
+    def bend(self, joint: str, angles: Array) -> Any:
+        """Return an instance of no size that bends a joint at angles (M,), None over too few."""
+        return None
 
-    def atoms(self, view: View) -> list[Shift]:
-        """Return the linear features of this instance; their combinations start a fit."""
-        return [shift for shift in self.gradient(view) if shift is not None]
+    def orders(self) -> Array:
+        """Return the orders of the waves that this instance is a sum of, in cycles per turn."""
+        return np.zeros(0)
 
-    def from_atoms(self: H, coefficients: Array) -> H:
-        """Return the instance that a combination of `atoms` stands for, inside its bounds."""
-        low, high = np.array([(p.lower, p.upper) for p, _ in self.components()]).T
-        return self.with_vector(np.clip(np.asarray(coefficients, dtype=np.float64), low, high))
+    def lines(self, joint: str, orders: Array) -> list[Any]:
+        """Return an instance of a single wave of no size for each order, shape (K,) [1/rev]."""
+        return []
+
+    def with_orders(self, orders: Array) -> Any:
+        """Return its waves of these orders and no others, shape (K,); new ones of no size yet."""
+        return self.effect
+
+    def causes(self) -> int:
+        """Return how many separate causes this instance stands for."""
+        return max(1, self.orders().size)
+
+
+class FitHooks(Hooks):
+    """
+    What a least-squares fit asks: the coordinates that it turns, and where it starts.
+
+    Most effects fit their parameters. One whose parameters bend (amplitude and phase) gives
+    coordinates in which it is straight.
+    """
+
+    def fitted(self) -> list[int]:
+        """Return which components a fit turns, as places in `Effect.components`."""
+        return [k for k, (p, _) in enumerate(self.effect.components()) if p.differentiable]
+
+    def coordinates(self) -> Array:
+        """Return the fit coordinates, shape (K,)."""
+        return np.asarray(self.effect.vector()[self.fitted()])
+
+    def with_coordinates(self, values: Array) -> Any:
+        """Return the same at other fit coordinates, kept inside the physical bounds."""
+        vector = np.array(self.effect.vector())
+        specs = self.effect.components()
+        for k, value in zip(self.fitted(), values, strict=True):
+            vector[k] = min(max(float(value), specs[k][0].lower), specs[k][0].upper)
+        return self.effect.with_vector(vector)
+
+    def coordinate_scales(self) -> Array:
+        """Return the typical size of every fit coordinate, shape (K,)."""
+        specs = self.effect.components()
+        return np.array([specs[k][0].typical for k in self.fitted()])
+
+    def coordinate_shifts(self, view: View) -> list[Shift]:
+        """Return d displacement / d fit coordinates."""
+        gradient = self.effect.gradient(view)
+        shifts = (gradient[k] for k in self.fitted())
+        return [shift for shift in shifts if shift is not None]
+
+    def errors(self, std: Array) -> dict[str, Any]:
+        """
+        Return standard errors by parameter, None for a component that has none.
+
+        Parameters
+        ----------
+        std : array, shape (K,)
+            Of the fit coordinates; NaN where the data tell nothing.
+
+        """
+        out: dict[str, Any] = {}
+        values = iter(None if np.isnan(value) else float(value) for value in std)
+        specs = self.effect.components()
+        for parameter, index in (specs[k] for k in self.fitted()):
+            if index is None:
+                out[parameter.name] = next(values)
+            else:
+                out.setdefault(parameter.name, []).append(next(values))
+        return {
+            name: value
+            for name, value in out.items()
+            if value is not None and value != [None] * len(np.atleast_1d(value))
+        }
+
+    def alike(self) -> list[tuple[str, ...]]:
+        """Return a label for every fit coordinate; those of one label are expected alike in size."""
+        return [(self.effect.name,)] * self.coordinates().size
+
+    def turned(self) -> Any:
+        """Return what data that push this instance to its bound ask for instead; else itself."""
+        return self.effect
+
+    @property
+    def ideal(self) -> float:
+        """Return by how much its formula errs on real arms, as a share of what is usual."""
+        return 1.0
 
     def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
         """
@@ -235,102 +311,47 @@ class Hooks(Parametric, ABC):
     @property
     def searched(self) -> bool:
         """Return whether a fit of it has to search for its start among its `starts`."""
-        return type(self).starts is not Hooks.starts
+        return type(self).starts is not FitHooks.starts
 
-    def joined(self: H, other: H) -> H | None:
-        """Return this effect and another of its kind and joint as one; None where one has to do."""
-        return None
 
-    @property
-    def ideal(self) -> float:
-        """Return by how much its formula errs on real arms, as a share of what is usual."""
-        return 1.0
+GROUPS: dict[str, type[Hooks]] = {'twin': TwinHooks, 'search': SearchHooks, 'fit': FitHooks}
+"""Groups of questions by the attribute of an effect that answers them."""
+TRAITS = frozenset(each.name for each in fields(Traits))
+OF_GROUP = {k: at for at, g in GROUPS.items() for k in vars(g) if not k.startswith('_')}
+"""Which group has a question."""
 
-    # The fit ------------------------------------------------------------------------------------
 
-    def coordinate_shifts(self, view: View) -> list[Shift]:
-        """Return d displacement / d fit coordinates."""
-        gradient = self.gradient(view)
-        shifts = (gradient[k] for k in self.fitted())
-        return [shift for shift in shifts if shift is not None]
+def gathered(kind: Any) -> None:
+    """
+    Put what a class has in the form of version 0.1, one attribute a hook, where it belongs now.
 
-    # Many small errors at once ------------------------------------------------------------------
+    Parameters
+    ----------
+    kind : subclass of Effect
 
-    @classmethod
-    def small(cls, view: View, joint: str | None, most: int) -> list[Any]:
-        """
-        Return the instances that a fit of many small errors takes along, of hardly any size.
+    """
+    own = {k: v for k, v in vars(kind).items() if k not in vars(kind).get('__annotations__', {})}
+    traits = {k: own[k] for k in own if k in TRAITS}
+    asked = {k: own[k] for k in own if k in OF_GROUP}
+    if not traits and not asked:
+        return
+    told = ', '.join(sorted([*traits, *asked]))
+    text = f'{kind.__name__}: {told} belong to traits, twin, search or fit; see docs/effects.md'
+    warnings.warn(text, DeprecationWarning, stacklevel=4)
+    kind.traits = replace(kind.traits, **traits)
+    for at in {OF_GROUP[k] for k in asked}:
+        base = type(getattr(kind, at))
+        body = {k: _forward(v) for k, v in asked.items() if OF_GROUP[k] == at}
+        setattr(kind, at, Hooked(type(f'{kind.__name__}{base.__name__}', (base,), body)))
+    for name in (*traits, *asked):
+        delattr(kind, name)
 
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-        most : int
-            Pairs of coordinates that the measurements allow every joint.
 
-        """
-        return list(cls.seeds(view, joint))[:2]
-
-    @classmethod
-    def bend(cls, joint: str, angles: Array) -> Any:
-        """
-        Return an instance of no size that bends a joint where it was, None over too short a way.
-
-        Parameters
-        ----------
-        joint : str
-        angles : array, shape (M,) [rad]
-            Where the joint was measured.
-
-        """
-        return None
-
-    def alike(self) -> list[tuple[str, ...]]:
-        """Return a label for every fit coordinate; those of one label are expected alike in size."""
-        return [(self.name,)] * self.coordinates().size
-
-    def turned(self: H) -> H:
-        """Return what data that push this instance to its bound ask for instead; else itself."""
-        return self
-
-    def orders(self) -> Array:
-        """Return the orders of the waves that this instance is a sum of, in cycles per turn."""
-        return np.zeros(0)
-
-    @classmethod
-    def lines(cls, joint: str, orders: Array) -> list[Any]:
-        """Return an instance of a single wave of no size for each order, shape (K,) [1/rev]."""
-        return []
-
-    def with_orders(self: H, orders: Array) -> H:
-        """Return its waves of these orders and no others, shape (K,); new ones of no size yet."""
-        return self
-
-    # The verdict --------------------------------------------------------------------------------
-
-    def causes(self) -> int:
-        """Return how many separate causes this instance stands for."""
-        return max(1, self.orders().size)
-
-    # The advice ---------------------------------------------------------------------------------
-
-    @abstractmethod
-    def remedy(self, robot: Robot) -> str:
-        """
-        Return what to mend where it was found, as one sentence with its size.
-
-        Parameters
-        ----------
-        robot : Robot
-            The nominal model: what is entered in the controller now.
-
-        """
-
-    # The prediction -----------------------------------------------------------------------------
-
-    def off_outside(self) -> float:
-        """Return how far its joint may be off where nothing was recorded, [rad or m]."""
-        return 0.0
+def _forward(old: Any) -> Any:
+    """Return a question of a group that is answered by what an effect had itself."""
+    if isinstance(old, property):
+        return property(lambda group: old.__get__(group.effect, group.kind))
+    return lambda group, *given: old.__get__(group.effect, group.kind)(*given)
 
 
 SAME = 1e-3

@@ -29,6 +29,7 @@ from ..arm.robot import Robot
 from ..arm.vectors import components, pad
 from ..arrays import Array
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -43,13 +44,16 @@ class HosePull(Effect):
     stiffness: Value = 0.0
 
     name = 'hose_pull'
-    title = 'pull of the hose package'
-    entered = 'program'
-    depends_on = 'load'
-    place = 'load'
+    traits = Traits(
+        title='pull of the hose package',
+        meaning='the hoses pull at the flange',
+        entered='program',
+        depends_on='load',
+        place='load',
+        common=False,
+    )
     of = 'robot'
     stage = Stage.LOAD
-    common = False
     parameters = (
         Parameter(
             'force',
@@ -89,12 +93,12 @@ class HosePull(Effect):
         return [{('tau', i): part[i] for i in range(view.robot.n)} for part in _torques(view)]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         x, y, z = (float(part) for part in np.asarray(self.force))
         return (
             f'Lead the hose package so that it hangs free: it pulls the flange by ({number(x)}, '
             f'{number(y)}, {number(z)}) N along x, y, z of the base, less '
-            f'{number(self.plain("stiffness"))} N for every metre away from it.'
+            f'{number(self._plain("stiffness"))} N for every metre away from it.'
         )
 
 

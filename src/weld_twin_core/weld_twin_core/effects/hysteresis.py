@@ -31,6 +31,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, MemoryEffect
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -38,6 +39,22 @@ SHORTEST, LONGEST = 4e-3, 0.3
 """Travels [rad] that a search considers: shorter is a gap, longer a wrong gear ratio."""
 SLIDING = 0.1
 """Metres of a joint that slides which are looked at as a radian of one that turns."""
+
+
+class _Fit(FitHooks):
+    """What the fit asks of it."""
+
+    effect: Hysteresis
+
+    def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
+        """Return loops of all travels: a start that is far off ends beside the best."""
+        if zoom:
+            return None
+        i = view.robot.index(self.effect.joint)
+        unit = SLIDING if view.robot.prismatic[i] else 1.0
+        travels = unit * np.geomspace(SHORTEST, LONGEST, 10)
+        z = Hysteresis(self.effect.joint, 1.0, travels)._loop(view.joint(i), None)[0]
+        return [Hysteresis(self.effect.joint, 1.0, float(travel)) for travel in travels], -z
 
 
 @register
@@ -50,14 +67,17 @@ class Hysteresis(MemoryEffect):
     travel: Value = 0.03
 
     name = 'hysteresis'
-    title = 'hysteresis'
-    entered = "the joint's gear"
-    changes_in_use = True
-    depends_on = 'direction'
+    traits = Traits(
+        title='hysteresis',
+        meaning='a joint stays behind where it came from, more the farther it came',
+        entered="the joint's gear",
+        depends_on='direction',
+        changes_in_use=True,
+        common=False,
+        by_motion=True,
+    )
     of = 'joint'
     stage = Stage.PLAY
-    common = False
-    by_motion = True
     parameters = (
         Parameter(
             'amplitude',
@@ -96,6 +116,7 @@ class Hysteresis(MemoryEffect):
         ),
     )
     needs = frozenset({'order'})
+    fit = Hooked(_Fit)
 
     def _loop(self, q: Array, state: Any) -> tuple[Array, Array, Any]:
         """Return z, the steps, and what to carry."""
@@ -128,37 +149,14 @@ class Hysteresis(MemoryEffect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: at stations the loop has closed, and is backlash.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on.
-
-        """
+        """Return why the data cannot show it: at stations the loop has closed, and is backlash."""
         if view.static:
             return 'static stations only show which way a joint came, as backlash does'
         return super().applicable(view, joint)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield a short, a usual and a long loop.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield a short, a usual and a long loop."""
         unit = SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
         for travel in (0.01, 0.04, 0.16):
             yield cls(str(joint), 0.0, travel * unit)
@@ -172,21 +170,11 @@ class Hysteresis(MemoryEffect):
         """Return the loop whose amplitude is the coefficient, never negative."""
         return Hysteresis(self.joint, max(float(coefficients[0]), 0.0), self.travel)
 
-    def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
-        """Return loops of all travels: a start that is far off ends beside the best."""
-        if zoom:
-            return None
-        i = view.robot.index(self.joint)
-        unit = SLIDING if view.robot.prismatic[i] else 1.0
-        travels = unit * np.geomspace(SHORTEST, LONGEST, 10)
-        z = Hysteresis(self.joint, 1.0, travels)._loop(view.joint(i), None)[0]
-        return [Hysteresis(self.joint, 1.0, float(travel)) for travel in travels], -z
-
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Compensate the lost motion of {self.site}, or approach seams from one side: it trails '
-            f'by {self.travelled(robot, self.plain("amplitude"))} once it has moved '
-            f'{self.travelled(robot, 3.0 * self.plain("travel"))} one way; see to its gear if that '
+            f'by {self._travelled(robot, self._plain("amplitude"))} once it has moved '
+            f'{self._travelled(robot, 3.0 * self._plain("travel"))} one way; see to its gear if that '
             'grows.'
         )

@@ -13,6 +13,8 @@ tells the load itself, tau = effort. No mass of a link counts then, nor does any
 declared: both are in what was measured.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -21,6 +23,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError
 from .effect import Effect
+from .hooks import Hooked, SearchHooks, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import metres, radians, size
@@ -28,6 +31,33 @@ from .wording import metres, radians, size
 LOAD_OF_EFFORT = {'effort': -1.0, 'effort_reversed': 1.0}
 """Load torque for each N m of measured effort: against it where it holds the load."""
 STATICS = ('equilibrium', 'first_order', *LOAD_OF_EFFORT)
+
+
+class _Twin(TwinHooks):
+    """What the twin asks of it."""
+
+    effect: JointCompliance
+
+    @property
+    def settles(self) -> bool:
+        """Return whether the load is the one of the posture that the springs have sagged to."""
+        return self.effect.statics == 'equilibrium'
+
+    @property
+    def by_effort(self) -> bool:
+        """Return whether it takes the joints' measured effort in the place of the statics."""
+        return self.effect.statics in LOAD_OF_EFFORT
+
+
+class _Search(SearchHooks):
+    """What the search asks of it."""
+
+    effect: JointCompliance
+
+    @property
+    def moved_by(self) -> str | None:
+        """Return the joint that must move for it to be seen: none where its load is measured."""
+        return None if self.effect.twin.by_effort else self.effect.joint
 
 
 @register
@@ -40,12 +70,15 @@ class JointCompliance(Effect):
     statics: str = 'equilibrium'
 
     name = 'joint_compliance'
-    title = 'compliance'
-    entered = 'program'
-    changes_in_use = True
-    everywhere = True
-    by_motion = True
-    depends_on = 'load'
+    traits = Traits(
+        title='compliance',
+        meaning='a joint gives way under load, like a spring',
+        entered='program',
+        depends_on='load',
+        changes_in_use=True,
+        by_motion=True,
+        everywhere=True,
+    )
     of = 'joint'
     stage = Stage.ELASTIC
     parameters = (
@@ -65,6 +98,8 @@ class JointCompliance(Effect):
     )
     needs = frozenset({'load'})
     options = ('statics',)
+    twin = Hooked(_Twin)
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """Refuse unknown statics."""
@@ -73,21 +108,6 @@ class JointCompliance(Effect):
             raise ModelError(
                 f'joint_compliance: statics must be one of {STATICS}, got {self.statics!r}'
             )
-
-    @property
-    def settles(self) -> bool:
-        """Return whether the load is the one of the posture that the springs have sagged to."""
-        return self.statics == 'equilibrium'
-
-    @property
-    def by_effort(self) -> bool:
-        """Return whether it takes the joints' measured effort in the place of the statics."""
-        return self.statics in LOAD_OF_EFFORT
-
-    @property
-    def moved_by(self) -> str | None:
-        """Return the joint that must move for it to be seen: none where its load is measured."""
-        return None if self.by_effort else self.joint
 
     def displace(self, view: View) -> Shift:
         """Return compliance times load torque; a positive compliance sags."""
@@ -102,7 +122,7 @@ class JointCompliance(Effect):
     def _load(self, view: View) -> Shift:
         """Return the load torque, by the model's statics or as it was measured."""
         i = view.robot.index(self.joint)
-        if not self.by_effort:
+        if not self.twin.by_effort:
             return {('q', i): view.shift[('tau', i)]}
         if view.effort is None:
             raise DataError(
@@ -114,38 +134,20 @@ class JointCompliance(Effect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show this effect at all, or None when they can.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-
-        """
+        """Return why the data cannot show this effect at all, or None when they can."""
         return None if view.effort is not None else super().applicable(view, joint)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield the spring, by measured effort where it is there.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-        pull : array, shape (N,), optional
-            Not looked at: there is one spring.
-
-        """
+        """Yield the spring, by measured effort where it is there."""
         if view.effort is None:
             yield cls(str(joint))
         else:
             yield cls(str(joint), statics='effort' if view.effort_holds else 'effort_reversed')
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
-        compliance = self.plain('compliance')
+        """Return what to mend, in words; see `Effect.remedy`."""
+        compliance = self._plain('compliance')
         slides = self.on_slide(robot)
         stiffness = (
             f'a stiffness of {size(1e-3 / compliance)} kN{"/m" if slides else " m/rad"}'

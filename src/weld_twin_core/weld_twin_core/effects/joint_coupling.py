@@ -12,9 +12,21 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect
+from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
+
+
+class _Search(SearchHooks):
+    """What the search asks of it."""
+
+    effect: JointCoupling
+
+    @property
+    def moved_by(self) -> str:
+        """Return the source: its angle is what comes through."""
+        return self.effect.source or self.effect.joint
 
 
 @register
@@ -27,11 +39,14 @@ class JointCoupling(Effect):
     ratio: Value = 0.0
 
     name = 'joint_coupling'
-    title = 'coupling'
-    entered = 'ratio'
-    by_motion = True
-    demand = 2
-    depends_on = 'angle'
+    traits = Traits(
+        title='coupling',
+        meaning='turning one joint turns another a little',
+        entered='ratio',
+        depends_on='angle',
+        demand=2,
+        by_motion=True,
+    )
     of = 'joint'
     stage = Stage.JOINT
     parameters = (
@@ -48,11 +63,7 @@ class JointCoupling(Effect):
         ),
     )
     options = ('source',)
-
-    @property
-    def moved_by(self) -> str:
-        """Return the source: its angle is what comes through."""
-        return self.source or self.joint
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """Refuse an unknown source, and a joint coupled with itself."""
@@ -74,29 +85,16 @@ class JointCoupling(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield one instance per neighbour along the chain, where gears share a housing.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield one instance per neighbour along the chain, where gears share a housing."""
         i = view.robot.index(str(joint))
         for k in (i - 1, i + 1):
             if 0 <= k < view.robot.n:
                 yield cls(str(joint), view.robot.joint_names[k], 0.0)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         source = self.source
-        ratio = self.plain('ratio')
+        ratio = self._plain('ratio')
         return (
             f'Enter a coupling of {source} into {self.site}: {number(90.0 * ratio)} deg for every 90 '
             'deg.'

@@ -15,6 +15,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .curve import QUANTITIES, basis, basis_slope, check_knots
 from .effect import Effect
+from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
@@ -23,6 +24,53 @@ KNOT = 0.1
 within some tenths of a radian. A joint that travels less has no curve."""
 LEAST_KNOTS, MOST_KNOTS = 2, 8
 """Fewest and most intervals of such a curve: one would be a line, more than eight are waves."""
+
+
+class _Search(SearchHooks):
+    """What the search asks of it."""
+
+    kind: type[JointCurve]
+
+    def bend(self, joint: str, angles: Array) -> JointCurve | None:
+        """Return a level curve over the angle, None where its knots would be too near."""
+        low, high = float(angles.min()), float(angles.max())
+        count = min(int((high - low) / KNOT), MOST_KNOTS)
+        if count < LEAST_KNOTS:
+            return None
+        return self.kind(
+            joint, np.zeros(count + 1), tuple(np.linspace(low, high, count + 1).tolist())
+        )
+
+
+class _Fit(FitHooks):
+    """What the fit asks of it."""
+
+    effect: JointCurve
+
+    def alike(self) -> list[tuple[str, ...]]:
+        """Return one label for each joint: every gear is as uneven as it was cut."""
+        return [(self.effect.name, self.effect.joint)] * self.coordinates().size
+
+
+class _Twin(TwinHooks):
+    """What the twin asks of it."""
+
+    effect: JointCurve
+
+    def off_outside(self) -> float:
+        """Return the RMS of a curve over the angle: no formula says how it goes on beyond."""
+        if (self.effect.over, self.effect.channel) != ('angle', 'q'):
+            return 0.0
+        return float(np.sqrt(np.mean(np.square(self.effect.values))))
+
+    def slope(self, view: View) -> Shift:
+        """Return the slope of a curve over the angle that bends the joint itself."""
+        if (self.effect.over, self.effect.channel) != ('angle', 'q'):
+            return {}
+        index = view.robot.index(self.effect.joint)
+        rise = basis_slope(self.effect.knots, view.joint(index))
+        values = np.asarray(self.effect.values, dtype=np.float64)
+        return {self.effect._site(view): np.tensordot(values, rise, axes=(-1, 0))}
 
 
 @register
@@ -44,15 +92,16 @@ class JointCurve(Effect):
     channel: str = 'q'
 
     name = 'joint_curve'
-    title = 'measured curve'
-    entered = 'program'
-    by_motion = True
+    traits = Traits(
+        title='measured curve', entered='program', cause=False, by_motion=True, bends=True
+    )
     of = 'joint'
     stage = Stage.LINK
-    cause = False
-    bends = True
     parameters = (Parameter('values', 'rad', size=0, typical=2e-4),)
     options = ('knots', 'over', 'channel')
+    search = Hooked(_Search)
+    fit = Hooked(_Fit)
+    twin = Hooked(_Twin)
 
     def check(self, robot: Robot) -> None:
         """Refuse an unknown joint, quantity or channel, and knots that do not increase."""
@@ -76,25 +125,6 @@ class JointCurve(Effect):
     def _site(self, view: View) -> tuple[str, int]:
         return self.channel, view.robot.index(self.joint)
 
-    @classmethod
-    def bend(cls, joint: str, angles: Array) -> JointCurve | None:
-        """Return a level curve over the angle, None where its knots would be too near."""
-        low, high = float(angles.min()), float(angles.max())
-        count = min(int((high - low) / KNOT), MOST_KNOTS)
-        if count < LEAST_KNOTS:
-            return None
-        return cls(joint, np.zeros(count + 1), tuple(np.linspace(low, high, count + 1).tolist()))
-
-    def alike(self) -> list[tuple[str, ...]]:
-        """Return one label for each joint: every gear is as uneven as it was cut."""
-        return [(self.name, self.joint)] * self.coordinates().size
-
-    def off_outside(self) -> float:
-        """Return the RMS of a curve over the angle: no formula says how it goes on beyond."""
-        if (self.over, self.channel) != ('angle', 'q'):
-            return 0.0
-        return float(np.sqrt(np.mean(np.square(self.values))))
-
     def displace(self, view: View) -> Shift:
         """Return the curve on the channel."""
         values = np.asarray(self.values, dtype=np.float64)
@@ -104,17 +134,8 @@ class JointCurve(Effect):
         """Return how much the value at each knot counts."""
         return [{self._site(view): row} for row in self._basis(view)]
 
-    def slope(self, view: View) -> Shift:
-        """Return the slope of a curve over the angle that bends the joint itself."""
-        if (self.over, self.channel) != ('angle', 'q'):
-            return {}
-        index = view.robot.index(self.joint)
-        rise = basis_slope(self.knots, view.joint(index))
-        values = np.asarray(self.values, dtype=np.float64)
-        return {self._site(view): np.tensordot(values, rise, axes=(-1, 0))}
-
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Look at {self.site}: it is off by a curve over the {self.on} that no known effect '
             'gives.'

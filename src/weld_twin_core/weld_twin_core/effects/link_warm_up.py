@@ -20,6 +20,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError
 from .effect import Effect
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -30,6 +31,16 @@ WARMER = 1.0
 """Kelvin by which a temperature must vary to be followed: sensors wander by some tenths."""
 EVEN = 1e-6
 """Share of their spacing by which stamps of stations differ where they are only counted."""
+
+
+class _Fit(FitHooks):
+    """What the fit asks of it."""
+
+    effect: LinkWarmUp
+
+    def fitted(self) -> list[int]:
+        """Return strain and time constant, or the strain alone where it follows a temperature."""
+        return [0, 1] if self.effect.follows is None else [0]
 
 
 @register
@@ -43,12 +54,15 @@ class LinkWarmUp(Effect):
     follows: Sequence[float] | None = None
 
     name = 'link_warm_up'
-    title = 'warm-up of the link'
-    entered = 'warming up'
-    depends_on = 'time'
+    traits = Traits(
+        title='warm-up of the link',
+        meaning='one link grows as it warms up',
+        entered='warming up',
+        depends_on='time',
+        common=False,
+    )
     of = 'link'
     stage = Stage.LINK
-    common = False
     parameters = (
         Parameter(
             'strain',
@@ -81,6 +95,7 @@ class LinkWarmUp(Effect):
     )
     options = ('follows',)
     needs = frozenset({'time'})
+    fit = Hooked(_Fit)
 
     def check(self, robot: Robot) -> None:
         """Refuse a temperature to follow that is not two numbers, or does not rise."""
@@ -127,10 +142,6 @@ class LinkWarmUp(Effect):
             self._grown(view, self.number('strain') * slow),
         ]
 
-    def fitted(self) -> list[int]:
-        """Return strain and time constant, or the strain alone where it follows a temperature."""
-        return [0, 1] if self.follows is None else [0]
-
     def atoms(self, view: View) -> list[Shift]:
         """Return the growth for a strain of one."""
         return [self._grown(view, self._warmth(view))]
@@ -143,37 +154,14 @@ class LinkWarmUp(Effect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: stations that are only counted tell no time.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint whose link it would be.
-
-        """
+        """Return why the data cannot show it: stations that are only counted tell no time."""
         if view.static and _counted(view.t):
             return 'the stations carry no times'
         return super().applicable(view, joint)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield a fast, a usual and a slow warm-up, and one that follows a temperature that varies.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield a fast, a usual and a slow warm-up, and one that follows a temperature that varies."""
         i = view.robot.index(str(joint))
         if view.robot.a[i] == 0.0 and view.robot.d[i] == 0.0:
             return
@@ -184,8 +172,8 @@ class LinkWarmUp(Effect):
             yield cls(str(joint), 0.0, span, (float(np.min(view.temperature)), rise))
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
-        grown = self.plain('strain') * 1e3
+        """Return what to mend, in words; see `Effect.remedy`."""
+        grown = self._plain('strain') * 1e3
         return (
             f'Warm {self.site} up before welding, or compensate its link while it warms: it grows by '
             f'{number(grown)} mm per m.'

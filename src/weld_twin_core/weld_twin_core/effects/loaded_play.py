@@ -21,6 +21,7 @@ from ..errors import ModelError
 from .backlash import RV
 from .curve import load
 from .effect import Effect
+from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -29,6 +30,19 @@ SHARES = (0.03, 0.15)
 
 CHANGED = 0.3
 """Share of half the play by which the joint must come off its flank: less looks like an offset."""
+
+
+class _Search(SearchHooks):
+    """What the search asks of it."""
+
+    kind: type[LoadedPlay]
+
+    def constants(self, view: View, joint: str | None) -> Iterable[Effect]:
+        """Yield play of a gear that slides easily, where the load keeps it on one flank."""
+        torque = load(view, view.robot.index(str(joint)))
+        held = SHARES[0] * float(np.abs(torque).max(initial=0.0))
+        if held > 0.0 and not _changes(torque, held):
+            yield self.kind(str(joint), 0.0, held)
 
 
 @register
@@ -41,13 +55,16 @@ class LoadedPlay(Effect):
     torque: float = 1.0
 
     name = 'loaded_play'
-    title = 'play under load'
-    entered = "the joint's gear"
-    depends_on = 'load'
+    traits = Traits(
+        title='play under load',
+        meaning='play whose side the load decides',
+        entered="the joint's gear",
+        depends_on='load',
+        common=False,
+        by_motion=True,
+    )
     of = 'joint'
     stage = Stage.LINK
-    common = False
-    by_motion = True
     parameters = (
         Parameter(
             'width',
@@ -62,6 +79,7 @@ class LoadedPlay(Effect):
     )
     options = ('torque',)
     needs = frozenset({'load'})
+    search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
         """Refuse a gear that friction does not hold at all: its flank would jump."""
@@ -85,20 +103,7 @@ class LoadedPlay(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield play of a gear that slides easily, and of one that sticks.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield play of a gear that slides easily, and of one that sticks."""
         torque = load(view, view.robot.index(str(joint)))
         most = float(np.abs(torque).max(initial=0.0))
         for share in SHARES:
@@ -106,27 +111,11 @@ class LoadedPlay(Effect):
             if most > 0.0 and _changes(torque, share * most):
                 yield cls(str(joint), 0.0, share * most)
 
-    @classmethod
-    def constants(cls, view: View, joint: str | None) -> Iterable[Effect]:
-        """
-        Yield play of a gear that slides easily, where the load keeps it on one flank.
-
-        Parameters
-        ----------
-        view : View
-        joint : str or None
-
-        """
-        torque = load(view, view.robot.index(str(joint)))
-        held = SHARES[0] * float(np.abs(torque).max(initial=0.0))
-        if held > 0.0 and not _changes(torque, held):
-            yield cls(str(joint), 0.0, held)
-
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Service or preload the gear of {self.site}: its load lays it on one flank or the other '
-            f'of {self.travelled(robot, self.plain("width"))} of play.'
+            f'of {self._travelled(robot, self._plain("width"))} of play.'
         )
 
 

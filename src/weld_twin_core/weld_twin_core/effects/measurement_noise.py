@@ -12,6 +12,7 @@ import numpy as np
 from ..arm.channels import Shift
 from ..arrays import Array
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
@@ -24,11 +25,9 @@ class MeasurementNoise(Effect):
     sigma: Value = 0.0
 
     name = 'measurement_noise'
-    depends_on = 'constant'
-    place = 'instrument'
+    traits = Traits(depends_on='constant', place='instrument', cause=False)
     of = 'robot'
     stage = Stage.NOISE
-    cause = False
     parameters = (Parameter('sigma', 'm', typical=2e-5, lower=0.0, differentiable=False),)
 
     def displace(self, view: View) -> Shift:
@@ -45,18 +44,5 @@ class MeasurementNoise(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield nothing: noise is no cause.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield nothing: noise is no cause."""
         return ()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -20,13 +21,16 @@ class MeasurementScale(Effect):
     scale: Value = 0.0
 
     name = 'measurement_scale'
-    title = 'scale error of the instrument'
-    entered = 'the scale of the instrument'
-    depends_on = 'place'
-    place = 'instrument'
+    traits = Traits(
+        title='scale error of the instrument',
+        meaning="the instrument's millimetre is too long or too short",
+        entered='the scale of the instrument',
+        depends_on='place',
+        place='instrument',
+        common=False,
+    )
     of = 'robot'
     stage = Stage.POSE
-    common = False
     parameters = (
         Parameter(
             'scale',
@@ -52,8 +56,8 @@ class MeasurementScale(Effect):
         return [{('pose', k): position[..., k] for k in range(3)}]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             'Have the instrument calibrated, or correct for air temperature: lengths read '
-            f'{number(self.plain("scale") * 1e3)} mm per m too long.'
+            f'{number(self._plain("scale") * 1e3)} mm per m too long.'
         )

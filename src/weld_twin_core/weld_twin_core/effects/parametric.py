@@ -50,7 +50,7 @@ class Parametric:
                 f'{self.name}: {parameter.name} must be a number, got {value!r}'
             ) from None
 
-    def check_values(self) -> None:
+    def _check_values(self) -> None:
         """
         Refuse parameters without physical meaning; they are looked at once.
 
@@ -124,7 +124,7 @@ class Parametric:
             at += count
         return replace(self, **values)
 
-    def plain(self, name: str) -> float:
+    def _plain(self, name: str) -> float:
         """Return a parameter that is one plain number."""
         return float(np.asarray(getattr(self, name)))
 
@@ -134,54 +134,6 @@ class Parametric:
         if k is not None:
             value = value[..., k]
         return value[..., None] if value.ndim else value
-
-    # Fit coordinates: what a least-squares fit turns. Most effects fit their parameters; an effect
-    # whose parameters bend (amplitude and phase) gives coordinates in which it is straight.
-
-    def fitted(self) -> list[int]:
-        """Return which components a fit turns, as places in `components`."""
-        return [k for k, (p, _) in enumerate(self.components()) if p.differentiable]
-
-    def coordinates(self) -> Array:
-        """Return the fit coordinates, shape (K,)."""
-        return np.asarray(self.vector()[self.fitted()])
-
-    def with_coordinates(self: P, values: Array) -> P:
-        """Return the same at other fit coordinates, kept inside the physical bounds."""
-        vector = np.array(self.vector())
-        specs = self.components()
-        for k, value in zip(self.fitted(), values, strict=True):
-            vector[k] = min(max(float(value), specs[k][0].lower), specs[k][0].upper)
-        return self.with_vector(vector)
-
-    def coordinate_scales(self) -> Array:
-        """Return the typical size of every fit coordinate, shape (K,)."""
-        specs = self.components()
-        return np.array([specs[k][0].typical for k in self.fitted()])
-
-    def errors(self, std: Array) -> dict[str, Any]:
-        """
-        Return standard errors by parameter, None for a component that has none.
-
-        Parameters
-        ----------
-        std : array, shape (K,)
-            Of the fit coordinates; NaN where the data tell nothing.
-
-        """
-        out: dict[str, Any] = {}
-        values = iter(None if np.isnan(value) else float(value) for value in std)
-        specs = self.components()
-        for parameter, index in (specs[k] for k in self.fitted()):
-            if index is None:
-                out[parameter.name] = next(values)
-            else:
-                out.setdefault(parameter.name, []).append(next(values))
-        return {
-            name: value
-            for name, value in out.items()
-            if value is not None and value != [None] * len(np.atleast_1d(value))
-        }
 
     def to_mapping(self) -> dict[str, Any]:
         """Return the entry of an effects file that makes this effect."""

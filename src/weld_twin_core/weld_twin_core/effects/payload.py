@@ -13,6 +13,7 @@ from ..arm.dynamics import payload_slope, payload_torque
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
+from .hooks import Hooked, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -35,6 +36,18 @@ def mass_range(robot: Robot) -> tuple[float, float]:
     return -robot.payload_mass - BELOW * own, OWN_WEIGHT * own - robot.payload_mass
 
 
+class _Twin(TwinHooks):
+    """What the twin asks of it."""
+
+    effect: Payload
+
+    def load_slope(self, view: View) -> Array:
+        """Return how the extra torque changes with the joints, shape (n, n, ..., N)."""
+        return payload_slope(
+            view.robot, view.frames, self.effect.number('mass'), self.effect._centre()
+        )
+
+
 @register
 @dataclass(frozen=True, eq=False)
 class Payload(Effect):
@@ -44,14 +57,17 @@ class Payload(Effect):
     com: Value = (0.0, 0.0, 0.0)
 
     name = 'payload'
-    title = 'wrong payload'
-    entered = 'load'
-    changes_in_use = True
-    depends_on = 'load'
-    place = 'load'
+    traits = Traits(
+        title='wrong payload',
+        meaning='the load at the flange is not what was declared',
+        entered='load',
+        depends_on='load',
+        place='load',
+        changes_in_use=True,
+        common=False,
+    )
     of = 'robot'
     stage = Stage.LOAD
-    common = False
     parameters = (
         Parameter(
             'mass',
@@ -76,15 +92,12 @@ class Payload(Effect):
             ),
         ),
     )
+    twin = Hooked(_Twin)
 
     def displace(self, view: View) -> Shift:
         """Return the extra torque on the 'tau' channel of every joint."""
         torque = payload_torque(view.robot, view.frames, self.number('mass'), self._centre())
         return _on_joints(torque)
-
-    def load_slope(self, view: View) -> Array:
-        """Return how the extra torque changes with the joints, shape (n, n, ..., N)."""
-        return payload_slope(view.robot, view.frames, self.number('mass'), self._centre())
 
     def _centre(self) -> Array:
         com = np.asarray(self.com, dtype=np.float64)
@@ -101,8 +114,8 @@ class Payload(Effect):
         return out
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
-        extra = self.plain('mass')
+        """Return what to mend, in words; see `Effect.remedy`."""
+        extra = self._plain('mass')
         com = np.asarray(self.com) * 1e3
         where = ', '.join(number(float(v)) for v in com)
         return (

@@ -24,6 +24,7 @@ from ..arm.vectors import components, dot, pad
 from ..arrays import Array
 from .base_leans import base_leans
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -40,13 +41,16 @@ class PedestalTilt(Effect):
     compliance: Value = (0.0, 0.0)
 
     name = 'pedestal_tilt'
-    title = 'leaning pedestal'
-    entered = 'program'
-    depends_on = 'load'
-    place = 'base'
+    traits = Traits(
+        title='leaning pedestal',
+        meaning="the pedestal under the robot bends under the arm's weight",
+        entered='program',
+        depends_on='load',
+        place='base',
+        common=False,
+    )
     of = 'robot'
     stage = Stage.LINK
-    common = False
     parameters = (
         Parameter(
             'compliance',
@@ -79,17 +83,7 @@ class PedestalTilt(Effect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: the moment has to change.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            None: it is of the whole robot.
-
-        """
+        """Return why the data cannot show it: the moment has to change."""
         reason = super().applicable(view, joint)
         if reason is not None:
             return reason
@@ -100,7 +94,7 @@ class PedestalTilt(Effect):
         return None
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         x, y = np.asarray(self.compliance) * 1e2
         return (
             'Stiffen the pedestal or its anchors: under 100 N m it leans by '

@@ -24,15 +24,18 @@ from .registry import REGISTRY
 from .transmission_ripple import TransmissionRipple
 from .view import Plausible
 
-TABLE: dict[tuple[str, str], Plausible] = {
-    (effect.name, parameter.name): parameter.range
-    for effect in REGISTRY.values()
-    for parameter in effect.parameters
-    if parameter.range is not None
-}
-"""By bundled effect and parameter."""
 UNKNOWN = Plausible(np.inf, -np.inf, np.inf, 'derived: nothing is known')
 """What is plausible where an effect does not say."""
+
+
+def table() -> dict[tuple[str, str], Plausible]:
+    """Return what every parameter of every effect may be, by effect and parameter."""
+    return {
+        (effect.name, parameter.name): parameter.range
+        for effect in REGISTRY.values()
+        for parameter in effect.parameters
+        if parameter.range is not None
+    }
 
 
 def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = None) -> Plausible:
@@ -68,7 +71,7 @@ def spreads(robot: Robot, effect: Effect) -> Array:
     if isinstance(effect, TransmissionRipple):
         each = plausible(robot, effect.name, 'amplitude', effect.site)
         # Sine and cosine share the amplitude.
-        return np.full(effect.coordinates().size, each.sd / np.sqrt(2.0))
+        return np.full(effect.fit.coordinates().size, each.sd / np.sqrt(2.0))
     return np.array([each.sd for each in _each(robot, effect)])
 
 
@@ -76,7 +79,7 @@ def ranges(robot: Robot, effect: Effect) -> tuple[Array, Array]:
     """Return the least and the most of every fit coordinate, each shape (K,)."""
     if isinstance(effect, TransmissionRipple):
         most = plausible(robot, effect.name, 'amplitude', effect.site).high
-        full = np.full(effect.coordinates().size, most)
+        full = np.full(effect.fit.coordinates().size, most)
         return -full, full
     found = _each(robot, effect)
     return np.array([each.low for each in found]), np.array([each.high for each in found])
@@ -103,7 +106,9 @@ def beyond(robot: Robot, effect: Effect) -> list[tuple[str, float, float]]:
 
 def _each(robot: Robot, effect: Effect) -> list[Plausible]:
     specs = effect.components()
-    return [plausible(robot, effect.name, specs[k][0].name, effect.site) for k in effect.fitted()]
+    return [
+        plausible(robot, effect.name, specs[k][0].name, effect.site) for k in effect.fit.fitted()
+    ]
 
 
 def _narrowed(found: Plausible, given: Mapping[str, float] | None) -> Plausible:

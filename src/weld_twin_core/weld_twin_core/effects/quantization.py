@@ -13,6 +13,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
+from .hooks import FitHooks, Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -28,6 +29,41 @@ MOST = 2000
 """Steps tried at once at most, which bounds memory."""
 
 
+class _Search(SearchHooks):
+    """What the search asks of it."""
+
+    def trials(self, view: View, joint: str | None) -> float:
+        """Return how many steps the spectrum tells apart."""
+        travel = float(np.ptp(view.joint(view.robot.index(str(joint)))))
+        return max(1.0, travel / FINEST)
+
+
+class _Fit(FitHooks):
+    """What the fit asks of it."""
+
+    effect: Quantization
+
+    def starts(self, view: View, zoom: int) -> tuple[list[Effect], Array] | None:
+        """
+        Return steps so close that the staircase stays in phase up to the largest position.
+
+        A spectrum tells a step only as finely as one period over the travel; stairs are counted
+        from zero, so at position q a step off by ds shifts them by q ds / step of a period.
+        """
+        q = view.joint(view.robot.index(self.effect.joint))
+        travel, far = float(np.ptp(q)), float(np.abs(q).max())
+        if zoom == ZOOMS or self.effect.step <= 0.0 or travel <= 0.0:
+            return None
+        fine = PHASE / far
+        half = 1.0 / (travel * fine) if zoom == 0 else float(ZOOM)
+        offset = np.arange(-min(int(half) + 1, MOST // 2), min(int(half) + 1, MOST // 2) + 1)
+        steps = 1.0 / (1.0 / self.effect.step + offset * fine / (0.5 * ZOOM) ** zoom)
+        steps = steps[steps > 0.0]
+        many = Quantization(self.effect.joint, steps)
+        displaced = many.displace(view)[('q', view.robot.index(self.effect.joint))]
+        return [Quantization(self.effect.joint, float(step)) for step in steps], displaced
+
+
 @register
 @dataclass(frozen=True, eq=False)
 class Quantization(Effect):
@@ -37,13 +73,16 @@ class Quantization(Effect):
     step: Value = 0.0
 
     name = 'quantization'
-    title = 'encoder resolution'
-    entered = 'the encoder'
-    by_motion = True
-    depends_on = 'angle'
+    traits = Traits(
+        title='encoder resolution',
+        meaning='a joint is read in steps',
+        entered='the encoder',
+        depends_on='angle',
+        common=False,
+        by_motion=True,
+    )
     of = 'joint'
     stage = Stage.JOINT
-    common = False
     parameters = (
         Parameter(
             'step',
@@ -61,6 +100,8 @@ class Quantization(Effect):
             sliding=Plausible(1e-5, 0.0, 1e-3, 'derived: a millimetre is no scale'),
         ),
     )
+    search = Hooked(_Search)
+    fit = Hooked(_Fit)
 
     def displace(self, view: View) -> Shift:
         """Return rounded minus exact position."""
@@ -82,17 +123,6 @@ class Quantization(Effect):
         A staircase of step s is a wave of 1/s cycles per radian: the spectrum of the residual's
         pull over joint position shows every step at once. A grid of steps would need tens of
         thousands, for a small error of the step runs out of phase over the joint's travel.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
         """
         if pull is None:
             return
@@ -114,32 +144,6 @@ class Quantization(Effect):
             yield cls(str(joint), size * cell / near)
             power[max(k - 6, 0) : k + 7] = 0.0
 
-    @classmethod
-    def trials(cls, view: View, joint: str | None) -> float:
-        """Return how many steps the spectrum tells apart."""
-        travel = float(np.ptp(view.joint(view.robot.index(str(joint)))))
-        return max(1.0, travel / FINEST)
-
-    def starts(self, view: View, zoom: int) -> tuple[list[Effect], Array] | None:
-        """
-        Return steps so close that the staircase stays in phase up to the largest position.
-
-        A spectrum tells a step only as finely as one period over the travel; stairs are counted
-        from zero, so at position q a step off by ds shifts them by q ds / step of a period.
-        """
-        q = view.joint(view.robot.index(self.joint))
-        travel, far = float(np.ptp(q)), float(np.abs(q).max())
-        if zoom == ZOOMS or self.step <= 0.0 or travel <= 0.0:
-            return None
-        fine = PHASE / far
-        half = 1.0 / (travel * fine) if zoom == 0 else float(ZOOM)
-        offset = np.arange(-min(int(half) + 1, MOST // 2), min(int(half) + 1, MOST // 2) + 1)
-        steps = 1.0 / (1.0 / self.step + offset * fine / (0.5 * ZOOM) ** zoom)
-        steps = steps[steps > 0.0]
-        many = Quantization(self.joint, steps)
-        displaced = many.displace(view)[('q', view.robot.index(self.joint))]
-        return [Quantization(self.joint, float(step)) for step in steps], displaced
-
     def atoms(self, view: View) -> list[Shift]:
         """Return the rounding error itself; its right coefficient is one."""
         return [self.displace(view)]
@@ -149,10 +153,10 @@ class Quantization(Effect):
         return self
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Read {self.site} with a finer encoder or more digits: it is rounded to '
-            f'{self.travelled(robot, self.plain("step"))}.'
+            f'{self._travelled(robot, self._plain("step"))}.'
         )
 
 

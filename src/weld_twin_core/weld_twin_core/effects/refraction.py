@@ -28,6 +28,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -55,13 +56,16 @@ class Refraction(Effect):
     instrument: Sequence[float] | None = None
 
     name = 'refraction'
-    title = 'bent line of sight'
-    entered = 'warm air bent the line of sight'
-    depends_on = 'place'
-    place = 'instrument'
+    traits = Traits(
+        title='bent line of sight',
+        meaning='warm air bends the beam of the instrument',
+        entered='warm air bent the line of sight',
+        depends_on='place',
+        place='instrument',
+        common=False,
+    )
     of = 'robot'
     stage = Stage.POSE
-    common = False
     parameters = (
         Parameter(
             'warming',
@@ -114,17 +118,7 @@ class Refraction(Effect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """
-        Return why the data cannot show it: it has to be known where the instrument stands.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            None: it is of the whole robot.
-
-        """
+        """Return why the data cannot show it: it has to be known where the instrument stands."""
         nearest = np.linalg.norm(view.frames.position, axis=-1).min(initial=np.inf)
         if nearest < NEAREST:
             return (
@@ -134,7 +128,7 @@ class Refraction(Effect):
         return super().applicable(view, joint)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         each = ', '.join(number(float(v)) for v in np.asarray(self.warming))
         return (
             'Stir the air along the line of sight, shield it from heat or stand the instrument '

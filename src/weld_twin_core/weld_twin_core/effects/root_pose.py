@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,9 +12,18 @@ from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix
 from ..arrays import Array
 from .constant import FrameError, frame_parameters
+from .hooks import Hooked, SearchHooks
 from .registry import register
 from .view import Plausible, Value
 from .wording import frame, placed
+
+
+class _Search(SearchHooks):
+    """What the search asks of it."""
+
+    def fits(self, robot: Robot, joint: str | None) -> bool:
+        """Return whether there is a positioner."""
+        return robot.behind > 0
 
 
 @register
@@ -26,21 +35,21 @@ class RootPose(FrameError):
     rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'root_pose'
-    title = 'root error of the positioner'
-    entered = 'root'
-    depends_on = 'constant'
-    place = 'base'
+    traits = replace(
+        FrameError.traits,
+        title='root error of the positioner',
+        meaning='the positioner stands elsewhere than its root frame says',
+        entered='root',
+        depends_on='constant',
+        place='base',
+        lacking='is of a positioner, and robot {robot!r} has none; use base_pose',
+    )
     channel = 'root'
-    lacking = 'is of a positioner, and robot {robot!r} has none; use base_pose'
     parameters = frame_parameters(
         Plausible.even(5e-3, 0.1, 'derived: a root that was measured by touch, or by hand'),
         Plausible.even(5e-3, 0.1, 'derived: five millimetres on a metre'),
     )
-
-    @classmethod
-    def fits(cls, robot: Robot, joint: str | None) -> bool:
-        """Return whether there is a positioner."""
-        return robot.behind > 0
+    search = Hooked(_Search)
 
     def stands(self, robot: Robot, base: Array) -> tuple[Array, Array]:
         """
@@ -66,7 +75,7 @@ class RootPose(FrameError):
         return np.asarray(there @ now), np.asarray(there @ new)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         rows = robot.T_base_foot
         step = (self.vector().reshape(2, 3) @ rows[:3, :3]).ravel()
         now, new = self.stands(robot, rows)

@@ -24,6 +24,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .associative_scan import linear
 from .effect import MemoryEffect
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
@@ -40,6 +41,38 @@ SHORTEST = 1e-9
 """Time constant [s] that a loop has at the least."""
 
 
+class _Fit(FitHooks):
+    """What the fit asks of it."""
+
+    effect: ServoLag
+
+    @property
+    def searched(self) -> bool:
+        """Return whether it swings: a fit from another damping ends beside the best."""
+        return self.effect.damping is not None
+
+    @property
+    def ideal(self) -> float:
+        """Return less for a loop that swings: its inertia is in the formula."""
+        return 1.0 if self.effect.damping is None else SWINGING
+
+    def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
+        """Return the loop at all dampings, and then at those close to the best."""
+        if self.effect.damping is None or view.static or zoom == 2:
+            return None
+        i = view.robot.index(self.effect.joint)
+        near = (
+            np.geomspace(0.2, 1.5, 9)
+            if zoom == 0
+            else self.effect.damping * np.geomspace(0.9, 1.1, 9)
+        )
+        each = [
+            ServoLag(self.effect.joint, self.effect.time_constant, float(damping))
+            for damping in near
+        ]
+        return each, np.stack([lag.run(view)[0]['q', i] for lag in each])
+
+
 @register
 @dataclass(frozen=True, eq=False)
 class ServoLag(MemoryEffect):
@@ -54,9 +87,12 @@ class ServoLag(MemoryEffect):
     damping: float | None = None
 
     name = 'servo_lag'
-    title = 'servo lag'
-    entered = "the drive's gains and feed-forward"
-    depends_on = 'speed'
+    traits = Traits(
+        title='servo lag',
+        meaning='the drive trails behind its command',
+        entered="the drive's gains and feed-forward",
+        depends_on='speed',
+    )
     of = 'joint'
     stage = Stage.SERVO
     parameters = (
@@ -76,6 +112,7 @@ class ServoLag(MemoryEffect):
     )
     options = ('damping',)
     needs = frozenset({'velocity', 'time'})
+    fit = Hooked(_Fit)
 
     def _coefficients(self, dt: Array) -> tuple[Array, Array]:
         """Return the decay over a step and the weight of the input's change over it."""
@@ -172,43 +209,11 @@ class ServoLag(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> list[ServoLag]:
-        """
-        Return a fast and a slow lag; between them the response is nearly proportional.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Return a fast and a slow lag; between them the response is nearly proportional."""
         if view.static:
             return []
         plain = [cls(str(joint), tau) for tau in (2e-3, 3e-2)]
         return plain + [cls(str(joint), 1e-2, damping) for damping in DAMPINGS]
-
-    @property
-    def searched(self) -> bool:
-        """Return whether it swings: a fit from another damping ends beside the best."""
-        return self.damping is not None
-
-    @property
-    def ideal(self) -> float:
-        """Return less for a loop that swings: its inertia is in the formula."""
-        return 1.0 if self.damping is None else SWINGING
-
-    def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
-        """Return the loop at all dampings, and then at those close to the best."""
-        if self.damping is None or view.static or zoom == 2:
-            return None
-        i = view.robot.index(self.joint)
-        near = np.geomspace(0.2, 1.5, 9) if zoom == 0 else self.damping * np.geomspace(0.9, 1.1, 9)
-        each = [ServoLag(self.joint, self.time_constant, float(damping)) for damping in near]
-        return each, np.stack([lag.run(view)[0]['q', i] for lag in each])
 
     def atoms(self, view: View) -> list[Shift]:
         """Return the displacement per second of time constant."""
@@ -219,8 +224,8 @@ class ServoLag(MemoryEffect):
         return ServoLag(self.joint, max(float(coefficients[0]), 0.0), self.damping)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Give the controller of {self.site} more feed-forward, or record measured in place of '
-            f'commanded joints: it lags by {size(self.plain("time_constant") * 1e3)} ms.'
+            f'commanded joints: it lags by {size(self._plain("time_constant") * 1e3)} ms.'
         )

@@ -16,7 +16,7 @@ from .setup_step import SetupStep
 
 def of_the_robot(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """Return what is left of the effects for the robot ever after, without those of one set-up."""
-    return tuple(e for e in (effect.lasting() for effect in effects) if e is not None)
+    return tuple(e for e in (effect.twin.lasting() for effect in effects) if e is not None)
 
 
 def seen_from(

@@ -18,6 +18,7 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View, single
 from .wording import base_frame
@@ -34,14 +35,16 @@ class SetupSettling(Effect):
     start: float = 0.0
 
     name = 'setup_settling'
-    title = 'settling set-up'
-    entered = 'how the set-up is held'
-    depends_on = 'time'
-    place = 'base'
+    traits = Traits(
+        title='settling set-up',
+        entered='how the set-up is held',
+        depends_on='time',
+        place='base',
+        cause=False,
+        of_setup=True,
+    )
     of = 'robot'
     stage = Stage.LINK
-    cause = False
-    of_setup = True
     parameters = (
         Parameter(
             'xyz',
@@ -80,27 +83,14 @@ class SetupSettling(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield time constants from a twentieth to half of the recording.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield time constants from a twentieth to half of the recording."""
         span = float(view.elapsed[-1])
         if span > 0.0:
             for share in (0.05, 0.12, 0.25, 0.5):
                 yield cls(time_constant=share * span, start=float(view.t[0]))
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Let the set-up settle before measuring: it started {base_frame(self.vector()[:6])} from '
             'where it ended.'

@@ -17,6 +17,7 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View, single
 from .wording import base_frame
@@ -35,14 +36,16 @@ class SetupStep(Effect):
     time: float = 0.0
 
     name = 'setup_step'
-    title = 'moved set-up'
-    entered = 'base'
-    depends_on = 'time'
-    place = 'base'
+    traits = Traits(
+        title='moved set-up',
+        entered='base',
+        depends_on='time',
+        place='base',
+        cause=False,
+        of_setup=True,
+    )
     of = 'robot'
     stage = Stage.LINK
-    cause = False
-    of_setup = True
     parameters = (
         Parameter(
             'xyz',
@@ -78,28 +81,15 @@ class SetupStep(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield steps at evenly spread samples, none at the very ends.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield steps at evenly spread samples, none at the very ends."""
         index = np.linspace(0, view.t.size - 1, TIMES + 2).round().astype(int)[1:-1]
         for k in np.unique(index):
             if k > 0:
                 yield cls(time=float(0.5 * (view.t[k - 1] + view.t[k])))
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Fasten the set-up: it moved by {base_frame(-self.vector()[:6])} at '
-            f'{self.plain("time"):.4g} s; measure what came before and after apart.'
+            f'{self._plain("time"):.4g} s; measure what came before and after apart.'
         )

@@ -15,6 +15,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -36,10 +37,13 @@ class ThermalGrowth(Effect):
     warmup: Sequence[float] | None = None
 
     name = 'thermal_growth'
-    title = 'thermal growth'
-    entered = 'warming up, or of the temperature in the cell'
-    demand = 1
-    depends_on = 'temperature'
+    traits = Traits(
+        title='thermal growth',
+        meaning='the links grow with temperature',
+        entered='warming up, or of the temperature in the cell',
+        depends_on='temperature',
+        demand=1,
+    )
     of = 'links'
     stage = Stage.LINK
     parameters = (
@@ -120,11 +124,11 @@ class ThermalGrowth(Effect):
         return [{channel: length * rise for channel, length in self._lengths(view)}]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         links = self.links or ('all links',)
         return (
             'Warm the arm up before welding, or compensate '
-            f'{number(self.plain("coefficient") * 1e3)} mm per m and K for {", ".join(links)}.'
+            f'{number(self._plain("coefficient") * 1e3)} mm per m and K for {", ".join(links)}.'
         )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View, single
 from .wording import size
@@ -20,11 +21,14 @@ class TimeDelay(Effect):
     delay: Value = 0.0
 
     name = 'time_delay'
-    title = 'clock delay'
-    entered = 'its clocks'
-    everywhere = True
-    depends_on = 'speed'
-    place = 'clock'
+    traits = Traits(
+        title='clock delay',
+        meaning='the measurements are stamped too late, or too early, by a constant time',
+        entered='its clocks',
+        depends_on='speed',
+        place='clock',
+        everywhere=True,
+    )
     of = 'robot'
     stage = Stage.CLOCK
     parameters = (
@@ -51,8 +55,8 @@ class TimeDelay(Effect):
         return [{('q', i): -view.qd[..., i] for i in range(view.robot.n)}]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
-        delay = self.plain('delay')
+        """Return what to mend, in words; see `Effect.remedy`."""
+        delay = self._plain('delay')
         order = 'late' if delay > 0.0 else 'early'
         return (
             f'Fix the clock: the measurements are stamped {size(delay * 1e3)} ms {order} against the '

@@ -16,7 +16,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .backlash import RV
 from .effect import Effect
-from .hooks import Waves, highest_order
+from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks, Waves, highest_order
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
@@ -32,6 +32,91 @@ with the order, so bands widen with it; where they end is a judgement."""
 MANY_ORDERS, SPARSE = 8, 3
 """Whole orders from which on their sum is worked out by powers of exp(i theta), and how many times as
 many powers as orders there may be: a sine takes as long as some five products."""
+
+
+class _Twin(TwinHooks):
+    """What the twin asks of it."""
+
+    effect: TransmissionRipple
+
+    def slope(self, view: View) -> Shift:
+        """Return sum A n cos(n theta + phase)."""
+        total = _sum(a * n * np.cos(angle) for a, n, angle in self.effect._terms(view))
+        return {('q', view.robot.index(self.effect.joint)): total}
+
+
+class _Search(SearchHooks):
+    """What the search asks of it."""
+
+    effect: TransmissionRipple
+    kind: type[TransmissionRipple]
+
+    def lines(self, joint: str, orders: Array) -> list[TransmissionRipple]:
+        """Return an instance of no size for each order, shape (K,) [1/rev]."""
+        return [self.kind(joint, 0.0, float(order), 0.0) for order in orders]
+
+    def small(self, view: View, joint: str | None, most: int) -> list[TransmissionRipple]:
+        """Return one ripple of all orders up to the highest that the measurements can hold apart."""
+        orders = np.arange(1.0, min(MAX_ORDER, most) + 1.0)
+        zero = np.zeros(orders.size)
+        return [self.kind(str(joint), zero, orders, zero)] if orders.size else []
+
+    def orders(self) -> Array:
+        """Return the orders, in cycles per turn."""
+        return np.atleast_1d(np.asarray(self.effect.order, dtype=np.float64))
+
+    def with_orders(self, orders: Array) -> TransmissionRipple:
+        """Return the ripple of these orders and no others."""
+        own, pairs = self.orders(), self.effect.fit.coordinates().reshape(-1, 2)
+        wanted = [pairs[own == order].sum(axis=0) for order in orders]
+        like = TransmissionRipple(self.effect.joint, np.zeros(len(wanted)), orders, 0.0)
+        return like.from_atoms(np.array(wanted))
+
+    def joined(self, other: TransmissionRipple) -> TransmissionRipple:
+        """Return the orders of both in one ripple."""
+        parts: dict[str, Any] = {
+            p.name: np.append(getattr(self.effect, p.name), getattr(other, p.name))
+            for p in self.effect.parameters
+        }
+        return replace(self.effect, **parts)
+
+
+class _Fit(FitHooks):
+    """What the fit asks of it."""
+
+    effect: TransmissionRipple
+
+    def alike(self) -> list[tuple[str, ...]]:
+        """Return a label per sine and cosine: the joint and the band of its order."""
+        band = np.searchsorted(BANDS, np.repeat(self.effect.search.orders(), 2))
+        return [(self.effect.name, self.effect.joint, str(b)) for b in band]
+
+    def errors(self, std: Array) -> dict[str, Any]:
+        """Return the errors of amplitude and phase; sine and cosine are what was fitted."""
+        amplitude = np.atleast_1d(np.asarray(self.effect.amplitude))
+        spread = np.sqrt((std.reshape(-1, 2) ** 2).mean(axis=1))
+        phase = np.minimum(spread / np.maximum(amplitude, 1e-300), np.pi)
+        if np.ndim(self.effect.amplitude) > 0:
+            return {'amplitude': spread.tolist(), 'phase': phase.tolist()}
+        return {'amplitude': float(spread[0]), 'phase': float(phase[0])}
+
+    def coordinates(self) -> Array:
+        """Return sine and cosine coefficients, pairs in order; the orders stay."""
+        amplitude = np.atleast_1d(np.asarray(self.effect.amplitude, dtype=np.float64))
+        phase = np.atleast_1d(np.asarray(self.effect.phase, dtype=np.float64))
+        return np.stack([amplitude * np.cos(phase), amplitude * np.sin(phase)], -1).ravel()
+
+    def with_coordinates(self, values: Array) -> TransmissionRipple:
+        """Return the ripple with other sine and cosine coefficients."""
+        return self.effect.from_atoms(values)
+
+    def coordinate_shifts(self, view: View) -> list[Shift]:
+        """Return sine and cosine of every order."""
+        return self.effect.atoms(view)
+
+    def coordinate_scales(self) -> Array:
+        """Return the typical amplitude for every coefficient."""
+        return np.full(2 * np.size(self.effect.order), self.effect.parameters[0].typical)
 
 
 @register
@@ -50,15 +135,18 @@ class TransmissionRipple(Effect):
     phase: Value = 0.0
 
     name = 'transmission_ripple'
-    title = 'transmission ripple'
-    entered = 'program'
-    everywhere = True
-    by_motion = True
-    demand = 1
-    depends_on = 'angle'
+    traits = Traits(
+        title='transmission ripple',
+        meaning='a gear turns unevenly, in waves over its turn',
+        entered='program',
+        depends_on='angle',
+        demand=1,
+        by_motion=True,
+        everywhere=True,
+        waves=Waves(dense=MAX_ORDER, highest=HIGHEST_LINE),
+    )
     of = 'joint'
     stage = Stage.JOINT
-    waves = Waves(dense=MAX_ORDER, highest=HIGHEST_LINE)
     parameters = (
         Parameter(
             'amplitude',
@@ -75,6 +163,9 @@ class TransmissionRipple(Effect):
         Parameter('order', '1/rev', size=0, lower=0.0, differentiable=False, linear=False),
         Parameter('phase', 'rad', size=0, linear=False),
     )
+    twin = Hooked(_Twin)
+    search = Hooked(_Search)
+    fit = Hooked(_Fit)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -109,7 +200,7 @@ class TransmissionRipple(Effect):
     def _dense(self) -> bool:
         """Return whether there are so many whole orders that powers are quicker than sines."""
         shapes = {np.shape(getattr(self, p.name)) for p in self.parameters}
-        orders = self.orders()
+        orders = self.search.orders()
         if len(shapes) > 1 or orders.size < MANY_ORDERS or orders.ndim != 1:
             return False
         whole = (orders == np.rint(orders)).all() and orders.min() > 0.0
@@ -117,7 +208,7 @@ class TransmissionRipple(Effect):
 
     def _all_orders(self, view: View) -> Array:
         """Return the sum of sines as a polynomial in exp(i theta)."""
-        orders = self.orders().astype(int)
+        orders = self.search.orders().astype(int)
         weights = np.zeros(int(orders.max()) + 1, complex)
         np.add.at(weights, orders, self.amplitude * np.exp(1j * np.asarray(self.phase)))
         turn = np.exp(1j * view.joint(view.robot.index(self.joint)))
@@ -135,94 +226,11 @@ class TransmissionRipple(Effect):
         phase: list[Shift | None] = [{channel: a * np.cos(angle)} for a, _, angle in terms]
         return amplitude + [None] * len(terms) + phase
 
-    def slope(self, view: View) -> Shift:
-        """Return sum A n cos(n theta + phase)."""
-        total = _sum(a * n * np.cos(angle) for a, n, angle in self._terms(view))
-        return {('q', view.robot.index(self.joint)): total}
-
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Return one instance per integer order that the joint's range of motion can tell.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Return one instance per integer order that the joint's range of motion can tell."""
         told = highest_order(view.joint(view.robot.index(str(joint))))
-        return cls.lines(str(joint), np.arange(1.0, min(MAX_ORDER, int(told)) + 1.0))
-
-    @classmethod
-    def lines(cls, joint: str, orders: Array) -> list[TransmissionRipple]:
-        """Return an instance of no size for each order, shape (K,) [1/rev]."""
-        return [cls(joint, 0.0, float(order), 0.0) for order in orders]
-
-    @classmethod
-    def small(cls, view: View, joint: str | None, most: int) -> list[TransmissionRipple]:
-        """
-        Return one ripple of all orders up to the highest that the measurements can hold apart.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it sits on.
-        most : int
-            How many orders.
-
-        """
-        orders = np.arange(1.0, min(MAX_ORDER, most) + 1.0)
-        zero = np.zeros(orders.size)
-        return [cls(str(joint), zero, orders, zero)] if orders.size else []
-
-    def alike(self) -> list[tuple[str, ...]]:
-        """Return a label per sine and cosine: the joint and the band of its order."""
-        band = np.searchsorted(BANDS, np.repeat(self.orders(), 2))
-        return [(self.name, self.joint, str(b)) for b in band]
-
-    def orders(self) -> Array:
-        """Return the orders, in cycles per turn."""
-        return np.atleast_1d(np.asarray(self.order, dtype=np.float64))
-
-    def with_orders(self, orders: Array) -> TransmissionRipple:
-        """
-        Return the ripple of these orders and no others.
-
-        Parameters
-        ----------
-        orders : array, shape (K,)
-            In cycles per turn; those that the ripple does not have yet are of no size.
-
-        """
-        own, pairs = self.orders(), self.coordinates().reshape(-1, 2)
-        wanted = [pairs[own == order].sum(axis=0) for order in orders]
-        like = TransmissionRipple(self.joint, np.zeros(len(wanted)), orders, 0.0)
-        return like.from_atoms(np.array(wanted))
-
-    def joined(self, other: TransmissionRipple) -> TransmissionRipple:
-        """Return the orders of both in one ripple."""
-        parts: dict[str, Any] = {
-            p.name: np.append(getattr(self, p.name), getattr(other, p.name))
-            for p in self.parameters
-        }
-        return replace(self, **parts)
-
-    def errors(self, std: Array) -> dict[str, Any]:
-        """Return the errors of amplitude and phase; sine and cosine are what was fitted."""
-        amplitude = np.atleast_1d(np.asarray(self.amplitude))
-        spread = np.sqrt((std.reshape(-1, 2) ** 2).mean(axis=1))
-        phase = np.minimum(spread / np.maximum(amplitude, 1e-300), np.pi)
-        if np.ndim(self.amplitude) > 0:
-            return {'amplitude': spread.tolist(), 'phase': phase.tolist()}
-        return {'amplitude': float(spread[0]), 'phase': float(phase[0])}
+        return cls.search.lines(str(joint), np.arange(1.0, min(MAX_ORDER, int(told)) + 1.0))
 
     def atoms(self, view: View) -> list[Shift]:
         """Return sine and cosine of every order, so that amplitude and phase become linear."""
@@ -230,12 +238,12 @@ class TransmissionRipple(Effect):
         theta = view.joint(channel[1])
         if self._dense():
             turn, now, powers = np.exp(1j * theta), np.ones_like(theta, complex), {}
-            for n in range(1, int(self.orders().max()) + 1):
+            for n in range(1, int(self.search.orders().max()) + 1):
                 now = now * turn
                 powers[n] = now
-            waves = [powers[int(n)] for n in self.orders()]
+            waves = [powers[int(n)] for n in self.search.orders()]
             return [{channel: part} for wave in waves for part in (wave.imag, wave.real)]
-        return [{channel: f(n * theta)} for n in self.orders() for f in (np.sin, np.cos)]
+        return [{channel: f(n * theta)} for n in self.search.orders() for f in (np.sin, np.cos)]
 
     def from_atoms(self, coefficients: Array) -> TransmissionRipple:
         """Return amplitude and phase of sine and cosine coefficients, pairs in `atoms` order."""
@@ -245,26 +253,8 @@ class TransmissionRipple(Effect):
             return TransmissionRipple(self.joint, float(amplitude[0]), self.order, float(phase[0]))
         return TransmissionRipple(self.joint, amplitude, self.order, phase)
 
-    def coordinates(self) -> Array:
-        """Return sine and cosine coefficients, pairs in order; the orders stay."""
-        amplitude = np.atleast_1d(np.asarray(self.amplitude, dtype=np.float64))
-        phase = np.atleast_1d(np.asarray(self.phase, dtype=np.float64))
-        return np.stack([amplitude * np.cos(phase), amplitude * np.sin(phase)], -1).ravel()
-
-    def with_coordinates(self, values: Array) -> TransmissionRipple:
-        """Return the ripple with other sine and cosine coefficients."""
-        return self.from_atoms(values)
-
-    def coordinate_shifts(self, view: View) -> list[Shift]:
-        """Return sine and cosine of every order."""
-        return self.atoms(view)
-
-    def coordinate_scales(self) -> Array:
-        """Return the typical amplitude for every coefficient."""
-        return np.full(2 * np.size(self.order), self.parameters[0].typical)
-
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         amplitude = np.atleast_1d(np.asarray(self.amplitude))
         order = np.atleast_1d(np.asarray(self.order))
         strongest = np.argsort(-np.abs(amplitude))[:3]

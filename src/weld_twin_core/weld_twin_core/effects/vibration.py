@@ -20,6 +20,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .associative_scan import linear
 from .effect import Effect, MemoryEffect
+from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
@@ -29,6 +30,33 @@ DAMPINGS = (0.03, 0.08, 0.25)
 """their dampings."""
 HIGHEST = 0.4
 """Frequency times the step in time of the joint stream that a search goes up to."""
+
+
+class _Fit(FitHooks):
+    """What the fit asks of it."""
+
+    effect: Vibration
+
+    def starts(self, view: View, zoom: int) -> tuple[list[Effect], Array] | None:
+        """
+        Return modes of all frequencies and dampings: far from the mode the fit has other optima.
+
+        On evenly spaced stamps, on which the recursion is a plain filter.
+        """
+        if zoom or view.static or view.t.size < 3:
+            return None
+        step = float(np.median(np.diff(view.t)))
+        t = np.arange(view.t[0], view.t[-1] + step, step)
+        q = np.interp(t, view.t, view.joint(view.robot.index(self.effect.joint)))
+        kick = np.concatenate([np.zeros(2), np.diff(q, n=2)]) / step
+        modes = [
+            Vibration(self.effect.joint, float(f), z, 1.0)
+            for f in FREQUENCIES[FREQUENCIES * step < HIGHEST]
+            for z in DAMPINGS
+        ]
+        poles, damped = (np.array(part) for part in zip(*(m._mode() for m in modes), strict=True))
+        response = _ringing(np.exp(poles * step), damped, kick)
+        return list(modes), np.stack([np.interp(view.t, t, own) for own in response])
 
 
 @register
@@ -42,9 +70,12 @@ class Vibration(MemoryEffect):
     gain: Value = 0.0
 
     name = 'vibration'
-    title = 'vibration'
-    entered = 'how the motion is planned, and of stiffness'
-    depends_on = 'acceleration'
+    traits = Traits(
+        title='vibration',
+        meaning='a joint swings after it was accelerated',
+        entered='how the motion is planned, and of stiffness',
+        depends_on='acceleration',
+    )
     of = 'joint'
     stage = Stage.SERVO
     parameters = (
@@ -83,6 +114,7 @@ class Vibration(MemoryEffect):
         ),
     )
     needs = frozenset({'velocity', 'time'})
+    fit = Hooked(_Fit)
 
     def _mode(self) -> tuple[Array, Array]:
         """Return the complex pole and the damped angular frequency [1/s]."""
@@ -152,20 +184,7 @@ class Vibration(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield modes from 2 to 40 Hz, as far as the joint stream's rate can show them.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (N,), optional
-            How strongly the residual would move the joint at every sample [rad or m, up to
-            scale].
-
-        """
+        """Yield modes from 2 to 40 Hz, as far as the joint stream's rate can show them."""
         if view.static or view.t.size < 3:
             return
         highest = HIGHEST / float(np.median(np.diff(view.t)))
@@ -179,36 +198,15 @@ class Vibration(MemoryEffect):
         z = self._response(view, None)[0]
         return [{('q', i): z.imag}, {('q', i): z.real}]
 
-    def starts(self, view: View, zoom: int) -> tuple[list[Effect], Array] | None:
-        """
-        Return modes of all frequencies and dampings: far from the mode the fit has other optima.
-
-        On evenly spaced stamps, on which the recursion is a plain filter.
-        """
-        if zoom or view.static or view.t.size < 3:
-            return None
-        step = float(np.median(np.diff(view.t)))
-        t = np.arange(view.t[0], view.t[-1] + step, step)
-        q = np.interp(t, view.t, view.joint(view.robot.index(self.joint)))
-        kick = np.concatenate([np.zeros(2), np.diff(q, n=2)]) / step
-        modes = [
-            Vibration(self.joint, float(f), z, 1.0)
-            for f in FREQUENCIES[FREQUENCIES * step < HIGHEST]
-            for z in DAMPINGS
-        ]
-        poles, damped = (np.array(part) for part in zip(*(m._mode() for m in modes), strict=True))
-        response = _ringing(np.exp(poles * step), damped, kick)
-        return list(modes), np.stack([np.interp(view.t, t, own) for own in response])
-
     def from_atoms(self, coefficients: Array) -> Vibration:
         """Return the mode whose gain is the in-phase coefficient."""
         return Vibration(self.joint, self.frequency, self.damping, float(coefficients[0]))
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
+        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Limit the jerk of {self.site}, or shape its motion for '
-            f'{self.plain("frequency"):.3g} Hz (damping {self.plain("damping"):.2g}); look '
+            f'{self._plain("frequency"):.3g} Hz (damping {self._plain("damping"):.2g}); look '
             'for a loose mount.'
         )
 

@@ -16,6 +16,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from .effect import Effect
+from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -36,13 +37,16 @@ class Wear(Effect):
     slowing: Value = 0.0
 
     name = 'wear'
-    title = 'tool wear'
-    entered = 'tool'
-    depends_on = 'time'
-    place = 'tool'
+    traits = Traits(
+        title='tool wear',
+        meaning='the tip of the tool wears away',
+        entered='tool',
+        depends_on='time',
+        place='tool',
+        common=False,
+    )
     of = 'robot'
     stage = Stage.LINK
-    common = False
     parameters = (
         Parameter(
             'rate',
@@ -92,26 +96,14 @@ class Wear(Effect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """
-        Yield a tip that wears evenly, and one that has slowed down by the end.
-
-        Parameters
-        ----------
-        view : View
-            The samples that reach the effect.
-        joint : str or None
-            None: it is of the whole robot.
-        pull : array, shape (N,), optional
-            Not looked at.
-
-        """
+        """Yield a tip that wears evenly, and one that has slowed down by the end."""
         span = max(float(np.max(view.elapsed, initial=0.0)), 1.0)
         for slowed in SLOWED:
             yield cls(0.0, slowed / span)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Hooks.remedy`."""
-        hour = self.plain('rate') * 3.6e6
+        """Return what to mend, in words; see `Effect.remedy`."""
+        hour = self._plain('rate') * 3.6e6
         return (
             f'Renew or measure the tip of the tool: along its axis it draws back by {number(hour)} mm '
             'per hour.'

@@ -88,9 +88,9 @@ class Features:
     def shifts(self, effect: Effect, atoms: bool = True) -> list[Shift]:
         """Return the effect's linear features (or fit-coordinate derivatives) at the stamps."""
         if effect.stage not in (Stage.SERVO, Stage.PLAY):
-            return effect.atoms(self.view) if atoms else effect.coordinate_shifts(self.view)
+            return effect.atoms(self.view) if atoms else effect.fit.coordinate_shifts(self.view)
         if not atoms:
-            return self._picked(effect.coordinate_shifts(self.joint_view))
+            return self._picked(effect.fit.coordinate_shifts(self.joint_view))
         key = self._clock, repr(effect), effect.vector().tobytes()
         if key not in self._remembered:
             self._remembered[key] = self._picked(effect.atoms(self.joint_view))
@@ -147,10 +147,10 @@ class Features:
             index = self.twin.robot.index(joint)
             pull = (self.column(('q', index))[: residual.shape[0]] * residual).sum(axis=0)
         seeds = list(kind.seeds(view, joint, pull))
-        return seeds, kind.trials(view, joint) or float(len(seeds))
+        return seeds, kind.search.trials(view, joint) or float(len(seeds))
 
 
 def joints_of(kind: type[Effect], robot: Robot) -> Sequence[str | None]:
     """Return the joints an effect can sit on, or one None for effects of the whole robot."""
     sites = robot.joint_names if kind.of in ('joint', 'link') else (None,)
-    return [site for site in sites if kind.fits(robot, site)]
+    return [site for site in sites if kind.search.fits(robot, site)]

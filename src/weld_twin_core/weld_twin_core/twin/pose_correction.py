@@ -9,19 +9,18 @@ its slope; in between it goes on as it did. How far apart that may be is learned
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from ..arm.chain import forward, frames
+from ..arm.chain import forward
 from ..arm.rotation import angle_between, rotation_matrix
 from ..arrays import Array
 from ..effects.effect import MemoryEffect
 from ..errors import DataError
 from ..kernels.single_turn import turn_between, turn_matrix
-from ..motion.inverse.newton import chain_jacobian, least_step, pose_error
+from ..motion.inverse.newton import least_step
 from ..recording import JointMotion
 from .goal_correction import GoalLimits, not_corrected, too_large
 from .posterior import pose_covariances
@@ -29,18 +28,18 @@ from .program_correction import SINGULAR
 from .program_model import ProgramModel
 
 ROUNDS = 12
-"""Newton rounds; effects are small, each takes away all but some thousandths of what is left."""
-CLOSED = 1e-12
-"""Error [m, rad] that is rounding."""
+"""Newton rounds; with the real arm's own slope every one squares what is left."""
+SIDE = 1e-4
+"""Step [rad or m] of a joint to either side over which slopes are taken: what bends there is below
+1e-8, and nearly the same for both arms, whose difference counts; rounding is below 1e-11."""
+SETTLED = 1e-6
+"""Step [rad or m] of all joints that is the last one: it leaves its square."""
+CLOSED = 1e-11
+"""Error [m, rad] that the last step may leave to first order."""
 OPEN = 1e-9
 """Error [m, rad] that a solution must not have: that of `compensate`."""
-SIDES = np.repeat((1e-3, 2e-3), 3)
-"""Distances [m, rad] to either side over which a slope is taken: what bends there is below 1e-9."""
-TRUSTED = np.array([5e-10, *[2e-8] * 12])
-"""Error [m, rad] of a pose, and of those beside it, whose next step need not be looked at: it leaves
-some thousandths, rounding of the pose and some millionths of a slope."""
 EXACT = 2e-10
-"""Largest error [m] that what is told between two looks should have."""
+"""Largest error [m], of way and turn, that what is told between two looks should have."""
 REACH = (2e-5, 5e-4, 1e-2)
 """Least, first and largest distance [m] between two exact looks; a turn counts half a metre a radian."""
 ONWARD = 0.97
@@ -57,19 +56,26 @@ class Looked(NamedTuple):
     ----------
     pose : array, shape (4, 4)
         The pose that was wanted, in the robot's base.
-    added : array, shape (6,) [m, rad]
-        What takes it to where the tool is to be commanded.
-    slope : array, shape (6, 6)
-        How that changes with the pose.
-    q : array, shape (n,)
-        Joints of the pose that is commanded.
+    values : array, shape (6 + n,)
+        What takes it to where the tool is to be commanded [m, rad], and the joints there.
+    slope : array, shape (6 + n, 6)
+        How those change with the pose.
 
     """
 
     pose: Array
-    added: Array
+    values: Array
     slope: Array
-    q: Array
+
+    @property
+    def added(self) -> Array:
+        """Return what takes the pose to where the tool is to be commanded, shape (6,) [m, rad]."""
+        return self.values[:6]
+
+    @property
+    def q(self) -> Array:
+        """Return the joints of the pose that is commanded, shape (n,)."""
+        return self.values[6:]
 
 
 class PoseCorrection:
@@ -86,14 +92,21 @@ class PoseCorrection:
     """
 
     def __init__(self, model: ProgramModel, tool: Array) -> None:
-        still = model.without_memory() or model
-        self.model = model
+        still, robot = model.without_memory() or model, model.robot
+        self.model, self.tool = model, tool
         self._arm = model.arm(tool)
         self._twin = still.twin(tool)
-        self._back = np.linalg.inv(model.robot.T_world_base)
+        self._back = np.linalg.inv(robot.T_world_base)
         self._still = still
         self._at: Looked | None = None
-        self._reach, self._bend, self._way = REACH[1], np.zeros((6, 6)), np.zeros(6)
+        self._sides = SIDE * np.concatenate(
+            [np.zeros((1, robot.n)), np.eye(robot.n), -np.eye(robot.n)]
+        )
+        self._begin()
+
+    def _begin(self) -> None:
+        """Know nothing yet of how what is added bends."""
+        self._reach, self._bend, self._way = REACH[1], np.zeros((1, 1)), np.zeros(6)
 
     @property
     def looked(self) -> Looked | None:
@@ -110,18 +123,37 @@ class PoseCorrection:
         """
         Return the exact correction of a pose, found from joints near it.
 
+        Its joints are those at which the real tool is at the pose: Newton, with the real arm's own
+        slope. What is added takes the pose to where the nominal arm has the tool at them.
+
         Raises
         ------
         DataError
             It cannot be reached from there.
 
         """
-        start = self._closed(self.arm_poses, pose[None], near[None])
-        return self._look(pose, start[0])
+        q, size = near, np.inf
+        for _ in range(ROUNDS):
+            beside = q + self._sides
+            real = self._real_poses(beside)
+            error, rise = between(real[0], pose), _rise(real)
+            size = np.abs(error).max()
+            step = least_step(rise, error, SINGULAR)
+            q = q + step
+            left = np.abs(error - rise @ step).max()
+            if left < CLOSED and np.abs(step).max() < SETTLED:
+                break
+        else:
+            if not size < OPEN:
+                raise DataError('the pose cannot be reached from where the arm stands')
+        back = least_step(rise, np.eye(6), SINGULAR).T
+        apart = _rise(self.arm_poses(beside)) - rise
+        added = between(pose, self.arm_poses(q[None])[0])
+        return Looked(pose, np.concatenate([added, q]), np.concatenate([apart @ back, back]))
 
-    def exact(self, pose: Array, known: Looked) -> Looked:
+    def exact(self, pose: Array) -> Looked:
         """
-        Return the exact correction of a pose, found from one near it.
+        Return the exact correction of a pose, found from the latest one.
 
         Raises
         ------
@@ -129,24 +161,17 @@ class PoseCorrection:
             It cannot be reached.
 
         """
-        poses = _around(pose)
-        way, size = _away(known, pose)
-        told = _told(known, self._bend, way, size) + between(pose[None], poses) @ known.slope.T
-        meant = moved(poses, told)
-        chain = frames(self._arm, known.q[None])
-        away = pose_error(chain, meant)
-        q = known.q + least_step(chain_jacobian(self._arm, chain), away, SINGULAR)
-        return self._look(pose, self._closed(self.arm_poses, meant, q), TRUSTED)
+        return self.first(pose, self.joints(pose))
 
     def adopt(self, looked: Looked | None) -> None:
         """Go on from an exact correction, and learn how far apart such looks may be; None forgets."""
         before, self._at = self._at, looked
         if before is None or looked is None:
-            self._reach, self._bend, self._way = REACH[1], np.zeros((6, 6)), np.zeros(6)
+            self._begin()
             return
         way, size = _away(before, looked.pose)
         told = _told(before, self._bend, way, size)
-        off = float(np.linalg.norm((told - looked.added)[:3]))
+        off = _size((told - looked.values)[:6])
         if size > REACH[0]:
             self._bend = (looked.slope - before.slope) / size
             self._way = way
@@ -174,7 +199,12 @@ class PoseCorrection:
         way, size = _away(self._at, pose)
         onward = _onward(self._way, way)
         reach = self._reach if onward else min(self._reach, REACH[1])
-        return _told(self._at, self._bend, way, size), size / reach
+        return _told(self._at, self._bend, way, size)[:6], size / reach
+
+    def joints(self, pose: Array) -> Array:
+        """Return the joints of what is commanded for a pose, shape (n,), told by the latest look."""
+        assert self._at is not None
+        return _told(self._at, self._bend, *_away(self._at, pose))[6:]
 
     def refusal(self, looked: Looked, limits: GoalLimits) -> str:
         """Return why a pose must not be corrected; empty where it may."""
@@ -213,38 +243,6 @@ class PoseCorrection:
         """Return where the controller has the tool, ``T_base_tool`` of postures (M, n), (M, 4, 4)."""
         return forward(self._arm, q)
 
-    def _look(self, pose: Array, near: Array, trusted: Array | float = 0.0) -> Looked:
-        """Return the solution of a pose and its slope, all seven times two poses at once."""
-        poses = _around(pose)
-        q = self._closed(
-            self._real_poses, poses, np.broadcast_to(near, (13, near.shape[-1])), trusted
-        )
-        added = between(poses, forward(self._arm, q))
-        slope = (added[1:7] - added[7:]) / (2.0 * SIDES[:, None])
-        return Looked(pose, added[0], slope.T, q[0])
-
-    def _closed(
-        self,
-        poses_of: Callable[[Array], Array],
-        wanted: Array,
-        q: Array,
-        trusted: Array | float = 0.0,
-    ) -> Array:
-        """Return joints that close poses, shape (M, n); below ``trusted`` a step is not looked at."""
-        size = np.full(len(q), np.inf)
-        for _ in range(ROUNDS):
-            error = between(poses_of(q), wanted)
-            size = np.abs(error).max(axis=-1)
-            if (size < CLOSED).all():
-                break
-            jacobian = chain_jacobian(self._arm, frames(self._arm, q))
-            q = q + least_step(jacobian, error, SINGULAR)
-            if (size < trusted).all():
-                return np.asarray(q)
-        if not size.max() < OPEN:
-            raise DataError('the pose cannot be reached from where the arm stands')
-        return np.asarray(q)
-
     def _real_poses(self, q: Array) -> Array:
         position, rotation = self._twin.poses(self._still.recording(_standing(q)))
         out = np.zeros((len(q), 4, 4))
@@ -252,11 +250,10 @@ class PoseCorrection:
         return np.asarray(self._back @ out)
 
 
-def _around(pose: Array) -> Array:
-    """Return a pose and those beside it by which its slope is told, shape (13, 4, 4)."""
-    return np.concatenate(
-        [pose[None], moved(pose, np.concatenate([np.diag(SIDES), -np.diag(SIDES)]))]
-    )
+def _rise(poses: Array) -> Array:
+    """Return d pose / d joint, shape (6, n), of a pose and those with joints to either side of it."""
+    ahead, behind = np.split(poses[1:], 2)
+    return np.asarray(between(behind, ahead).T / (2.0 * SIDE))
 
 
 def _standing(q: Array) -> JointMotion:
@@ -266,12 +263,17 @@ def _standing(q: Array) -> JointMotion:
 def _away(at: Looked, pose: Array) -> tuple[Array, float]:
     """Return the way from a look to a pose, shape (6,), and its size [m]."""
     way = between(at.pose, pose)
-    return way, sqrt(way[:3] @ way[:3]) + LEVER * sqrt(way[3:] @ way[3:])
+    return way, _size(way)
+
+
+def _size(way: Array) -> float:
+    """Return the size of a way and turn (6,) [m]."""
+    return sqrt(way[:3] @ way[:3]) + LEVER * sqrt(way[3:] @ way[3:])
 
 
 def _told(at: Looked, bend: Array, way: Array, size: float) -> Array:
-    """Return what a look tells to add a way (6,) from it, its slope bent onwards with its size [m]."""
-    return np.asarray(at.added + (at.slope + 0.5 * size * bend) @ way)
+    """Return what a look tells of a way (6,) from it, (6 + n,), its slope bent onwards with its size."""
+    return np.asarray(at.values + (at.slope + 0.5 * size * bend) @ way)
 
 
 def _onward(before: Array, way: Array) -> bool:

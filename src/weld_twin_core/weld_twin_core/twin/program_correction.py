@@ -32,7 +32,6 @@ from ..recording import JointMotion
 from .drawn import Drawn
 from .posterior import largest_sigma
 from .program_model import ProgramModel, missing
-from .trust import trust
 
 ROUNDS = 5
 """Rounds of moving points; effects are small, each takes away all but some thousandths."""
@@ -317,7 +316,7 @@ class _Work(NamedTuple):
         if posterior is None or covariance is None:
             return None
         gap = missing(self.model.wanted(piece), self.model.real(piece, piece.motion))
-        return trust(posterior.domain, piece.motion.q, gap[:, :3], covariance[:, :3, :3])
+        return posterior.domain.trust(piece.motion.q, gap[:, :3], covariance[:, :3, :3])
 
     def result(
         self, moved: MoveProgram, left: dict[int, str], calm: dict[int, str]

@@ -135,7 +135,7 @@ class EffectStages:
             if tangents is not None:
                 for k, effect in effects:
                     own += indexed(k, effect.gradient(view))
-                    for key, value in effect.slope(view).items():
+                    for key, value in effect.twin.slope(view).items():
                         slopes[key] = slopes.get(key, 0.0) + value
             if effects and stage not in (Stage.LOAD, Stage.ELASTIC):
                 shifts = [effect.displace(view) for _, effect in effects]
@@ -149,8 +149,8 @@ class EffectStages:
         if not loads and not springs:
             return view
         loaded = _loaded(view, loads)
-        rigid = [spring.displace(loaded) for spring in springs if not spring.settles]
-        settling = [spring for spring in springs if spring.settles]
+        rigid = [spring.displace(loaded) for spring in springs if not spring.twin.settles]
+        settling = [spring for spring in springs if spring.twin.settles]
         give = [*rigid, *(spring.displace(loaded) for spring in settling)]
         for _ in range(SETTLING_ROUNDS if settling else 0):
             loaded = _loaded(view.displaced(*give), loads)
@@ -170,12 +170,12 @@ class EffectStages:
             Behind all stages, as `pointwise` leaves it.
 
         """
-        springs = [spring for spring in self.of_stage(Stage.ELASTIC) if spring.settles]
+        springs = [spring for spring in self.of_stage(Stage.ELASTIC) if spring.twin.settles]
         if not springs:
             return None
         slope = torque_slope(self.robot, view.frames, view.wrench, view.wrench_frame)
         for effect in self.of_stage(Stage.LOAD):
-            slope = slope + effect.load_slope(view)
+            slope = slope + effect.twin.load_slope(view)
         gives = -np.moveaxis(slope, (0, 1), (-2, -1))
         soft = np.zeros((*np.broadcast_shapes(gives.shape[:-2], (*self.draws, 1)), self.robot.n))
         for spring in springs:

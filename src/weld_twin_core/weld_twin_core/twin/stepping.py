@@ -110,12 +110,13 @@ class LiveTwin:
 
         """
         q = self._checked(t, q)
+        if not self._twin.effects:
+            self._command.remember(t, q)
+            return q.copy(), self._nominal(q)
         if qd is None:
             qd = self._command.since_before(t, q)
         else:
             self._command.remember(t, q)
-        if not self.twin.effects:
-            return q.copy(), self._nominal(q)
         view = self._remembered(t, self._view(t, q, qd, wrench, temperature, wrench_frame, effort))
         view = self.twin.displaced(view)
         joints = view.q[0].copy()
@@ -141,7 +142,7 @@ class LiveTwin:
         return Poses(poses.position[0], poses.rotation[0])
 
     def _checked(self, t: float, q: Array) -> Array:
-        robot = self.twin.robot
+        robot = self._twin.robot
         q = np.asarray(q, dtype=np.float64)
         if q.shape != (robot.n,):
             raise DataError(f'robot {robot.name!r} needs {robot.n} joint positions, got {q.shape}')
@@ -157,8 +158,8 @@ class LiveTwin:
 
     def _nominal(self, q: Array) -> Poses:
         """Return the pose without effects, at a tenth of what the stages cost."""
-        if self._single.robot is not self.twin.robot:
-            self._single = SinglePose(self.twin.robot)
+        if self._single.robot is not self._twin.robot:
+            self._single = SinglePose(self._twin.robot)
         pose = self._single(q)
         return Poses(pose[:3, 3], pose[:3, :3])
 

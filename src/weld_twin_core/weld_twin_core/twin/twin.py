@@ -207,7 +207,7 @@ class Twin(EffectStages):
         return [
             (('q', channel[1]), effect.number('compliance'))
             for effect in self.of_stage(Stage.ELASTIC)
-            if self.robot.index(str(effect.site)) == channel[1] and not effect.by_effort
+            if self.robot.index(str(effect.site)) == channel[1] and not effect.twin.by_effort
         ]
 
     # Evaluation ------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from weld_twin_lab.belief.rows import read_rows
 from weld_twin_lab.belief.share_cover import told_and_true
 from weld_twin_lab.belief.share_trial import true_shares
 from weld_twin_lab.blind.blind_cell import deviation, draw_cell, floor, take
-from weld_twin_lab.blind.making import Case
+from weld_twin_lab.blind.making import SealedCase
 from weld_twin_nodes.cli import main
 
 RESULTS = Path(__file__).parents[4] / 'docs' / 'results'
@@ -42,7 +42,7 @@ def case_of(*offsets, seed=1):
     ride = take(cell, 'free', 15.0, np.random.default_rng(2))
     causes = [{'effect': 'joint_offset', 'joint': cell.robot.joint_names[k], 'offset': size}
               for k, size in enumerate(offsets, 1)]  # fmt: skip
-    return Case(None, cell, causes, [], [], (), ride, ride, ride, False)
+    return SealedCase(None, cell, causes, [], [], (), ride, ride, ride, False)
 
 
 def squares(case, causes):

@@ -93,7 +93,7 @@ def test_another_seed_does_not_go_where_cases_are(checked, weld_twin):
 
 
 def test_a_cause_put_into_a_real_bag_moves_it_as_the_twin_says():
-    from weld_twin_lab.blind.blind_cell import Cell, Take
+    from weld_twin_lab.blind.blind_cell import BlindCell, Take
     from weld_twin_lab.blind.real_motion import recorded_command, with_cause
     from weld_twin_lab.plant.tracker import Tracker
 
@@ -109,7 +109,7 @@ def test_a_cause_put_into_a_real_bag_moves_it_as_the_twin_says():
     real = bare.with_measured(Measurements(measured_t, poses.position + noise, poses.rotation))
     cause = {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 1e-3}
 
-    cell = Cell(robot, Tracker())
+    cell = BlindCell(robot, Tracker())
     mixed, size = with_cause(cell, cause, Take(recorded_command(real), 1), real)
 
     moved = Twin(robot, effects_from_list([cause], robot)).poses(bare, measured_t)

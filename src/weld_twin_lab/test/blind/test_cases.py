@@ -5,13 +5,16 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import fields
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm import catalog
+from weld_twin_core.effects import REGISTRY, effects_from_list
 from weld_twin_core.errors import DataError
+from weld_twin_core.twin.twin import Twin
 from weld_twin_lab.blind.ambiguous import CONSTRUCTIONS, construct
 from weld_twin_lab.blind.cause_sizes import FAMILIES, OUTSIDE, SIZES, draw, scaled
 from weld_twin_lab.blind.deck import KINDS, STRATA, Lot, lots
@@ -20,7 +23,15 @@ from weld_twin_lab.blind.recorded_motion import motion
 
 pytest.importorskip('mujoco')
 
-from weld_twin_lab.blind.blind_cell import Cell, Take, deviation, floor, record
+from weld_twin_lab.blind.blind_cell import (
+    BlindCell,
+    Take,
+    as_recording,
+    deviation,
+    exact,
+    floor,
+    record,
+)
 from weld_twin_lab.blind.making import draw_case
 from weld_twin_lab.plant.plant import KNOWN
 from weld_twin_lab.plant.plant_recording import Command
@@ -36,7 +47,7 @@ def robot():
 
 @pytest.fixture(scope='module')
 def cell(robot):
-    return Cell(robot, Tracker(rate=60.0, sigma=SIGMA, jitter=2e-5, joint_rate=125.0))
+    return BlindCell(robot, Tracker(rate=60.0, sigma=SIGMA, jitter=2e-5, joint_rate=125.0))
 
 
 @pytest.fixture(scope='module')
@@ -98,6 +109,33 @@ def test_a_case_shows_its_cause_as_large_as_wanted():
     np.testing.assert_allclose(case.ratios, [off])
 
 
+def of_the_elbow(name):
+    """Return a cause of its typical size, on the elbow where it has a joint."""
+    cause = draw(name, catalog.load('ur5'), 6.0, np.random.default_rng(7))
+    places = {'joint': 'elbow_joint', 'source': 'shoulder_lift_joint'}
+    return {key: places.get(key, value) for key, value in cause.items()}
+
+
+def read_by_both(name):
+    """Tell whether twin and plant read one entry, and a motion without load shows the cause."""
+    known = {field.name for field in fields(REGISTRY[name])} | {'effect'}
+    unseen = REGISTRY[name].needs & {'temperature', 'wrench'} or name == 'payload'
+    return set(of_the_elbow(name)) <= known and not unseen
+
+
+@pytest.mark.parametrize('name', [name for name in FAMILIES if read_by_both(name)])
+def test_twin_and_plant_move_the_tool_alike(name, cell, taken, robot):
+    cause = of_the_elbow(name)
+    clean = as_recording('clean', record(cell, (), taken, exact(cell.tracker)))
+    real, nominal = (
+        Twin(robot, effects).poses(clean, clean.measured.t).position
+        for effects in (effects_from_list([cause], robot), ())
+    )
+    off, by_plant = real - nominal, deviation(cell, [cause], taken)
+    assert rms(off) == pytest.approx(rms(by_plant), rel=0.1)
+    assert np.sum(off * by_plant) > 0.99 * np.sqrt(np.sum(off**2) * np.sum(by_plant**2))
+
+
 def test_a_moved_base_moves_the_tool_by_as_much(cell, taken):
     cause = {'effect': 'base_pose', 'xyz': [3e-4, 0.0, 4e-4], 'rotvec': [0.0, 0.0, 0.0]}
     np.testing.assert_allclose(rms(deviation(cell, [cause], taken)), 5e-4, rtol=1e-6)
@@ -123,14 +161,14 @@ def test_an_aligned_base_hides_what_a_base_does():
 def test_the_floor_is_the_noise_and_outliers_are_set_apart(robot, taken):
     tracker = Tracker(rate=60.0, sigma=SIGMA, outlier_share=0.05, outlier_size=3e-3)
     cause = {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 1e-3}
-    left, outliers = floor(Cell(robot, tracker), [cause], taken)
+    left, outliers = floor(BlindCell(robot, tracker), [cause], taken)
     np.testing.assert_allclose(left, np.sqrt(3.0) * SIGMA, rtol=0.1)
     assert 5 <= len(outliers) <= 40
 
 
 def test_jitter_is_part_of_the_floor(robot, taken):
     still, shaken = (
-        floor(Cell(robot, Tracker(rate=60.0, sigma=SIGMA, jitter=jitter)), [], taken)[0]
+        floor(BlindCell(robot, Tracker(rate=60.0, sigma=SIGMA, jitter=jitter)), [], taken)[0]
         for jitter in (0.0, 1e-3)
     )
     assert shaken > 1.5 * still
@@ -145,7 +183,7 @@ def test_an_ambiguous_construction_is_what_its_like_can_be(name, arm):
     robot = catalog.load(arm).with_frames(tool=tool)
     rng = np.random.default_rng(8)
     moved = motion('free', robot, 6.0, rng)
-    cell = Cell(robot, Tracker(rate=60.0, sigma=SIGMA))
+    cell = BlindCell(robot, Tracker(rate=60.0, sigma=SIGMA))
     taken = Take(Command(moved.t, moved.q), 1)
     built = construct(name, robot, 6.0, rng)
     off = deviation(cell, built.causes, taken).ravel()

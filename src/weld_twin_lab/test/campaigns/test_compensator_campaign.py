@@ -77,10 +77,10 @@ def test_whoever_goes_on_tries_what_is_missing_alone():
     from weld_twin_lab.campaigns.compensating.trial import CHANGES, Known
 
     begun, last = next(iter(HOMES)), {**CHANGE, 'change': CHANGES[-1]}
-    known = Known([row(robot=begun), row(robot=begun), after(CHANGES[-1])], [last])
+    known = Known([row(robot=begun), row(robot=begun), after(CHANGES[-1])], [last], [])
     assert begun not in unfinished(known, 2)
     assert unfinished(known, 3) == list(HOMES)  # more goals are asked for than before
-    assert unfinished(Known(known.rows, [CHANGE]), 2) == list(HOMES)
+    assert unfinished(Known(known.rows, [CHANGE], []), 2) == list(HOMES)
 
 
 def test_goals_are_seams_and_those_inside_lie_where_the_arm_was_recorded():

@@ -16,7 +16,7 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_lab.contest.course import Run, commands, run_all
 from weld_twin_lab.contest.entrants import geometry, never_knows, zero_offset
 from weld_twin_lab.contest.open_form import (
-    Answer,
+    ContestAnswer,
     read_answer,
     read_case,
     write_answer,
@@ -97,8 +97,8 @@ def test_names_beyond_three_of_one_cause_do_not_count(case, truth):
     names = [(effect, 'elbow_joint', 0.2) for effect in ('backlash', 'servo_lag', 'joint_offset')]
     hidden = (*names, ('link_length', 'elbow_joint', 0.1))
     predicted = never_knows.answer(read_case(case[0])).predicted
-    assert not point(Answer(predicted, (hidden,)), truth).family
-    assert point(Answer(predicted, (hidden[1:],)), truth).family
+    assert not point(ContestAnswer(predicted, (hidden,)), truth).family
+    assert point(ContestAnswer(predicted, (hidden[1:],)), truth).family
 
 
 def test_anybody_can_enter_and_a_failure_is_told(case, truth, tmp_path):
@@ -136,7 +136,11 @@ def test_the_page_says_where_others_are_better_and_who_is_best_on_the_measured_a
     floor = truth.positions + NOISE
     half = {'weld_twin': 2.0, 'mine': 1.0, 'close': 1.95, 'never_knows': 0.5}
     runs = {
-        name: {'one': Run(Answer(truth.positions + size * NOISE, unknown=1.0), 3.0 / size, 10**8)}
+        name: {
+            'one': Run(
+                ContestAnswer(truth.positions + size * NOISE, unknown=1.0), 3.0 / size, 10**8
+            )
+        }
         for name, size in half.items()
     }
     near = closer(runs, {'one': truth})
@@ -168,7 +172,7 @@ def test_a_command_without_its_places_is_refused(text):
 
 def test_an_answer_out_of_form_is_refused(case, tmp_path):
     predicted = np.zeros((80, 3))
-    write_answer(tmp_path, Answer(predicted, unknown=0.4))
+    write_answer(tmp_path, ContestAnswer(predicted, unknown=0.4))
     assert read_answer(tmp_path, 80).unknown == 0.4
     with pytest.raises(DataError, match='must have 79 rows'):
         read_answer(tmp_path, 79)

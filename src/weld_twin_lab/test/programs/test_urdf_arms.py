@@ -13,7 +13,7 @@ pytest.importorskip('mujoco', reason='the plant needs MuJoCo')
 
 from weld_twin_lab.programs.drawn_urdf import HANDS, drawn_arm  # noqa: E402
 from weld_twin_lab.programs.plain_arm import tool_pose  # noqa: E402
-from weld_twin_lab.programs.urdf_trial import Cell  # noqa: E402
+from weld_twin_lab.programs.urdf_trial import UrdfCell  # noqa: E402
 
 
 @pytest.mark.parametrize('number', range(7))
@@ -30,7 +30,7 @@ def test_urdf_plant_and_controller_are_one_arm(number, tmp_path):
     for link, tool in ((flange, np.eye(4)), ('tcp', np.array(arm.controller.T_flange_tool))):
         wanted = (place[base].inverse() * place[link]).homogeneous
         np.testing.assert_allclose(tool_pose(arm.controller, q, tool), wanted, atol=1e-9)
-        cell = Cell(arm, [], np.eye(4), np.eye(4), tmp_path)
+        cell = UrdfCell(arm, [], np.eye(4), np.eye(4), tmp_path)
         position, turned = cell.poses(q[None], [], tool)
         np.testing.assert_allclose(position[0], wanted[:3, 3], atol=1e-9)
         np.testing.assert_allclose(turned[0], wanted[:3, :3], atol=1e-9)

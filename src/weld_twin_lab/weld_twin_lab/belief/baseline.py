@@ -208,13 +208,13 @@ def scores(rows: Sequence[Mapping[str, Any]]) -> dict[str, Estimate]:
         **out,
         'cases in which an innocent place is accused': share([bool(c.innocent) for c in cases]),
         'disowned': share([c.disowned for c in cases]),
-        'with a family taken out: something is told above 0.5': share(
+        'with a family taken out: something is reported above 0.5': share(
             [any(p > TOLD for p, _, _ in c.told) for c in cases if c.withheld and c.causes > 1]
         ),
         'whole answers right': share([c.right for c in cases]),
         'whole answers right and sure': share([c.right and c.sure for c in cases]),
         'whole answers sure and wrong': share([c.sure and not c.right for c in cases]),
-        'causes told that are right': share([right for _, right, _ in told]),
+        'causes reported that are right': share([right for _, right, _ in told]),
         'causes sure and wrong, of the sure ones': share([not right for _, right, s in told if s]),
         'calibration error of causes': calibration_error(
             [p for p, _, _ in told], [r for _, r, _ in told]

@@ -67,7 +67,7 @@ def grown(seed: int, number: int) -> dict[str, Any]:
     return {'name': name, 'error': None, 'truth': truth, 'told': kept[:-1], 'turned': kept[-1]}
 
 
-class Step(NamedTuple):
+class GrowingStep(NamedTuple):
     """
     A cause that was sure and right, before and after a recording more.
 
@@ -87,7 +87,7 @@ class Step(NamedTuple):
         return self.after < self.before - FALL
 
 
-def steps(row: Mapping[str, Any]) -> Iterator[Step]:
+def steps(row: Mapping[str, Any]) -> Iterator[GrowingStep]:
     """
     Yield every right cause that was sure, with what a recording more made of it.
 
@@ -103,7 +103,7 @@ def steps(row: Mapping[str, Any]) -> Iterator[Step]:
         held = [_of(one['verdict'], alike) for one in row['told']]
         for k, ((before, sure), (after, still)) in enumerate(pairwise(held)):
             if sure:
-                yield Step(row['name'], k + 1, (effect, joint), before, after, still)
+                yield GrowingStep(row['name'], k + 1, (effect, joint), before, after, still)
 
 
 def _of(verdict: Mapping[str, Any], alike: frozenset[Site]) -> tuple[float, bool]:

@@ -118,11 +118,11 @@ def _levels(effect: str, joint: str | None, robot: str) -> Levels:
         return Levels(frozenset(own), frozenset(dependences))
     kind = REGISTRY[effect]
     places = {_built(REGISTRY[e], j).at for e, j in _alike(robot, (effect, joint))}
-    return Levels(frozenset(places), frozenset({kind.depends_on}))
+    return Levels(frozenset(places), frozenset({kind.traits.depends_on}))
 
 
 def _constant(kind: type[Effect]) -> bool:
-    return kind.cause and kind.depends_on == 'constant'
+    return kind.traits.cause and kind.traits.depends_on == 'constant'
 
 
 def _constants(robot: Robot) -> Iterator[Effect]:

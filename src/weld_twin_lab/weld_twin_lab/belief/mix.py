@@ -15,7 +15,7 @@ import numpy as np
 
 from ..blind.ambiguous import CONSTRUCTIONS
 from ..blind.deck import KINDS, Deck, Lot, lots
-from ..blind.making import Case, draw_case
+from ..blind.making import SealedCase, draw_case
 from ..blind.poor_motion import WAYS
 
 SHARES = {**KINDS, 'outside': 6, 'withheld': 6}
@@ -29,7 +29,7 @@ SPANS = (15.0, 45.0)
 class Drawn(NamedTuple):
     """A case, and how its motion was made poor."""
 
-    case: Case
+    case: SealedCase
     poor: str
 
 

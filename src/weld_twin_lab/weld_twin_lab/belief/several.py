@@ -16,7 +16,7 @@ import numpy as np
 
 from ..blind.cause_sizes import FAMILIES, MOVING
 from ..blind.deck import ROBOTS, Deck, Lot
-from ..blind.making import Case, draw_case
+from ..blind.making import SealedCase, draw_case
 from ..blind.poor_motion import poorer
 from .mix import SPANS
 
@@ -51,7 +51,7 @@ HELD_OUT = 3
 """One case of so many brings a held-out recording; of stations it has few."""
 
 
-def several(seed: int, number: int) -> tuple[Case, bool]:
+def several(seed: int, number: int) -> tuple[SealedCase, bool]:
     """
     Return case ``number`` of a seed, and whether its held-out recording is given.
 

@@ -11,7 +11,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from ..blind.blind_cell import deviation, floor
-from ..blind.making import Case
+from ..blind.making import SealedCase
 from .mix import drawn, mixed
 from .trial import tried
 
@@ -19,7 +19,7 @@ KINDS = {'single': 1, 'double': 2, 'triple': 3}
 """Kinds of cases, and how many causes each has."""
 
 
-def true_shares(case: Case) -> list[float]:
+def true_shares(case: SealedCase) -> list[float]:
     """
     Return the true share of every cause of a case.
 
@@ -30,7 +30,7 @@ def true_shares(case: Case) -> list[float]:
 
     Parameters
     ----------
-    case : Case
+    case : SealedCase
 
     """
     whole = deviation(case.cell, case.causes, case.train)

@@ -21,7 +21,7 @@ from ..blind.achieved import aligned_on, counted, gap_on
 from ..blind.blind_cell import Take, as_recording, record
 from ..blind.diagnosing import engine_digest
 from ..blind.displacement import rms
-from ..blind.making import Case, truth_of
+from ..blind.making import SealedCase, truth_of
 from .mix import drawn
 from .several import several
 from .visible import shown
@@ -54,7 +54,7 @@ def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
     return row
 
 
-def _drawn(seed: int, number: int, mix: str) -> tuple[Case, str, bool]:
+def _drawn(seed: int, number: int, mix: str) -> tuple[SealedCase, str, bool]:
     """Return a case, how its motion was made poor, and whether it has a held-out recording."""
     if mix == SEVERAL:
         case, held_out = several(seed, number)
@@ -62,14 +62,14 @@ def _drawn(seed: int, number: int, mix: str) -> tuple[Case, str, bool]:
     return (*drawn(seed, number), True)
 
 
-def row_of(name: str, case: Case, *, held_out: bool = True) -> dict[str, Any]:
+def row_of(name: str, case: SealedCase, *, held_out: bool = True) -> dict[str, Any]:
     """
     Return the row of a case.
 
     Parameters
     ----------
     name : str
-    case : Case
+    case : SealedCase
     held_out : bool
         Whether its held-out recording is given to the diagnosis.
 
@@ -106,13 +106,13 @@ def said(told: Diagnosis) -> dict[str, Any]:
     }
 
 
-def recordings_of(case: Case, more: Sequence[Take] = ()) -> list[Recording]:
+def recordings_of(case: SealedCase, more: Sequence[Take] = ()) -> list[Recording]:
     """
     Return the recordings of a case that are to be diagnosed.
 
     Parameters
     ----------
-    case : Case
+    case : SealedCase
     more : sequence of Take
         Further ones of the same truth.
 
@@ -124,13 +124,15 @@ def recordings_of(case: Case, more: Sequence[Take] = ()) -> list[Recording]:
     return [_recorded(case, layout.TRAIN), *also]
 
 
-def diagnosed(case: Case, recordings: Sequence[Recording], *, held_out: bool = False) -> Diagnosis:
+def diagnosed(
+    case: SealedCase, recordings: Sequence[Recording], *, held_out: bool = False
+) -> Diagnosis:
     """
     Return the diagnosis of recordings of a case.
 
     Parameters
     ----------
-    case : Case
+    case : SealedCase
     recordings : sequence of Recording
     held_out : bool
         Whether the held-out recording of the case is given.
@@ -148,12 +150,12 @@ def diagnosed(case: Case, recordings: Sequence[Recording], *, held_out: bool = F
     )
 
 
-def _recorded(case: Case, use: str) -> Recording:
+def _recorded(case: SealedCase, use: str) -> Recording:
     taken = {layout.TRAIN: case.train, layout.HOLDOUT: case.holdout, layout.TEST: case.test}[use]
     return as_recording(use, record(case.cell, case.causes, taken))
 
 
-def _sealed(case: Case, truth: dict[str, Any], told: Diagnosis) -> dict[str, Any]:
+def _sealed(case: SealedCase, truth: dict[str, Any], told: Diagnosis) -> dict[str, Any]:
     """Return what is left on the recording that the diagnosis never saw, RMS [m]."""
     if told.status == 'unsound':
         return {}

@@ -18,9 +18,9 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 
-from ..blind.blind_cell import Cell, Take, deviation, exact, record
+from ..blind.blind_cell import BlindCell, Take, deviation, exact, record
 from ..blind.cause_sizes import SIZES, Cause
-from ..blind.making import Case
+from ..blind.making import SealedCase
 
 STEP = 0.1
 """Share of a parameter by which it is changed for its column; angles by as much [rad]."""
@@ -28,7 +28,7 @@ TURNING = {'transmission_ripple': ('phase',), 'bearing_tilt': ('phase',)}
 """Parameters beside the sizes that bend a cause."""
 
 
-def shown(case: Case) -> list[float]:
+def shown(case: SealedCase) -> list[float]:
     """
     Return for each cause by how much chi-square rises without it, the least of both kinds of motion.
 
@@ -36,7 +36,7 @@ def shown(case: Case) -> list[float]:
 
     Parameters
     ----------
-    case : Case
+    case : SealedCase
 
     """
     cell = replace(case.cell, align=())
@@ -65,16 +65,16 @@ def _fitted(design: Array, target: Array) -> Array:
     return np.asarray(np.linalg.lstsq(design / size, target, rcond=1e-9)[0] / size)
 
 
-def _moved(cell: Cell, causes: Sequence[Cause], takes: Sequence[Take]) -> Array:
+def _moved(cell: BlindCell, causes: Sequence[Cause], takes: Sequence[Take]) -> Array:
     """Return how far causes move the measured positions on all recordings, (rows,) [m]."""
     return np.concatenate([deviation(cell, causes, taken).ravel() for taken in takes])
 
 
-def _samples(cell: Cell, taken: Take) -> int:
+def _samples(cell: BlindCell, taken: Take) -> int:
     return len(record(cell, (), taken, exact(cell.tracker)).position)
 
 
-def _frames(cell: Cell, takes: Sequence[Take], align: Sequence[str]) -> list[Array]:
+def _frames(cell: BlindCell, takes: Sequence[Take], align: Sequence[str]) -> list[Array]:
     """Return the columns of the frames that are fitted; of the tool its shift alone."""
     seen = [record(cell, (), taken, exact(cell.tracker)) for taken in takes]
     out: list[Array] = []

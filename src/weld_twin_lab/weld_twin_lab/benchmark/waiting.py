@@ -29,7 +29,7 @@ Keep = Callable[[Entry], None]
 
 
 @dataclass(frozen=True)
-class Job:
+class WaitingJob:
     """
     Something that a person waits for.
 
@@ -67,44 +67,46 @@ read_recording(sys.argv[1], load('ur5'))
 CASES = 4
 """Sealed cases that are diagnosed; the time is told for one."""
 JOBS = (
-    Job('`weld-twin --help`', (*_CLI, '--help')),
-    Job('`import weld_twin_core`', ('-c', 'import weld_twin_core')),
-    Job('`import weld_twin_core.diagnosis`', ('-c', 'import weld_twin_core.diagnosis')),
-    Job(
+    WaitingJob('`weld-twin --help`', (*_CLI, '--help')),
+    WaitingJob('`import weld_twin_core`', ('-c', 'import weld_twin_core')),
+    WaitingJob('`import weld_twin_core.diagnosis`', ('-c', 'import weld_twin_core.diagnosis')),
+    WaitingJob(
         'diagnose 60 s of motion, page included',
         (*_CLI, 'diagnose', '{data}', '--robot', 'ur5', '--out', '{out}'),
         'motion',
     ),
-    Job(
+    WaitingJob(
         'diagnose 2,772 stations, six-dimensional, ripple of all orders',
         (*_CLI, 'diagnose', '{data}', '--robot', 'ur10', '--align', 'base', '--out', '{out}'),
         'stations',
         once=True,
     ),
-    Job(
+    WaitingJob(
         'diagnose one hour of motion',
         (*_CLI, 'diagnose', '{data}', '--robot', 'ur5', '--out', '{out}'),
         'hour',
         once=True,
     ),
-    Job('read ten minutes of bag (111,000 messages)', ('-c', _READ, '{data}'), 'minutes'),
-    Job('read an hour of bag (666,000 messages)', ('-c', _READ, '{data}'), 'hour', once=True),
-    Job(
+    WaitingJob('read ten minutes of bag (111,000 messages)', ('-c', _READ, '{data}'), 'minutes'),
+    WaitingJob(
+        'read an hour of bag (666,000 messages)', ('-c', _READ, '{data}'), 'hour', once=True
+    ),
+    WaitingJob(
         'import a table of 100,000 rows',
         (*_CLI, 'import', '{data}', '--robot', 'ur5', '--out', '{out}'),
         'table',
     ),
-    Job(
+    WaitingJob(
         'sensitivity study with page',
         (*_CLI, 'sensitivity', '--robot', 'ur5', '--out', '{out}'),
         once=True,
     ),
-    Job(
+    WaitingJob(
         'claims of the paper, 7 robots x 3 seams',
         (*_CLI, 'sensitivity', '--claims', '--out', '{out}'),
         once=True,
     ),
-    Job(
+    WaitingJob(
         'a sealed blind case: made, diagnosed, scored',
         (
             *_CLI,
@@ -193,7 +195,7 @@ def merged(kept: Sequence[Entry], new: Sequence[Entry]) -> list[Entry]:
     return [found[job.name] for job in JOBS if job.name in found]
 
 
-def _entry(job: Job, pythons: dict[str, str], out: Path, runs: int) -> Entry:
+def _entry(job: WaitingJob, pythons: dict[str, str], out: Path, runs: int) -> Entry:
     place = data.made(job.needs, out) if job.needs else Path()
     costs: dict[str, list[Cost]] = {name: [] for name in pythons}
     for turn in range(1 if job.once else runs + 1):

@@ -38,7 +38,7 @@ GROSS = 6.0
 
 
 @dataclass(frozen=True, eq=False)
-class Cell:
+class BlindCell:
     """
     One cell with its instruments.
 
@@ -78,7 +78,9 @@ class Take(NamedTuple):
     seed: int
 
 
-def draw_cell(robot: str, kind: str, families: Sequence[str], rng: np.random.Generator) -> Cell:
+def draw_cell(
+    robot: str, kind: str, families: Sequence[str], rng: np.random.Generator
+) -> BlindCell:
     """Return a cell in which causes of these families can be seen."""
     arm = catalog.load(robot).with_frames(tool=_torch(rng))
     known: tuple[Cause, ...] = ()
@@ -90,7 +92,7 @@ def draw_cell(robot: str, kind: str, families: Sequence[str], rng: np.random.Gen
     if 'refraction' in families:
         arm = arm.with_frames(base=_far(rng))
     spring = {'joint_compliance', 'loaded_play'} & set(families)
-    return Cell(
+    return BlindCell(
         arm,
         _tracker(kind, rng),
         known,
@@ -102,13 +104,13 @@ def draw_cell(robot: str, kind: str, families: Sequence[str], rng: np.random.Gen
     )
 
 
-def fitted_out(cell: Cell, align: tuple[str, ...] | None, noise_m: float | None) -> Cell:
+def fitted_out(cell: BlindCell, align: tuple[str, ...] | None, noise_m: float | None) -> BlindCell:
     """
     Return a cell with other frames to be fitted, and an instrument of another noise.
 
     Parameters
     ----------
-    cell : Cell
+    cell : BlindCell
     align : tuple of str, optional
     noise_m : float, optional
         RMS length [m].
@@ -175,12 +177,12 @@ def _tracker(kind: str, rng: np.random.Generator) -> Tracker:
     )
 
 
-def take(cell: Cell, kind: str, span: float, rng: np.random.Generator) -> Take:
+def take(cell: BlindCell, kind: str, span: float, rng: np.random.Generator) -> Take:
     """Return a motion of a kind in this cell, with what surrounds it."""
     return of_motion(cell, motion(kind, cell.robot, span, rng), rng)
 
 
-def of_motion(cell: Cell, moved: Motion, rng: np.random.Generator) -> Take:
+def of_motion(cell: BlindCell, moved: Motion, rng: np.random.Generator) -> Take:
     """Return a given motion in this cell, with what surrounds it."""
     return Take(_command(cell, moved, rng), _seed(rng))
 
@@ -194,7 +196,7 @@ def _seed(rng: np.random.Generator) -> int:
     return int(rng.integers(2**31))
 
 
-def _command(cell: Cell, moved: Motion, rng: np.random.Generator) -> Command:
+def _command(cell: BlindCell, moved: Motion, rng: np.random.Generator) -> Command:
     t = moved.t
     since, span = t - t[0], t[-1] - t[0]
     wrench = temperature = None
@@ -211,7 +213,7 @@ def _command(cell: Cell, moved: Motion, rng: np.random.Generator) -> Command:
 
 
 def record(
-    cell: Cell, causes: Sequence[Cause], taken: Take, tracker: Tracker | None = None
+    cell: BlindCell, causes: Sequence[Cause], taken: Take, tracker: Tracker | None = None
 ) -> PlantRecording:
     """Return what the cell with these causes records; the same take gives the same again."""
     rng = np.random.default_rng(taken.seed)
@@ -258,7 +260,7 @@ def _signal(t: Array | None, value: Array | None) -> Signal | None:
     return None if t is None or value is None else Signal(t, value)
 
 
-def deviation(cell: Cell, causes: Sequence[Cause], taken: Take) -> Array:
+def deviation(cell: BlindCell, causes: Sequence[Cause], taken: Take) -> Array:
     """
     Return how far the causes move the measured position, free of noise, shape (M, 3) [m].
 
@@ -270,7 +272,7 @@ def deviation(cell: Cell, causes: Sequence[Cause], taken: Take) -> Array:
 
 
 @lru_cache(maxsize=2)
-def _ideal(cell: Cell, taken: Take) -> PlantRecording:
+def _ideal(cell: BlindCell, taken: Take) -> PlantRecording:
     """Return what the cell records without a cause and without noise; sizing asks for it often."""
     return record(cell, (), taken, exact(cell.tracker))
 
@@ -282,7 +284,7 @@ def at_stamps(made: PlantRecording, t: Array) -> Array:
     return np.asarray(CubicSpline(made.t_measured, made.position)(t))
 
 
-def floor(cell: Cell, causes: Sequence[Cause], taken: Take) -> tuple[float, list[int]]:
+def floor(cell: BlindCell, causes: Sequence[Cause], taken: Take) -> tuple[float, list[int]]:
     """
     Return what is left of a recording when its causes are known, and its outliers.
 
@@ -302,7 +304,9 @@ def floor(cell: Cell, causes: Sequence[Cause], taken: Take) -> tuple[float, list
     return rms(left[~gross]), [int(k) for k in np.nonzero(gross)[0]]
 
 
-def _by_jitter(cell: Cell, causes: Sequence[Cause], taken: Take, seen: PlantRecording) -> Array:
+def _by_jitter(
+    cell: BlindCell, causes: Sequence[Cause], taken: Take, seen: PlantRecording
+) -> Array:
     """Return how far the tool moves between true instants and their stamps, shape (M, 3) [m]."""
     steady = record(cell, causes, taken, exact(cell.tracker))
     velocity = CubicSpline(steady.t_measured, steady.position)(steady.t_measured, 1)

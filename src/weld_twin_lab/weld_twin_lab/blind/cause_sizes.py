@@ -10,7 +10,10 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.plausible import plausible as plausible_of
+
+from ..plant.textbook_effects import LIBRARY
 
 Cause = dict[str, Any]
 """An entry of an effects file."""
@@ -57,6 +60,9 @@ SIZES: dict[str, tuple[str, ...]] = {
     'link_warm_up': ('strain',),
 }
 """The parameters of every cause that grow with it."""
+NEW = sorted((LIBRARY & set(REGISTRY)) - set(SIZES) - {'measurement_noise'})
+"""Effects that plant and library have, and that nothing is said of here: as they say themselves."""
+SIZES |= {name: (REGISTRY[name].parameters[0].name,) for name in NEW}
 OUTSIDE = (
     'station_step',
     'tool_slip',
@@ -198,6 +204,7 @@ _POSITIVE = frozenset(
         'pedestal_tilt',
         'hose_pull',
         'refraction',
+        *(name for name in NEW if REGISTRY[name].parameters[0].lower >= 0.0),
     }
 )
 
@@ -350,3 +357,16 @@ _DRAWN: dict[str, Callable[..., Cause]] = {
     'clock_rate': _whole('rate', 2e-5),
     'link_warm_up': _warm_up,
 }
+
+
+def _usual(family: str) -> Callable[..., Cause]:
+    """Return how to draw an effect of the sizes that its parameters say are typical."""
+    kind = REGISTRY[family]
+    sizes = {p.name: p.typical if p.size < 2 else [p.typical] * p.size for p in kind.parameters}
+    return lambda robot, span, rng: {
+        **({'joint': _joint(robot, rng)} if kind.of in ('joint', 'link') else {}),
+        **sizes,
+    }
+
+
+_DRAWN |= {name: _usual(name) for name in NEW}

@@ -25,7 +25,7 @@ from . import layout, seal
 from .ambiguous import CONSTRUCTIONS, construct
 from .blind_cell import (
     SPANS,
-    Cell,
+    BlindCell,
     Take,
     again,
     as_recording,
@@ -40,7 +40,7 @@ from .cause_sizes import FAMILIES, MOVING, Cause, site
 from .deck import STRATA, Lot, lots
 from .displacement import rms
 from .poor_motion import poorer
-from .sizing import Unseen, draw_causes, sized_together
+from .sizing import NotVisible, draw_causes, sized_together
 
 TRIES = 30
 """
@@ -53,14 +53,14 @@ DECOY = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class SealedCase:
     """
     One case, all of it.
 
     Attributes
     ----------
     lot : Lot
-    cell : Cell
+    cell : BlindCell
     causes : list of effects
     alike : list of lists of (family, joint)
         Answers as right as the truth.
@@ -77,7 +77,7 @@ class Case:
     """
 
     lot: Lot
-    cell: Cell
+    cell: BlindCell
     causes: list[Cause]
     alike: list[list[tuple[str, str | None]]]
     ratios: list[float]
@@ -164,7 +164,7 @@ def make_case(
     raise DataError(f'the simulator cannot move any {name} of {", ".join(lot.families)}')
 
 
-def _written(case: Case, name: str, cases: Path, truths: Path) -> dict[str, str]:
+def _written(case: SealedCase, name: str, cases: Path, truths: Path) -> dict[str, str]:
     with new_directory(cases / name, mark=layout.CASE) as place:
         write_case(place, name, case)
     with new_directory(truths / name, mark=layout.TRUTH) as place:
@@ -174,7 +174,7 @@ def _written(case: Case, name: str, cases: Path, truths: Path) -> dict[str, str]
 
 def draw_case(
     lot: Lot, rng: np.random.Generator, spans: tuple[float, float] = SPANS, poor: str = ''
-) -> Case:
+) -> SealedCase:
     """
     Return a case that shows its causes as large as the lot wants them.
 
@@ -193,11 +193,11 @@ def draw_case(
         No cell and motion drawn shows them.
 
     """
-    reason: Exception = Unseen(lot.kind)
+    reason: Exception = NotVisible(lot.kind)
     for attempt in range(TRIES):
         try:
             return _attempt(_eased(lot, attempt), rng, spans, poor)
-        except (Unseen, FloatingPointError) as error:
+        except (NotVisible, FloatingPointError) as error:
             reason = error
     raise DataError(f'no case of {", ".join(lot.families)} on {lot.robot} came about: {reason}')
 
@@ -212,7 +212,9 @@ def _eased(lot: Lot, attempt: int) -> Lot:
     return replace(lot, motion=motion, strata=strata)
 
 
-def _attempt(lot: Lot, rng: np.random.Generator, spans: tuple[float, float], poor: str) -> Case:
+def _attempt(
+    lot: Lot, rng: np.random.Generator, spans: tuple[float, float], poor: str
+) -> SealedCase:
     drawn = draw_cell(lot.robot, lot.motion, lot.families, rng)
     cell = fitted_out(drawn, lot.align, lot.noise_m)
     span = float(rng.uniform(*spans))
@@ -225,11 +227,13 @@ def _attempt(lot: Lot, rng: np.random.Generator, spans: tuple[float, float], poo
     )
     excluded = _excluded(lot, rng)
     also = tuple(take(cell, other, span, rng) for other in others)
-    return Case(lot, cell, causes, alike, ratios, excluded, train, holdout, test, fresh, also)
+    return SealedCase(
+        lot, cell, causes, alike, ratios, excluded, train, holdout, test, fresh, also
+    )
 
 
 def _causes(
-    lot: Lot, cell: Cell, train: Take, span: float, rng: np.random.Generator
+    lot: Lot, cell: BlindCell, train: Take, span: float, rng: np.random.Generator
 ) -> tuple[list[Cause], list[list[tuple[str, str | None]]], list[float]]:
     if lot.kind == 'none':
         return [], [], []
@@ -238,7 +242,7 @@ def _causes(
         return causes, [], ratios
     built = construct(lot.families[0], cell.robot, span, rng)
     if 'base' in cell.align and any(c['effect'] == 'base_pose' for c in built.causes):
-        raise Unseen('an aligned base hides what the base does')
+        raise NotVisible('an aligned base hides what the base does')
     causes, ratio = sized_together(cell, built.causes, train, lot.strata[0], rng)
     return causes, built.alike, [ratio]
 
@@ -253,7 +257,7 @@ def _excluded(lot: Lot, rng: np.random.Generator) -> tuple[str, ...]:
     return ()
 
 
-def write_case(place: Path, name: str, case: Case) -> None:
+def write_case(place: Path, name: str, case: SealedCase) -> None:
     """Write what whoever diagnoses may see."""
     cell = case.cell
     write_robot_yaml(place / layout.ROBOT, cell.robot)
@@ -273,7 +277,7 @@ def write_case(place: Path, name: str, case: Case) -> None:
     )
 
 
-def write_truth(place: Path, name: str, case: Case) -> None:
+def write_truth(place: Path, name: str, case: SealedCase) -> None:
     """Write what is sealed: the causes, and the recording that no diagnosis sees."""
     cell = case.cell
     tested = record(cell, case.causes, case.test)
@@ -281,14 +285,14 @@ def write_truth(place: Path, name: str, case: Case) -> None:
     layout.write(place / layout.TRUTH, {'salt': secrets.token_hex(16), **truth_of(name, case)})
 
 
-def truth_of(name: str, case: Case) -> dict[str, Any]:
+def truth_of(name: str, case: SealedCase) -> dict[str, Any]:
     """
     Return the truth of a case in plain values.
 
     Parameters
     ----------
     name : str
-    case : Case
+    case : SealedCase
 
     """
     cell, lot = case.cell, case.lot

@@ -14,13 +14,13 @@ from weld_twin_core.twin.features import Features
 from weld_twin_core.twin.twin import Twin
 
 from ..plant.outside_causes import FLANK_TORQUE
-from .making import Case
+from .making import SealedCase
 
 NO_LOAD = 1e-6
 """Load [N m, N] below which it is that of rounding."""
 
 
-def one_arm(case: Case) -> Case:
+def one_arm(case: SealedCase) -> SealedCase:
     """
     Return the case with what friction holds in a gear the same in every recording.
 

@@ -35,7 +35,7 @@ from weld_twin_nodes.offline.task_pool import Runner, Task
 from ..plant.plant_recording import Command, PlantRecording
 from ..plant.tracker import Tracker
 from . import layout, seal
-from .blind_cell import Cell, Take, at_stamps, record
+from .blind_cell import BlindCell, Take, at_stamps, record
 from .cause_sizes import FAMILIES, MOVING, Cause, draw, scaled, site
 from .deck import STRATA, Deck
 from .displacement import rms
@@ -168,7 +168,7 @@ def _mixed(
     aligned = initial_frames(problem, Model(robot, (robot.T_world_base,)))
     arm = aligned.robot.with_frames(base=aligned.bases[0])
     noise = noise_floor(problem, problem.residuals(aligned)).rms_m
-    cell = Cell(arm, Tracker(), richness=float(rng.uniform(0.0, 1.0)))
+    cell = BlindCell(arm, Tracker(), richness=float(rng.uniform(0.0, 1.0)))
     taken = Take(recorded_command(real), int(rng.integers(2**31)))
     wanted = float(np.exp(rng.uniform(*np.log(STRATA[wish.stratum]))))
     possible = [name for name in _possible(real, align) if name != wish.family]
@@ -216,7 +216,9 @@ def recorded_command(real: Recording) -> Command:
     )
 
 
-def with_cause(cell: Cell, cause: Cause, taken: Take, real: Recording) -> tuple[Recording, float]:
+def with_cause(
+    cell: BlindCell, cause: Cause, taken: Take, real: Recording
+) -> tuple[Recording, float]:
     """Return the recording with a cause added, and the RMS of what was added [m]."""
     measured = real.measured
     if measured is None:

@@ -30,8 +30,8 @@ from .deck import MOTIONS, ROBOTS, Lot
 from .diagnosing import diagnose_case, engine_digest
 from .displacement import rms
 from .judging import NAMING, judge
-from .making import Case, write_case, write_truth
-from .sizing import Unseen, sized
+from .making import SealedCase, write_case, write_truth
+from .sizing import NotVisible, sized
 
 ARMS = ('ur5', 'kuka_kr6_r900', 'franka_panda')
 """A wrist of parallel axes, a spherical wrist, seven joints."""
@@ -114,24 +114,24 @@ def recover_one(
     asked = {'family': family, 'arm': arm, 'size': size, 'motion': motion}
     try:
         case = _case(seed, family, arm, size, motion)
-    except Unseen as error:
+    except NotVisible as error:
         return {**asked, 'not_shown': str(error)}
     with TemporaryDirectory() as place:
         return {**asked, 'not_shown': None, 'causes': case.causes, **_worth(case, Path(place))}
 
 
-def _case(seed: int, family: str, arm: str, size: float, motion: str) -> Case:
+def _case(seed: int, family: str, arm: str, size: float, motion: str) -> SealedCase:
     """
     Return a case of one cause, its frames given, its recordings all of the same motion.
 
     Raises
     ------
-    Unseen
+    NotVisible
         No plausible cause is that large on any motion drawn.
 
     """
     own = [seed, FAMILIES.index(family), ROBOTS.index(arm), round(1000.0 * size)]
-    reason: Exception = Unseen(family)
+    reason: Exception = NotVisible(family)
     for attempt in range(TRIES):
         rng = np.random.default_rng([*own, attempt])
         cell = replace(draw_cell(arm, motion, (family,), rng), align=())
@@ -139,11 +139,11 @@ def _case(seed: int, family: str, arm: str, size: float, motion: str) -> Case:
             train = take(cell, motion, SECONDS, rng)
             span = float(train.command.t[-1])
             cause, off = sized(cell, draw(family, cell.robot, span, rng), train, size)
-        except (Unseen, PathError, FloatingPointError) as error:
+        except (NotVisible, PathError, FloatingPointError) as error:
             reason = error
             continue
         lot = Lot('single', arm, motion, (family,), ())
-        return Case(
+        return SealedCase(
             lot,
             cell,
             [cause],
@@ -155,10 +155,10 @@ def _case(seed: int, family: str, arm: str, size: float, motion: str) -> Case:
             again(train, rng),
             fresh=False,
         )
-    raise Unseen(str(reason))
+    raise NotVisible(str(reason))
 
 
-def _worth(case: Case, place: Path) -> dict[str, Any]:
+def _worth(case: SealedCase, place: Path) -> dict[str, Any]:
     """Write the case as any other, diagnose it, and return what the verdict was worth."""
     cases, truths = place / 'cases', place / 'truths'
     write_case(cases / NAME, NAME, case)

@@ -10,7 +10,7 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 
-from .blind_cell import Cell, Take, deviation
+from .blind_cell import BlindCell, Take, deviation
 from .cause_sizes import MOVING, Cause, draw, plausible, scaled, site
 from .deck import STRATA
 from .displacement import correlation, rms
@@ -23,17 +23,17 @@ NEAR = 1.15
 """A size is right when it is wrong by no more than this factor."""
 
 
-class Unseen(Exception):
+class NotVisible(Exception):
     """No plausible cause of the family is as large as wanted on this motion."""
 
 
-def sized(cell: Cell, cause: Cause, taken: Take, wanted: float) -> tuple[Cause, Array]:
+def sized(cell: BlindCell, cause: Cause, taken: Take, wanted: float) -> tuple[Cause, Array]:
     """
     Return a cause grown until its deviation is so many times the noise, and the deviation.
 
     Raises
     ------
-    Unseen
+    NotVisible
         It would have to be implausibly large or small.
 
     """
@@ -46,12 +46,14 @@ def sized(cell: Cell, cause: Cause, taken: Take, wanted: float) -> tuple[Cause, 
             return trial, off
         factor *= wanted / max(ratio, 1e-9)
         if not plausible(cell.robot, cause, factor):
-            raise Unseen(f'{cause["effect"]} is {ratio:.3g} times the noise, wanted {wanted:.3g}')
+            raise NotVisible(
+                f'{cause["effect"]} is {ratio:.3g} times the noise, wanted {wanted:.3g}'
+            )
     return trial, off
 
 
 def draw_causes(
-    cell: Cell,
+    cell: BlindCell,
     families: Sequence[str],
     strata: Sequence[int],
     taken: Take,
@@ -62,7 +64,7 @@ def draw_causes(
 
     Raises
     ------
-    Unseen
+    NotVisible
         A family cannot be seen on this motion.
 
     """
@@ -71,14 +73,14 @@ def draw_causes(
     for family, stratum in zip(families, strata, strict=True):
         cause, off = _one(cell, family, STRATA[stratum], taken, offs, rng)
         if site(cause) in map(site, causes):
-            raise Unseen(f'{family} twice at one place')
+            raise NotVisible(f'{family} twice at one place')
         causes.append(cause)
         offs.append(off)
     return causes, [rms(off) / cell.noise for off in offs]
 
 
 def _one(
-    cell: Cell,
+    cell: BlindCell,
     family: str,
     stratum: tuple[float, float],
     taken: Take,
@@ -86,31 +88,31 @@ def _one(
     rng: np.random.Generator,
 ) -> tuple[Cause, Array]:
     if taken.command.static and family in MOVING:
-        raise Unseen(f'{family} shows in motion only')
+        raise NotVisible(f'{family} shows in motion only')
     span = float(taken.command.t[-1] - taken.command.t[0])
-    reason = Unseen(family)
+    reason = NotVisible(family)
     for _ in range(TRIES):
         wanted = float(np.exp(rng.uniform(*np.log(stratum))))
         try:
             cause, off = sized(cell, draw(family, cell.robot, span, rng), taken, wanted)
-        except Unseen as error:
+        except NotVisible as error:
             reason = error
             continue
         if all(correlation(off, other) < ALIKE for other in others):
             return cause, off
-        reason = Unseen(f'{family} moves the tool as another cause does')
+        reason = NotVisible(f'{family} moves the tool as another cause does')
     raise reason
 
 
 def sized_together(
-    cell: Cell, causes: Sequence[Cause], taken: Take, stratum: int, rng: np.random.Generator
+    cell: BlindCell, causes: Sequence[Cause], taken: Take, stratum: int, rng: np.random.Generator
 ) -> tuple[list[Cause], float]:
     """
     Return causes grown together, and how many times the noise their deviation is.
 
     Raises
     ------
-    Unseen
+    NotVisible
         They would have to be implausibly large or small.
 
     """
@@ -123,5 +125,5 @@ def sized_together(
             break
         factor *= wanted / max(ratio, 1e-9)
         if not all(plausible(cell.robot, cause, factor) for cause in causes):
-            raise Unseen(f'the construction is {ratio:.3g} times the noise')
+            raise NotVisible(f'the construction is {ratio:.3g} times the noise')
     return grown, ratio

@@ -8,11 +8,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import binomtest
 
 from weld_twin_core.arrays import Array
 
-NORMAL_95 = 1.959963984540054
-"""Standard deviations that hold 95 % of a normal distribution."""
 DRAWS = 2000
 """Bootstrap samples; fifty of them lie beyond either end of a 95 % interval."""
 BINS = 10
@@ -29,22 +28,12 @@ class Estimate(NamedTuple):
 
 
 def share(hits: Sequence[bool]) -> Estimate:
-    """
-    Return a share with its Wilson score interval [1]_.
-
-    References
-    ----------
-    .. [1] E. B. Wilson, "Probable inference, the law of succession, and statistical inference",
-       J. American Statistical Association 22, 1927.
-
-    """
-    n = len(hits)
+    """Return a share with its Wilson score interval."""
+    n, right = len(hits), sum(map(bool, hits))
     if n == 0:
         return Estimate(None, None, None, 0)
-    p, z2 = sum(map(bool, hits)) / n, NORMAL_95**2
-    middle = (p + z2 / (2.0 * n)) / (1.0 + z2 / n)
-    half = NORMAL_95 * np.sqrt(p * (1.0 - p) / n + z2 / (4.0 * n * n)) / (1.0 + z2 / n)
-    return Estimate(p, max(float(middle - half), 0.0), min(float(middle + half), 1.0), n)
+    ends = binomtest(right, n).proportion_ci(0.95, 'wilson')
+    return Estimate(right / n, float(ends.low), float(ends.high), n)
 
 
 def bootstrap(

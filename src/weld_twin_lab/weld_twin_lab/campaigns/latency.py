@@ -34,6 +34,13 @@ ON_TF = tuple(
 )
 """Parameters of a twin that takes its base from `/tf`."""
 COMPARED = ('p50_us', 'p99_us', 'cpu_us')
+RATIOS = (
+    ('ratio', 'twin', 'relay'),
+    ('ratio_bare', 'twin', 'bare'),
+    ('ratio_tf', 'twin_tf', 'relay'),
+    ('ratio_tf_raw', 'twin_tf', 'raw_relay'),
+)
+"""Names of the ratios that are kept, each of one contender to another."""
 JUDGED = (*(('ratio', key) for key in COMPARED), ('ratio_tf', 'p50_us'), ('ratio_tf', 'p99_us'))
 """
 Ratios that must be within the limit, without and with frames on `/tf`. Reading the frames takes
@@ -59,6 +66,7 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     contenders = (
         Contender('relay', relay, joints, ()),
         Contender('raw_relay', relay, joints, ('-p', 'raw:=true')),
+        Contender('bare', relay, pose, ('-p', 'bare:=true')),
         Contender('twin', TWIN, pose, ()),
         Contender('twin_tf', TWIN, pose, ON_TF),
     )
@@ -66,7 +74,7 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
         for contender in contenders:
             race.turn(contender, 500.0, 1.0)
         rates = [_at(race, rate, args, tell) for rate in RATES]
-        beside = _beside_diagnosis(race, contenders[2], args, tell)
+        beside = _beside_diagnosis(race, contenders[3], args, tell)
     poses = pose_race(args.turns, POSES, tell)
     worst = max(row[which][key] for row in rates for which, key in JUDGED)
     lost = sum(row['twin']['lost'] for row in rates) + poses['lost']
@@ -99,9 +107,8 @@ def _at(
     for contender in race.contenders:
         row[contender.name] = contender.result()
         tell(f'{rate:6.0f} Hz  {contender.name:10} {row[contender.name]}')
-    row['ratio'] = {key: round(row['twin'][key] / row['relay'][key], 3) for key in COMPARED}
-    for key, name in (('ratio_tf', 'relay'), ('ratio_tf_raw', 'raw_relay')):
-        row[key] = {k: round(row['twin_tf'][k] / row[name][k], 3) for k in COMPARED}
+    for key, who, name in RATIOS:
+        row[key] = {k: round(row[who][k] / row[name][k], 3) for k in COMPARED}
     tell(f'{rate:6.0f} Hz  twin / relay {row["ratio"]}, with TF {row["ratio_tf"]}')
     return row
 
@@ -160,8 +167,9 @@ def table(result: dict[str, Any]) -> str:
 
     poses = result.get('poses')
     more = '' if poses is None else '\n\n' + pose_table(poses)
-    on_tf = all('ratio_tf' in row for row in result['rates'])
-    head: tuple[str, ...] = 'Hz', 'relay p50 / p99', 'raw relay', 'twin', 'twin / relay'
+    on_tf, bare = (all(key in row for row in result['rates']) for key in ('ratio_tf', 'bare'))
+    head: tuple[str, ...] = 'Hz', 'relay p50 / p99', 'raw relay'
+    head += ('rclpy alone', 'twin', 'twin / relay') if bare else ('twin', 'twin / relay')
     head += ('twin on /tf / relay',) if on_tf else ()
     return (
         markdown.table(
@@ -171,6 +179,7 @@ def table(result: dict[str, Any]) -> str:
                     f'{row["rate_hz"]:g}',
                     ms(row['relay']),
                     ms(row['raw_relay']),
+                    *([ms(row['bare'])] if bare else []),
                     ms(row['twin']),
                     ratio(row['ratio']),
                     *([ratio(row['ratio_tf'])] if on_tf else []),

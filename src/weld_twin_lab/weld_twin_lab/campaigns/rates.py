@@ -29,7 +29,7 @@ PATIENCE = 120.0
 """Seconds that a driver may take beyond its motion."""
 
 
-class Case(NamedTuple):
+class RateCase(NamedTuple):
     """Robots that run at once: model by namespace; joint states a second of each."""
 
     robots: dict[str, str]
@@ -37,8 +37,8 @@ class Case(NamedTuple):
 
 
 CASES = (
-    Case({'left': 'ur5', 'right': 'ur10'}, 500.0),
-    Case({'arm': 'ur5'}, 1000.0),
+    RateCase({'left': 'ur5', 'right': 'ur10'}, 500.0),
+    RateCase({'arm': 'ur5'}, 1000.0),
 )
 
 
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     }
 
 
-def _case(case: Case, seconds: float, folder: Path) -> list[dict[str, Any]]:
+def _case(case: RateCase, seconds: float, folder: Path) -> list[dict[str, Any]]:
     """Run the robots of a case beside each other; return a row for each."""
     from weld_twin_nodes.harness import Cell
     from weld_twin_nodes.live.all_nodes import MODULES
@@ -90,7 +90,7 @@ def _case(case: Case, seconds: float, folder: Path) -> list[dict[str, Any]]:
     return [_row(case, space, said[space], folder / space) for space in case.robots]
 
 
-def _row(case: Case, space: str, said: str, bag: Path) -> dict[str, Any]:
+def _row(case: RateCase, space: str, said: str, bag: Path) -> dict[str, Any]:
     """Return what a bag lacks of what a driver sent."""
     from weld_twin_core.errors import TwinError
     from weld_twin_msgs_py.bags import BagReader

@@ -18,7 +18,7 @@ from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots import load_robot
 
 from ..blind import layout
-from .open_form import Answer, read_answer, write_case
+from .open_form import ContestAnswer, read_answer, write_case
 from .processes import Cold, Ended, Starter, Warm
 
 ENTRANTS = (
@@ -42,7 +42,7 @@ class Run:
 
     Attributes
     ----------
-    answer : Answer, optional
+    answer : ContestAnswer, optional
         None where it gave none.
     seconds : float [s]
         Of processor time, start of the interpreter included.
@@ -52,7 +52,7 @@ class Run:
 
     """
 
-    answer: Answer | None
+    answer: ContestAnswer | None
     seconds: float
     memory_bytes: int
     trouble: str = ''

@@ -39,7 +39,7 @@ Cause = tuple[Name, ...]
 
 
 @dataclass(frozen=True)
-class Case:
+class ContestCase:
     """
     What a method may know.
 
@@ -78,7 +78,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Answer:
+class ContestAnswer:
     """
     What a method says.
 
@@ -175,7 +175,7 @@ def _measured(recording: Recording) -> Measurements:
     return recording.measured
 
 
-def read_case(folder: Path) -> Case:
+def read_case(folder: Path) -> ContestCase:
     """
     Return a case.
 
@@ -197,7 +197,9 @@ def read_case(folder: Path) -> Case:
         rotation = matrix_from_quaternion(measured[:, 4:], 'measured orientation')
     seen = train.with_measured(Measurements(measured[:, 0], measured[:, 1:4], rotation))
     robot = load_robot(str(folder / _ROBOT))
-    return Case(robot, seen, ask, times, tuple(said['align']), tuple(said['exclude']), folder)
+    return ContestCase(
+        robot, seen, ask, times, tuple(said['align']), tuple(said['exclude']), folder
+    )
 
 
 def _read(path: Path) -> Array:
@@ -223,7 +225,7 @@ def _read_signal(path: Path, static: bool) -> Signal | None:
     return Signal(table[:, 0], value, held=not static)
 
 
-def write_answer(folder: Path, answer: Answer) -> None:
+def write_answer(folder: Path, answer: ContestAnswer) -> None:
     """Write an answer."""
     folder.mkdir(parents=True, exist_ok=True)
     content = {
@@ -238,7 +240,7 @@ def write_answer(folder: Path, answer: Answer) -> None:
     _write(folder / PREDICTED, ['x', 'y', 'z'], [answer.predicted])
 
 
-def read_answer(folder: Path, count: int) -> Answer:
+def read_answer(folder: Path, count: int) -> ContestAnswer:
     """
     Return an answer.
 
@@ -272,4 +274,4 @@ def read_answer(folder: Path, count: int) -> Answer:
             f"'{folder / PREDICTED}' must have {count} rows of three finite numbers, it has "
             f'{predicted.shape[0]} of {predicted.shape[1]}'
         )
-    return Answer(predicted, causes, unknown, none)
+    return ContestAnswer(predicted, causes, unknown, none)

@@ -22,7 +22,7 @@ from ..blind.ambiguous import Site
 from ..blind.displacement import rms
 from ..blind.judging import CONFIDENT, IN_LIBRARY, answers_of
 from .course import Run
-from .open_form import Answer, Cause, Name
+from .open_form import Cause, ContestAnswer, Name
 
 LIKELY = 0.5
 """Probability from which something is said to be there."""
@@ -84,7 +84,7 @@ class Point:
     over_floor: float
 
 
-def point(answer: Answer, case: Sealed) -> Point:
+def point(answer: ContestAnswer, case: Sealed) -> Point:
     """Return what an answer was worth."""
     truth = case.truth
     there = answer.none < LIKELY and (bool(answer.causes) or answer.unknown >= LIKELY)
@@ -106,7 +106,7 @@ def point(answer: Answer, case: Sealed) -> Point:
     )
 
 
-def _first(answer: Answer, count: int) -> list[Name]:
+def _first(answer: ContestAnswer, count: int) -> list[Name]:
     """Return the names of so many causes, the likeliest, and of each the likeliest names."""
     ranked = sorted(answer.causes, key=lambda cause: -sum(p for *_, p in cause))
     return [name for cause in ranked[:count] for name in _likely(cause)]
@@ -116,11 +116,11 @@ def _likely(cause: Cause) -> list[Name]:
     return sorted(cause, key=lambda name: -name[2])[:NAMES]
 
 
-def _names(answer: Answer) -> list[Name]:
+def _names(answer: ContestAnswer) -> list[Name]:
     return [name for cause in answer.causes for name in cause]
 
 
-def _belief(answer: Answer, sites: Sequence[Site]) -> float:
+def _belief(answer: ContestAnswer, sites: Sequence[Site]) -> float:
     """Return the mean belief in the families of some causes."""
     each = [
         max((p for effect, _, p in _names(answer) if effect == at[0]), default=0.0) for at in sites
@@ -128,7 +128,7 @@ def _belief(answer: Answer, sites: Sequence[Site]) -> float:
     return float(np.mean(each)) if each else 0.0
 
 
-def _sure_wrong(answer: Answer, case: Sealed) -> bool:
+def _sure_wrong(answer: ContestAnswer, case: Sealed) -> bool:
     """Return whether it is sure of a cause that is none, or of nothing where something is."""
     right = {at for sites in answers_of(case.truth) for at in sites} if case.named else set()
     if answer.sure is None:

@@ -91,7 +91,7 @@ def _arm(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]:
     """Return every small error that arms of this kind have, each drawn from its usual spread."""
     out = []
     for effect in plausible_arm.directions(robot, ()):
-        if effect.of not in ('joint', 'link') or effect.waves is not None:
+        if effect.of not in ('joint', 'link') or effect.traits.waves is not None:
             continue
         size = plausible_arm.widths(robot, [effect]) * rng.standard_normal(effect.vector().size)
         if effect.name == 'joint_compliance':

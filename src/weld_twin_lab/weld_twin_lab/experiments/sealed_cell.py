@@ -30,7 +30,7 @@ from ..blind.blind_cell import as_recording, of_motion, record
 from ..blind.cause_sizes import site
 from ..blind.deck import Lot
 from ..blind.judging import Judged, judge
-from ..blind.making import Case, draw_case
+from ..blind.making import SealedCase, draw_case
 from ..blind.one_arm import one_arm
 from ..blind.poor_motion import WAYS
 from ..blind.recorded_motion import RATE, Motion
@@ -75,7 +75,7 @@ class SealedCell:
         self.name = f'{seed}-{number:04d}'
         # Few stations are poor; of a path there is no few.
         self.poor = str(rng.choice([w for w in WAYS if w != 'few' or lot.motion == 'stations']))
-        self._case: Case = one_arm(draw_case(lot, rng, SECONDS, poor=self.poor))
+        self._case: SealedCase = one_arm(draw_case(lot, rng, SECONDS, poor=self.poor))
         self._changed: dict[str, SetUpChange] = {}
         self._salt = int(rng.integers(2**62))
         self.robot: Robot = self._case.cell.robot

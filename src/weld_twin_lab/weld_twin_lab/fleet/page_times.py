@@ -27,7 +27,7 @@ TIMES = 3
 """Each page is made so often; the longest counts."""
 
 
-class Row(NamedTuple):
+class PageTime(NamedTuple):
     """What was timed on which database."""
 
     database: str
@@ -36,7 +36,7 @@ class Row(NamedTuple):
     is_page: bool = True
 
 
-def page_times(cells: int, diagnoses: int) -> tuple[list[Row], str]:
+def page_times(cells: int, diagnoses: int) -> tuple[list[PageTime], str]:
     """Return the times, and why PostgreSQL is not among them; empty where it is."""
     with tempfile.TemporaryDirectory() as place:
         rows = _on('SQLite', str(Path(place) / 'pages.db'), cells, diagnoses)
@@ -48,26 +48,28 @@ def page_times(cells: int, diagnoses: int) -> tuple[list[Row], str]:
     return rows, ''
 
 
-def _on(name: str, url: str, cells: int, diagnoses: int) -> list[Row]:
+def _on(name: str, url: str, cells: int, diagnoses: int) -> list[PageTime]:
     database = Database(url)
     runs = Runs(database)
-    rows = [Row(name, 'fill', _longest(lambda: fill(database, cells, diagnoses), 1), False)]
+    rows = [PageTime(name, 'fill', _longest(lambda: fill(database, cells, diagnoses), 1), False)]
     long = list(made(cells, 2000))
     database.write(lambda connection: [database.put(connection, LONG, entry) for entry in long])
     some = database.cells()[: max(cells // 10, 1)]
     looks = _longest(lambda: [runs.look(cell) for cell in some], 1)
-    rows.append(Row(name, 'what changed on a cell, once a diagnosis', looks / len(some), False))
+    rows.append(
+        PageTime(name, 'what changed on a cell, once a diagnosis', looks / len(some), False)
+    )
     rows += [
-        Row(name, 'all cells', _longest(lambda: ranking_page(database, str))),
-        Row(name, 'a cell', _longest(lambda: cell_page(database, 'line 002'))),
-        Row(
+        PageTime(name, 'all cells', _longest(lambda: ranking_page(database, str))),
+        PageTime(name, 'a cell', _longest(lambda: cell_page(database, 'line 002'))),
+        PageTime(
             name,
             'a cell, first time',
             _longest(lambda: cell_page(database, f'line {cells:03d}'), 1),
         ),
     ]
     runs.look(LONG)
-    rows.append(Row(name, 'a cell with 2,000', _longest(lambda: cell_page(database, LONG))))
+    rows.append(PageTime(name, 'a cell with 2,000', _longest(lambda: cell_page(database, LONG))))
     database.close()
     return rows
 
@@ -82,7 +84,7 @@ def _longest(work: Callable[[], object], times: int = TIMES) -> float:
     return out
 
 
-def table(rows: Sequence[Row], cells: int, diagnoses: int) -> str:
+def table(rows: Sequence[PageTime], cells: int, diagnoses: int) -> str:
     """Return the page of results."""
     told = [
         (row.database, row.what, f'{row.seconds:.2f} s', f'{GOAL:.0f} s' if row.is_page else '')

@@ -19,7 +19,7 @@ from weld_twin_msgs_py.robots import write_robot_yaml
 from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.history import Entry, entry_of
 
-from ..blind.blind_cell import Cell, Take, as_recording, draw_cell, record, take
+from ..blind.blind_cell import BlindCell, Take, as_recording, draw_cell, record, take
 
 Cause = dict[str, Any]
 ROBOTS = ('ur5', 'kuka_kr6_r900', 'abb_irb120', 'fanuc_m10ia', 'ur10', 'yaskawa_ar2010')
@@ -41,7 +41,7 @@ class YearlyCell:
 
     Attributes
     ----------
-    cell : Cell
+    cell : BlindCell
     as_built : tuple of mappings
         Its flaws on the first day.
     checks : tuple of Take
@@ -49,7 +49,7 @@ class YearlyCell:
 
     """
 
-    cell: Cell
+    cell: BlindCell
     as_built: tuple[Cause, ...]
     checks: tuple[Take, ...]
 

@@ -15,11 +15,11 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 
-from ..blind.blind_cell import Cell, as_recording, draw_cell, record, take
+from ..blind.blind_cell import BlindCell, as_recording, draw_cell, record, take
 from ..blind.cause_sizes import FAMILIES, MOVING, OUTSIDE, Cause
 from ..blind.deck import ROBOTS, STRATA
 from ..blind.poor_motion import poorer
-from ..blind.sizing import Unseen, draw_causes
+from ..blind.sizing import NotVisible, draw_causes
 
 STEPS = ('station_step', 'tool_slip')
 """Causes that are mistakes of the set-up as well; they are drawn there."""
@@ -71,7 +71,7 @@ def draw(rng: np.random.Generator, *, rich: bool = False) -> Sound:
 
     """
     for _ in range(TRIES):
-        with suppress(Unseen, FloatingPointError, DataError):
+        with suppress(NotVisible, FloatingPointError, DataError):
             return _drawn(rng, rich)
     raise DataError('no sound recording came about')
 
@@ -104,7 +104,7 @@ def _drawn(rng: np.random.Generator, rich: bool) -> Sound:
 
 
 def _as_told(
-    cell: Cell, recording: Recording, align: tuple[str, ...], rng: np.random.Generator
+    cell: BlindCell, recording: Recording, align: tuple[str, ...], rng: np.random.Generator
 ) -> tuple[Robot, Recording]:
     """Return the robot as told, and the recording seen from anywhere if frames are fitted."""
     robot = cell.robot

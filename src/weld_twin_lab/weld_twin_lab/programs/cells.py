@@ -20,7 +20,7 @@ PULSES = (1000.0, -1200.0, 1100.0, 900.0, -800.0, 700.0)
 """Per degree, of the axes of the Yaskawa arm: of the usual size, with both signs."""
 
 
-class Cell(NamedTuple):
+class ProgramCell(NamedTuple):
     """A robot, the suffix of its programs, an independent reader, and rounding [rad or m]."""
 
     robot: str
@@ -29,14 +29,14 @@ class Cell(NamedTuple):
     rounding: float
 
 
-CELLS: dict[str, Cell] = {
-    'urscript': Cell('ur5', '.script', readers.urscript, 1e-6),
-    'krl': Cell('kuka_kr16_2', '.src', readers.krl, 1e-6),
-    'rapid': Cell('abb_irb1600', '.mod', readers.rapid, 1e-6),
-    'inform': Cell('yaskawa_ma1440', '.jbi', readers.inform, 2e-5),
-    'fanuc-ls': Cell('fanuc_m10ia', '.ls', readers.fanuc, 2e-5),
-    'joint-trajectory': Cell('ur5', '.yaml', readers.trajectory, 1e-8),
-    'csv': Cell('ur5', '.csv', readers.table, 1e-8),
+CELLS: dict[str, ProgramCell] = {
+    'urscript': ProgramCell('ur5', '.script', readers.urscript, 1e-6),
+    'krl': ProgramCell('kuka_kr16_2', '.src', readers.krl, 1e-6),
+    'rapid': ProgramCell('abb_irb1600', '.mod', readers.rapid, 1e-6),
+    'inform': ProgramCell('yaskawa_ma1440', '.jbi', readers.inform, 2e-5),
+    'fanuc-ls': ProgramCell('fanuc_m10ia', '.ls', readers.fanuc, 2e-5),
+    'joint-trajectory': ProgramCell('ur5', '.yaml', readers.trajectory, 1e-8),
+    'csv': ProgramCell('ur5', '.csv', readers.table, 1e-8),
 }
 """By language."""
 

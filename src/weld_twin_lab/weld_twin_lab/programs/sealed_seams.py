@@ -18,9 +18,9 @@ from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.programs import Context
 from weld_twin_nodes.offline.exporting import Speeds, export
 
-from ..blind.blind_cell import Cell, as_recording, record
+from ..blind.blind_cell import BlindCell, as_recording, record
 from ..blind.deck import Lot, lots
-from ..blind.making import Case, draw_case
+from ..blind.making import SealedCase, draw_case
 from ..blind.one_arm import one_arm
 from ..blind.recorded_motion import RATE
 from ..blind.seams import drawn_seam
@@ -59,8 +59,8 @@ class SealedSeam:
     Attributes
     ----------
     language : str
-    case : Case
-        Cell, causes, and the free motion.
+    case : SealedCase
+        BlindCell, causes, and the free motion.
     context : Context
         What programs are read with.
     kind : str
@@ -78,7 +78,7 @@ class SealedSeam:
     """
 
     language: str
-    case: Case
+    case: SealedCase
     context: Context
     kind: str
     text: str
@@ -89,7 +89,7 @@ class SealedSeam:
     temperature: float | None
 
     @property
-    def cell(self) -> Cell:
+    def cell(self) -> BlindCell:
         """Return the cell; where its base stands is known, for seams are judged in the world."""
         return replace(self.case.cell, align=())
 
@@ -159,7 +159,7 @@ def sealed_seam(language: str, seed: int, number: int) -> SealedSeam:
     raise DataError(f'none of {TRIES} seams drawn for {case.cell.robot.name} can be welded')
 
 
-def _dealt(language: str, seed: int, number: int, rng: np.random.Generator) -> Case:
+def _dealt(language: str, seed: int, number: int, rng: np.random.Generator) -> SealedCase:
     """Return a case; causes that do not show on a robot give way to those of another deck."""
     why = DataError(language)
     for deck in range(DECKS):

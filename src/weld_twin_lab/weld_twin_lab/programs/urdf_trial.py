@@ -56,7 +56,7 @@ SINGULAR = 60.0
 
 
 @dataclass(frozen=True, eq=False)
-class Cell:
+class UrdfCell:
     """An arm with its causes, where it was put up, and how it is told to the product."""
 
     arm: DrawnArm
@@ -146,7 +146,7 @@ def _through(seed: int, number: int, arm: DrawnArm, place: Path) -> dict[str, An
     tracker[:3, 3] = rng.uniform(-2.0, 2.0, 3)
     reflector = np.array(arm.controller.T_flange_tool)
     reflector[:3, 3] += rng.uniform(-0.01, 0.01, 3)
-    cell = Cell(arm, _causes(rng, arm), tracker, reflector, place)
+    cell = UrdfCell(arm, _causes(rng, arm), tracker, reflector, place)
     stations = _planned(cell)
     _simulated(cell)
     measured = _measured(cell, stations, rng)
@@ -183,7 +183,7 @@ def _causes(rng: np.random.Generator, arm: DrawnArm) -> list[dict[str, Any]]:
     return out
 
 
-def _planned(cell: Cell) -> np.ndarray:
+def _planned(cell: UrdfCell) -> np.ndarray:
     """Return the stations that the product plans, shape (N, 6); its program leads to them too."""
     out = cell.place / 'plan'
     limits = ('--tolerance', '0.06', '--minutes', '12', '--noise', '0.02')
@@ -192,21 +192,21 @@ def _planned(cell: Cell) -> np.ndarray:
     return np.array(plan['q'])
 
 
-def _simulated(cell: Cell) -> None:
+def _simulated(cell: UrdfCell) -> None:
     nothing = cell.place / 'none.yaml'
     nothing.write_text('[]\n')
     seam = ('--effects', str(nothing), '--path', 'line', '--profile', 'smooth')
     command('simulate', *cell.words, *seam, '--out', str(cell.place / 'simulated'))
 
 
-def _measured(cell: Cell, stations: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _measured(cell: UrdfCell, stations: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Return where the instrument sees the reflector at every station, shape (N, 3) [m]."""
     position, _ = cell.poses(stations, cell.causes, cell.reflector)
     seen = position @ cell.tracker[:3, :3].T + cell.tracker[:3, 3]
     return np.asarray(seen + rng.normal(0.0, NOISE, seen.shape))
 
 
-def _diagnosed(cell: Cell, stations: np.ndarray, measured: np.ndarray) -> dict[str, Any]:
+def _diagnosed(cell: UrdfCell, stations: np.ndarray, measured: np.ndarray) -> dict[str, Any]:
     names = [joint['name'] for joint in cell.arm.plant['joints']]
     table, bag, found = cell.place / 'table.csv', cell.place / 'bag', cell.place / 'found'
     with table.open('w', newline='', encoding='utf-8') as file:
@@ -220,7 +220,7 @@ def _diagnosed(cell: Cell, stations: np.ndarray, measured: np.ndarray) -> dict[s
     return out
 
 
-def _signs(cell: Cell, found: dict[str, Any]) -> bool | None:
+def _signs(cell: UrdfCell, found: dict[str, Any]) -> bool | None:
     """Tell whether a zero that was found has the sign of the URDF's joint; None without one."""
     true = cell.causes[0]
     k = [joint['name'] for joint in cell.arm.plant['joints']].index(true['joint'])
@@ -231,7 +231,7 @@ def _signs(cell: Cell, found: dict[str, Any]) -> bool | None:
     return None
 
 
-def _seam(cell: Cell, stations: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
+def _seam(cell: UrdfCell, stations: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
     """Return the joints at the points of a seam among the stations, shape (POINTS, 6)."""
     arm = cell.arm.controller
     for _ in range(TRIES):
@@ -268,7 +268,7 @@ def _condition(arm: Arm, q: np.ndarray) -> float:
     return out
 
 
-def _text(cell: Cell, seam: np.ndarray, poses: np.ndarray | None, language: str) -> str:
+def _text(cell: UrdfCell, seam: np.ndarray, poses: np.ndarray | None, language: str) -> str:
     """Return a program through points: to the first by joints, then straight where poses are given."""
     robot = load_robot(cell.place / 'arm.urdf', tip_link='tcp')  # for its limits and joints alone
     context = Context(robot, controller_of(robot, language))
@@ -284,12 +284,12 @@ def _text(cell: Cell, seam: np.ndarray, poses: np.ndarray | None, language: str)
     return written(Exported('seam', tuple(moves), context, tool, 1, False, ('drawn',)), language)
 
 
-def _wanted(cell: Cell, seam: np.ndarray) -> np.ndarray:
+def _wanted(cell: UrdfCell, seam: np.ndarray) -> np.ndarray:
     arm = cell.arm.controller
     return np.array([tool_pose(arm, q, arm.T_flange_tool) for q in seam])
 
 
-def _off(cell: Cell, moves: readers.Moves, seam: np.ndarray, wanted: np.ndarray) -> float:
+def _off(cell: UrdfCell, moves: readers.Moves, seam: np.ndarray, wanted: np.ndarray) -> float:
     """Return how far the plant's tool is from the seam at worst, at its points [m]."""
     arm = cell.arm.controller
     way = driven(arm, moves, seam[0], 0.02)
@@ -310,7 +310,7 @@ def _ends(arm: Arm, moves: readers.Moves, seam: np.ndarray, q: np.ndarray) -> li
 
 
 def _corrected(
-    cell: Cell, seam: np.ndarray, language: str, best: list[dict[str, Any]]
+    cell: UrdfCell, seam: np.ndarray, language: str, best: list[dict[str, Any]]
 ) -> dict[str, Any]:
     suffix, reader = LANGUAGES[language]
     wanted = _wanted(cell, seam)
@@ -339,7 +339,7 @@ def _corrected(
     }
 
 
-def _by_product(cell: Cell, name: str, text: str, out: str) -> dict[str, Any]:
+def _by_product(cell: UrdfCell, name: str, text: str, out: str) -> dict[str, Any]:
     """Return what correct writes of a program; refused, it is left as it was."""
     program, place = cell.place / name, cell.place / out
     program.write_text(text, encoding='utf-8')
@@ -356,7 +356,7 @@ def _by_product(cell: Cell, name: str, text: str, out: str) -> dict[str, Any]:
 
 
 def _by_plant(
-    cell: Cell, seam: np.ndarray, wanted: np.ndarray, causes: Sequence[dict[str, Any]]
+    cell: UrdfCell, seam: np.ndarray, wanted: np.ndarray, causes: Sequence[dict[str, Any]]
 ) -> readers.Moves:
     """Return the moves of a seam corrected until the plant with these causes goes where it should."""
     arm, poses = cell.arm.controller, wanted.copy()
@@ -370,7 +370,7 @@ def _by_plant(
     return [('LIN', [pose]) for pose in poses]
 
 
-def _best(cell: Cell, stations: np.ndarray, measured: np.ndarray) -> list[dict[str, Any]]:
+def _best(cell: UrdfCell, stations: np.ndarray, measured: np.ndarray) -> list[dict[str, Any]]:
     """Return the true causes with the sizes that fit best to what was measured."""
     keys = [next(key for key in cause if key not in ('effect', 'joint')) for cause in cell.causes]
     truth = np.array([cause[key] for cause, key in zip(cell.causes, keys, strict=True)])
@@ -396,7 +396,7 @@ def _best(cell: Cell, stations: np.ndarray, measured: np.ndarray) -> list[dict[s
     return of(found.x[: len(keys)])
 
 
-def _files(cell: Cell, seam: np.ndarray) -> dict[str, Any]:
+def _files(cell: UrdfCell, seam: np.ndarray) -> dict[str, Any]:
     """Return how far the corrected files have the controller's frames from each other [m]."""
     options = dict(zip(cell.arm.options[::2], cell.arm.options[1::2], strict=True))
     links = options.get('--base-link'), options['--tip-link']

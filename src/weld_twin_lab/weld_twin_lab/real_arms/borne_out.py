@@ -30,7 +30,7 @@ from weld_twin_core.effects.plausible import plausible
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.twin import Twin
 
-from .rows import Row, size
+from .rows import ArmRow, size
 
 TINY = 1e-12
 """Least error [m] divided by."""
@@ -96,14 +96,14 @@ class Borne:
 
 
 def borne_out(
-    row: Row, told: Sequence[Effect], claims: Sequence[Sequence[str]]
+    row: ArmRow, told: Sequence[Effect], claims: Sequence[Sequence[str]]
 ) -> tuple[dict[str, Borne], list[tuple[Borne, Borne]]]:
     """
     Return what unseen data say of every kind, and of every claim.
 
     Parameters
     ----------
-    row : Row
+    row : ArmRow
     told : sequence of Effect
         What a diagnosis tells, as it found it: shapes that are not straight are taken from it.
     claims : sequence of sequence of str
@@ -152,7 +152,7 @@ def thinned(recording: Recording) -> Recording:
     return recording.with_measured(recording.measured.take(keep))
 
 
-def _aligned(recording: Recording, row: Row) -> Robot:
+def _aligned(recording: Recording, row: ArmRow) -> Robot:
     """Return the robot with its frames where they fit best."""
     problem, model = aligned(recording, row.robot, row.align, ())
     model = refined(problem, model) if row.align else model
@@ -169,7 +169,9 @@ def _kinds(robot: Robot, recording: Recording, told: Sequence[Effect]) -> Kinds:
         kind = REGISTRY[name]
         if recording.measured is None and name in ('measurement_scale', 'drift'):
             continue
-        if not kind.cause or (kind.stage.name in ('SERVO', 'CLOCK') and recording.joints.static):
+        if not kind.traits.cause or (
+            kind.stage.name in ('SERVO', 'CLOCK') and recording.joints.static
+        ):
             continue
         sites = robot.joint_names if kind.of in ('joint', 'link') else (None,)
         for site in sites:
@@ -205,7 +207,7 @@ def _turned(robot: Robot, effects: Sequence[Effect]) -> Iterator[tuple[Effect, i
     """Yield the components that a fit turns."""
     for effect in effects:
         for k, (parameter, _) in enumerate(effect.components()):
-            if parameter.differentiable or not effect.fitted():
+            if parameter.differentiable or not effect.fit.fitted():
                 yield effect, k
 
 
@@ -220,7 +222,7 @@ class _Columns:
     width: int
 
     @classmethod
-    def of(cls, robot: Robot, row: Row, recording: Recording, kinds: Kinds) -> _Columns:
+    def of(cls, robot: Robot, row: ArmRow, recording: Recording, kinds: Kinds) -> _Columns:
         at = None if recording.measured is None else recording.measured.t
         poses = Twin(robot).poses(recording, at)
         labels = None

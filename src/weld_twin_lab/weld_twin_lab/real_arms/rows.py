@@ -29,7 +29,7 @@ Make = Callable[[Source], tuple[Rows, Rows]]
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class ArmRow:
     """
     One recording to diagnose, and what else was recorded of the same arm.
 
@@ -52,7 +52,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Plan:
+class ArmPlan:
     """How a row is made: its source, which stations, and what is known or left out."""
 
     name: str
@@ -63,59 +63,59 @@ class Plan:
     halved: bool = False
 
 
-def plans() -> tuple[Plan, ...]:
+def plans() -> tuple[ArmPlan, ...]:
     """Return every row of the study; nothing is read yet."""
     out = [plan for arm in ('ur5', 'ur10') for plan in _of_tracked(arm)]
     for arm in ('panda_1', 'panda_2', 'kuka_14'):
         source = partial(sources.sockets, arm=arm)
-        out += [Plan(f'{arm} without place {k}', source, partial(_place, k)) for k in range(3)]
+        out += [ArmPlan(f'{arm} without place {k}', source, partial(_place, k)) for k in range(3)]
     for name, make in _PARTS.items():
         halved = name == 'all'
         out += [
-            Plan(f'positioner {name}', sources.positioner, make, halved=halved),
-            Plan(f'iiwa {name}', sources.iiwa, make, halved=halved),
-            Plan(f'motoman {name}', partial(sources.motoman, masses=True), make, halved=halved),
+            ArmPlan(f'positioner {name}', sources.positioner, make, halved=halved),
+            ArmPlan(f'iiwa {name}', sources.iiwa, make, halved=halved),
+            ArmPlan(f'motoman {name}', partial(sources.motoman, masses=True), make, halved=halved),
         ]
     return (
         *out,
-        Plan('motoman all, no masses', partial(sources.motoman, masses=False), _all),
-        Plan('emps first 60 %', sources.servo, partial(_span, 0.0, 0.6)),
-        Plan('emps last 60 %', sources.servo, partial(_span, 0.4, 1.0)),
-        Plan('emps middle third', sources.servo, partial(_span, 0.33, 0.67)),
-        Plan('ur5 swinging', sources.swinging, _all),
+        ArmPlan('motoman all, no masses', partial(sources.motoman, masses=False), _all),
+        ArmPlan('emps first 60 %', sources.servo, partial(_span, 0.0, 0.6)),
+        ArmPlan('emps last 60 %', sources.servo, partial(_span, 0.4, 1.0)),
+        ArmPlan('emps middle third', sources.servo, partial(_span, 0.33, 0.67)),
+        ArmPlan('ur5 swinging', sources.swinging, _all),
     )
 
 
-def _of_tracked(arm: str) -> list[Plan]:
+def _of_tracked(arm: str) -> list[ArmPlan]:
     """Return the rows of one of the two arms under a laser tracker."""
     source = partial(sources.tracked, name=f'{arm}_laser_tracker')
     out = [
-        Plan(f'{arm} {n} stations, draw {seed}', source, partial(_drawn, n, seed), halved=True)
+        ArmPlan(f'{arm} {n} stations, draw {seed}', source, partial(_drawn, n, seed), halved=True)
         for seed in (1, 2)
         for n in COUNTS
     ]
     out += [
-        Plan(f'{arm} {n} stations, tool known', source, partial(_drawn, n, 3), tool_known=True)
+        ArmPlan(f'{arm} {n} stations, tool known', source, partial(_drawn, n, 3), tool_known=True)
         for n in COUNTS[1:]
     ]
     out += [
-        Plan(f'{arm} quarter 1', source, partial(_quarter, 0)),
-        Plan(f'{arm} octant 0', source, partial(_octant, 0)),
+        ArmPlan(f'{arm} quarter 1', source, partial(_quarter, 0)),
+        ArmPlan(f'{arm} octant 0', source, partial(_octant, 0)),
     ]
     if arm == 'ur5':
         return [
             *out,
-            Plan('ur5 quarter 4', source, partial(_quarter, 3)),
-            Plan('ur5 octant 7', source, partial(_octant, 7)),
+            ArmPlan('ur5 quarter 4', source, partial(_quarter, 3)),
+            ArmPlan('ur5 octant 7', source, partial(_octant, 7)),
         ]
     points = [
-        Plan(f'{arm} {n} points', source, partial(_drawn, n, 4), points_only=True, halved=True)
+        ArmPlan(f'{arm} {n} points', source, partial(_drawn, n, 4), points_only=True, halved=True)
         for n in COUNTS[1:]
     ]
     return [*out, *points]
 
 
-def row(data: Path, plan: Plan) -> Row:
+def row(data: Path, plan: ArmPlan) -> ArmRow:
     """Return a row of the study, read from its data."""
     source = plan.source(data)
     recording, robot, align = source.recording, source.robot, source.align
@@ -128,7 +128,7 @@ def row(data: Path, plan: Plan) -> Row:
         robot = robot.with_frames(tool=whole.robot.T_flange_tool)
         align = ('base',)
     rest = _part(recording, other) if other.size else None
-    return Row(plan.name, robot, align, _part(recording, fitted), rest)
+    return ArmRow(plan.name, robot, align, _part(recording, fitted), rest)
 
 
 def halves(recording: Recording) -> tuple[Recording, Recording] | None:

@@ -22,7 +22,7 @@ from ..real_robots.unseen_stations import residual
 from ..transfer.crash import traceback_told
 from ..transfer.plain import PLAIN, plain_fit
 from .borne_out import Borne, borne_out
-from .rows import Row, halves, plans, row, size
+from .rows import ArmRow, halves, plans, row, size
 
 TOLD = 0.5
 """Probability from which on a cause counts as told: it is likelier right than wrong."""
@@ -79,7 +79,7 @@ def told_claims(said: Mapping[str, Any]) -> list[dict[str, Any]]:
     """
     out: dict[tuple[str, ...], dict[str, Any]] = {}
     for cause in said['causes']:
-        names = [n for n in cause['names'] if n[0] in REGISTRY and REGISTRY[n[0]].cause]
+        names = [n for n in cause['names'] if n[0] in REGISTRY and REGISTRY[n[0]].traits.cause]
         if cause['probability'] <= TOLD or cause['rest'] or not names:
             continue
         many = said['families'] and all(p > TOLD for _, _, p in names)
@@ -117,12 +117,12 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         'tracebacks': sum(e['traceback'] is not None for e in entries),
         'unknown': sum(e['status'] == 'unknown' for e in done),
         'unsound': sum(e['status'] == 'unsound' for e in done),
-        'told a cause borne out against all that is told': sum(
+        'reported a cause borne out against all that is reported': sum(
             worth(e, 'against_told') for e in entries
         ),
         'told a cause borne out against all kinds': sum(worth(e, 'against_all') for e in entries),
         'claims': len(claims),
-        'claims borne out against all that is told': sum(
+        'claims borne out against all that is reported': sum(
             _holds(c, 'against_told') for c in claims
         ),
         'claims borne out against all kinds': sum(_holds(c, 'against_all') for c in claims),
@@ -141,7 +141,7 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def table(entries: Sequence[Mapping[str, Any]]) -> str:
     """Return all rows and the figures as a page of Markdown."""
     lines = [
-        '| row | status | told; borne out against all that is told: bold | left beside '
+        '| row | status | reported; borne out against all that is reported: bold | left beside '
         '| error over the best plain fit |',
         '|---|---|---|---|---|',
     ]
@@ -206,7 +206,7 @@ def _accused(entry: Mapping[str, Any]) -> bool:
     )
 
 
-def _tried(recording: Recording, one: Row) -> tuple[Diagnosis | None, str | None]:
+def _tried(recording: Recording, one: ArmRow) -> tuple[Diagnosis | None, str | None]:
     try:
         return diagnose([recording], one.robot, align=one.align, experiment=False), None
     except Exception:  # what is counted here is exactly what nobody expected
@@ -239,7 +239,7 @@ def _said(found: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _unseen(one: Row, found: Diagnosis) -> dict[str, float] | None:
+def _unseen(one: ArmRow, found: Diagnosis) -> dict[str, float] | None:
     """Return the RMS error [m] of plain fits and of the diagnosis on what was not fitted."""
     if one.other is None or found.status == 'unsound':
         return None

@@ -49,6 +49,9 @@ class MeasuringFrame:
 
     """
 
+    what, means = 'measurement', 'the measuring frame'
+    named_by, other = 'measuring_frame', 'measuring_frame and T_measuring_base'
+
     def __init__(self, expected: str = '') -> None:
         self._expected = expected.strip('/')
         self._frame_id: str | None = None
@@ -69,21 +72,27 @@ class MeasuringFrame:
         name = frame_id.strip('/')
         if self._expected and name not in ('', self._expected):
             raise OtherFrame(
-                f'the measurement is given in {frame_id!r}, but measuring_frame is '
-                f'{self._expected!r}; publish it in that frame, or set measuring_frame and '
-                'T_measuring_base for the other'
+                f'the {self.what} is given in {frame_id!r}, but {self.named_by} is '
+                f'{self._expected!r}; publish it in that frame, or set {self.other} for the other'
             )
         if self._frame_id is not None and name != self._frame_id.strip('/'):
             raise OtherFrame(
-                f'the measurement is given in {frame_id!r}, those before it in '
+                f'the {self.what} is given in {frame_id!r}, those before it in '
                 f'{self._frame_id!r}; publish one frame on one topic'
             )
         self._frame_id = frame_id
         self.remark = (
-            f'measurements are given in {frame_id!r}; it is taken for the measuring frame'
+            f'{self.what}s are given in {frame_id!r}; it is taken for {self.means}'
             if name
-            else 'measurements name no frame; they are taken to be in the measuring frame'
+            else f'{self.what}s name no frame; they are taken to be in {self.means}'
         )
+
+
+class PlannedFrame(MeasuringFrame):
+    """The frame of a stream of poses that a planner sends: that of the robot's base."""
+
+    what, means = 'pose', "the robot's base"
+    named_by = other = 'base_frame'
 
 
 class WrenchFrame:

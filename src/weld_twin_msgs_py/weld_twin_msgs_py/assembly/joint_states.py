@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from math import inf, isfinite
-from operator import ge, itemgetter, le
+from operator import ge, itemgetter, le, sub
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -143,7 +143,7 @@ class JointStates:
         self._given = joint_names is not None
         self._names = robot.joint_names if joint_names is None else tuple(joint_names)
         self._mend = mend
-        self._resting: Array | None = None
+        self._resting: list[float] | None = None
         self._zeros = False
         slack = _SLACK if limits else inf
         self._ranges = [
@@ -187,15 +187,17 @@ class JointStates:
             sample = sample._replace(effort=from_messages.joint_efforts(message, self._names))
         if sample is None or not self._mend or sample.qd is None:
             return sample
-        return sample._replace(qd=None) if self._only_zeros(sample.q, sample.qd) else sample
+        if self._only_zeros(sample.q.tolist(), sample.qd.tolist()):
+            return JointSample(sample.stamp, sample.q, None, sample.effort)
+        return sample
 
-    def _only_zeros(self, q: Array, qd: Array) -> bool:
+    def _only_zeros(self, q: list[float], qd: list[float]) -> bool:
         """Return whether velocities stay zero while joints move, as some drivers have them."""
-        if qd[0] != 0.0 or qd.any():
+        if any(qd):
             self._resting, self._zeros = None, False
         elif self._resting is None:
             self._resting = q
-        elif not self._zeros and np.abs(q - self._resting).max() > TRAVEL:
+        elif not self._zeros and max(map(abs, map(sub, q, self._resting))) > TRAVEL:
             self._zeros = True
             self.velocity_remark = (
                 'velocities are zero while the joints move; they are taken from the positions'

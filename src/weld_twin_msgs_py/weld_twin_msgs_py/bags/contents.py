@@ -241,7 +241,7 @@ def _judge(
         notes.append('positions only: errors that turn the tool in place stay invisible')
     for use, effects in (('wrench', 'tool loads'), ('temperature', 'thermal growth')):
         if use not in used:
-            notes.append(f'no {use}: {effects} cannot be told from other causes')
+            notes.append(f'no {use}: {effects} cannot be distinguished from other causes')
     for topic in used.values():
         for number, what in (
             (topic.unstamped, 'without a stamp'),

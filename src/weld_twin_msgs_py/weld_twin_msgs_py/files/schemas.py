@@ -15,7 +15,7 @@ from typing import Any
 
 from weld_twin_core.contacts import KINDS as CONTACTS
 from weld_twin_core.effects import REGISTRY, Effect
-from weld_twin_core.effects.plausible import TABLE
+from weld_twin_core.effects.plausible import table
 from weld_twin_core.motion.paths import Torch, Weave
 from weld_twin_core.motion.paths.mapping import SEAMS
 from weld_twin_core.motion.paths.torch import HEADINGS
@@ -83,7 +83,7 @@ def _chain() -> dict[str, Schema]:
 
 def _robot() -> Schema:
     limits = _object({'sd': NUMBER, 'low': NUMBER, 'high': NUMBER})
-    effects = {effect for effect, _ in TABLE}
+    effects = {effect for effect, _ in table()}
     return _object(
         {
             **_chain(),
@@ -106,7 +106,7 @@ def _robot() -> Schema:
             'source': _said(TEXT, 'where the numbers come from'),
             'plausible': _object(
                 {
-                    effect: _object({p: limits for e, p in TABLE if e == effect})
+                    effect: _object({p: limits for e, p in table() if e == effect})
                     for effect in sorted(effects)
                 }
             ),

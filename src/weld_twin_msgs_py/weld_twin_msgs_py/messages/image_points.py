@@ -41,7 +41,7 @@ def points(message: Any) -> Array:
     count, step = message.width * message.height, message.point_step
     data = np.asarray(message.data, dtype=np.uint8)
     if data.size < count * step:
-        raise DataError(f'{count} points of {step} bytes are told, but {data.size} bytes came')
+        raise DataError(f'{count} points of {step} bytes are declared, but {data.size} bytes came')
     kind = np.dtype(
         {
             'names': list(FIELDS),

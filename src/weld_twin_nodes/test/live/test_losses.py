@@ -134,14 +134,21 @@ def test_the_end_of_a_loss_is_told_with_what_is_missing_in_all(bench):
     assert bench.twin.log.count('by the gaps') == 1
 
 
+def ended(process):
+    """Return how long a process takes to end when it is asked to [s]."""
+    begun = time.monotonic()
+    process.interrupt()
+    assert process.end(timeout=15.0) == 0
+    return time.monotonic() - begun
+
+
 def test_a_node_ends_soon_though_who_listens_to_it_stands_still(bench):
     bench.analyzer.signal(signal.SIGSTOP)
     bench.send(100)
-    begun = time.monotonic()
-    bench.twin.interrupt()
     try:
-        assert bench.twin.end(timeout=10.0) == 0
-        assert time.monotonic() - begun < 3.0
+        spent = ended(bench.twin)
     finally:
         bench.analyzer.signal(signal.SIGCONT)
+    # How long a node takes to end with nobody in its way is the machine's own, and its load's.
+    assert spent - ended(bench.analyzer) < 2.7
     assert 'without waiting for it any longer' in bench.twin.log

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.twin.goal_correction import GoalLimits
 from weld_twin_core.twin.pose_correction import PoseCorrection, between
 from weld_twin_core.twin.program_model import ProgramModel
+from weld_twin_nodes.streams.looks_beside import LooksBeside
 from weld_twin_nodes.streams.pose_stream import PoseStream
 
 UR5 = load('ur5')
@@ -128,6 +131,49 @@ def test_the_shadow_tells_and_sends_nothing():
     given = Run(stream(shadow=True)).go(3)
     assert given.pose is None
     assert np.linalg.norm(given.added[:3]) > 1e-4
+
+
+def test_a_leap_that_no_joint_can_follow_is_not_passed_on():
+    run = Run(stream())
+    run.go(60)
+    leap = np.zeros((4, 4))
+    leap[1, 3] = 0.1
+    run.pose = run.pose + leap  # in one step of a stream that stands where the arm stands
+    given = run.go(1)
+    assert given.pose is None
+    assert 'limit of velocity' in given.why
+    run.pose = run.pose - leap
+    assert run.go(60).pose is not None
+
+
+def test_looks_made_in_a_process_beside_are_the_same_and_no_pose_waits_for_one():
+    beside, here = LooksBeside(), Run(stream())
+    try:
+        run = Run(stream(beside=beside))
+        until(lambda: beside.answer() is None and beside.up)
+        run.stream.correction.first = run.stream.correction.exact = None  # it looks at none itself
+        run.go(1)
+        assert np.abs(run.added[0]).max() < 1e-12  # held where the arm stands
+        until(lambda: run.go(1) and run.stream.corrected)
+        for _ in range(18):
+            run.go(2, speed=0.05)
+            until(lambda: run.stream.settle() is None and beside.free)
+        here.go(len(run.added) - 36)
+        here.go(36, speed=0.05)
+        assert all(sent is not None for sent in run.added)
+        np.testing.assert_allclose(run.added[-1], here.added[-1], atol=2e-9)
+        assert np.linalg.norm(run.added[-1][:3]) > 1e-4
+    finally:
+        beside.close()
+    del run.stream.correction.first, run.stream.correction.exact
+    assert run.go(50, speed=0.05).pose is not None  # where the process is gone, it goes on alone
+
+
+def until(so):
+    end = time.monotonic() + 20.0
+    while not so():
+        assert time.monotonic() < end
+        time.sleep(0.005)
 
 
 def test_poses_that_break_a_limit_of_a_joint_end_the_correction():

@@ -23,7 +23,7 @@ FRAME_SETTINGS = (
     Setting(
         'measuring_frame',
         '',
-        'frame that measurements must be given in, and that poses are told in; empty: the first '
+        'frame that measurements must be given in, and that poses are given in; empty: the first '
         'that comes, and world',
     ),
     Setting('base_frame', '', "name of the robot's base in what is published; empty: base"),
@@ -77,7 +77,7 @@ def placed_twin(node: CellNode, twin: Twin) -> Twin:
     robot = placed(node, twin.robot)
     moved = abs(robot.T_world_base - twin.robot.T_world_base).max()
     if moved > 0.0:
-        node.remark('the base that was told is used; the base of the model differs from it')
+        node.remark('the base that was given is used; the base of the model differs from it')
     return twin if moved == 0.0 else Twin(robot, twin.effects)
 
 

@@ -17,6 +17,7 @@ from rclpy.node import Node
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import ModelError, TwinError
+from weld_twin_msgs_py.assembly import Intake
 from weld_twin_msgs_py.assembly.beside import Beside
 from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, FedBack, plain_messages
 from weld_twin_msgs_py.messages.to_messages import ros_messages
@@ -156,7 +157,11 @@ class CellNode(Node):
             self._tell_last_losses()
             begun = time.monotonic()
             for output in self._outputs:
-                self._wait_for_readers(output, begun)
+                if not self._taken_in(output, begun):
+                    self.get_logger().warning(
+                        f'{output.topic}: a subscriber has not taken in all that was sent to it; '
+                        'this node ends without waiting for it any longer'
+                    )
         super().destroy_node()  # type: ignore[no-untyped-call]
 
     def _meet_listeners(self) -> None:
@@ -166,20 +171,17 @@ class CellNode(Node):
         while there() < self.count_subscribers(DIAGNOSTICS.name) and time.monotonic() < end:
             time.sleep(READY_EVERY)
 
-    def _wait_for_readers(self, output: Output, begun: float) -> None:
-        """Wait until all who take an output have all of it, or stand still; and say so."""
+    def _taken_in(self, output: Output, begun: float) -> bool:
+        """Wait until all who take an output have all of it, or stand still; return whether they have."""
+        asked = begun if self.ending_since is None else self.ending_since
         while True:
             live = readers(self, output.topic) <= self.neighbours.alive()
-            asked = begun if self.ending_since is None else self.ending_since
-            end = begun + LAST_WORDS if live else asked + ALIVE
-            if output.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED)):
-                return
-            if time.monotonic() > end:
-                break
-        self.get_logger().warning(
-            f'{output.topic}: a subscriber has not taken in all that was sent to it; this node ends '
-            'without waiting for it any longer'
-        )
+            left = (begun + LAST_WORDS if live else asked + ALIVE) - time.monotonic()
+            # What stands still has had its time with the outputs before, and an ack is there or not.
+            if output.wait_for_all_acked(Duration(seconds=min(max(left, 1e-3), ACKNOWLEDGED))):
+                return True
+            if left <= 0.0:
+                return False
 
     def take_robot(self, robot: Robot | None, joint_names: tuple[str, ...] | None = None) -> None:
         """
@@ -398,7 +400,7 @@ class CellNode(Node):
             self.health.remarks.append(sentence)
             self.get_logger().info(sentence)
 
-    def tell_beside(self, beside: Beside) -> None:
+    def _tell_beside(self, beside: Beside) -> None:
         """Tell of joints that move and are none of the robot's: one may carry it."""
         sentence = beside.warning(self._carrying_nothing) if beside.moving else ''
         if sentence and self.health.lasting.get(BESIDE) != sentence:
@@ -488,7 +490,15 @@ class CellNode(Node):
             self.frames.tree.clear()
         self.time_went_back()
 
+    def intakes(self) -> Sequence[Intake]:
+        """Return what takes messages in: what it takes for granted is told, not with every message."""
+        return ()
+
     def _tell_health(self) -> None:
+        for intake in self.intakes():
+            for sentence in intake.remarks:
+                self.remark(sentence)
+            self._tell_beside(intake.joints.beside)
         for source in self._sources:
             source.adapt()
             self.health.inputs[source.name].matched = source.matched()

@@ -4,18 +4,12 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
-from collections.abc import Callable
-from concurrent.futures import Future as Done
-from concurrent.futures import ThreadPoolExecutor, wait
-from datetime import datetime, timezone
+from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 from rclpy.task import Future
@@ -23,26 +17,15 @@ from std_srvs.srv import Trigger
 
 from weld_twin_core.arm.rotation import transform
 from weld_twin_core.errors import DataError, TwinError
-from weld_twin_core.twin.goal_correction import (
-    CorrectedGoal,
-    GoalLimits,
-    Refusal,
-    corrected_goal,
-)
+from weld_twin_core.twin.goal_correction import CorrectedGoal, Refusal
 from weld_twin_core.twin.pose_correction import PoseCorrection
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.assembly import Intake, Role
-from weld_twin_msgs_py.assembly.frame_names import MeasuringFrame
+from weld_twin_msgs_py.assembly.frame_names import PlannedFrame
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_write import PoseEncoder, TwistEncoder
-from weld_twin_msgs_py.messages.goals import (
-    GoalPoints,
-    beyond_tolerance,
-    corrected_trajectory,
-    read_goal,
-)
+from weld_twin_msgs_py.messages.goals import corrected_trajectory
 from weld_twin_msgs_py.messages.topics import (
-    AUDIT,
     COMPENSATED,
     CORRECTION,
     DEVIATION,
@@ -55,35 +38,26 @@ from weld_twin_msgs_py.messages.topics import (
 
 from ..offline.loaded_model import LoadedModel, loaded
 from ..streams.arm_state import ArmState
-from ..streams.pose_stream import Found, PoseStream, Work
+from ..streams.looks_beside import LooksBeside
+from ..streams.pose_stream import PoseStream
 from ..streams.supervision import Supervision
 from .cell_frames import base_frame
+from .compensator_settings import COMPENSATOR_SETTINGS, REFUSALS, limits_of, no_refusal
+from .goal_audit import GoalAudit
+from .goal_judge import GoalJudge, Judged
 from .goal_relay import Decision, GoalRelay
-from .input_settings import JOINT_SETTINGS
 from .managed_node import ManagedNode
-from .robot_settings import ROBOT_SETTINGS, robot_of
+from .robot_settings import robot_of
 from .run_node import run
 from .settings import Setting
 
 INACTIVE = 'the compensator is not active; configure and activate it'
-REFUSALS = ('stop', 'pass')
-"""What the parameter ``on_refusal`` may be."""
 SHORT_TURN = 2e-4
 """Seconds after which threads take turns: what is worked out beside a pose must not keep it waiting."""
-POLL = 0.002
-"""Seconds between two looks at whether a goal is worked out."""
 LOOK_EVERY = 0.5
 """Seconds between two looks at whether the model is to be used still."""
-LATE = 0.5
-"""A goal that should have begun so long ago [s] begins in the middle, and its correction with a step."""
-WRITTEN = 1.0
-"""Seconds an ending node gives its disk to take the audit."""
 WITHDRAWN = 'withdrawn'
 """Under which the node keeps why it corrects nothing."""
-
-
-Judged = tuple[CorrectedGoal | Refusal, tuple[int, ...]]
-"""What becomes of a goal, and where the robot's joints stand in it."""
 
 
 class Compensator(ManagedNode):
@@ -94,72 +68,7 @@ class Compensator(ManagedNode):
     is told all the same.
     """
 
-    settings: ClassVar[tuple[Setting, ...]] = (
-        Setting(
-            'managed',
-            True,
-            'work only between the transitions activate and deactivate of a managed node; else at once',
-        ),
-        *ROBOT_SETTINGS,
-        *JOINT_SETTINGS,
-        Setting('model', '', 'diagnosis.json of this arm; ~/reload reads it again', live=True),
-        Setting(
-            'controller',
-            'joint_trajectory_controller',
-            'controller whose action follow_joint_trajectory corrected goals go to',
-        ),
-        Setting(
-            'apply', False, 'send what is corrected; else tell the correction alone', live=True
-        ),
-        Setting(
-            'on_refusal',
-            'stop',
-            'what becomes of poses that are refused: stop (nothing is sent) or pass; goals are rejected',
-            live=True,
-        ),
-        Setting(
-            'max_correction_m', 2e-3, 'longest way a pose may be moved [m]', 0.0, 0.1, live=True
-        ),
-        Setting(
-            'max_correction_rad',
-            float(np.pi / 180.0),
-            'largest turn a pose may be moved by [rad]',
-            0.0,
-            0.2,
-            live=True,
-        ),
-        Setting('max_rate_m_s', 0.05, 'fastest change of that way [m/s]', 1e-6, 10.0, live=True),
-        Setting(
-            'max_rate_rad_s', 0.2, 'fastest change of that turn [rad/s]', 1e-6, 100.0, live=True
-        ),
-        Setting(
-            'max_acceleration',
-            20.0,
-            'largest acceleration of a joint in what is corrected [rad/s^2, m/s^2]; the robot file may '
-            'say less',
-            1e-6,
-            1e4,
-            live=True,
-        ),
-        Setting(
-            'max_model_age',
-            0.0,
-            'age of the model file above which nothing is corrected [s]; 0: any',
-            0.0,
-            1e10,
-            live=True,
-        ),
-        Setting(
-            'max_age',
-            1.0,
-            'age of the last joint state above which it is not known where the arm stands [s]',
-            0.05,
-            3600.0,
-        ),
-        Setting(
-            'audit', '', 'file that the audit line of every goal is added to; none when empty'
-        ),
-    )
+    settings: ClassVar[tuple[Setting, ...]] = COMPENSATOR_SETTINGS
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('compensator', **kwargs)
@@ -171,16 +80,16 @@ class Compensator(ManagedNode):
         self._streamed: tuple[Any, float | None] = self._around
         self._model: LoadedModel | None = None
         self._active = False
-        self._told, self._looked_at, self._outdated = '', -np.inf, ''
+        self._told = self._outdated = ''
         self._watch = Supervision()
         self._listened, self._most_age = False, self.setting('max_age')
         self._stream: PoseStream | None = None
-        self._beside, self._goals, self._books = (ThreadPoolExecutor(1) for _ in range(3))
-        self._written: Done[None] | None = None
+        self._looks = LooksBeside()
+        self._judge = GoalJudge(self)
         self._out = self.offer(POSE_OUT)
         self._correction = self.offer(CORRECTION, awaited=False)
-        self._audit = self.offer(AUDIT, awaited=False)
-        self._frame = MeasuringFrame(self.setting('base_frame'))
+        self._audit = GoalAudit(self)
+        self._frame = PlannedFrame(self.setting('base_frame'))
         self._encoders: dict[str, tuple[PoseEncoder, TwistEncoder]] = {}
         self.add_on_set_parameters_callback(self._check)
         self.create_service(Trigger, '~/reload', self._reload)
@@ -192,7 +101,7 @@ class Compensator(ManagedNode):
         self._relay = self._offer_action()
         self.every(LOOK_EVERY, self._look)
         if self.setting('on_refusal') not in REFUSALS:
-            raise DataError(self._no_refusal(self.setting('on_refusal')))
+            raise DataError(no_refusal(self.setting('on_refusal')))
         self.start()
 
     def own_topics(self) -> list[str]:
@@ -235,10 +144,9 @@ class Compensator(ManagedNode):
 
     def destroy_node(self) -> None:
         """End what is worked out beside; what became of goals is written before."""
-        if self._written is not None:
-            wait([self._written], WRITTEN)
-        for pool in (self._beside, self._goals, self._books):
-            pool.shutdown(wait=False, cancel_futures=True)
+        self._audit.close()
+        self._judge.close()
+        self._looks.close()
         if self._relay is not None:
             self._relay.close()
         super().destroy_node()
@@ -276,18 +184,18 @@ class Compensator(ManagedNode):
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:
             if parameter.name == 'on_refusal' and parameter.value not in REFUSALS:
-                reason = self._no_refusal(parameter.value)
+                reason = no_refusal(parameter.value)
                 return SetParametersResult(successful=False, reason=reason)
             if self._active:
                 reason = f'{parameter.name} may be set while the compensator is not active'
                 return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 
-    @staticmethod
-    def _no_refusal(value: str) -> str:
-        return f'on_refusal must be one of {", ".join(REFUSALS)}, got {value!r}'
-
     # What is known ---------------------------------------------------------------------------
+
+    def intakes(self) -> Sequence[Intake]:
+        """Return what takes its messages in."""
+        return (self._intake,)
 
     def _on_wrench(self, message: Any) -> None:
         taken = self._intake.take(Role.WRENCH, message)
@@ -301,8 +209,6 @@ class Compensator(ManagedNode):
 
     def _on_joints(self, message: Any) -> None:
         taken = self._intake.joint_sample(message)
-        for sentence in self._intake.remarks:
-            self.remark(sentence)
         if taken is None:
             return
         if taken[1]:
@@ -348,20 +254,6 @@ class Compensator(ManagedNode):
         wrench, warm = self._around
         return self._model.around(wrench, self._intake.wrench_frame.meaning, warm)
 
-    def _limits(self) -> GoalLimits:
-        return GoalLimits(
-            *(
-                self.setting(name)
-                for name in (
-                    'max_correction_m',
-                    'max_correction_rad',
-                    'max_rate_m_s',
-                    'max_rate_rad_s',
-                    'max_acceleration',
-                )
-            )
-        )
-
     # Poses -----------------------------------------------------------------------------------
 
     def _pose_correction(self) -> PoseCorrection:
@@ -375,16 +267,11 @@ class Compensator(ManagedNode):
             self.remark(f'{name} is not corrected in poses, which do not tell what comes next')
         self._stream = PoseStream(
             correction,
-            self._limits(),
+            limits_of(self),
             passing=self.setting('on_refusal') == 'pass',
             shadow=not self.setting('apply'),
-            later=self._later,
+            beside=self._looks,
         )
-
-    def _later(self, work: Work) -> Callable[[], Found | None]:
-        """Begin work beside; return what tells its result once it is there."""
-        doing = self._beside.submit(work)
-        return lambda: doing.result() if doing.done() else None
 
     def _on_pose(self, message: Any) -> None:
         self._frame.take(message.header.frame_id)
@@ -408,11 +295,9 @@ class Compensator(ManagedNode):
         position, rotation = from_messages.pose(message)
         stamp = from_messages.stamp_ns(message)
         encode, encode_twist = self._encoder(message.header.frame_id)
-        now = time.monotonic()
-        arm = self._arm.where(now, self._most_age)
-        # Of poses that come in a burst, the stamps tell how far they are apart; where they are set.
-        at = stamp * 1e-9 or now
-        given = stream.take(transform(rotation, position), at, arm, self._withdrawn())
+        arm = self._arm.where(time.monotonic(), self._most_age)
+        # Of poses that come in a burst, the stamps tell how far they are apart.
+        given = stream.take(transform(rotation, position), stamp * 1e-9, arm, self._withdrawn())
         if given.pose is not None:
             self._out.publish(encode(stamp, given.pose[:3, 3], given.pose[:3, :3]))
         if given.added is not None and self._listened:
@@ -432,71 +317,43 @@ class Compensator(ManagedNode):
         """Return what becomes of a goal."""
         self._look()
         token = self._token()
+        audit = self._audit
         if not goal.trajectory.points:  # the order to stop, which nothing may hold up
-            return Decision(goal, '', partial(self._settled, None, 'passed', 'it has no point'))
+            why = 'it has no point'
+            return Decision(goal, '', partial(audit.settle, token, None, 'passed', why))
         applied, why = self.setting('apply'), self._withdrawn()
         if why:
             passed = goal if not applied and self._active else None
-            return Decision(passed, why, partial(self._settled, None, 'refused', why), token)
+            return Decision(passed, why, partial(audit.settle, token, None, 'refused', why), token)
         if not applied:  # it does not wait for what is only told
             return Decision(goal, '', partial(self._judged_later, goal), token)
         judged: Future = Future()
-        self._judge(goal, judged.set_result)
+        self._work_out(goal, judged.set_result)
         found, columns = await judged
+        settled = partial(audit.judged, token, found)
         if isinstance(found, Refusal):
-            settled = partial(self._settled, found, 'refused', found.reason)
             return Decision(None, found.reason, settled, token)
         trajectory = corrected_trajectory(goal.trajectory, columns, found.goal, found.waits)
         rest = [name for name in goal.get_fields_and_field_types() if name != 'trajectory']
         sent = type(goal)(trajectory=trajectory, **{name: getattr(goal, name) for name in rest})
         self._tell_added(goal.trajectory.header, found)
-        return Decision(sent, '', partial(self._settled, found, _verdict(found), ''), token)
+        return Decision(sent, '', settled, token)
 
     def _judged_later(self, goal: Any, below: str) -> None:
         """Tell of a goal that was passed on what a correction would have done."""
 
         def tell(judged: Judged) -> None:
-            found = judged[0]
-            if isinstance(found, CorrectedGoal):
-                self._tell_added(goal.trajectory.header, found)
-            why = found.reason if isinstance(found, Refusal) else ''
-            self._settled(found, _verdict(found), why, below)
+            if isinstance(judged[0], CorrectedGoal):
+                self._tell_added(goal.trajectory.header, judged[0])
+            self._audit.judged(self._token(), judged[0], below)
 
-        self._judge(goal, tell)
+        self._work_out(goal, tell)
 
-    def _judge(self, goal: Any, told: Callable[[Judged], None]) -> None:
-        """Work a goal out beside, so that poses and the rest are served meanwhile; then tell."""
-        try:
-            points = self._read(goal)
-        except TwinError as error:
-            told((Refusal(str(error)), ()))
-            return
+    def _work_out(self, goal: Any, told: Callable[[Judged], None]) -> None:
+        """Have a goal worked out beside, with what is known now."""
         start = self._arm.start(time.monotonic(), self.setting('max_age'))
-        doing = self._goals.submit(
-            corrected_goal, self._present(), points.goal, self._limits(), start
-        )
-
-        def look() -> None:
-            if not doing.done() or timer.is_canceled():
-                return
-            timer.cancel()
-            self.destroy_timer(timer)
-            try:
-                told((_tolerated(goal, points, doing.result()), points.columns))
-            except TwinError as error:
-                told((Refusal(str(error)), ()))
-
-        timer = self.every(POLL, look)
-
-    def _read(self, goal: Any) -> GoalPoints:
-        """Return the points of a goal; refuse one that should have begun already."""
-        stamp = goal.trajectory.header.stamp
-        given = read_goal(goal.trajectory, self._intake.joints.names)
-        at = stamp.sec * 1_000_000_000 + stamp.nanosec
-        late = (self.get_clock().now().nanoseconds - at) * 1e-9 - float(given.goal.t[0])
-        if at and late > LATE:
-            raise DataError(f'the goal should have begun {late:.2f} s ago, by its stamp')
-        return given
+        names = self._intake.joints.names
+        self._judge.judge(goal, names, self._present(), limits_of(self), start, told)
 
     def _tell_added(self, header: Any, found: CorrectedGoal) -> None:
         """Publish what is added at every point, at the time when the arm is to be there."""
@@ -506,52 +363,7 @@ class Compensator(ManagedNode):
         for t, added in zip(found.goal.t, found.added, strict=True):
             self._correction.publish(encode(begun + round(float(t) * 1e9), added))
 
-    def _settled(
-        self, found: CorrectedGoal | Refusal | None, verdict: str, why: str, below: str = ''
-    ) -> None:
-        """Tell in the log and in the audit what became of a goal."""
-        largest = None if found is None else found.largest
-        line: dict[str, Any] = {
-            'time': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),
-            'model': None if self._model is None else self._model.digest,
-            'applied': self.setting('apply'),
-            'verdict': 'rejected by the controller' if below else verdict,
-            'why': below or why,
-            'largest_m': None if largest is None else largest[0],
-            'largest_rad': None if largest is None else largest[1],
-        }
-        if isinstance(found, CorrectedGoal):
-            line |= {
-                'expected_before_m': found.before,
-                'expected_after_m': found.after,
-                'bound_m': found.bound,
-                'waits_s': found.waits,
-                'notes': list(found.notes),
-            }
-        text = json.dumps(line)
-        self._audit.publish(AUDIT.message_class()(data=text))
-        told = f'goal {text}'
-        if below or verdict == 'refused':
-            self.get_logger().warning(told)
-            self.health.say(f'goal {line["verdict"]}: {line["why"]}')
-        else:
-            self.get_logger().info(told)
-        self._write_audit(text)
-
-    def _write_audit(self, text: str) -> None:
-        """Add a line to the file beside: poses do not wait for a disk."""
-        path = self.setting('audit')
-        if path:
-            self._written = self._books.submit(self._append, path, text)
-
-    def _append(self, path: str, text: str) -> None:
-        try:
-            with Path(path).open('a', encoding='utf-8') as file:
-                file.write(text + '\n')
-        except OSError as error:
-            self.warn(path, f"audit '{path}' cannot be written: {error.strerror}")
-
-    def _token(self) -> object:
+    def _token(self) -> str | None:
         """Return what tells the model that counts now."""
         return None if self._model is None else self._model.digest
 
@@ -562,27 +374,6 @@ class Compensator(ManagedNode):
             return 'the model was exchanged meanwhile'
         why = self._withdrawn()
         return f'the model was withdrawn meanwhile: {why}' if why else ''
-
-
-def _verdict(found: CorrectedGoal | Refusal) -> str:
-    if isinstance(found, Refusal):
-        return 'refused'
-    return 'corrected' if found.before else 'nothing to correct'
-
-
-def _tolerated(
-    goal: Any, points: GoalPoints, found: CorrectedGoal | Refusal
-) -> CorrectedGoal | Refusal:
-    """Return a corrected goal, or that it goes beyond what the goal itself tolerates."""
-    if isinstance(found, Refusal):
-        return found
-    beyond = beyond_tolerance(
-        [*goal.path_tolerance, *goal.goal_tolerance],
-        goal.trajectory.joint_names,
-        points.columns,
-        found.goal.q - points.goal.q,
-    )
-    return Refusal(beyond, found.largest) if beyond else found
 
 
 def main(args: list[str] | None = None) -> int:

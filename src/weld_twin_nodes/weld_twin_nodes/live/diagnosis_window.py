@@ -15,7 +15,6 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.assembly import Intake, Role, Samples, assembled
-from weld_twin_msgs_py.assembly.beside import Beside
 from weld_twin_msgs_py.bags.images import Image
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS, stamp_ns
 from weld_twin_msgs_py.messages.image_points import points
@@ -48,6 +47,10 @@ class Window:
     joint_names : sequence of str, optional
         What the joint states call the joints, in the order of the robot.
 
+    Attributes
+    ----------
+    intake : Intake
+
     """
 
     def __init__(
@@ -59,7 +62,7 @@ class Window:
     ) -> None:
         self._robot = robot
         self._duration = round(duration * NANOSECONDS)
-        self._intake = Intake(
+        self.intake = Intake(
             robot, measuring_frame=measuring_frame, joint_names=joint_names, mend=True
         )
         self._streams: dict[Role, deque[Row]] = {}
@@ -69,17 +72,7 @@ class Window:
         """Forget everything, as after a jump of the clock."""
         self._streams.clear()
         self._images.clear()
-        self._intake.reset()
-
-    @property
-    def remarks(self) -> list[str]:
-        """Return what is to be told of names and frames that were taken for granted."""
-        return self._intake.remarks
-
-    @property
-    def beside(self) -> Beside:
-        """Return the joints that come along and are none of the robot's."""
-        return self._intake.joints.beside
+        self.intake.reset()
 
     @property
     def last(self) -> int | None:
@@ -119,7 +112,7 @@ class Window:
             It cannot be used; the window is as it was.
 
         """
-        taken = self._intake.take(role, message)
+        taken = self.intake.take(role, message)
         if taken is None:
             return
         if taken.restarted:
@@ -169,7 +162,7 @@ class Window:
             if self._streams.get(side):
                 streams[side] = _samples(self._streams[side])
         return assembled(
-            'live', self._robot, streams, wrench_frame=self._intake.wrench_frame.meaning
+            'live', self._robot, streams, wrench_frame=self.intake.wrench_frame.meaning
         )
 
 

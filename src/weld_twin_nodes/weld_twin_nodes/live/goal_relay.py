@@ -59,6 +59,7 @@ class _Running:
     def __init__(self, below: Any, token: object, outcome: Future) -> None:
         self.below, self.token, self.outcome = below, token, outcome
         self.above: Any = None
+        self.cancelling: Future | None = None
         self.away: float | None = None
 
 
@@ -97,6 +98,7 @@ class GoalRelay:
         self._pending: dict[int, _Running] = {}
         self._running: list[_Running] = []
         self._turns: deque[Future] = deque()
+        self._stops = 0
         self._server = ActionServer(
             node,
             kind,
@@ -114,20 +116,26 @@ class GoalRelay:
         self._client.destroy()
 
     async def _take(self, goal: Any) -> GoalResponse:
-        """Decide on a goal when those before it are decided on, and send it on."""
-        turn = Future()
+        """Decide on a goal after those before it, and send it on; an order to stop waits for none."""
+        if not goal.trajectory.points:
+            self._stops += 1
+            return await self._sent_on(goal, self._stops)
+        turn, stops = Future(), self._stops
         before = self._turns[-1] if self._turns else None
         self._turns.append(turn)
         try:
             if before is not None:
                 await before
-            return await self._sent_on(goal)
+            return await self._sent_on(goal, stops)
         finally:
             self._turns.remove(turn)
             turn.set_result(None)
 
-    async def _sent_on(self, goal: Any) -> GoalResponse:
+    async def _sent_on(self, goal: Any, stops: int) -> GoalResponse:
         decision = await self._decide(goal)
+        if self._stops != stops:
+            decision.settled('an order to stop came before it was sent on')
+            return GoalResponse.REJECT
         if decision.goal is None:
             decision.settled('')
             return GoalResponse.REJECT
@@ -175,6 +183,8 @@ class GoalRelay:
         running = self._pending.pop(id(above.request))
         running.above = above
         found = await running.outcome
+        if running.cancelling is not None:  # the result may overtake the answer to the cancel
+            await running.cancelling
         self._running.remove(running)
         if isinstance(found, str):
             above.abort()
@@ -199,7 +209,9 @@ class GoalRelay:
         running = running or self._pending.get(id(above.request))
         if running is None:
             return CancelResponse.REJECT
+        running.cancelling = cancelling = Future()
         answer = await self._answered(running.below.cancel_goal_async())
+        cancelling.set_result(None)
         taken = answer is not None and bool(answer.goals_canceling)
         return CancelResponse.ACCEPT if taken else CancelResponse.REJECT
 

@@ -17,7 +17,7 @@ JOINT_SETTINGS = (
         'joint_prefix',
         '',
         "what the joint states put before the robot's joint names; empty: any one prefix is taken "
-        'off and told',
+        'off and reported',
     ),
     Setting(
         'joint_map',

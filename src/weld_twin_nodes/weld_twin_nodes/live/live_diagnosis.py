@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, ClassVar
 
 from weld_twin_core.diagnosis.algebra.problem import frames_named
-from weld_twin_msgs_py.assembly import Role
+from weld_twin_msgs_py.assembly import Intake, Role
 from weld_twin_msgs_py.messages.topics import (
     DIAGNOSIS,
     IMAGE_POINTS,
@@ -131,11 +132,12 @@ class LiveDiagnosis(ManagedNode):
         self._worker.stop()
         super().destroy_node()
 
+    def intakes(self) -> Sequence[Intake]:
+        """Return what takes its messages in."""
+        return (self._window.intake,)
+
     def _take(self, role: Role, message: Any) -> None:
         self._window.take(role, message)
-        for remark in self._window.remarks:
-            self.remark(remark)
-        self.tell_beside(self._window.beside)
 
     def _take_image(self, message: Any) -> None:
         self._window.take_image(message)

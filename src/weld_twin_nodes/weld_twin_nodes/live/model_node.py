@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from rcl_interfaces.msg import SetParametersResult
@@ -13,6 +14,7 @@ from std_srvs.srv import Trigger
 
 from weld_twin_core.errors import TwinError
 from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.assembly import Intake
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, TEMPERATURE, TOOL_WRENCH
 
 from ..offline.told_twin import build_twin, doubts
@@ -50,7 +52,7 @@ class ModelNode(CellNode):
 
     def start(self) -> None:
         """Take input; to be called when the outputs are there."""
-        self.listen(TOOL_WRENCH, self._on_wrench, held=True)
+        self.listen(TOOL_WRENCH, self.stream.take_wrench, held=True)
         self.listen(TEMPERATURE, self.stream.take_temperature, held=True)
         self._input = self.listen(JOINT_STATES, self._on_joints, required=True)
 
@@ -58,21 +60,15 @@ class ModelNode(CellNode):
         """Forget the motion so far."""
         self.stream.reset()
 
-    def _on_wrench(self, message: Any) -> None:
-        self.stream.take_wrench(message)
-        self._remark()
-
     def _on_joints(self, message: Any) -> None:
         sample = self.stream.step(message)
         if sample is not None:
             self.publish(sample)
-        self._input.others = self.stream.passed_over
-        self._remark()
 
-    def _remark(self) -> None:
-        for sentence in self.stream.remarks:
-            self.remark(sentence)
-        self.tell_beside(self.stream.beside)
+    def intakes(self) -> Sequence[Intake]:
+        """Return what takes its messages in."""
+        self._input.others = self.stream.passed_over
+        return (self.stream.intake,)
 
     @abstractmethod
     def publish(self, sample: Sample) -> None:

@@ -17,7 +17,6 @@ from weld_twin_core.diagnosis.soundness.mending import reading_map
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.compensation import Compensation, compensate
 from weld_twin_core.twin.posterior import Posterior
-from weld_twin_core.twin.trust import trust
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.diagnosis_model import mended_source, read_diagnosis, read_model
@@ -78,8 +77,7 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
     covariances = model.covariances(recording)
     share = None
     if model.posterior is not None and covariances is not None:
-        share = trust(
-            model.posterior.domain,
+        share = model.posterior.domain.trust(
             recording.joints.q,
             real.position - nominal.position,
             covariances[:, :3, :3],

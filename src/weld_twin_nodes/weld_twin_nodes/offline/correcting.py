@@ -120,7 +120,7 @@ def program_model(
 
 def _refuse_by_effort(effects: Sequence[Effect], path: Path | str) -> None:
     """Refuse springs that take measured efforts: nobody has measured those of a motion to come."""
-    taking = [effect.site for effect in effects if effect.by_effort]
+    taking = [effect.site for effect in effects if effect.twin.by_effort]
     if taking:
         raise ModelError(
             f"the model '{path}' takes the measured effort of {taking[0]}, and a motion that is still "

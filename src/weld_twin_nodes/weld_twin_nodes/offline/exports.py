@@ -170,7 +170,7 @@ def _readings(model: Model) -> list[str]:
 
 def _causes(model: Model) -> tuple[Effect, ...]:
     """Return the effects of robot and cell; how a set-up moved is of no use elsewhere."""
-    return of_the_robot([effect for effect in model.known + model.found if effect.cause])
+    return of_the_robot([effect for effect in model.known + model.found if effect.traits.cause])
 
 
 def _write_effects(path: Path, notes: Sequence[str], effects: Sequence[Effect]) -> None:

@@ -21,7 +21,9 @@ from weld_twin_core.motion.programs import travel
 from weld_twin_core.sequences import halton
 from weld_twin_core.twin.posterior import postures_within_limits
 from weld_twin_msgs_py.bags import read_recording
-from weld_twin_msgs_py.programs import Context, read_program, to_moves
+from weld_twin_msgs_py.programs import Context, controller_of, read_program, to_moves
+from weld_twin_msgs_py.programs.languages import language_of
+from weld_twin_msgs_py.programs.source import read_source
 
 POSTURES = 160
 """Postures of a region, a third of which judge it; more change what is told by some per cent."""
@@ -54,7 +56,9 @@ def anywhere(robot: Robot, spread: float) -> tuple[Array, Array]:
     return postures_within_limits(robot, ANYWHERE), clear_postures(robot, spread)[:POSTURES]
 
 
-def region(robot: Robot, told: str, context: Context, language: str = '') -> tuple[Array, Array]:
+def region(
+    robot: Robot, told: str, context: Context | None = None, language: str = ''
+) -> tuple[Array, Array]:
     """
     Return postures of a region, those that judge it, shape (K, n), and those that may be measured.
 
@@ -63,8 +67,8 @@ def region(robot: Robot, told: str, context: Context, language: str = '') -> tup
     robot : Robot
     told : str
         ``x,y,z:x,y,z``, corners of a box in the robot's base frame [mm]; a program; or a bag.
-    context : Context
-        For programs.
+    context : Context, optional
+        For programs; with the frames of the program alone where left out.
     language : str
         Of a program, where its file does not tell it.
 
@@ -77,6 +81,8 @@ def region(robot: Robot, told: str, context: Context, language: str = '') -> tup
     if Path(told).is_dir():
         q = read_recording(told, robot).joints.q
     elif Path(told).is_file():
+        language = language or language_of(read_source(told), told, '')
+        context = context or Context(robot, controller_of(robot, language))
         q = _of_program(robot, told, context, language)
     else:
         q = _in_box(robot, _box(told))

@@ -4,17 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
 from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.twin.goal_correction import SMOOTH_PEAK, SMOOTH_SPEED, GoalLimits
 from weld_twin_core.twin.pose_correction import LEVER, Looked, PoseCorrection, between, moved
+
+from .looks_beside import LooksBeside
 
 STILL = 2e-5
 """Poses that stay within this [m, rad] stand still: far below what a seam moves between two of them."""
@@ -30,8 +31,13 @@ FAR = 2.0
 """The same from which the pose waits for it: the error is eight times that at one."""
 DOUBT_EVERY = 0.02
 """Way [m] after which it is asked anew how sure the model is; that changes slowly."""
+UNHEARD = 'where the arm stands is not known: no joint states are heard'
+OPENING = 'the first pose is looked at'
+"""Why nothing is added yet to the first poses of a stream."""
 SHORT = 1e-6
 """Ramp [m, rad] that is none."""
+SHORTEST = 0.01
+"""Time [s] that two poses are at least taken to be apart: stamps may be some milliseconds off."""
 SPAN = 0.05
 """Shortest time [s] over which speeds of joints are taken from exact looks."""
 
@@ -54,18 +60,6 @@ class Given(NamedTuple):
     pose: Array | None
     added: Array | None
     why: str = ''
-
-
-class Found(NamedTuple):
-    """An exact look, why the pose must not be corrected, and how sure the model is where asked [m]."""
-
-    looked: Looked | None
-    why: str = ''
-    doubt: float | None = None
-
-
-Work = Callable[[], Found]
-"""What is to be worked out."""
 
 
 class _Ramp(NamedTuple):
@@ -100,9 +94,9 @@ class PoseStream:
         What is refused passes as it came; else nothing is sent.
     shadow : bool
         Nothing is sent; what would be added is told.
-    later : callable, optional
-        Takes work that is not to keep the stream waiting, and returns a function that tells whether
-        it is done and what came of it; left out, it is done at once.
+    beside : LooksBeside, optional
+        Makes exact looks meanwhile; left out, and until it is up, the stream makes them itself
+        after a pose.
 
     """
 
@@ -113,11 +107,12 @@ class PoseStream:
         *,
         passing: bool = False,
         shadow: bool = False,
-        later: Callable[[Work], Callable[[], Found | None]] | None = None,
+        beside: LooksBeside | None = None,
     ) -> None:
-        self.correction, self._limits = correction, limits
-        self._passing, self._shadow, self._later = passing, shadow, later
-        self._coming: Callable[[], Found | None] | None = None
+        self.correction, self._limits, self._beside = correction, limits, beside
+        if beside is not None:
+            beside.follow(correction)
+        self._passing, self._shadow = passing, shadow
         self._fresh: PoseCorrection | None = None
         self.forget()
 
@@ -127,16 +122,18 @@ class PoseStream:
 
     def forget(self) -> None:
         """Begin anew with the next pose."""
-        self.correction.adopt(None)
+        self._know_nothing()
         self._mode, self._refused, self._tried = 'none', '', -np.inf
         self._ramp: _Ramp | None = None
         self._held = np.zeros(6)
         self._rest_pose: Array | None = None
+        self._at, self._since = np.eye(4), np.inf
         self._rest_since = self._last = -np.inf
         self._next: Array | None = None
-        self._coming = None
+        self._asked = -np.inf
         self._sizes = self._doubts = 0.0
         self._doubted: Array | None = None
+        self._doubtful = False
         self._speeds: tuple[float, Array, Array | None] | None = None
 
     @property
@@ -162,19 +159,19 @@ class PoseStream:
         """
         if not 0.0 <= now - self._last <= SILENT:
             self.forget()
-        self._last = now
+        self._since, self._last = now - self._last, now
         rest = self._rested(pose, now)
         if self._fresh is not None and (rest >= REST or self._mode != 'corrected'):
             self._exchange(self._fresh)
-        self._adopt_coming(now)
         added, why = self._wanted(pose, now, rest, arm, withdrawn)
         if self._shadow:
             self._mode = 'none' if added is None else 'corrected'
-            return Given(None, added, why)
+            return Given(None, added, '' if why == OPENING else why)
         if self._ramp is not None:
             return self._on_ramp(now, why)
         if added is None:
-            return self._uncorrected(pose, now, rest, why)
+            stays = self._held_still(pose, arm) if why == OPENING else None
+            return stays or self._uncorrected(pose, now, rest, self._refused or why)
         if self._mode == 'corrected':
             self._held = added
             return Given(moved(pose, added), added)
@@ -185,22 +182,46 @@ class PoseStream:
         return self._begin_ramp(pose, now, added, 'corrected')
 
     def settle(self) -> None:
-        """Do what was put off until the pose was sent: look where the straight line ends."""
-        known, pose = self.correction.looked, self._next
-        self._next = None
-        if pose is None or known is None or self._coming is not None:
-            return
-        work = partial(self._found, partial(self.correction.exact, pose, known))
-        if self._later is None:
-            done = work()
-            self._coming = lambda: done
-        else:
-            self._coming = self._later(work)
+        """Do what was put off until the pose was sent, one thing after each: the next pose is near."""
+        pose, self._next = self._next, None
+        known, beside = self.correction.looked, self._beside
+        answer = None if beside is None else beside.answer()
+        if isinstance(answer, float) and known is not None:
+            self._weigh(known, answer)
+        elif answer is not None and not isinstance(answer, float):
+            self._judge(answer, self._asked)
+        elif beside is None or not beside.up:
+            self._settle_here(pose)
+        elif beside.free and self._first is not None:
+            self._asked = self._last
+            beside.look(*self._first)
+            self._first = None
+        elif beside.free and known is not None and pose is not None:
+            self._asked = self._last
+            beside.look(pose, self.correction.joints(pose))
+        elif beside.free and known is not None and self._doubtful and not self._refused:
+            beside.doubt(known)
+
+    def _settle_here(self, pose: Array | None) -> None:
+        known, self._opening = self.correction.looked, False
+        if known is not None and pose is not None:
+            self._look(pose, self._last)
+        elif known is not None and self._doubtful and not self._refused:
+            self._weigh(known, self.correction.doubt(known))
+
+    def _know_nothing(self) -> None:
+        """Forget all looks, and what was asked."""
+        self.correction.adopt(None)
+        self._opening, self._first = False, None
+        if self._beside is not None:
+            self._beside.drop()
 
     def _exchange(self, fresh: PoseCorrection) -> None:
         """Take another correction; what was added stays until it is faded over."""
         self.correction, self._fresh = fresh, None
-        self._coming = self._next = self._speeds = self._doubted = None
+        if self._beside is not None:
+            self._beside.follow(fresh)
+        self._next = self._speeds = self._doubted = None
         self._refused, self._sizes, self._doubts = '', 0.0, 0.0
         if self._mode == 'corrected':
             self._mode = 'held'
@@ -212,73 +233,82 @@ class PoseStream:
     ) -> tuple[Array | None, str]:
         """Return what is to be added by the model, or why nothing is."""
         if withdrawn and not (self.corrected and rest < REST):
-            self.correction.adopt(None)
+            self._know_nothing()
             return None, withdrawn
         if self._refused:
             if rest < REST or now - self._tried < REST:
                 return None, self._refused
             self._refused = ''
-            self.correction.adopt(None)
-        if self.correction.looked is None:
-            self._tried, self._speeds = now, None
-            if arm is None:
-                return None, 'where the arm stands is not known: no joint states are heard'
-            self._adopt(self._found(partial(self.correction.first, pose, arm)), now)
-            if self._refused:
-                return None, self._refused
+            self._know_nothing()
+        if self._opening or self.correction.looked is None:
+            why = self._open(pose, now, arm)
+            if why:
+                return None, why
         added, far = self.correction.added(pose)
         if far > FAR:
-            known = self.correction.looked
-            assert known is not None
-            self._coming = None
-            self._adopt(self._found(partial(self.correction.exact, pose, known)), now)
+            before = self.correction.joints(self._at)
+            self._look(pose, now)
+            self._refused = self._refused or self._leapt(before)
             if self._refused:
                 return None, self._refused
             added, far = self.correction.added(pose)
+        self._at = pose
         if far > LOOK:
             self._next = pose
         return added, ''
 
-    def _found(self, solve: Callable[[], Looked]) -> Found:
-        """Return an exact look with why it is refused, or why there is none."""
+    def _open(self, pose: Array, now: float, arm: Array | None) -> str:
+        """Look at the first pose, or have it looked at; return why nothing is added to it."""
+        if self._opening:
+            return OPENING
+        self._tried, self._speeds = now, None
+        if arm is None:
+            return UNHEARD
+        if self._beside is not None and self._beside.up:
+            self._first, self._opening = (pose, arm), True
+            return OPENING
+        self._look(pose, now, arm)
+        looked = self.correction.looked
+        if looked is not None and not self._refused:
+            self._weigh(looked, self.correction.doubt(looked))
+        return self._refused
+
+    def _look(self, pose: Array, now: float, arm: Array | None = None) -> None:
+        """Look at a pose exactly, from joints near it or from the look before; nothing else counts."""
+        if self._beside is not None:
+            self._beside.drop()
+        found = self.correction
         try:
-            looked = solve()
+            looked = found.exact(pose) if arm is None else found.first(pose, arm)
         except DataError as error:
-            return Found(None, str(error))
-        return Found(looked, self.correction.refusal(looked, self._limits), self._asked(looked))
+            self._judge(error, now)
+        else:
+            self._judge(looked, now)
 
-    def _asked(self, looked: Looked) -> float | None:
-        """Return how sure the model is of a look [m], where that is to be asked anew."""
-        at = looked.pose[:3, 3]
-        if self._doubted is not None and np.linalg.norm(at - self._doubted) < DOUBT_EVERY:
-            return None
-        self._doubted = at
-        return self.correction.doubt(looked)
-
-    def _adopt_coming(self, now: float) -> None:
-        """Take a look that was put off, once it is there."""
-        found = None if self._coming is None else self._coming()
-        if found is not None:
-            self._coming = None
-            self._adopt(found, now)
-
-    def _adopt(self, found: Found, now: float) -> None:
-        looked, why, doubt = found
-        if looked is None:
-            self._refused = why
+    def _judge(self, looked: Looked | DataError, now: float) -> None:
+        """Go on from an exact look at the pose of a time, unless it must not be corrected."""
+        if isinstance(looked, DataError):
+            self._refused, self._opening = str(looked), False
             return
-        why = why or self._too_quick(looked, now)
-        if doubt is not None:
-            self._sizes += float(looked.added[:3] @ looked.added[:3])
-            self._doubts += doubt**2
-            if self._sizes < self._doubts:
-                why = why or (
-                    f'the model is less sure of these poses ({doubt * 1e3:.3f} mm) than the '
-                    'correction is large'
-                )
-        self._refused = why
+        pose, found = looked.pose, self.correction
+        self._refused = found.refusal(looked, self._limits) or self._too_quick(looked, now)
         self._tried = now
-        self.correction.adopt(looked)
+        found.adopt(looked)
+        before = self._doubted
+        way = np.inf if before is None else np.linalg.norm(pose[:3, 3] - before)
+        self._doubtful = bool(way > DOUBT_EVERY)
+        self._opening &= not self._refused
+
+    def _weigh(self, looked: Looked, doubt: float) -> None:
+        """Hold how sure the model is of the latest look [m] against how large the correction is."""
+        self._doubted, self._doubtful, self._opening = looked.pose[:3, 3], False, False
+        self._sizes += float(looked.added[:3] @ looked.added[:3])
+        self._doubts += doubt**2
+        if self._sizes < self._doubts:
+            self._refused = (
+                f'the model is less sure of these poses ({doubt * 1e3:.3f} mm) than the correction '
+                'is large'
+            )
 
     def _too_quick(self, looked: Looked, now: float) -> str:
         """Return that joints, or what is added, change faster than they may."""
@@ -294,18 +324,20 @@ class PoseStream:
         bend = np.zeros_like(speed) if before[2] is None else (speed - before[2]) / span
         self._speeds = now, looked.q, speed
         most = np.minimum(robot.max_acceleration, self._limits.acceleration)
-        for value, limit, name in (
-            (speed, robot.max_velocity, 'velocity'),
-            (bend, most, 'acceleration'),
-        ):
-            over = np.abs(value) - limit
-            if over.max() > 0.0:
-                i = int(over.argmax())
-                return (
-                    f'these poses break the limit of {name} of {robot.joint_names[i]}: '
-                    f'{abs(value[i]):.3g}, the limit is {limit[i]:.3g}'
-                )
-        return ''
+        return _over(np.abs(speed), robot.max_velocity, 'velocity', robot) or _over(
+            np.abs(bend), most, 'acceleration', robot
+        )
+
+    def _leapt(self, before: Array) -> str:
+        """Return that joints, from where they were at the pose before, cannot follow so far a step."""
+        looked, robot = self.correction.looked, self.correction.model.robot
+        assert looked is not None
+        return _over(
+            np.abs(looked.q - before) / max(self._since, SHORTEST),
+            robot.max_velocity,
+            'velocity',
+            robot,
+        )
 
     # What is sent ----------------------------------------------------------------------------
 
@@ -323,17 +355,31 @@ class PoseStream:
 
     def _begun(self, pose: Array, now: float, added: Array, arm: Array | None) -> Given:
         """Begin with a stream: fade in from where the arm stands, before its first pose is followed."""
-        assert arm is not None
-        there = between(pose, self.correction.arm_poses(arm[None])[0])
-        far = [float(np.linalg.norm(part)) for part in np.split(there, 2)]
-        if far[0] > NEAR[0] or far[1] > NEAR[1]:
-            self._refused = (
-                f'the pose is {far[0] * 1e3:.1f} mm and {np.degrees(far[1]):.2f} degrees from where '
-                'the arm stands; begin there'
-            )
+        there = self._to_arm(pose, arm)
+        if there is None:
             return self._uncorrected(pose, now, 0.0, self._refused)
         self._held = there
         return self._begin_ramp(pose, now, added, 'corrected')
+
+    def _held_still(self, pose: Array, arm: Array | None) -> Given | None:
+        """Return what keeps the arm where it is while the first look is made; None where it is not."""
+        held = self._to_arm(pose, arm) if self._mode == 'none' else self._held
+        return None if held is None else Given(moved(pose, held), held)
+
+    def _to_arm(self, pose: Array, arm: Array | None) -> Array | None:
+        """Return what takes a pose to where the arm stands, shape (6,); None where that is too far."""
+        if arm is None:
+            self._refused = UNHEARD
+            return None
+        there = between(pose, self.correction.arm_poses(arm[None])[0])
+        far = [float(np.linalg.norm(part)) for part in np.split(there, 2)]
+        if far[0] <= NEAR[0] and far[1] <= NEAR[1]:
+            return there
+        self._refused = (
+            f'the pose is {far[0] * 1e3:.1f} mm and {np.degrees(far[1]):.2f} degrees from where '
+            'the arm stands; begin there'
+        )
+        return None
 
     def _begin_ramp(self, pose: Array, now: float, end: Array, mode: str, why: str = '') -> Given:
         way = [float(np.linalg.norm(part)) for part in np.split(end - self._held, 2)]
@@ -365,3 +411,15 @@ class PoseStream:
         if at is None or np.abs(pose - at).max() > STILL:
             self._rest_pose, self._rest_since = pose, now
         return now - self._rest_since
+
+
+def _over(values: Array, limits: Array, name: str, robot: Robot) -> str:
+    """Return that a joint breaks its limit; empty where none does."""
+    over = values - limits
+    if over.max() <= 0.0:
+        return ''
+    i = int(over.argmax())
+    return (
+        f'these poses break the limit of {name} of {robot.joint_names[i]}: {values[i]:.3g}, the limit '
+        f'is {limits[i]:.3g}'
+    )

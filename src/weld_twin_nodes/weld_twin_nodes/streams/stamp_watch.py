@@ -159,10 +159,14 @@ def _seen(step: Array, passed: Array, begin: int, end: int) -> Seen:
 
 def _rushed(step: Array, passed: Array, k: int) -> bool:
     """Return whether the messages before or after a step came faster than their stamps pass."""
-    for side in (slice(max(k - FEWEST, 0), k), slice(k + 1, k + 1 + FEWEST)):
-        time, stamps = float(passed[side].sum()), float(step[side].sum())
-        if step[side].size >= FEWEST // 2 and time < RUSH * stamps:
-            return True
+    for span in (
+        FEWEST,
+        KEPT,
+    ):  # a process that is held up for a moment spoils few steps, not many
+        for side in (slice(max(k - span, 0), k), slice(k + 1, k + 1 + span)):
+            time, stamps = float(passed[side].sum()), float(step[side].sum())
+            if step[side].size >= FEWEST // 2 and time < RUSH * stamps:
+                return True
     return False
 
 

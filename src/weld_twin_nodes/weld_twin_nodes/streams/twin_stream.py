@@ -7,10 +7,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from weld_twin_core.arrays import Array
+from weld_twin_core.effects.effect import Stage
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly import Intake, Role, Taken
-from weld_twin_msgs_py.assembly.beside import Beside
 from weld_twin_msgs_py.assembly.held_signal import HeldSignal
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 
@@ -61,13 +61,17 @@ class JointStream:
     joint_names : sequence of str, optional
         What the joint states call the joints, in the order of the robot.
 
+    Attributes
+    ----------
+    intake : Intake
+
     """
 
     def __init__(self, twin: Twin, joint_names: tuple[str, ...] | None = None) -> None:
         self._twin = twin
         self._live = twin.live()
-        self._intake = Intake(twin.robot, joint_names=joint_names, mend=True)
-        self._take_efforts()
+        self.intake = Intake(twin.robot, joint_names=joint_names, mend=True)
+        self._take_twin()
         self._epoch: int | None = None
         self._wrench = HeldSignal()
         self._temperature = HeldSignal()
@@ -80,30 +84,21 @@ class JointStream:
     @property
     def passed_over(self) -> int:
         """Return how many joint states made no sample of their own and were not refused."""
-        return self._intake.joints.others + self._intake.joints.parts
-
-    @property
-    def remarks(self) -> list[str]:
-        """Return what is to be told of names and frames that were taken for granted."""
-        return self._intake.remarks
-
-    @property
-    def beside(self) -> Beside:
-        """Return the joints that come along and are none of the robot's."""
-        return self._intake.joints.beside
+        return self.intake.joints.others + self.intake.joints.parts
 
     def change(self, twin: Twin) -> None:
         """Go on with other effects; those that stay keep their memory."""
         self._twin = self._live.twin = twin
-        self._take_efforts()
+        self._take_twin()
 
-    def _take_efforts(self) -> None:
-        """Ask the joint states for efforts where effects take them."""
-        self._intake.joints.efforts = any(effect.by_effort for effect in self._twin.effects)
+    def _take_twin(self) -> None:
+        """Ask the joint states for efforts where effects take them; see whether clocks differ."""
+        self.intake.joints.efforts = any(effect.twin.by_effort for effect in self._twin.effects)
+        self._clocks_differ = bool(self._twin.of_stage(Stage.CLOCK))
 
     def reset(self) -> None:
         """Begin anew, as after a jump of the clock; wrench and temperature hold."""
-        self._intake.reset()
+        self.intake.reset()
         self._forget()
 
     def _forget(self) -> None:
@@ -114,11 +109,11 @@ class JointStream:
 
     def take_wrench(self, message: Any) -> None:
         """Take the load on the tool."""
-        _keep(self._wrench, self._intake.take(Role.WRENCH, message))
+        _keep(self._wrench, self.intake.take(Role.WRENCH, message))
 
     def take_temperature(self, message: Any) -> None:
         """Take the temperature."""
-        _keep(self._temperature, self._intake.take(Role.TEMPERATURE, message))
+        _keep(self._temperature, self.intake.take(Role.TEMPERATURE, message))
 
     def step(self, message: Any) -> Sample | None:
         """
@@ -130,7 +125,7 @@ class JointStream:
             The message cannot be used; nothing has changed then.
 
         """
-        taken = self._intake.joint_sample(message)
+        taken = self.intake.joint_sample(message)
         if taken is None:
             return None
         (stamp, q, qd, effort), restarted = taken
@@ -138,7 +133,7 @@ class JointStream:
             self._forget()
         if self._epoch is None:
             self._epoch = stamp
-        wrench, frame = self._wrench.at(stamp), self._intake.wrench_frame.meaning
+        wrench, frame = self._wrench.at(stamp), self.intake.wrench_frame.meaning
         warm = self._temperature.at(stamp)
         temperature = None if warm is None else float(warm[0])
         elapsed = (stamp - self._epoch) * 1e-9
@@ -151,7 +146,9 @@ class JointStream:
             frame,
             effort,
         )
-        late = round(float(self._twin.late(elapsed)) * NANOSECONDS)
+        late = 0
+        if self._clocks_differ:
+            late = round(float(self._twin.late(elapsed)) * NANOSECONDS)
         return Sample(stamp, stamp + late, joints, poses, wrench, frame, temperature, effort)
 
 

@@ -79,7 +79,7 @@ def cause(effect: str, joint: str | None) -> str:
 def called(effect: str) -> str:
     """Return an effect as people call it."""
     kind = REGISTRY.get(effect)
-    return (kind.title if kind else '') or effect.replace('_', ' ')
+    return (kind.traits.title if kind else '') or effect.replace('_', ' ')
 
 
 def found_name(found: Found) -> str:

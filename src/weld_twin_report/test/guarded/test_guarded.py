@@ -78,7 +78,7 @@ def test_a_process_that_is_killed_is_told_and_started_again(tmp_path):
         (warm_pid,) = [
             pid
             for pid in children(os.getpid())
-            if b'weld_twin_report.cli.warm' in Path(f'/proc/{pid}/cmdline').read_bytes()
+            if b'weld_twin_report.warm' in Path(f'/proc/{pid}/cmdline').read_bytes()
             and Path(f'/proc/{pid}/stat').read_text().split()[2] != 'Z'
         ][-1:]
         killed = threading.Timer(0.5, os.kill, (int(warm_pid), signal.SIGKILL))

@@ -19,6 +19,7 @@ from weld_twin_msgs_py.bags import BagReader, provenance, read_recording, write_
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.robots import read_robot_yaml, read_urdf
 from weld_twin_nodes.cli import main
+from weld_twin_nodes.cli.in_process import weld_twin
 
 WIDTH, OFFSET, DELAY = 1.0e-3, 1.5e-3, 0.012
 FILES = {
@@ -68,23 +69,17 @@ def cell(tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
-def found(cell):
-    """What diagnose leaves behind, judged on the other run."""
-    out = cell / 'found'
-    assert (
-        run(
-            'diagnose',
-            cell / 'first',
-            '--robot',
-            'ur5',
-            '--holdout',
-            cell / 'second',
-            '--out',
-            out,
-        )
-        == 0
-    )
-    return out
+def said(cell):
+    """What diagnose says, judged on the other run."""
+    words = ('diagnose', cell / 'first', '--robot', 'ur5', '--holdout', cell / 'second')
+    return weld_twin(*words, '--out', cell / 'found')
+
+
+@pytest.fixture(scope='module')
+def found(cell, said):
+    """What it leaves behind."""
+    assert said.code == 0, said.err
+    return cell / 'found'
 
 
 def test_play_is_found_with_its_width(found):
@@ -113,12 +108,10 @@ def test_inputs_are_told_with_their_hashes(cell, found):
     assert digest.hexdigest() in (found / 'report.html').read_text()
 
 
-def test_the_verdict_is_printed(cell, tmp_path, capsys):
-    code = run('diagnose', cell / 'first', '--robot', 'ur5', '--out', tmp_path / 'd')
-    out, err = capsys.readouterr()
-    assert code == 0 and err == ''
-    assert 'comes from backlash of elbow_joint' in ' '.join(out.split())
-    assert str(tmp_path / 'd' / 'report.html') in out.replace('\n', '')
+def test_the_verdict_is_printed(said, found):
+    assert said.code == 0 and said.err == ''
+    assert 'comes from backlash of elbow_joint' in ' '.join(said.out.split())
+    assert str(found / 'report.html') in said.out.replace('\n', '')
 
 
 def test_what_is_known_is_in_the_twin_from_the_start(cell, tmp_path):

@@ -76,7 +76,7 @@ def test_a_value_has_as_many_digits_as_its_error_allows(value, std, text):
 
 
 def test_every_effect_of_the_library_has_a_name_in_words():
-    titled = {name for name, effect in REGISTRY.items() if effect.title}
+    titled = {name for name, effect in REGISTRY.items() if effect.traits.title}
     assert titled == set(REGISTRY) - {'measurement_noise'}
 
 

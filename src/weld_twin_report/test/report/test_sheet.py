@@ -228,6 +228,8 @@ def test_a_tolerance_given_is_judged_at_the_top_with_the_certificate():
 @pytest.mark.parametrize('name', CASES)
 def test_nothing_hinders_reading_light_dark_phone_or_print(name, browser):
     assert browser.hindrances(report_page(CASES[name]())) == []
+    if name in diagnoses.ALL:  # its script has run
+        assert re.fullmatch(r'\d+ .', browser.contexts[-1].pages[0].inner_text('#times'))
 
 
 @pytest.mark.parametrize('name', ['circle', 'calibration', 'unknown', 'unsound', 'long_names'])

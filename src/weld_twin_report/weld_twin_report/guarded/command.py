@@ -3,7 +3,7 @@
 """
 A command run on somebody's data, so that nothing it meets there harms anybody else.
 
-A warm process (`weld_twin_report.cli.warm`) has everything loaded and forks for each command: that
+A warm process (`weld_twin_report.warm`) has everything loaded and forks for each command: that
 costs some ten milliseconds, not the second that a new program needs. Its answers come as lines.
 """
 
@@ -208,7 +208,7 @@ class Guarded:
     def _start(self) -> None:
         self._rest = b''
         self._process = subprocess.Popen(
-            [sys.executable, '-m', 'weld_twin_report.cli.warm'],
+            [sys.executable, '-m', 'weld_twin_report.warm'],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # ended together with what it runs

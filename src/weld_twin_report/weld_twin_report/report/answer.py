@@ -68,7 +68,7 @@ class Table(NamedTuple):
     rows: list[list[str]]
 
 
-class Rival(NamedTuple):
+class Alternative(NamedTuple):
     """A hypothesis: how likely it is against the likeliest, and what it leaves of the gap."""
 
     name: str
@@ -211,7 +211,7 @@ class Answer:
         return [Table('Effects found', heads, rows)] if rows else []
 
     @cached_property
-    def rivals(self) -> list[list[Rival]]:
+    def alternatives(self) -> list[list[Alternative]]:
         """Return the hypotheses cause by cause: within one, probabilities do not rise."""
         groups: list[list[Candidate]] = []
         for c in weighed(self.diagnosis):
@@ -219,7 +219,7 @@ class Answer:
                 groups[-1].append(c)
             else:
                 groups.append([c])
-        return [[_rival(c, group[0].probability) for c in group] for group in groups]
+        return [[_alternative(c, group[0].probability) for c in group] for group in groups]
 
     @cached_property
     def open(self) -> list[str]:
@@ -261,8 +261,8 @@ def recorded_at(recordings: Sequence[Recording]) -> str:
     return f'recorded {when:%Y-%m-%d %H:%M} UTC'
 
 
-def _rival(candidate: Candidate, best: float) -> Rival:
-    return Rival(
+def _alternative(candidate: Candidate, best: float) -> Alternative:
+    return Alternative(
         site_name(candidate.site),
         _against(candidate.probability, best),
         millimetres(candidate.rms_after_m),

@@ -12,6 +12,7 @@ import numpy as np
 
 from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.diagnosis.result import NAMING, Cause, Diagnosis, Site
+from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.effect import Effect
 from weld_twin_nodes.wording.mending import (
     Left,
@@ -103,6 +104,16 @@ class CauseAnswer:
     def alike(self) -> tuple[Site, ...]:
         """Return what these data cannot tell apart; nothing where its name is settled."""
         return alternatives(self.diagnosis, self.cause)
+
+    @property
+    def meaning(self) -> list[str]:
+        """Return what is wrong, in plain words: of each name that it may have."""
+        names = [site.effect for site in self.alike] or [e.name for e in self.effects]
+        told = [REGISTRY[name].traits for name in dict.fromkeys(names)]
+        told = [traits for traits in told if traits.meaning]
+        if len(told) < 2:
+            return [f'{each.meaning[:1].upper()}{each.meaning[1:]}.' for each in told]
+        return [f'{each.title}: {each.meaning}.' for each in told]
 
     @property
     def _should_it_be(self) -> str:
@@ -286,7 +297,7 @@ class CauseAnswer:
         if unnamed(self.cause):
             told = look_at(self.diagnosis, self.k)
         elif not effects:
-            return ['Measure as told under "What to measure next".']
+            return ['Measure as said under "What to measure next".']
         else:
             twins = same_words(self.diagnosis, *(Site(e.name, e.site) for e in effects))
             ways = filter(None, [*dict.fromkeys(map(gearing, effects)), self._warning])

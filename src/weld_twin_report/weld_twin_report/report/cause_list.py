@@ -26,7 +26,7 @@ from .untried import reason_and_joints, untried
 _CANDIDATES = 6
 """Hypotheses shown for a cause."""
 _SLOTS = 6
-"""Places of which rivals are listed."""
+"""Places of which alternatives are listed."""
 _KINDS = (
     'A kind is named where data that were not fitted get worse without it by a tenth or '
     'more in the median part left out, and better in none; all other kinds that are '
@@ -105,7 +105,7 @@ def _found(answer: Answer) -> Html | None:
 
 def _candidates(answer: Answer) -> Html | None:
     """Return the hypotheses for every cause, the most probable first."""
-    diagnosis, groups = answer.diagnosis, answer.rivals
+    diagnosis, groups = answer.diagnosis, answer.alternatives
     if not groups:
         return None
     named = bool(diagnosis.effects)

@@ -130,7 +130,7 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
         Tells which joints slide; left out, all turn.
 
     """
-    kind = effect.entered
+    kind = effect.traits.entered
     if kind == 'ratio':
         return _RATIO
     if kind not in _ANYWHERE and kind != 'program':
@@ -162,11 +162,11 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
 
 def _instead(effect: Effect) -> str:
     """Return what an error is a matter of where a controller has nothing to enter for it."""
-    if not effect.entered:
+    if not effect.traits.entered:
         return 'no field of a controller is known for it'
-    if effect.place in ('instrument', 'clock'):
-        return f'the robot is not at fault, but how it was recorded: {effect.entered}'
-    return f'a matter of {effect.entered}'
+    if effect.traits.place in ('instrument', 'clock'):
+        return f'the robot is not at fault, but how it was recorded: {effect.traits.entered}'
+    return f'a matter of {effect.traits.entered}'
 
 
 def gearing(effect: Effect) -> str:

@@ -122,7 +122,7 @@ def _causes(answer: Answer, demand: Demand) -> tuple[Html | None, ...]:
 
 
 def _engineers(answer: Answer) -> Html:
-    """Return rivals, changes and the way the gap shrinks: whom the answer is enough need none of it."""
+    """Return alternatives, changes and how the gap shrinks, for those who want more than an answer."""
     return tag(
         'details',
         tag('summary', 'For engineers: what else it could be, and how far each effect shrinks it'),

@@ -69,8 +69,9 @@ def _places(answer: Answer) -> list[tuple[str, float, str]]:
 
 def _at(told: CauseAnswer) -> Sequence[tuple[str, float]]:
     """Return the places of a cause; where several causes fit alike, theirs, and none is surer."""
-    own = [site.joint or getattr(REGISTRY.get(site.effect), 'place', None) for site in told.alike]
-    places = list(dict.fromkeys(place for place in own if place not in (None, 'joint')))
+    known = [site for site in told.alike if site.joint or site.effect in REGISTRY]
+    own = [site.joint or REGISTRY[site.effect].traits.place for site in known]
+    places = list(dict.fromkeys(place for place in own if place != 'joint'))
     return [(place, HALF / len(places)) for place in places] or told.cause.place
 
 
@@ -86,7 +87,7 @@ def _dependences(answer: Answer) -> list[tuple[str, float, str]]:
 def _on(told: CauseAnswer) -> Sequence[tuple[str, float]]:
     """Return what a cause depends on; where several causes fit alike, what each of them does."""
     effects = [REGISTRY.get(site.effect) for site in told.alike]
-    on = list(dict.fromkeys(effect.depends_on for effect in effects if effect is not None))
+    on = list(dict.fromkeys(effect.traits.depends_on for effect in effects if effect is not None))
     return [(each, HALF / len(on)) for each in on] if len(on) > 1 else told.cause.dependence
 
 

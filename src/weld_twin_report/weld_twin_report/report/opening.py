@@ -298,7 +298,7 @@ def _row(answer: Answer, told: CauseAnswer, rule: Rule) -> Html:
         joined([tag('b', value), f' ({ends})']),
         lines(told.off_in_short(_VALUES)) or 'open',
         lines(told.sure) or 'not judged',
-        'cannot be told: nothing that was tried stands for it'
+        'cannot be said: nothing that was tried stands for it'
         if left is None
         else _left_over(left.rms_after, left.largest_after, rule),
         told.where_to_enter,

@@ -46,8 +46,8 @@ def print_summary(diagnosis: Diagnosis, console: Console, demand: Demand | None 
     if diagnosis.status == 'unknown' and diagnosis.causes:
         rows = [told.row for told in answer.causes[:_MOST]]
         _print_table(console, 'what is certain', LEVEL_HEADS, rows)
-    elif sum(map(len, answer.rivals)) > 1:
-        rows = [list(rival[:4]) for group in answer.rivals for rival in group]
+    elif sum(map(len, answer.alternatives)) > 1:
+        rows = [list(other[:4]) for group in answer.alternatives for other in group]
         heads = ('effect', 'against the likeliest', 'gap left', 'change')
         _print_table(console, 'candidates', heads, rows[:_MOST])
     for names in answer.open:

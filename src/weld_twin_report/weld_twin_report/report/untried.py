@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Which effects could not be tried: nothing that is said of rivals holds for them."""
+"""Which effects could not be tried: nothing that is said of alternatives holds for them."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ _STATES = {
     'partly': 'went away in part',
     'grew': 'is larger than before, or was corrected the wrong way round',
     'over': 'was corrected too far, or has changed since',
-    'open': 'cannot be told from this recording',
+    'open': 'does not show in this recording',
 }
 _SCALE = 1.15
 """Width of the drawing in units of the largest figure in it."""
@@ -32,12 +32,15 @@ _SCALE = 1.15
 def headline(found: Verification) -> str:
     """Return in a sentence what was promised, what was measured, and whether that was kept."""
     what = f'along {found.program}' if found.program else 'of the mended robot'
-    noise = (
-        f', without the {millimetres(found.noise_m)} of measuring noise' if found.program else ''
-    )
+    noise = ''
+    if found.program:
+        noise = (
+            f' ({millimetres(found.measured.least)} at least), without the '
+            f'{millimetres(found.measured.noise)} of measuring noise'
+        )
     return (
         f'{"Kept" if found.kept else "Not kept"}: promised {what} {_promised(found.promised)}, '
-        f'measured {millimetres(found.measured_m)} RMS{noise} ({found.samples} measurements).'
+        f'measured {millimetres(found.measured.rms)} RMS{noise} ({found.samples} measurements).'
     )
 
 
@@ -107,11 +110,14 @@ def _figures(found: Verification) -> Html:
     if found.promised.low is not None and found.promised.high is not None:
         span = f'{millimetres(found.promised.low)} to {millimetres(found.promised.high)}'
     noise = (
-        f'noise of {millimetres(found.noise_m)} taken out' if found.program else 'with its noise'
+        f'{millimetres(found.measured.least)} at least; noise of '
+        f'{millimetres(found.measured.noise)} taken out'
+        if found.program
+        else 'with its noise'
     )
     cells = (
         ('Promised', millimetres(found.promised.rms), span),
-        ('Measured', millimetres(found.measured_m), noise),
+        ('Measured', millimetres(found.measured.rms), noise),
         ('Kept', 'yes' if found.kept else 'no', f'{found.samples} measurements'),
     )
     return figures(cells)

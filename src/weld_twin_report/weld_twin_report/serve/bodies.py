@@ -139,11 +139,11 @@ class Bodies:
         """Wait until there is room for a body; it is there until it is whole, or leaves."""
         until = time.monotonic() + PATIENCE
         while body not in self._read and not body.whole:
-            rivals = self._rivals(body.party)
-            if not rivals:
+            others = self._of_others(body.party)
+            if not others:
                 self._read[body] = None
                 return
-            slowest = max(rivals, key=Body.behind)
+            slowest = max(others, key=Body.behind)
             if slowest.behind() > GIVES_WAY:
                 slowest.gave_way = True
                 self.leave(slowest)
@@ -156,7 +156,7 @@ class Bodies:
         """Forget a body."""
         self._read.pop(body, None)
 
-    def _rivals(self, party: str) -> list[Body]:
+    def _of_others(self, party: str) -> list[Body]:
         """Return the bodies one of which has to go first; none where there is room."""
         mine = [each for each in self._read if each.party == party]
         if len(mine) >= self._of_party:

@@ -108,7 +108,7 @@ def giving_way(
         oldest = next((j for j in left if j.party == party and j.state not in OPEN), None)
         if oldest is None or share <= fair:
             raise NoRoom(
-                'the server keeps no more than it was told to, and that is used up; delete '
+                'the server keeps no more than it may, and that is used up; delete '
                 'recordings of yours that you need no longer, or ask whoever runs it'
             )
         left.remove(oldest)

@@ -33,5 +33,5 @@ def actions(
 
 def _action(effect: Effect, robot: Robot, turned: Collection[str]) -> str:
     """Return its remedy, and how to read it where the joint was recorded with the other sign."""
-    counted = effect.set_at_controller and effect.site in turned
+    counted = effect.traits.set_at_controller and effect.site in turned
     return f'{effect.remedy(robot)} {TURNED_ROUND}' if counted else effect.remedy(robot)

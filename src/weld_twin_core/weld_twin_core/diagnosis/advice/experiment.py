@@ -207,7 +207,7 @@ def _named(effects: Sequence[Effect], others: Sequence[Effect]) -> str:
 
 
 def _name(effect: Effect, others: Sequence[Effect]) -> str:
-    if effect.cause:
+    if effect.traits.cause:
         return f'{effect.name} of {effect.site}' if effect.site else effect.name
     # A curve bends as any formula of the same kind does: what it stands for is the others.
     alike = any((other.at, other.on) == (effect.at, effect.on) for other in others)

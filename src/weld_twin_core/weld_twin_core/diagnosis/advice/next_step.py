@@ -158,7 +158,9 @@ def _promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
     parted = 0.5 * erfc(-beyond / sqrt(2.0))
     if verdict.status != 'unknown':
         return parted * (NAMED + GAINED * verdict.confidence)
-    named = all(REGISTRY[item['effect']].cause for side in wanted['between'] for item in side)
+    named = all(
+        REGISTRY[item['effect']].traits.cause for side in wanted['between'] for item in side
+    )
     believed = verdict.confidence if verdict.sets else 1.0 - verdict.confidence
     return parted * max(believed, 0.0 if named else EVEN)
 

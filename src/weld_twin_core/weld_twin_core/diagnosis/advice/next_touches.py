@@ -142,9 +142,9 @@ def _unknowns(
 def _sizes(design: Design, effects: Sequence[Effect], disputed: set[tuple[str, ...]]) -> Array:
     """Return the weight that asks for the disputed sizes: each variance over the square found."""
     out = np.zeros(design.errors)
-    at = design.errors - sum(effect.coordinates().size for effect in effects)
+    at = design.errors - sum(effect.fit.coordinates().size for effect in effects)
     for effect in effects:
-        x = effect.coordinates()
+        x = effect.fit.coordinates()
         if effect.key in disputed:
             out[at : at + x.size] = 1.0 / np.maximum(x @ x, LEAST**2)
         at += x.size

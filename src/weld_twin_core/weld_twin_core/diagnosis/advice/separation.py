@@ -157,7 +157,7 @@ def _normal(stack: Array) -> Array:
 def _held(model: Model, names: Sequence[str]) -> Array:
     """Return the prior precision of every column by name; none of frames, none of the difference."""
     precision = effect_precision(model)
-    own = [f'{k}.{j}' for k, e in enumerate(model.found) for j in range(e.coordinates().size)]
+    own = [f'{k}.{j}' for k, e in enumerate(model.found) for j in range(e.fit.coordinates().size)]
     by_name = dict(zip(own, precision.tolist(), strict=True))
     return np.array([*(by_name.get(name, 0.0) for name in names), 0.0])
 

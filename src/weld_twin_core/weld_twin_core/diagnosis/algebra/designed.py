@@ -117,7 +117,7 @@ def designed(problem: Problem, model: Model, scale: Scale) -> tuple[Design, list
 
 def _piece(problem: Problem, features: list[Features], scale: Scale, effect: Effect) -> Columns:
     """Return the columns of one effect."""
-    if effect.coordinates().size >= MANY and not problem.touched:
+    if effect.fit.coordinates().size >= MANY and not problem.touched:
         shifts = [maker.shifts(effect, atoms=False) for maker in features]
         joint = moved_joint(shifts)
         if joint is not None:

@@ -105,8 +105,8 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
     model = replace(model, common=tuple(shared))
     effects = []
     for effect in (*(change.effect for change in model.changes), *model.found):
-        now = effect.coordinates()
-        effects.append(effect.with_coordinates(now + step[at : at + now.size]))
+        now = effect.fit.coordinates()
+        effects.append(effect.fit.with_coordinates(now + step[at : at + now.size]))
         at += now.size
     count = len(model.changes)
     pairs = zip(model.changes, effects[:count], strict=True)
@@ -116,7 +116,7 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
 
 def coordinates(model: Model) -> Array:
     """Return the fit coordinates of all found effects, shape (K,)."""
-    return np.concatenate([np.zeros(0), *(effect.coordinates() for effect in model.found)])
+    return np.concatenate([np.zeros(0), *(effect.fit.coordinates() for effect in model.found)])
 
 
 def fit(

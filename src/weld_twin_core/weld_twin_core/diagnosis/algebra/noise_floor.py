@@ -62,7 +62,7 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
     independent = True
     for recording, part in zip(problem.recordings, residuals, strict=True):
         position = measured_axes(part[:3])
-        left = _left(position)
+        left = spread_of(position)
         static = recording.joints.static
         direct = _repeats(recording.joints.q, position) if static else _differences(position)
         if direct is None and recording.measured is not None:
@@ -77,7 +77,7 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
     return NoiseFloor(float(np.average(values, weights=counts)), independent)
 
 
-def _left(position: Array) -> float:
+def spread_of(position: Array) -> float:
     """Return the spread of what a model leaves; two heaps are no wider than they are apart."""
     return min(robust_spread(position), float(np.sqrt((position**2).mean())))
 

@@ -43,7 +43,7 @@ def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
     precision = np.concatenate([precision, *(np.ones(part.size) for part in beside)])
     off = np.concatenate([off, *beside])
     spread = [spreads(model.robot, change.effect) for change in model.changes]
-    now = [change.effect.coordinates() for change in model.changes]
+    now = [change.effect.fit.coordinates() for change in model.changes]
     own = np.concatenate([np.zeros(0), *spread]) ** -2.0 if spread else np.zeros(0)
     return np.concatenate([precision, own]), np.concatenate([off, *now])
 

@@ -412,7 +412,7 @@ class Problem:
                     block[at : at + own.mean.size] = own.change.transpose(2, 1, 0)
                 at += own.mean.size
             parts.append(np.concatenate([block, *self._change_columns(k, maker)]))
-        sizes = [change.effect.coordinates().size for change in self.changes]
+        sizes = [change.effect.fit.coordinates().size for change in self.changes]
         names += [f'change {i}.{j}' for i, size in enumerate(sizes) for j in range(size)]
         return parts, names
 
@@ -423,7 +423,7 @@ class Problem:
             if change.recording == own:
                 out.append(self.seen(k, maker.columns(change.effect, atoms=False)))
             else:
-                size = change.effect.coordinates().size
+                size = change.effect.fit.coordinates().size
                 out.append(np.zeros((size, self.rows[k], self.samples[k])))
         return out
 

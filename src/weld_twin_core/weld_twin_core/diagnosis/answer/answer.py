@@ -152,7 +152,7 @@ def changed(found: Search, families: Sequence[str]) -> tuple[Changed, ...]:
         Changed(
             item.change.recording,
             item.change.effect,
-            item.change.effect.errors(np.sqrt(np.diag(item.covariance))),
+            item.change.effect.fit.errors(np.sqrt(np.diag(item.covariance))),
         )
         for item in items
     )

@@ -111,11 +111,11 @@ def standard_errors(
     variance = np.diag(covariance(problem, model, scale, precision, share))
     at, out = 0, []
     for k, effect in enumerate(model.found):
-        size = effect.coordinates().size
+        size = effect.fit.coordinates().size
         own = np.sqrt(variance[at : at + size])
         at += size
         own = np.maximum(own, _elsewhere(problem, model, scale, k, share))
-        out.append(effect.errors(np.hypot(own, idealised(effect))))
+        out.append(effect.fit.errors(np.hypot(own, idealised(effect))))
     return out
 
 
@@ -149,16 +149,17 @@ def _free(model: Model) -> NDArray[np.bool_]:
     """Return which fit coordinates are off their bounds, shape (K,)."""
     out: list[bool] = []
     for effect in model.found:
-        specs = [effect.components()[k][0] for k in effect.fitted()]
+        specs = [effect.components()[k][0] for k in effect.fit.fitted()]
         out += [
-            p.lower < value < p.upper for p, value in zip(specs, effect.coordinates(), strict=True)
+            p.lower < value < p.upper
+            for p, value in zip(specs, effect.fit.coordinates(), strict=True)
         ]
     return np.array(out, dtype=bool)
 
 
 def _visible(columns: Design, model: Model) -> NDArray[np.bool_]:
     """Return which columns the data show, shape (P,)."""
-    scales = np.concatenate([effect.coordinate_scales() for effect in model.found])
+    scales = np.concatenate([effect.fit.coordinate_scales() for effect in model.found])
     reach = np.concatenate([np.ones(columns.count - scales.size), 1e3 * scales])
     return np.asarray(columns.peaks() * reach > UNSEEN)
 
@@ -167,15 +168,15 @@ def _elsewhere(problem: Problem, model: Model, scale: Scale, k: int, share: floa
     """Return how far instances that fit nearly as well spread about effect k, per coordinate."""
     effect = model.found[k]
     trials = profile(problem, model, scale, k)
-    if trials is None or not effect.coordinates().size:
-        return np.zeros(effect.coordinates().size)
+    if trials is None or not effect.fit.coordinates().size:
+        return np.zeros(effect.fit.coordinates().size)
     others, worse = trials
     weight = np.exp(-0.5 * share * np.maximum(worse, 0.0))
-    apart = np.array([other.coordinates() for other in others]) - effect.coordinates()
+    apart = np.array([other.fit.coordinates() for other in others]) - effect.fit.coordinates()
     return np.asarray(np.sqrt(weight @ apart**2 / (1.0 + weight.sum())))
 
 
 def idealised(effect: Effect) -> Array:
     """Return how far real arms differ from the formulas, per coordinate."""
-    specs = [effect.components()[k][0] for k in effect.fitted()]
-    return np.array([p.idealised for p in specs]) * np.abs(effect.coordinates())
+    specs = [effect.components()[k][0] for k in effect.fit.fitted()]
+    return np.array([p.idealised for p in specs]) * np.abs(effect.fit.coordinates())

@@ -192,7 +192,8 @@ def not_told(problem: Problem) -> tuple[str, ...]:
     return tuple(
         name
         for name, kind in REGISTRY.items()
-        if (kind.place == 'base' and not problem.placed) or kind.depends_on in NO_CONTACT
+        if (kind.traits.place == 'base' and not problem.placed)
+        or kind.traits.depends_on in NO_CONTACT
     )
 
 

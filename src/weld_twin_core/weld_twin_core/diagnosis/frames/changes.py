@@ -54,7 +54,7 @@ class Told:
     @property
     def sure(self) -> bool:
         """Return whether it stands out of the noise."""
-        value = self.change.effect.coordinates()
+        value = self.change.effect.fit.coordinates()
         chi = float(value @ np.linalg.pinv(self.covariance, hermitian=True) @ value)
         return chi > SURE**2 * value.size
 
@@ -78,7 +78,7 @@ def families_named(given: str | Iterable[str], what: str = 'may_change') -> tupl
     """
     parts = given.split(',') if isinstance(given, str) else given
     names = tuple(dict.fromkeys(name for part in parts if (name := str(part).strip())))
-    constant = sorted(n for n, kind in REGISTRY.items() if kind.cause and _constant(kind))
+    constant = sorted(n for n, kind in REGISTRY.items() if kind.traits.cause and _constant(kind))
     for name in names:
         if name not in constant:
             raise ModelError(
@@ -89,7 +89,7 @@ def families_named(given: str | Iterable[str], what: str = 'may_change') -> tupl
 
 
 def _constant(kind: type[Effect]) -> bool:
-    return kind.depends_on == 'constant' and not kind.dated
+    return kind.traits.depends_on == 'constant' and not kind.traits.dated
 
 
 def with_changes(
@@ -124,7 +124,7 @@ def with_changes(
         model, precision = model.with_found(constant_errors(model.robot)), None
     prior = effect_precision(model) if precision is None else precision
     every = replace(problem.thinned(ROWS), changes=candidates)
-    count = sum(c.effect.coordinates().size for c in candidates) + prior.size
+    count = sum(c.effect.fit.coordinates().size for c in candidates) + prior.size
     freedom = float(min(count, every.size // 2))
     free, scale = _freed(every, replace(model, changes=candidates), prior, freedom)
     chosen = _chosen(every, free, scale, prior, beliefs)
@@ -139,7 +139,9 @@ def with_changes(
 def constant_errors(robot: Robot) -> tuple[Effect, ...]:
     """Return every constant error of every joint, at zero."""
     kinds = [
-        k for k in REGISTRY.values() if k.cause and _constant(k) and k.of in ('joint', 'link')
+        k
+        for k in REGISTRY.values()
+        if k.traits.cause and _constant(k) and k.of in ('joint', 'link')
     ]
     return tuple(kind(joint) for kind in kinds for joint in robot.joint_names)  # type: ignore[call-arg]
 
@@ -151,7 +153,7 @@ def _candidates(problem: Problem, robot: Robot, families: Sequence[str]) -> tupl
     for k in range(1, 1 + max(given)):
         for name in families:
             kind = REGISTRY[name]
-            if 'base' in problem.align and kind.fitted_with == 'base':
+            if 'base' in problem.align and kind.traits.fitted_with == 'base':
                 continue
             for joint in joints_of(kind, robot):
                 out.append(Change(k, kind(**({} if joint is None else {'joint': joint}))))
@@ -213,7 +215,7 @@ def _chosen(
 
 def _places(problem: Problem, model: Model) -> list[Array]:
     """Return the columns of every change."""
-    sizes = [change.effect.coordinates().size for change in model.changes]
+    sizes = [change.effect.fit.coordinates().size for change in model.changes]
     first = problem.frame_count + problem.shared_count
     ends = first + np.cumsum(np.array([0, *sizes], dtype=int))
     return [np.arange(a, b) for a, b in pairwise(ends)]
@@ -286,7 +288,7 @@ def told(
         for change, part in zip(model.changes, parts, strict=True)
     ]
     for kind in (REGISTRY[name] for name in families):
-        if kind.fitted_with == 'base' and 'base' in problem.align:
+        if kind.traits.fitted_with == 'base' and 'base' in problem.align:
             out += _bases(kind, problem, model, whole)
     found = sorted(out, key=lambda each: each.change.recording)
     return tuple(each for each in found if each.sure)
@@ -300,7 +302,7 @@ def _bases(kind: type[Effect], problem: Problem, model: Model, whole: Array) -> 
         step = frame_offset(model.bases[k], model.bases[first], left=True)
         mix = np.zeros((6, whole.shape[0]))
         mix[:, :6], mix[:, 6 * i : 6 * i + 6] = -np.eye(6), np.eye(6)
-        effect = kind().with_coordinates(step)
+        effect = kind().fit.with_coordinates(step)
         own = problem.given[k] if problem.given else k
         out.append(Told(Change(own, effect), mix @ whole @ mix.T))
     return out

@@ -114,7 +114,7 @@ def held(found: Fit, problem: Problem, scale: Scale, precision: Array, given: Ro
 
 def _between(model: Model) -> int:
     """Return the number of coordinates of what differs between the recordings."""
-    return sum(change.effect.coordinates().size for change in model.changes)
+    return sum(change.effect.fit.coordinates().size for change in model.changes)
 
 
 def _off(problem: Problem, model: Model, given: Robot) -> tuple[Array, Array]:

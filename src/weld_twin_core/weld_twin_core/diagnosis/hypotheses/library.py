@@ -68,10 +68,10 @@ def candidate_kinds(exclude: Sequence[str], align: frozenset[str]) -> list[type[
     kinds = [
         kind
         for kind in REGISTRY.values()
-        if kind.cause
-        and not kind.dated
+        if kind.traits.cause
+        and not kind.traits.dated
         and kind.name not in exclude
-        and kind.fitted_with not in align
+        and kind.traits.fitted_with not in align
     ]
     return sorted(kinds, key=lambda kind: (kind.stage, kind.name))
 
@@ -135,9 +135,9 @@ class _Shelf:
 
     def _seeds(self, kind: type[Effect], joint: str | None) -> tuple[list[Effect], float]:
         """Return the instances that are looked for, and among how many they were chosen."""
-        if kind.waves is not None and joint is not None:
-            most = min(kind.waves.dense, orders_told(self.features, joint))
-            lines = kind.lines(joint, np.arange(1.0, most + 1.0))
+        if kind.traits.waves is not None and joint is not None:
+            most = min(kind.traits.waves.dense, orders_told(self.features, joint))
+            lines = kind.search.lines(joint, np.arange(1.0, most + 1.0))
             return lines, float(len(lines))
         k = moved_most(self.features, joint)
         return self.features[k].seeds(kind, joint, self.pulls[k])
@@ -179,7 +179,7 @@ class _Shelf:
         else:
             piece = Amounts(self._moved(joint), amounts(shifts, joint, self.problem.samples))
         # Even a thousand times the typical effect would stay far below the noise.
-        scales = seed.coordinate_scales()
+        scales = seed.fit.coordinate_scales()
         reach = 1e3 * float(scales.max()) if scales.size else 1.0
         return piece if piece.largest() * reach > 1e-2 else None
 
@@ -204,9 +204,9 @@ def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
     """
     out: dict[tuple[str, ...], Effect] = {}
     for kind in REGISTRY.values():
-        if kind.of not in ('joint', 'link') or not kind.cause or kind.dated:
+        if kind.of not in ('joint', 'link') or not kind.traits.cause or kind.traits.dated:
             continue
         for joint in joints_of(kind, robot):
             if kind.applicable(view, joint) is None:
-                out |= {e.key: e for e in kind.small(view, joint, 1) if e.on in on}
+                out |= {e.key: e for e in kind.search.small(view, joint, 1) if e.on in on}
     return list(out.values())

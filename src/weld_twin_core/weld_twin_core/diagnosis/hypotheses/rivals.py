@@ -17,6 +17,7 @@ import numpy as np
 from ...effects.effect import Effect
 from ..algebra.fit import Fit, fit
 from ..result import Site
+from .other_sets import Other
 from .seed_systems import Choice, evidence, ranking
 from .selection import Workspace, fitted_with, implausible
 
@@ -49,7 +50,11 @@ class Rival:
 
 
 def rivals(
-    work: Workspace, now: Fit, k: int, effective: Callable[[Fit], float]
+    work: Workspace,
+    now: Fit,
+    k: int,
+    effective: Callable[[Fit], float],
+    others: Sequence[Other] = (),
 ) -> tuple[Rival, ...]:
     """
     Return found effect k and those that could take its place, most probable first.
@@ -60,6 +65,8 @@ def rivals(
         The final fit, on the workspace's problem and scale.
     effective : callable
         Number of independent rows of a fit.
+    others : sequence of Other
+        Sets that do without something found: what takes its place may need company.
 
     """
     effect = now.model.found[k]
@@ -72,7 +79,16 @@ def rivals(
     for choice, other in tried:
         nats = nats_in_place(rest, other, count, choice)
         out.append(Rival(Site(*choice.unit.site), nats, other))
+    for other_set in others:
+        if other_set.instead_of == (effect.name, effect.site):
+            first = next((s for s in other_set.newcomers(now) if s not in _sites(out)), None)
+            if first is not None:
+                out.append(Rival(Site(*first), out[0].nats + other_set.ahead, other_set.fit))
     return weighed(out, work.beliefs.temperature)
+
+
+def _sites(out: Sequence[Rival]) -> list[tuple[str, str | None]]:
+    return [(rival.site.effect, rival.site.joint) for rival in out]
 
 
 def contenders(

@@ -18,6 +18,7 @@ from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..result import Site
 from .library import Library, build
+from .other_sets import reconsidered
 from .rivals import Rival, rivals
 from .selection import (
     Workspace,
@@ -120,7 +121,7 @@ def effective_rows(
     share = effective_share(found.residual, problem.rows, problem.samples) ** trust
     count = share * found.residual.size
     # What entered first explains most, and so does what its formula misses.
-    misfit = beliefs.misfit * (found.model.found[0].ideal if found.model.found else 1.0)
+    misfit = beliefs.misfit * (found.model.found[0].fit.ideal if found.model.found else 1.0)
     explained = max(bare_rss - found.rss, 0.0) / max(found.rss, 1e-300) * count
     return float(count / (1.0 + misfit**2 * explained / beliefs.misfit_directions))
 
@@ -252,9 +253,11 @@ def settled(
 ) -> tuple[Fit, tuple[tuple[Rival, ...], ...]]:
     """Return the fit in which every effect is the best in its place, and its rivals."""
     for attempt in range(SWAPS + 1):
+        now, others = reconsidered(work, now, effective)
+        progress('other sets weighed')
         slots = []
         for k, effect in enumerate(now.model.found):
-            slots.append(rivals(work, now, k, effective))
+            slots.append(rivals(work, now, k, effective, others))
             progress(f'rivals of {Site(effect.name, effect.site)} weighed')
             leader = slots[-1][0]
             if leader.fit is not now and attempt < SWAPS:
@@ -271,7 +274,7 @@ def settled(
 def names(model: Model) -> list[tuple[str, str | None, int]]:
     """Return what tells one set of found effects from another."""
     return sorted(
-        ((e.name, e.site, e.coordinates().size) for e in model.found),
+        ((e.name, e.site, e.fit.coordinates().size) for e in model.found),
         key=lambda item: (item[0], item[1] or '', item[2]),
     )
 

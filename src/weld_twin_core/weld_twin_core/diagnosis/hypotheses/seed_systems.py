@@ -144,9 +144,24 @@ class SeedSystems:
             Products of all columns with the model's, and with the residual.
 
         """
-        pull = own @ residual
-        rss = float(residual @ residual)
-        normal = own @ own.T
+        return self.given(own @ own.T, own @ residual, float(residual @ residual), products)
+
+    def given(self, normal: Array, pull: Array, rss: float, products: Array) -> SeedSystems:
+        """
+        Return the systems with columns projected out of which the products are known.
+
+        Parameters
+        ----------
+        normal : array, shape (P, P)
+            Products of the columns.
+        pull : array, shape (P,)
+            Their products with the residual.
+        rss : float
+            Sum of squares of the residual.
+        products : array, shape (all columns, P + 1)
+            Products of all columns with them, and with the residual.
+
+        """
         live = np.flatnonzero(normal.diagonal() > EMPTY)
         scaled, size = unit_diagonal(normal[np.ix_(live, live)], 1e-12)
         cross = products[:, live] / size
@@ -285,24 +300,37 @@ class Choice:
 
     Attributes
     ----------
-    columns : array of int
-        Of the seed, those that earn their place.
     nats : float
         Log of the evidence ratio against leaving the unit out (Schwarz's approximation).
-    coefficients : array, shape (K,)
-        Of all the seed's columns, zero for those left out.
+    alike : Alike
+        The systems that the seed's is among.
+    row : int
+        Which of them.
+    chosen : array of int
+        Of the seed's columns, those that earn their place.
 
     """
 
     unit: Unit
     seed: int
-    columns: Index
     nats: float
-    coefficients: Array
+    alike: Alike
+    row: int
+    chosen: Index
+
+    @property
+    def columns(self) -> Index:
+        """Return the numbers of the columns that earn their place."""
+        return self.alike.columns[self.row][self.chosen]
 
     def effect(self) -> Effect:
-        """Return the effect that the linear coefficients stand for."""
-        return self.unit.seeds[self.seed].from_atoms(self.coefficients)
+        """Return the effect that the least-squares coefficients stand for."""
+        normal = self.alike.normal[self.row][np.ix_(self.chosen, self.chosen)]
+        scaled, size = unit_diagonal(normal, SINGULAR)
+        right = self.alike.right[self.row][self.chosen]
+        coefficients = np.zeros(self.alike.columns.shape[1])
+        coefficients[self.chosen] = np.linalg.solve(scaled, right / size) / size
+        return self.unit.seeds[self.seed].from_atoms(coefficients)
 
 
 def ranking(systems: SeedSystems, units: Sequence[Unit], effective: float) -> list[Choice]:
@@ -319,27 +347,19 @@ def ranking(systems: SeedSystems, units: Sequence[Unit], effective: float) -> li
         Number of independent rows.
 
     """
-    nats = np.full(sum(len(unit.seeds) for unit in units), -np.inf)
-    where: dict[int, tuple[Alike, int, Index]] = {}
-    for alike, grown in zip(systems.alike, systems.grown(effective), strict=True):
-        nats[alike.seeds] = grown.nats
-        where.update(
-            (int(s), (alike, k, np.flatnonzero(grown.chosen[k])))
-            for k, s in enumerate(alike.seeds)
-        )
-    found, at = [], 0
+    grown = systems.grown(effective)
+    count = sum(len(unit.seeds) for unit in units)
+    nats, group, row = np.full(count, -np.inf), np.zeros(count, int), np.zeros(count, int)
+    for k, (alike, each) in enumerate(zip(systems.alike, grown, strict=True)):
+        nats[alike.seeds], group[alike.seeds] = each.nats, k
+        row[alike.seeds] = np.arange(alike.seeds.size)
+    found, at = list[Choice](), 0
     for unit in units:
         best = at + int(np.argmax(nats[at : at + len(unit.seeds)]))
         if np.isfinite(nats[best]):
             worth = float(nats[best] - np.log(unit.trials))
-            found.append(_choice(unit, best - at, worth, *where[best]))
+            k, r = int(group[best]), int(row[best])
+            chosen = np.flatnonzero(grown[k].chosen[r])
+            found.append(Choice(unit, best - at, worth, systems.alike[k], r, chosen))
         at += len(unit.seeds)
     return sorted(found, key=lambda choice: -choice.nats)
-
-
-def _choice(unit: Unit, seed: int, nats: float, alike: Alike, k: int, chosen: Index) -> Choice:
-    """Return a choice with the least-squares coefficients of its columns."""
-    scaled, size = unit_diagonal(alike.normal[k][np.ix_(chosen, chosen)], SINGULAR)
-    coefficients = np.zeros(alike.columns.shape[1])
-    coefficients[chosen] = np.linalg.solve(scaled, alike.right[k][chosen] / size) / size
-    return Choice(unit, seed, alike.columns[k][chosen], nats, coefficients)

@@ -111,7 +111,7 @@ def forward(
 def _repeats(choice: Choice, taken: list[tuple[str, str | None]]) -> bool:
     """Return whether a unit is in the model already and its kind cannot take in another."""
     kind = type(choice.unit.seeds[0])
-    return choice.unit.site in taken and kind.joined is Effect.joined
+    return choice.unit.site in taken and not kind.search.joins
 
 
 def _refined(
@@ -211,7 +211,7 @@ def merged(found: tuple[Effect, ...], effect: Effect) -> tuple[Effect, ...]:
     """Return the effects with one more, in one with its like where their kind can join."""
     for k, other in enumerate(found):
         if (other.name, other.site) == (effect.name, effect.site):
-            both = other.joined(effect)
+            both = other.search.joined(effect)
             if both is not None:
                 return (*found[:k], both, *found[k + 1 :])
     return (*found, effect)

@@ -59,7 +59,7 @@ def started(problem: Problem, model: Model, scale: Scale, effect: Effect) -> Eff
 
 def searched(effect: Effect) -> bool:
     """Return whether an effect's kind needs a search for its start."""
-    return effect.searched
+    return effect.fit.searched
 
 
 def profile(
@@ -134,7 +134,7 @@ class _Looker:
         bases = self.problem.by_sample(self.basis)
         memory = effect.stage in MEMORY
         views = [maker.joint_view if memory else maker.view for maker in self.features]
-        trials = [effect.starts(view, zoom) for view in views]
+        trials = [effect.fit.starts(view, zoom) for view in views]
         # What moves the joint most says which instances; the others say what they do there.
         most = trials[moved_most(self.features, effect.site)]
         told = most or next((own for own in trials if own is not None), None)

@@ -27,10 +27,10 @@ REASON = 'the joint hardly moves'
 
 def hardly_moves(features: list[Features], effect: Effect) -> bool:
     """Return whether an effect sits on a joint, or has a source, that hardly moves."""
-    if effect.moved_by is None:
+    if effect.search.moved_by is None:
         return False
     robot = features[0].twin.robot
-    i = robot.index(effect.moved_by)
+    i = robot.index(effect.search.moved_by)
     positions = [maker.view.joint(i) for maker in features]
     travel = max(float(np.max(q)) for q in positions) - min(float(np.min(q)) for q in positions)
     return travel < (STILL_SLIDE if robot.prismatic[i] else STILL)

@@ -33,6 +33,7 @@ from ..algebra.fit import Fit, fit
 from ..beliefs import Beliefs
 from ..result import Site
 from .library import build
+from .other_sets import ahead
 from .rivals import Rival, contenders, nats_in_place, weighed
 from .search import Search, refitted
 from .selection import Workspace, backward, fitted_with, implausible
@@ -163,7 +164,7 @@ def _lead(found: Search, other: Rival) -> _Lead | None:
     kept = {(e.name, e.site) for e in own.model.found}
     if (other.site.effect, other.site.joint) not in kept:
         return None
-    nats = nats_in_place(now, own, found.effective(now))
+    nats = ahead(work, own, now, found.effective)
     if nats <= work.beliefs.enter_nats:
         return None
     replaced = [(e.name, e.site) not in kept for e in now.model.found]
@@ -179,7 +180,7 @@ def _parts(found: Search, k: int, exclude: Sequence[str]) -> list[Effect]:
     """
     effects = found.small.model.found
     own, taken = effects[k], {(e.name, e.site) for e in effects}
-    if not _constant(type(own)) or own.coordinates().size < MOST_PARTS:
+    if not _constant(type(own)) or own.fit.coordinates().size < MOST_PARTS:
         return []
     robot = found.baseline.model.robot
     frames = [_frame_columns(robot, name) for name in sorted(found.work.problem.align)]
@@ -237,7 +238,11 @@ def _settable_first(found: Search, exclude: frozenset[str]) -> Search:
     taken = {(e.name, e.site) for e in effects}
     chosen: dict[int, Site] = {}
     for k, own in enumerate(effects[: len(found.slots)]):
-        if not _constant(type(own)) or own.set_at_controller or own.coordinates().size > 1:
+        if (
+            not _constant(type(own))
+            or own.traits.set_at_controller
+            or own.fit.coordinates().size > 1
+        ):
             continue
         for other in _settable(robot, exclude):
             site = Site(other.name, other.site)
@@ -263,7 +268,7 @@ def _settable_first(found: Search, exclude: frozenset[str]) -> Search:
 def _settable(robot: Robot, exclude: frozenset[str]) -> Iterator[Effect]:
     """Yield every error of no size that a person can set."""
     for name, kind in REGISTRY.items():
-        if kind.set_at_controller and name not in exclude:
+        if kind.traits.set_at_controller and name not in exclude:
             for joint in joints_of(kind, robot):
                 yield _of(Site(name, joint))
 
@@ -279,11 +284,11 @@ def _led_by(slot: tuple[Rival, ...], site: Site, small: Fit) -> tuple[Rival, ...
 
 def _causes(names: Sequence[str]) -> list[type[Effect]]:
     """Return the kinds that are a cause."""
-    return [REGISTRY[name] for name in names if name in REGISTRY and REGISTRY[name].cause]
+    return [REGISTRY[name] for name in names if name in REGISTRY and REGISTRY[name].traits.cause]
 
 
 def _constant(kind: type[Effect]) -> bool:
-    return kind.cause and kind.depends_on == 'constant'
+    return kind.traits.cause and kind.traits.depends_on == 'constant'
 
 
 def _same_anywhere(
@@ -305,8 +310,8 @@ def _constants_here(
     for joint in _with_next(found.baseline.model.robot, joints):
         view = features[moved_most(features, joint)].view
         for kind in REGISTRY.values():
-            if kind.cause and kind.of == 'joint' and kind.applicable(view, joint) is None:
-                yield from kind.constants(view, joint)
+            if kind.traits.cause and kind.of == 'joint' and kind.applicable(view, joint) is None:
+                yield from kind.search.constants(view, joint)
                 yield from _at_rest(features, kind, joint)
 
 
@@ -336,7 +341,7 @@ def _whitened(found: Search, features: list[Features], effect: Effect) -> Array:
 
 def _at_rest(features: list[Features], kind: type[Effect], joint: str) -> list[Effect]:
     """Return instances that are no more than a constant, as the joint they need hardly moves."""
-    if not kind.by_motion or kind.stage in (Stage.SERVO, Stage.PLAY):
+    if not kind.traits.by_motion or kind.stage in (Stage.SERVO, Stage.PLAY):
         return []
     seeds = list(kind.seeds(features[moved_most(features, joint)].view, joint))[:FEW]
     return [seed for seed in seeds if hardly_moves(features, seed)]
@@ -366,7 +371,7 @@ def _candidates(robot: Robot, kinds: Sequence[str], align: frozenset[str]) -> It
     view = _anywhere(robot).view
     for name in kinds:
         kind = REGISTRY[name]
-        if kind.fitted_with in align:
+        if kind.traits.fitted_with in align:
             continue
         for joint in joints_of(kind, robot):
             # A robot without a positioner has no foot of one, whatever is taken out.
@@ -405,7 +410,7 @@ def never_parted(found: Search, sets: Sequence[Sequence[Site]]) -> tuple[tuple[S
     for group in sets:
         known = [site for site in group if site.effect in REGISTRY]
         left = [site for site in known if _constant(REGISTRY[site.effect])]
-        left.sort(key=lambda site: not REGISTRY[site.effect].set_at_controller)
+        left.sort(key=lambda site: not REGISTRY[site.effect].traits.set_at_controller)
         while len(left) > 1:
             first = _of(left[0])
             same = [left[0], *(s for s in left[1:] if always(robot, first, _of(s), align))]

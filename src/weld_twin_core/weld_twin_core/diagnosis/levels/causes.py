@@ -214,7 +214,7 @@ def _nameless(
     claims, left = list(told), list[Part]()
     taken = {at for claim in told for at in claim.members}
     for k, effect in enumerate(model if curved is not None else ()):
-        if k not in taken and not effect.bends:
+        if k not in taken and not effect.traits.bends:
             levels = {effect.at: 1.0}, {effect.on: 1.0}
             claims.append(_Claim((k,), *levels, {Site(effect.name, effect.site): 1.0}))
     for place, own in places.items():

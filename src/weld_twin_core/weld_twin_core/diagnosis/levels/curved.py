@@ -101,7 +101,7 @@ def standing(
 
 
 def _setup(found: Search) -> list[Effect]:
-    return [effect for effect in found.final.model.found if not effect.cause]
+    return [effect for effect in found.final.model.found if not effect.traits.cause]
 
 
 def bare_fit(found: Search, kept: Sequence[Effect] = ()) -> tuple[Problem, Fit, Scale]:

@@ -20,6 +20,7 @@ from ..algebra.definite import Index
 from ..algebra.fit import Fit, design
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
+from ..unseen.chance import Candidates, chance_gain
 from ..unseen.folds import steadiness, ways_to_divide
 from .groups import Group, all_groups, wandering_groups, whole_arm_groups
 
@@ -177,6 +178,8 @@ class Folds:
         Features, whitened.
     target : array, shape (rows,)
         What they are to explain, whitened.
+    labels : array of int, shape (rows,)
+        The fold that each row belongs to.
     order : array of int, shape (rows,), or None
         Rows fold by fold; None where they lie so.
     spans : tuple of slice
@@ -186,6 +189,7 @@ class Folds:
 
     columns: Array
     target: Array
+    labels: Array
     order: Index | None
     spans: tuple[slice, ...]
 
@@ -207,7 +211,9 @@ class Folds:
         together = bool((np.diff(labels) >= 0).all())
         order = None if together else np.argsort(labels, kind='stable')
         ends = np.cumsum(np.unique(labels, return_counts=True)[1]).tolist()
-        return cls(columns, target, order, tuple(slice(a, b) for a, b in pairwise([0, *ends])))
+        return cls(
+            columns, target, labels, order, tuple(slice(a, b) for a, b in pairwise([0, *ends]))
+        )
 
     def errors(self, index: Index, precision: Array) -> Array:
         """Return the squared error on every fold of the columns fitted on the others, (B,)."""
@@ -323,6 +329,14 @@ class Choosing:
         held = [np.full(self.places[m.group].size, m.ridge) for m in members]
         return index.astype(int), np.concatenate([self.fixed_precision, *held])
 
+    def beside(self, members: Sequence[Member]) -> Candidates:
+        """Return all that could enter beside some members."""
+        index, precision = self._columns_of(members)
+        columns, taken = self.ways[0].columns, {m.group for m in members}
+        groups = (columns[place] for k, place in enumerate(self.places) if k not in taken)
+        ways = [way.labels for way in self.ways]
+        return Candidates(columns[index], precision, groups, RIDGES, ways)
+
     def errors(self, members: Sequence[Member]) -> list[Array]:
         """Return the squared error of a model on every fold, for each way to divide."""
         index, precision = self._columns_of(members)
@@ -377,6 +391,8 @@ def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:
         gain, member, errors = max(tried, key=lambda item: item[0])
         steady = min(steadiness(a, b) for a, b in zip(now, errors, strict=True))
         if gain < beliefs.group_share or steady < beliefs.group_steady:
+            break
+        if gain < chance_gain(work.beside(members), gain, beliefs.group_steady):
             break
         members.append(member)
         now = errors

@@ -93,7 +93,7 @@ class Group:
         """Return the prior precision of the carried curves' values, in units of noise."""
         if self.curves:
             return ridge * self.scales**2
-        sizes = [curve.coordinate_scales() for curve in self.carriers]
+        sizes = [curve.fit.coordinate_scales() for curve in self.carriers]
         return np.concatenate([np.zeros(0), *(1.0 / (LOOSE * size) ** 2 for size in sizes)])
 
     def __str__(self) -> str:

@@ -86,7 +86,9 @@ def _grouped(found: Search, verdict: Verdict, rival: Curved | None, beliefs: Bel
         bare = replace(found.final, model=found.final.model.with_found(()))
         return free_form(found.problem, found.scale, bare, none, beliefs, whole_arm=True)
     told = {site for group in verdict.sets for site in group}
-    own = [e for e in found.final.model.found if Site(e.name, e.site) in told or not e.cause]
+    own = [
+        e for e in found.final.model.found if Site(e.name, e.site) in told or not e.traits.cause
+    ]
     kept = own if rival is None else rival.kept
     small, bare, scale = bare_fit(found, kept)
     form = free_form(small, scale, bare, none, beliefs, whole_arm=True)

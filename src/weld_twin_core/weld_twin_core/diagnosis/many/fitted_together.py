@@ -24,6 +24,8 @@ from ..algebra.fit import design
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
+from ..unseen.chance import Candidates, chance_gain
+from ..unseen.folds import gain, least_gain, ways_to_divide
 from ..unseen.unseen_stretches import Unseen
 from .shrinkage import believed, groups, learned_precision, predicted
 from .small_errors import many_small
@@ -48,6 +50,9 @@ CREEPS = 1.0
 FEW_COLUMNS = 200
 """Coordinates up to which sizes are learned anew for every part that is left out: with more there are
 so many stations that sizes hardly hang on some of them, and it would take minutes."""
+LEARNED = (0.1, 1.0, 10.0, 100.0)
+"""Precisions of sizes that many errors could have had, in units of those learned: from three times as
+large to a tenth."""
 CHOSEN = 1.2
 """Effects chosen one by one were chosen on the stations left out as well: what they leave there
 counts a fifth more where the many are many. From draws of 15 to 60 stations of two real arms."""
@@ -83,8 +88,9 @@ def fitted_together(
     better = found.crowded or left < (1.0 if chosen else beliefs.better) * few
     if not better:
         better = left < CHOSEN * few and _many(found, best, beliefs)
-    if better and not found.crowded and _one_and_crumbs(best, beliefs):
-        better = False
+    better = better and (found.crowded or not _one_and_crumbs(best, beliefs))
+    if not (found.final.model.found or found.crowded) and _by_chance(found, best):
+        return found
     if better and found.problem.untracked and PLACES - 1 <= found.problem.places < PLENTY_PLACES:
         trial = _carrying(found, exclude, steps[0], beliefs, progress)
         if found.problem.places < PLACES or unseen_rms(trial) < left:
@@ -94,11 +100,34 @@ def fitted_together(
     return replace(found, many=best) if left < CHOSEN * few else found
 
 
+def _by_chance(none: Search, many: Search) -> bool:
+    """Return whether many small errors predict no more of few stations than they would of noise."""
+    fitted = Unseen.of(many.problem, many.scale, many.final, many.precision)
+    bare = Unseen.of(many.problem, many.scale, none.final, none.precision)
+    told = least_gain(
+        [
+            gain(one.squares(one.whole), more.squares(more.whole), more.trusted_labels())
+            for one, more in zip(bare.every_way(), fitted.every_way(), strict=True)
+        ]
+    )
+    columns, frames = fitted.columns.written_out(), fitted.frames
+    size = np.sqrt(np.maximum(fitted.precision, 1e-300))[:, None]
+    # All of them at once, at the sizes learned and at others: sizes are learned from noise, too.
+    tried = Candidates(
+        columns[:frames],
+        fitted.precision[:frames],
+        [columns[frames:] / size[frames:]],
+        LEARNED,
+        ways_to_divide(many.problem),
+    )
+    return told.share <= chance_gain(tried, told.share, 0.0)
+
+
 def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:
     """Return the kinds left out of every step, from the least that is fitted to the most."""
     steps = [_beyond(demand) for demand, least in enumerate(BEAR) if stations >= least]
     # First without curves: what a handful of stations bears is the geometry under load.
-    curves = tuple(name for name, kind in REGISTRY.items() if kind.bends)
+    curves = tuple(name for name, kind in REGISTRY.items() if kind.traits.bends)
     steps = steps[-1:] if stations >= PLENTY else [(*steps[0], *curves), *steps]
     if not problem.untracked:
         return steps
@@ -122,7 +151,7 @@ def _carrying(
     judged on the others, this left 0.31 mm instead of 0.33 mm in the mean, and 0.49 mm instead of
     0.84 mm at the worst place of the three with the largest rest.
     """
-    waves = {name for name, kind in REGISTRY.items() if kind.waves is not None}
+    waves = {name for name, kind in REGISTRY.items() if kind.traits.waves is not None}
     less = tuple(name for name in less if name not in waves)
     return _together(found, (*exclude, *less), beliefs, progress, orders=ONCE)
 
@@ -143,8 +172,14 @@ def _without_creep(
     the recording the creep goes on and the arm does not. On a grid of a real arm that was measured
     plane by plane, its first fifth predicted the rest to 0.83 mm with a creep and to 0.12 without.
     """
-    creeps = {e.name for e in best.final.model.found if e.depends_on == 'time' and not e.dated}
-    creeps -= {name for name, kind in REGISTRY.items() if kind.of_setup or kind.common}
+    creeps = {
+        e.name
+        for e in best.final.model.found
+        if e.traits.depends_on == 'time' and not e.traits.dated
+    }
+    creeps -= {
+        name for name, kind in REGISTRY.items() if kind.traits.of_setup or kind.traits.common
+    }
     if not creeps:
         return best, left
     trial = _together(found, (*exclude, *creeps), beliefs, progress)
@@ -224,7 +259,7 @@ def _too_large(robot: Robot, effect: Effect) -> bool:
 
 def _beyond(demand: int) -> tuple[str, ...]:
     """Return the kinds that demand more of the stations, left out of a step."""
-    return tuple(name for name, kind in REGISTRY.items() if kind.demand > demand)
+    return tuple(name for name, kind in REGISTRY.items() if kind.traits.demand > demand)
 
 
 def _but_scales(less: tuple[str, ...]) -> tuple[str, ...]:

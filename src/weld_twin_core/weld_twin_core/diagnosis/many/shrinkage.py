@@ -45,8 +45,8 @@ def groups(found: tuple[Effect, ...], beliefs: Beliefs) -> tuple[Array, Array]:
 
     Number -1 marks coordinates that are fitted freely.
     """
-    labels = [label for effect in found for label in effect.alike()]
-    scales = [effect.coordinate_scales() for effect in found]
+    labels = [label for effect in found for label in effect.fit.alike()]
+    scales = [effect.fit.coordinate_scales() for effect in found]
     names = {label: k for k, label in enumerate(dict.fromkeys(labels))}
     numbers = np.array([names[label] for label in labels], dtype=int)
     counts = np.bincount(numbers, minlength=len(names)) if numbers.size else np.zeros(0, int)
@@ -273,9 +273,9 @@ def believed(model: Model) -> Array:
     """Return the prior precision of every coordinate; curves are as high as ripple usually is."""
     parts = [effect_precision(model.with_found((effect,))) for effect in model.found]
     for effect, part in zip(model.found, parts, strict=True):
-        if not (effect.cause or effect.of_setup):
+        if not (effect.traits.cause or effect.traits.of_setup):
             unknown = part == 0.0
-            part[unknown] = effect.coordinate_scales()[unknown] ** -2.0
+            part[unknown] = effect.fit.coordinate_scales()[unknown] ** -2.0
     return np.concatenate([np.zeros(0), *parts])
 
 

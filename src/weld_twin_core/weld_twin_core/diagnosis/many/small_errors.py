@@ -59,7 +59,7 @@ def many_small(
     everything = model.with_found(_everything(problem, model, exclude, beliefs, orders))
     scale = robust_scale(problem, problem.residuals(model))
     model, scale = shrunk_step(problem, everything, scale, beliefs, learn=learn)
-    model = model.with_found(tuple(effect.turned() for effect in model.found))
+    model = model.with_found(tuple(effect.fit.turned() for effect in model.found))
     progress('families fitted together')
     if learn:
         model = with_lines(problem, model, scale, beliefs)
@@ -87,24 +87,26 @@ def _everything(
     out: list[Effect] = []
     small: Sequence[Effect]
     for kind in candidate_kinds(exclude, problem.align):
-        if kind.stage in (Stage.SERVO, Stage.CLOCK) or not kind.common:
+        if kind.stage in (Stage.SERVO, Stage.CLOCK) or not kind.traits.common:
             out += [e for e in model.found if e.name == kind.name]
             continue
         for joint in joints_of(kind, model.robot):
             view = features[moved_most(features, joint)].view
             if kind.applicable(view, joint) is not None:
                 continue
-            if kind.waves is None:
-                small = _as_found(kind.small(view, joint, most), have)
+            if kind.traits.waves is None:
+                small = _as_found(kind.search.small(view, joint, most), have)
             elif orders is not None or _travel(view, joint) >= beliefs.wave_range:
                 told = orders_told(features, str(joint))
-                small = kind.small(view, joint, min(orders or most, told))
+                small = kind.search.small(view, joint, min(orders or most, told))
             else:
                 small = []
             out += [effect for effect in small if not hardly_moves(features, effect)]
-    out += _bends(features, exclude, {effect.site for effect in out if effect.orders().size})
+    out += _bends(
+        features, exclude, {effect.site for effect in out if effect.search.orders().size}
+    )
     out = _apart_from_frames(problem, features, out)
-    return (*out, *(e for e in model.found if e.dated))
+    return (*out, *(e for e in model.found if e.traits.dated))
 
 
 def _apart_from_frames(
@@ -133,12 +135,12 @@ def _bends(
 ) -> list[Effect]:
     """Return what bends the joints that turn and have no waves of their own."""
     robot = features[0].twin.robot
-    kinds = [k for k in REGISTRY.values() if k.bends and k.name not in exclude]
+    kinds = [k for k in REGISTRY.values() if k.traits.bends and k.name not in exclude]
     out = []
     for i, joint in enumerate(robot.joint_names):
         if joint not in waved and not robot.prismatic[i]:
             angles = np.concatenate([maker.view.joint(i) for maker in features])
-            out += [kind.bend(joint, angles) for kind in kinds]
+            out += [kind.search.bend(joint, angles) for kind in kinds]
     return [effect for effect in out if effect is not None]
 
 
@@ -158,7 +160,9 @@ def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
 
     Both are nuisance: they are part of where the frames were, not of the robot.
     """
-    for kind in [kind for kind in REGISTRY.values() if kind.of_setup and not kind.dated]:
+    for kind in [
+        kind for kind in REGISTRY.values() if kind.traits.of_setup and not kind.traits.dated
+    ]:
         features = problem.features(model)
         span = span_of(problem.whitened(problem.frame_columns(features)[0], scale))
         residual = outside(problem.whitened(problem.residuals(model), scale), span)
@@ -272,7 +276,7 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
     The score statistic of sine and cosine at every order costs one small product per joint; the
     strongest line enters, the residual it explains is taken off, and the look is repeated.
     """
-    kinds = [effect.waves for effect in model.found if effect.waves is not None]
+    kinds = [effect.traits.waves for effect in model.found if effect.traits.waves is not None]
     if not kinds:
         return model
     residual = problem.residuals(model)
@@ -308,15 +312,15 @@ def _free(
     free: NDArray[np.bool_] = orders <= orders_told(features, joint)
     for effect in model.found:
         if effect.site == joint:
-            for order in effect.orders():
+            for order in effect.search.orders():
                 free &= np.abs(orders - order) >= waves.apart
     return free
 
 
 def _with_order(found: list[Effect], joint: str, order: float) -> list[Effect]:
     return [
-        effect.with_orders(np.append(effect.orders(), order))
-        if effect.waves and effect.site == joint
+        effect.search.with_orders(np.append(effect.search.orders(), order))
+        if effect.traits.waves and effect.site == joint
         else effect
         for effect in found
     ]

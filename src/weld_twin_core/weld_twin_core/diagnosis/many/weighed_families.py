@@ -93,14 +93,16 @@ def weighed_families(found: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[W
     effects = found.final.model.found
     members: dict[str, list[int]] = {}
     for k, effect in enumerate(effects):
-        if effect.cause or effect.bends:
+        if effect.traits.cause or effect.traits.bends:
             members.setdefault(effect.name, []).append(k)
-    always = [k for k, effect in enumerate(effects) if not (effect.cause or effect.bends)]
+    always = [
+        k for k, effect in enumerate(effects) if not (effect.traits.cause or effect.traits.bends)
+    ]
     case = _Case.of(found, unseen, always)
     chosen = _chosen(case, members, beliefs.family_worth)
     out = []
     for name, index in members.items():
-        if not effects[index[0]].cause:
+        if not effects[index[0]].traits.cause:
             continue
         sizes = [(Site(name, effects[k].site), unseen.rms(unseen.targets[1 + k])) for k in index]
         sizes.sort(key=lambda item: -item[1])
@@ -148,7 +150,7 @@ class _Case:
             parts.append(first + _neighbours(view))
             first = int(parts[-1].max()) + 1
         sites = tuple(Site(effect.name, effect.site) for effect in model.found)
-        causes = tuple(effect.cause for effect in model.found)
+        causes = tuple(effect.traits.cause for effect in model.found)
         return cls(tuple(views), np.concatenate(parts), always, sites, causes, {})
 
     def named(self, effects: Sequence[int]) -> bool:

@@ -129,7 +129,7 @@ def place_of(rival: Rival) -> str:
 def dependence_of(rival: Rival) -> str:
     """Return what a rival depends on."""
     effect = effect_of(rival)
-    return effect.on if effect is not None else REGISTRY[rival.site.effect].depends_on
+    return effect.on if effect is not None else REGISTRY[rival.site.effect].traits.depends_on
 
 
 def _marginal(slot: Slot, key: Callable[[Rival], Key]) -> dict[Key, float]:

@@ -1,25 +1,20 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The models that the recordings allow: a Gaussian about the fitted one.
+The models that the recordings allow, as mean and second moment about the fitted one.
 
-Every arm has a little of every small error, found or not. All of them have a prior of zero mean;
-how wide it is for each family is learned from this arm, starting at what arms usually have, as is
-the noise [1]_. In directions that the data show, the data decide; in the others the prior stays.
-
-References
-----------
-.. [1] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4, 1992.
+Every arm has a little of every small error, found or not. All of them have a prior of zero mean; how
+large each is, is one of the sizes of `sizes`. In directions that the data show, the data decide; in the
+others the prior stays.
 
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError
 
 from ...arrays import Array
 from ...effects.setup_motion import of_the_robot
@@ -27,15 +22,17 @@ from ...recording import Recording
 from ...twin.domain import Domain
 from ...twin.posterior import Directions, Posterior, postures_within_limits, usual_sigma
 from ...twin.twin import Twin
-from ..algebra.definite import inverted, solved
+from ..algebra.definite import inverted
 from ..algebra.designed import designed
 from ..algebra.fit import LEAST_TURN, coordinates
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Model, Problem, Scale
 from ..frames.open_directions import VISIBLE, open_directions
+from ..unseen.folds import posture_regions
 from . import plausible_arm
-from .leftover import Unseen, leftover, posture_blocks
+from .leftover import Unseen, leftover
+from .sizes import Prior, Rows, weighed
 
 ROWS = 9000
 """Rows looked at; more show the same directions."""
@@ -47,56 +44,14 @@ POSTURES = 200
 LEAST = 1e-6
 """Least noise of a position per axis [m]: no instrument is better, and a simulated cell without
 noise would leave no digits for what is open."""
-ROUNDS = 12
-"""Times that widths and noise are learned in turn; there is no test of convergence."""
 USUAL_NOISE = 3e-5
 """What an arm and an instrument leave of a position per axis [m] before anything is known of
 them: arms repeat within 0.02 to 0.1 mm, trackers measure within 0.02 mm."""
-NOISE_TRUST = 8.0
-"""So many rows' worth of belief in that."""
-TRUST = 4.0
-"""So many coordinates' worth of belief in the usual sizes, against what this arm shows."""
 PARTNERS = 0.35
 """Part of a direction from which on an axis is named with it."""
 MOST = 3
 """Axes that name a direction."""
 AXES = ('x', 'y', 'z', 'turn about x', 'turn about y', 'turn about z')
-
-
-@dataclass(frozen=True, eq=False)
-class Prior:
-    """
-    Where coordinates lie before the data.
-
-    Attributes
-    ----------
-    middle, width : array, shape (P,)
-        Counted from the fit; standard deviation.
-    group : array of int, shape (P,)
-        Family, -1 for frames.
-    gears : array of bool, shape (G,)
-        Families that say nothing of others.
-
-    """
-
-    middle: Array
-    width: Array
-    group: Array
-    gears: NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """
-    Whitened rows at the fitted model, in units of its noise.
-
-    ``columns`` (P, rows) are those of the coordinates of a `Prior`, ``residual`` (rows,) is what
-    the model leaves, ``share`` the part of the rows that count as independent.
-    """
-
-    columns: Array
-    residual: Array
-    share: float
 
 
 def allowed(
@@ -119,21 +74,22 @@ def allowed(
     problem, scale = _thinned(problem, _noisy(scale))
     what = _directions(problem, model)
     rows, prior = _rows(problem, model, scale, what), _prior(what, model)
-    width, noise = learned(rows, prior, _expected(problem, scale))
-    system = Conditioning(rows, prior, width, noise)
-    mean, covariance = system.given()
+    models = weighed(rows, prior, _expected(problem, scale))
+    system = Conditioning(rows, prior, models.shown, models.noise)
     unseen = _unseen(problem, model, scale, precision, rows)
-
-    left = leftover(problem, scale, unseen, system.given, floor)
-    ends = what.count - np.cumsum([k.size for k in reversed(what.knots)])[::-1]
+    left = leftover(problem, scale, unseen, system.given, floor, models.rough)
+    curves = np.split(
+        models.open, what.count - np.cumsum([k.size for k in what.knots[::-1]])[::-1]
+    )
+    fine = [float(np.sqrt((heights**2).mean())) for heights in curves[1:]]
     posterior = Posterior(
         what,
-        mean,
-        covariance,
-        plausible_arm.discrepancy(model.robot, left, width[ends], model.found),
+        models.mean,
+        models.covariance,
+        plausible_arm.discrepancy(model.robot, left, np.array(fine), model.found),
         Domain.of(recordings, model.robot),
         left_open(problem, model),
-        prior_std=width,
+        prior_std=models.open,
     )
     return _with_usual_sigma(posterior, model, problem)
 
@@ -207,7 +163,7 @@ def _unseen(problem: Problem, model: Model, scale: Scale, precision: Array, rows
         rows.columns,
         _turns(problem, model, scale),
         rows.residual,
-        posture_blocks(problem),
+        posture_regions(problem),
     )
 
 
@@ -254,54 +210,6 @@ def _prior(what: Directions, model: Model) -> Prior:
         np.concatenate([np.full(frames, -1), group, curves]).astype(int),
         np.concatenate([gears, np.ones(len(sizes), bool)]),
     )
-
-
-def learned(rows: Rows, prior: Prior, expected: float = 1.0) -> tuple[Array, float]:
-    """
-    Return the width of every coordinate as this arm shows it, shape (P,), and the noise.
-
-    Parameters
-    ----------
-    rows, prior : Rows, Prior
-    expected : float
-        Variance of a row before anything is known; the noise returned is a variance too.
-
-    """
-    unit = rows.columns * prior.width[:, None]
-    normal, right = rows.share * unit @ unit.T, rows.share * unit @ rows.residual
-    rss = rows.share * float(rows.residual @ rows.residual)
-    count = rows.share * rows.residual.size
-    middle = prior.middle / prior.width
-    grown, noise = np.ones(prior.gears.size), 1.0
-    tied, trusted = prior.group >= 0, NOISE_TRUST
-    size = np.ones(prior.width.size)
-    for _ in range(ROUNDS):
-        step, spread = _solved(normal / noise, right / noise, middle, size)
-        known = np.clip(1.0 - spread / size**2, 0.0, 1.0)
-        left = rss - 2.0 * right @ step + step @ normal @ step
-        free = max(count - float(known.sum()), 0.0)
-        noise = (max(left, 0.0) + trusted * expected) / (free + trusted)
-        shown = np.bincount(prior.group[tied], (step - middle)[tied] ** 2, grown.size)
-        weight = np.bincount(prior.group[tied], known[tied], grown.size)
-        # A good arm is good in everything, so that families are compared with all together.
-        common, rough = (
-            (shown[part].sum() + TRUST) / (weight[part].sum() + TRUST)
-            for part in (~prior.gears, prior.gears)
-        )
-        # One rough gear makes the others suspect; a smooth one says nothing of them.
-        usual = np.where(prior.gears, max(rough, 1.0), common)
-        grown = np.sqrt((shown + TRUST * usual) / (weight + TRUST))
-        size = np.where(tied, grown[prior.group], 1.0)
-    return prior.width * size, noise
-
-
-def _solved(normal: Array, right: Array, middle: Array, size: Array) -> tuple[Array, Array]:
-    """Return mean and variance of coordinates with a prior about ``middle``, shapes (P,)."""
-    system = _with_prior(normal * np.outer(size, size))
-    found = solved(system, size * (right - normal @ middle))
-    if found is None:
-        raise LinAlgError('the information of the data is not definite')
-    return middle + size * found[0], found[1] * size**2
 
 
 def _with_prior(information: Array) -> Array:

@@ -91,7 +91,7 @@ def alone(problem: Problem, model: Model, shrink: Shrink, *, many: bool = False)
 
 def _left(model: Model) -> tuple[Effect, ...]:
     """Return what a robot file cannot hold of the arm and its cell."""
-    causes = [effect for effect in model.known + model.found if effect.cause]
+    causes = [effect for effect in model.known + model.found if effect.traits.cause]
     return corrected(model.robot, of_the_robot(causes))[1]
 
 
@@ -100,7 +100,7 @@ def _constants(model: Model) -> Model:
     left = {id(effect) for effect in _left(model)}
     held = tuple(
         effect
-        for effect in of_the_robot([e for e in model.known + model.found if e.cause])
+        for effect in of_the_robot([e for e in model.known + model.found if e.traits.cause])
         if id(effect) not in left and isinstance(effect, ChannelError | FrameError)
     )
     return replace(model, known=(), found=held)
@@ -113,7 +113,7 @@ def _freed(constants: Model, *, many: bool) -> Model:
     more = tuple(
         kind(joint)  # type: ignore[call-arg]
         for kind in REGISTRY.values()
-        if kind.set_at_controller
+        if kind.traits.set_at_controller
         for joint in joints_of(kind, robot)
         if (kind.name, joint) not in own
     )
@@ -175,15 +175,15 @@ def _changes(constants: Model, own: Model) -> tuple[Effect, ...]:
     out: list[Effect] = []
     for effect in own.found:
         old = before.get((effect.name, effect.site))
-        step = effect.coordinates() - (0.0 if old is None else old.coordinates())
+        step = effect.fit.coordinates() - (0.0 if old is None else old.fit.coordinates())
         if np.abs(step).max() > 0.0:
-            out.append(effect.with_coordinates(step))
+            out.append(effect.fit.with_coordinates(step))
     frames = {
         'base': frame_offset(own.bases[0], constants.bases[0], left=True),
         'tool': frame_offset(own.robot.T_flange_tool, constants.robot.T_flange_tool, left=False),
     }
     for kind in REGISTRY.values():
-        moved = frames.get(str(kind.fitted_with))
+        moved = frames.get(str(kind.traits.fitted_with))
         if issubclass(kind, FrameError) and moved is not None and np.abs(moved).max() > 0.0:
             out.append(kind(xyz=moved[:3], rotvec=moved[3:]))  # type: ignore[call-arg]
     return tuple(out)

@@ -39,23 +39,27 @@ MOST = 24
 def directions(robot: Robot, found: Sequence[Effect]) -> tuple[Effect, ...]:
     """Return the effects whose coordinates are uncertain, at the values found or at zero."""
     out: list[Effect] = []
-    for kind in [kind for kind in REGISTRY.values() if kind.everywhere]:
+    for kind in [kind for kind in REGISTRY.values() if kind.traits.everywhere]:
         for joint in joints_of(kind, robot):
             here = [e for e in found if (e.name, e.site) == (kind.name, joint)]
-            if kind.waves is None:
+            if kind.traits.waves is None:
                 out += here[:1] or [_none_yet(kind, joint)]
             elif joint is not None and not robot.prismatic[robot.index(joint)]:
                 wave = reduce(_joined, here, _none_yet(kind, joint))
-                out += [wave.with_orders(ORDERS), *_finer(wave)]
+                out += [wave.search.with_orders(ORDERS), *_finer(wave)]
     for effect in found:
-        if effect.waves is None and _counts(effect) and effect.key not in {e.key for e in out}:
+        if (
+            effect.traits.waves is None
+            and _counts(effect)
+            and effect.key not in {e.key for e in out}
+        ):
             out.append(effect)
-    return tuple(e for e in out if e.coordinates().size)
+    return tuple(e for e in out if e.fit.coordinates().size)
 
 
 def _counts(effect: Effect) -> bool:
     """Return whether an effect goes along to other motions: all but how one set-up moved."""
-    return effect.cause or not effect.of_setup
+    return effect.traits.cause or not effect.traits.of_setup
 
 
 def _none_yet(kind: type[Effect], joint: str | None) -> Effect:
@@ -63,13 +67,13 @@ def _none_yet(kind: type[Effect], joint: str | None) -> Effect:
 
 
 def _joined(one: Effect, other: Effect) -> Effect:
-    return one.joined(other) or other
+    return one.search.joined(other) or other
 
 
 def _finer(wave: Effect) -> list[Effect]:
     """Return the part of some waves that the orders of every arm do not have."""
-    other = wave.orders()[~np.isin(wave.orders(), ORDERS)]
-    return [wave.with_orders(other)] if 0 < 2 * other.size <= MOST else []
+    other = wave.search.orders()[~np.isin(wave.search.orders(), ORDERS)]
+    return [wave.search.with_orders(other)] if 0 < 2 * other.size <= MOST else []
 
 
 def middles(effects: Sequence[Effect], found: Sequence[Effect]) -> Array:
@@ -80,14 +84,14 @@ def middles(effects: Sequence[Effect], found: Sequence[Effect]) -> Array:
     and so are the waves of a joint that was fitted with many orders at once: their sizes were
     learned together there, and some of them alone must not be drawn back.
     """
-    dense = {(e.name, e.site) for e in found if e.orders().size > ORDERS.size}
+    dense = {(e.name, e.site) for e in found if e.search.orders().size > ORDERS.size}
     out = [np.zeros(0)]
     for effect in effects:
-        if effect.waves is not None:
-            straight = [(effect.name, effect.site) not in dense] * effect.coordinates().size
+        if effect.traits.waves is not None:
+            straight = [(effect.name, effect.site) not in dense] * effect.fit.coordinates().size
         else:
-            straight = [effect.components()[j][0].linear for j in effect.fitted()]
-        out.append(np.where(straight, -effect.coordinates(), 0.0))
+            straight = [effect.components()[j][0].linear for j in effect.fit.fitted()]
+        out.append(np.where(straight, -effect.fit.coordinates(), 0.0))
     return np.concatenate(out)
 
 
@@ -98,10 +102,10 @@ def groups(effects: Sequence[Effect]) -> tuple[Array, NDArray[np.bool_]]:
     A family is an effect on all joints; but every gear is as uneven as it was cut, and says
     nothing of the others.
     """
-    names = [(e.name, None if e.waves is None else e.site) for e in effects]
-    gears = {name: e.waves is not None for name, e in zip(names, effects, strict=True)}
+    names = [(e.name, None if e.traits.waves is None else e.site) for e in effects]
+    gears = {name: e.traits.waves is not None for name, e in zip(names, effects, strict=True)}
     distinct = list(gears)
-    sizes = [effect.coordinates().size for effect in effects]
+    sizes = [effect.fit.coordinates().size for effect in effects]
     numbers = np.repeat([distinct.index(name) for name in names], sizes).astype(int)
     return numbers, np.array(list(gears.values()), dtype=bool)
 
@@ -112,7 +116,7 @@ def widths(robot: Robot, effects: Sequence[Effect]) -> Array:
     for effect in effects:
         size = spreads(robot, effect)
         # What the table knows nothing of is as far from the fit as that is from nothing.
-        unknown = np.maximum(np.abs(effect.coordinates()), effect.coordinate_scales())
+        unknown = np.maximum(np.abs(effect.fit.coordinates()), effect.fit.coordinate_scales())
         sizes.append(np.where(np.isfinite(size), size, unknown))
     return np.concatenate(sizes)
 
@@ -144,9 +148,9 @@ def discrepancy(robot: Robot, rest: Rest, fine: Array, found: Sequence[Effect]) 
     """
     fine = np.array(fine)
     for effect in found:
-        if effect.off_outside() > 0.0:
+        if effect.twin.off_outside() > 0.0:
             joint = robot.index(str(effect.site))
-            fine[joint] = max(fine[joint], effect.off_outside())
+            fine[joint] = max(fine[joint], effect.twin.off_outside())
     turning = np.where(robot.prismatic, 0.0, 1.0)
     return Discrepancy(
         rest.position, rest.orientation, rest.gear * turning, fine * turning, SPACING

@@ -76,7 +76,7 @@ TURN_TOLD = 1e-3
 
 def parted(case: Case) -> Sequence[Finding]:
     """Return which recordings have a tool of their own, where that explains what is left."""
-    told = any(change.effect.fitted_with == 'tool' for change in case.model.changes)
+    told = any(change.effect.traits.fitted_with == 'tool' for change in case.model.changes)
     if len(case.recordings) < 2 or told:
         return ()
     shot = case.snapshot
@@ -129,7 +129,7 @@ def _words(case: Case, own: Arm) -> str:
     """Return which tools stand elsewhere than the first, and the farthest by how much."""
     far = {}
     for change in own.model.changes:
-        steps = change.effect.coordinates()
+        steps = change.effect.fit.coordinates()
         far[change.recording] = float(np.linalg.norm(steps[:3])), float(np.linalg.norm(steps[3:]))
     # A turn counts by what it does at the reach of a torch.
     sizes = {k: way + TORCH * turn for k, (way, turn) in far.items()}

@@ -348,7 +348,7 @@ def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
         return (mistake(words, 'other', ('base',), remedy),)
     if not isinstance(worst, JointOffset):
         return (_foreign(case.model.robot, worst, ', more than industrial arms are off by'),)
-    joint, value = str(worst.site), np.degrees(worst.plain('offset'))
+    joint, value = str(worst.site), np.degrees(float(worst.number('offset')))
     words = (
         f'The zero of joint {joint!r} lies {value:+.1f} degrees from that of the model, which no '
         'mastering leaves.'
@@ -390,7 +390,7 @@ def _other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Finding, float]
         model = start.with_found(tuple(errors))
         precision = effect_precision(model)
         if spread > 0.0:
-            names = np.concatenate([np.repeat(e.name, e.coordinates().size) for e in errors])
+            names = np.concatenate([np.repeat(e.name, e.fit.coordinates().size) for e in errors])
             precision = np.where(np.isin(names, LENGTHS), spread**-2.0, precision)
         # What an arm can have leaves less: more is no noise that would excuse anything.
         model = bent(problem, model, precision, LARGE)

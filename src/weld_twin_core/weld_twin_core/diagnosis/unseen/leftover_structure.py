@@ -20,7 +20,8 @@ from ...arrays import Array
 from ...twin.features import Features
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
-from .unseen_stretches import Unseen
+from .chance import Candidates, chance_gain
+from .unseen_stretches import RIDGES, Unseen
 
 KNOTS = 8
 """Bumps over a range of angle or time: a bump is as wide as an eighth of it, finer ones would
@@ -44,6 +45,8 @@ class Structure:
         Share of the squared error on unseen stretches that they take away.
     sure : float
         The gain over its standard error between stretches.
+    chance : float
+        Share that the best of them hardly ever takes off noise alone; 0 where rows are many.
 
     """
 
@@ -51,20 +54,26 @@ class Structure:
     gain: float
     sure: float
     depends_on: tuple[str, ...]
+    chance: float = 0.0
 
 
 def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
     """Return what generic columns add to a model on stretches not used for fitting."""
     base = unseen.base(range(len(model.found)))
-    found = [
-        (base.gain(columns), name)
-        for name, columns in _generic(unseen.problem, model, unseen.scale)
-    ]
+    groups = list(_generic(unseen.problem, model, unseen.scale))
+    found = [(base.gain(columns), name) for name, columns in groups]
     found.sort(key=lambda item: -item[0].share)
     best = found[0][0]
     least, certain = beliefs.dependence_gain, beliefs.dependence_sure
     names = tuple(n for one, n in found[:TOLD] if one.share > least and one.steady > certain)
-    return Structure(best.rms_m, best.share, best.steady, names)
+    chance = 0.0
+    if best.share > beliefs.structure_gain and best.steady > beliefs.blatant_sure:
+        each = (columns for _, columns in groups)
+        tried = Candidates(
+            unseen.columns.written_out(), unseen.precision, each, RIDGES, [unseen.labels]
+        )
+        chance = chance_gain(tried, best.share, beliefs.blatant_sure)
+    return Structure(best.rms_m, best.share, best.steady, names, chance)
 
 
 def _generic(problem: Problem, model: Model, scale: Scale) -> Iterator[tuple[str, Array]]:

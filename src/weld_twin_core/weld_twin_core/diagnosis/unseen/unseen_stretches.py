@@ -429,7 +429,7 @@ def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Uns
     model = fit.model
     columns, _ = designed(problem, model, scale)
     frames = columns.count - fit.coordinates.size
-    ends = np.cumsum([frames, *(effect.coordinates().size for effect in model.found)]).tolist()
+    ends = np.cumsum([frames, *(effect.fit.coordinates().size for effect in model.found)]).tolist()
     prior = np.zeros(columns.count)
     prior[:frames], off = frame_prior(problem, model)
     if precision.size:
@@ -475,5 +475,7 @@ def _tether(model: Model) -> Array:
 
     A vibration that only the first stretch excites has no frequency in the others.
     """
-    sizes = [np.maximum(np.abs(e.coordinates()), e.coordinate_scales()) for e in model.found]
+    sizes = [
+        np.maximum(np.abs(e.fit.coordinates()), e.fit.coordinate_scales()) for e in model.found
+    ]
     return 1.0 / (TETHER * np.concatenate([np.zeros(0), *sizes])) ** 2

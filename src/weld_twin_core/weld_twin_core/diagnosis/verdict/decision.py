@@ -68,19 +68,21 @@ class Left:
         gain, sure = self.evidence.structure.gain, self.evidence.structure.sure
         usual = gain > self.beliefs.structure_gain and sure > self.beliefs.structure_sure
         blatant = gain > self.beliefs.blatant_gain and sure > self.beliefs.blatant_sure
-        return usual or blatant
+        return (usual or blatant) and gain > self.evidence.structure.chance
 
     @property
     def high(self) -> bool:
         """Return whether what remains rises above a floor that was measured apart."""
         told = self.evidence
-        return told.independent and told.after > self.beliefs.above * told.floor
+        above = max(self.beliefs.above, told.leverage)
+        return told.independent and told.after > above * told.floor
 
     @property
     def wide(self) -> bool:
         """Return whether what remains is far wider than a floor that only the fit shows."""
         told = self.evidence
-        return not told.independent and told.after > self.beliefs.far_above * told.floor
+        above = max(self.beliefs.far_above, told.leverage)
+        return not told.independent and told.after > above * told.floor
 
     @property
     def above_noise(self) -> bool:

@@ -15,6 +15,8 @@ from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
 from ..many.weighed_families import WeighedFamily, weighed_families
 from ..result import Shrink, Site
+from ..unseen.chance import chance_ratio
+from ..unseen.folds import ways_to_divide
 from ..unseen.leftover_structure import Structure
 from ..unseen.unseen_stretches import Unseen
 
@@ -50,6 +52,9 @@ class Evidence:
         out, it is ``after``.
     chance : float
         Ratio of ``after`` to ``fitted`` that chance alone reaches: few stations vary much.
+    leverage : float
+        Ratio of ``after`` to ``floor`` that noise alone hardly ever exceeds: few stations are taken
+        up in part by the fit.
     believed : tuple of float
         How probable it is of every effect found that its name is right, as the calibration has it;
         of many small errors, of all that are named.
@@ -72,6 +77,7 @@ class Evidence:
     families: tuple[WeighedFamily, ...] | None = None
     least: float | None = None
     chance: float = 1.0
+    leverage: float = 1.0
     believed: tuple[float, ...] = ()
     missed: tuple[tuple[str, str], ...] = ()
 
@@ -119,7 +125,14 @@ def gathered(
         families=weighed_families(found, unseen, beliefs) if found.dense else None,
         least=least,
         chance=chance,
+        leverage=_leverage(unseen, floor),
     )
+
+
+def _leverage(unseen: Unseen, floor: NoiseFloor) -> float:
+    ways = ways_to_divide(unseen.problem)
+    columns = unseen.columns.written_out()
+    return chance_ratio(columns, unseen.precision, ways, known=floor.independent)
 
 
 def _parts(unseen: Unseen) -> tuple[float, ...]:

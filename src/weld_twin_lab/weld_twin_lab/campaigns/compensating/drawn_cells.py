@@ -42,6 +42,9 @@ SECONDS, RATE = 40.0, 50.0
 """Length and rate of what a diagnosis learns from [s, 1/s]."""
 NOISE = (2e-5, 1e-4)
 """Standard deviation of a measured coordinate there [m]: a laser tracker, a good camera."""
+REST = (5e-6, 5e-5)
+"""Size of what joints are off by besides their causes [rad], from arm to arm: a gear of a new robot is
+within 0.03 mrad of even, an encoder within 0.01."""
 TRIES = 200
 """Goals that are drawn for an arm before it is given up: many are out of its reach."""
 
@@ -93,6 +96,22 @@ def drawn_causes(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]
     if not np.any(robot.mass):
         others.pop()
     return [first, second, others[int(rng.integers(len(others)))]]
+
+
+def drawn_rest(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]:
+    """Return what every joint of a real arm is off by besides: no cause worth a name, a curve."""
+    size = float(np.exp(rng.uniform(*np.log(REST))))
+    return [
+        {
+            'effect': 'transmission_ripple',
+            'joint': joint,
+            'amplitude': abs(float(rng.normal(scale=size))),
+            'order': order,
+            'phase': float(rng.uniform(-np.pi, np.pi)),
+        }
+        for joint in robot.joint_names
+        for order in (1.0, 2.0)
+    ]
 
 
 def learned(robot: Robot, causes: list[dict[str, Any]], rng: np.random.Generator) -> Learned:

@@ -15,7 +15,7 @@ from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, POSE_OUT
 
 from ..live.latency_race import Contender, Race
-from ..live.pulse import HOME, ROBOT
+from ..live.pulse import BEAT, HOME, ROBOT
 
 ARM = '/race/arm'
 """Where the arm's joint states are told."""
@@ -32,8 +32,8 @@ CAUSES = (
     {'effect': 'joint_compliance', 'joint': 'shoulder_lift_joint', 'compliance': 4e-6},
 )
 """What the model holds: constants, a gear's error and a spring."""
-SECONDS = 1.0
-"""Length of a turn [s]."""
+SECONDS = BEAT
+"""Length of a turn [s]: there and back, so that the next one begins where this one ended."""
 
 
 def race(turns: int, rate: float, tell: Callable[[str], None]) -> dict[str, Any]:

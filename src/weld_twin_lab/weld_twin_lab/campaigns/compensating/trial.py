@@ -66,10 +66,11 @@ AFTER = 100_000
 
 
 class Known(NamedTuple):
-    """What became of goals, and of changes, so far."""
+    """What became of goals, of changes, and of goals without a cell, so far."""
 
     rows: list[dict[str, Any]]
     changes: list[dict[str, Any]]
+    without: list[dict[str, Any]]
 
 
 class CellTrial:

@@ -12,6 +12,7 @@ import numpy as np
 
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arrays import Array
+from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.goal_correction import GoalLimits, Refusal, Start, corrected_goal
 from weld_twin_core.twin.goal_motion import Goal, course, fine_times
@@ -20,19 +21,27 @@ from weld_twin_core.twin.reversals import approached
 from weld_twin_core.twin.twin import Twin
 from weld_twin_nodes.offline.correcting import program_model
 
-from .drawn_cells import cell_of, drawn_goal, learned, true_effects
+from .drawn_cells import cell_of, drawn_goal, drawn_rest, learned, true_effects
 
 LIMITS = GoalLimits(acceleration=20.0)
 """As a compensator has them that is told nothing else."""
 
 
 def judged(name: str, seed: int, goals: int) -> list[dict[str, Any]]:
-    """Return what becomes of the goals of one arm that stands where each of them begins."""
+    """
+    Return what becomes of the goals of one arm that stands where each of them begins.
+
+    Beside its causes it has what every real arm has: joints that are off by a little anywhere.
+    """
     robot, causes, rng = cell_of(name, seed)
+    causes += drawn_rest(robot, rng)
     with TemporaryDirectory() as place:
         file = Path(place) / 'diagnosis.json'
         file.write_text(learned(robot, causes, rng).text)
-        model = program_model(robot, file)
+        try:
+            model = program_model(robot, file)
+        except TwinError:  # a compensator does not take it either
+            return []
     true = ProgramModel(robot, true_effects(robot, causes))
     rows = []
     for _ in range(goals):
@@ -40,7 +49,7 @@ def judged(name: str, seed: int, goals: int) -> list[dict[str, Any]]:
         start = Start(goal.q[0], False, rng.choice([-1.0, 1.0], robot.n))
         found, best = (corrected_goal(each, goal, LIMITS, start) for each in (model, true))
         before = _off(true, goal, goal, start)
-        row = {'robot': name, 'after': '', 'inside': inside, 'before_m': before}
+        row = {'robot': name, 'arm': seed, 'after': '', 'inside': inside, 'before_m': before}
         row['best_m'] = before if isinstance(best, Refusal) else best.after
         if isinstance(found, Refusal):
             row |= {'verdict': 'refused', 'after_m': before, 'bound_m': None}

@@ -15,17 +15,17 @@ import numpy as np
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.in_process import weld_twin
 
-from .commands import Row, Words, file_case, folder_case
+from .commands import KillRow, Words, file_case, folder_case
 from .services import fleet_case, server_case
 
-Once = Callable[[np.random.Generator], Row]
+Once = Callable[[np.random.Generator], KillRow]
 """Kills once, at a moment drawn, and says what came of it."""
 
 VERDICT, OF = 'name, at, status, gap_m, effects', 'WHERE cells.id = cell_id'
 """What of a diagnosis is compared: not its number, which may differ after a kill."""
 
 
-class Case(NamedTuple):
+class KillCase(NamedTuple):
     """
     Something that is killed.
 
@@ -155,12 +155,12 @@ def _serve(place: Path) -> Once:
 
 
 CASES = (
-    Case('diagnose', _diagnose),
-    Case('plan-measurement', _plan),
-    Case('correct-program', _correct),
-    Case('fleet page', _page),
-    Case('history add', _history),
-    Case('fleet run', _fleet),
-    Case('serve', _serve),
+    KillCase('diagnose', _diagnose),
+    KillCase('plan-measurement', _plan),
+    KillCase('correct-program', _correct),
+    KillCase('fleet page', _page),
+    KillCase('history add', _history),
+    KillCase('fleet run', _fleet),
+    KillCase('serve', _serve),
 )
 """In the order of the table."""

@@ -40,7 +40,7 @@ PERSON: Files = {'notes.txt': b'torch changed on Monday', 'photos/cell.jpg': b'\
 """What lies beside the result, and nobody asked to be changed."""
 
 
-class Row(TypedDict):
+class KillRow(TypedDict):
     """What came of a kill; `lost` and `half` are sentences, empty for none."""
 
     case: str
@@ -123,7 +123,7 @@ def files(folder: Path) -> Files:
 
 def folder_case(
     name: str, place: Path, words: Callable[[int, Path], Words]
-) -> Callable[[np.random.Generator], Row]:
+) -> Callable[[np.random.Generator], KillRow]:
     """
     Return what kills a command that writes a folder, which holds an older result and a person's files.
 
@@ -159,7 +159,7 @@ def _kill_folder(
     after: Files,
     took: tuple[float, int],
     rng: np.random.Generator,
-) -> Row:
+) -> KillRow:
     out = place / 'found'
     there = bool(rng.random() < 0.75)
     while True:
@@ -172,7 +172,7 @@ def _kill_folder(
             break
     person = PERSON if there else {}
     left = files(out)
-    row = Row(
+    row = KillRow(
         case=name,
         how=kill.how + ('' if there else ', into a new folder'),
         lost=_lost(left, person),
@@ -212,7 +212,7 @@ def file_case(
     old: Path,
     words: Callable[[Path], Words],
     told: Callable[[Path], str],
-) -> Callable[[np.random.Generator], Row]:
+) -> Callable[[np.random.Generator], KillRow]:
     """
     Return what kills a command that changes one file, such as a database.
 
@@ -234,7 +234,7 @@ def file_case(
     took = measured(words(new))
     before, after = told(old), told(new)
 
-    def once(rng: np.random.Generator) -> Row:
+    def once(rng: np.random.Generator) -> KillRow:
         folder = place / 'out'
         while True:
             shutil.rmtree(folder, ignore_errors=True)
@@ -246,6 +246,6 @@ def file_case(
         half = '' if told(folder / 'file') in (before, after) else 'neither the old nor the new'
         run_killed(words(folder / 'file'), Kill())
         lost = '' if told(folder / 'file') == after else 'the next run does not make it whole'
-        return Row(case=name, how=kill.how, lost=lost, half=half, mixed=False)
+        return KillRow(case=name, how=kill.how, lost=lost, half=half, mixed=False)
 
     return once

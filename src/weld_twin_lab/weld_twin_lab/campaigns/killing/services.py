@@ -15,7 +15,7 @@ import numpy as np
 
 from ...fleet.fleet_runs import command, rows, timed
 from ...fleet.users import Visitor, started, wait
-from .commands import Row
+from .commands import KillRow
 
 LINES = 3
 """Recordings of the list whose run is killed."""
@@ -27,7 +27,7 @@ RECORDING = r'href="(/recordings/[0-9a-f]{32})"'
 """How the list of recordings refers to one of them."""
 AFTER = 4.0
 """Seconds from the beginning of an upload up to which a server is killed; a diagnosis takes as long."""
-Once = Callable[[np.random.Generator], Row]
+Once = Callable[[np.random.Generator], KillRow]
 
 
 def fleet_case(place: Path, bag: Path, robot: str) -> Once:
@@ -50,7 +50,7 @@ def fleet_case(place: Path, bag: Path, robot: str) -> Once:
     took = timed(listed, whole, '--workers', '2')
     expected = rows(whole)
 
-    def once(rng: np.random.Generator) -> Row:
+    def once(rng: np.random.Generator) -> KillRow:
         database = place / 'killed.db'
         while True:
             for file in place.glob('killed.db*'):
@@ -65,7 +65,7 @@ def fleet_case(place: Path, bag: Path, robot: str) -> Once:
         final = rows(str(database), with_cost=True)
         again = [key for key, row in left.items() if final.get(key) != row]
         gone = {key: row[:-3] for key, row in final.items()} != expected
-        return Row(
+        return KillRow(
             case='fleet run',
             how=f'after {moment:.3f} s',
             lost='rows are lost or written again' if again or gone else '',
@@ -109,7 +109,7 @@ def server_case(place: Path, bag: Path, robot: str) -> Once:
     process.wait()
     first = _results(served, earlier)
 
-    def once(rng: np.random.Generator) -> Row:
+    def once(rng: np.random.Generator) -> KillRow:
         process, person.root = started(served)
         moment = float(rng.uniform(0.0, AFTER))
         dropped: list[str] = []
@@ -136,7 +136,7 @@ def server_case(place: Path, bag: Path, robot: str) -> Once:
         process.kill()
         process.wait()
         how = f'{moment:.3f} s after an upload began'
-        return Row(case='serve', how=how, lost=lost, half=half, mixed=False)
+        return KillRow(case='serve', how=how, lost=lost, half=half, mixed=False)
 
     return once
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 import numpy as np
 from sklearn.ensemble import HistGradientBoostingRegressor
 
-from ..open_form import Answer, Case
+from ..open_form import ContestAnswer, ContestCase
 from .residual import features, nominal, off
 
 
-def answer(case: Case) -> Answer:
+def answer(case: ContestCase) -> ContestAnswer:
     """Return the nominal arm plus what three sets of trees add, with early stopping as advised."""
     measured = case.train.measured
     assert measured is not None, 'a case is measured'
@@ -24,4 +24,4 @@ def answer(case: Case) -> Answer:
         for part in off(case).T
     ]
     where = nominal(case, case.ask.joints, case.times)
-    return Answer(where + np.stack(added, axis=1), unknown=1.0)
+    return ContestAnswer(where + np.stack(added, axis=1), unknown=1.0)

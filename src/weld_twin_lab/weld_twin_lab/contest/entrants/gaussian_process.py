@@ -13,14 +13,14 @@ from sklearn.gaussian_process.kernels import RBF, WhiteKernel
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from ..open_form import Answer, Case
+from ..open_form import ContestAnswer, ContestCase
 from .residual import features, nominal, off
 
 MOST = 300
 """Samples that are kept, spread evenly: the work grows with their cube."""
 
 
-def answer(case: Case) -> Answer:
+def answer(case: ContestCase) -> ContestAnswer:
     """Return the nominal arm plus what the process adds; its scales by likelihood, as advised."""
     measured = case.train.measured
     assert measured is not None, 'a case is measured'
@@ -34,4 +34,4 @@ def answer(case: Case) -> Answer:
         warnings.simplefilter('ignore', ConvergenceWarning)
         process.fit(known, off(case)[rows])
     added = process.predict(features(case.ask.joints, case.times))
-    return Answer(nominal(case, case.ask.joints, case.times) + added, unknown=1.0)
+    return ContestAnswer(nominal(case, case.ask.joints, case.times) + added, unknown=1.0)

@@ -16,7 +16,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import rotation_matrix, transform
 from weld_twin_core.arrays import Array
 
-from ..open_form import Answer, Case
+from ..open_form import ContestAnswer, ContestCase
 
 FAMILY = {'a': 'link_length', 'd': 'link_length', 'alpha': 'link_twist', 'theta': 'joint_offset'}
 """What a library of effects calls an error of each DH value."""
@@ -51,12 +51,12 @@ class Fitted:
     robot: Robot
 
 
-def answer(case: Case) -> Answer:
+def answer(case: ContestCase) -> ContestAnswer:
     """Return the values that are off, by how far they move the tool."""
     return answer_with(case, ALL)
 
 
-def answer_with(case: Case, free: tuple[str, ...]) -> Answer:
+def answer_with(case: ContestCase, free: tuple[str, ...]) -> ContestAnswer:
     """Return what a fit of some of the DH values says."""
     fitted = fit(case, free)
     moved: dict[tuple[str, str | None], float] = defaultdict(float)
@@ -71,10 +71,10 @@ def answer_with(case: Case, free: tuple[str, ...]) -> Answer:
     )
     q, _ = case.ask.joints.at(case.times)
     predicted = forward(fitted.robot, q)[:, :3, 3]
-    return Answer(predicted, causes, none=0.0 if causes else 1.0)
+    return ContestAnswer(predicted, causes, none=0.0 if causes else 1.0)
 
 
-def fit(case: Case, free: tuple[str, ...]) -> Fitted:
+def fit(case: ContestCase, free: tuple[str, ...]) -> Fitted:
     """Return the DH values and frames that fit the measured positions best."""
     measured = case.train.measured
     assert measured is not None, 'a case is measured'

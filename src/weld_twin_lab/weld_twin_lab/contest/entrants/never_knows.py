@@ -6,10 +6,10 @@ from __future__ import annotations
 
 from weld_twin_core.arm.chain import forward
 
-from ..open_form import Answer, Case
+from ..open_form import ContestAnswer, ContestCase
 
 
-def answer(case: Case) -> Answer:
+def answer(case: ContestCase) -> ContestAnswer:
     """Return that the cause is unknown."""
     q, _ = case.ask.joints.at(case.times)
-    return Answer(forward(case.robot, q)[:, :3, 3], unknown=1.0)
+    return ContestAnswer(forward(case.robot, q)[:, :3, 3], unknown=1.0)

@@ -10,16 +10,16 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion
 
-from ..open_form import Case
+from ..open_form import ContestCase
 
 
-def nominal(case: Case, motion: JointMotion, t: Array) -> Array:
+def nominal(case: ContestCase, motion: JointMotion, t: Array) -> Array:
     """Return where the nominal tool is, shape (M, 3) [m]."""
     q, _ = motion.at(t)
     return np.asarray(forward(case.robot, q)[:, :3, 3])
 
 
-def off(case: Case) -> Array:
+def off(case: ContestCase) -> Array:
     """Return measured minus nominal position, shape (M, 3) [m]."""
     measured = case.train.measured
     assert measured is not None, 'a case is measured'

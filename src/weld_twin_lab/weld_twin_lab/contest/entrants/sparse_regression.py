@@ -14,7 +14,7 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion
 
-from ..open_form import Answer, Case
+from ..open_form import ContestAnswer, ContestCase
 from .residual import nominal, off
 
 TERMS = ('joint_offset', 'transmission_ripple', 'transmission_ripple', 'servo_lag', 'backlash')
@@ -27,7 +27,7 @@ STEP = 1e-6
 """Of the differences by which a joint's pull on the tool is found [rad]."""
 
 
-def answer(case: Case) -> Answer:
+def answer(case: ContestCase) -> ContestAnswer:
     """Return the terms that are left, by their share in the error, and what they predict."""
     measured = case.train.measured
     assert measured is not None, 'a case is measured'
@@ -51,10 +51,10 @@ def answer(case: Case) -> Answer:
         ((*at, share / whole),) for at, share in sorted(shares.items(), key=lambda item: -item[1])
     )
     predicted = nominal(case, case.ask.joints, case.times) + (asked @ weights).reshape(-1, 3)
-    return Answer(predicted, causes, none=0.0 if causes else 1.0)
+    return ContestAnswer(predicted, causes, none=0.0 if causes else 1.0)
 
 
-def _columns(case: Case, motion: JointMotion, t: Array) -> Array:
+def _columns(case: ContestCase, motion: JointMotion, t: Array) -> Array:
     """Return how each term would move the tool, shape (3 M, joints x terms) [m]."""
     q, qd = motion.at(t)
     base = forward(case.robot, q)[:, :3, 3]
@@ -75,7 +75,7 @@ def _columns(case: Case, motion: JointMotion, t: Array) -> Array:
     return np.stack(out, axis=1)
 
 
-def _reach(case: Case, motion: JointMotion, t: Array) -> float:
+def _reach(case: ContestCase, motion: JointMotion, t: Array) -> float:
     """Return how far the tool is from the base, RMS [m]: what a small turn is multiplied by."""
     where = nominal(case, motion, t) - case.robot.T_world_base[:3, 3]
     return float(np.sqrt((where**2).sum(axis=1).mean()))

@@ -13,10 +13,10 @@ from weld_twin_msgs_py.files.diagnosis_model import read_model
 from weld_twin_nodes.offline.told_twin import build_twin
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
-from ..open_form import Answer, Case
+from ..open_form import ContestAnswer, ContestCase
 
 
-def answer(case: Case) -> Answer:
+def answer(case: ContestCase) -> ContestAnswer:
     """Return the verdict: every name with its probability, and the prediction of the model."""
     twin = build_twin(case.robot, '' if case.known is None else case.known)
     found = diagnose(
@@ -39,7 +39,7 @@ def answer(case: Case) -> Answer:
     )
     sure = float(verdict['confidence'] or 0.0)
     status = verdict['status']
-    return Answer(
+    return ContestAnswer(
         model.twin(0).poses(case.ask, case.times).position,
         causes,
         unknown=sure if status == 'unknown' else 0.0,

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from ..open_form import Answer, Case
+from ..open_form import ContestAnswer, ContestCase
 from .geometry import answer_with, fit
 
 
-def answer(case: Case) -> Answer:
+def answer(case: ContestCase) -> ContestAnswer:
     """Return the joint whose zero moves the tool most, without a doubt."""
     fitted = fit(case, ('theta',))
     row = int(fitted.effect[: case.robot.n].argmax())
     predicted = answer_with(case, ('theta',)).predicted
-    return Answer(predicted, ((('joint_offset', case.robot.joint_names[row], 1.0),),))
+    return ContestAnswer(predicted, ((('joint_offset', case.robot.joint_names[row], 1.0),),))

@@ -32,6 +32,7 @@ from weld_twin_nodes.cli.options import (
 from weld_twin_nodes.cli.parsing import Adder
 
 if TYPE_CHECKING:
+    from weld_twin_core.arm.robot import Robot
     from weld_twin_core.diagnosis import Diagnosis
     from weld_twin_core.diagnosis.advice import Limits
     from weld_twin_core.recording import Recording
@@ -82,6 +83,9 @@ def _add_setup(parser: argparse.ArgumentParser) -> None:
     )
     text += 'instrument moved; may be given again'
     add('--changed', 'BAG', 'WHAT', text, many=True, rare=True)
+    text = 'what measured: at960, radian, vantage, handyprobe, romer, dial, ..., or its largest '
+    text += 'permissible error in mm, such as 0.015+0.006/m; @3 behind it: 3 m away'
+    add('--instrument', 'NAME', text)
     text = 'describes what the contacts of the bags touched, where they were not imported with it'
     add('--contacts', 'ARTEFACT.yaml', text, rare=True)
     text = 'if data or set-up are wrong and one correction explains it, make it and go on'
@@ -104,6 +108,9 @@ def _add_sheet(parser: argparse.ArgumentParser) -> None:
     add('--uncertainty', 'MM', text, type=float, rare=True)
     text = 'what joints are called: a prefix (A1, A2, ...), or a YAML file of lines "joint: name"'
     add('--joint-names', 'A|J|FILE', text, default='', rare=True)
+    text = 'say how sure the corrected robot is there: a program, a bag, or a box X,Y,Z:X,Y,Z (corners '
+    text += 'in the base frame, mm)'
+    add('--region', 'R', text)
     text = 'whose controller it is, if the name of the robot does not tell'
     add('--controller', text, choices=BRANDS, rare=True)
     add('--pdf', 'print the page to report.pdf, to sign; needs Chromium')
@@ -169,8 +176,10 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
     from weld_twin_core.diagnosis.frames.changes import families_named
     from weld_twin_core.errors import ModelError
     from weld_twin_msgs_py.bags import read_recording
+    from weld_twin_msgs_py.files.instruments import instrument, measured_by
     from weld_twin_nodes.offline.set_up_changes import told
 
+    measures = instrument(args.instrument) if args.instrument else None
     align, excluded = frames_named(args.align, '--align'), _families(args.exclude_effect)
     changing = families_named(args.may_change, '--may-change')
     if changing and len(args.bags) < 2:
@@ -186,10 +195,13 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             recording = read_recording(
                 path, twin.robot, topics, one_clock=False, needs_measurements=True
             )
-            recordings.append(_described(recording, args.contacts))
+            recording = _described(recording, args.contacts)
+            if measures is not None:
+                recording = measured_by(recording, measures, own_frame='base' in align)
+            recordings.append(recording)
         count = len(args.bags)
         fitted, more = told(_bounded(recordings[:count]), changes, twin.robot)
-        return diagnose(
+        found = diagnose(
             fitted,
             twin.robot,
             align=align,
@@ -201,6 +213,24 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             limits=_limits(args),
             progress=tell,
         )
+    return _in_region(found, args.region, twin.robot, fitted[0])
+
+
+def _in_region(
+    found: Diagnosis, told: str | None, robot: Robot, recording: Recording
+) -> Diagnosis:
+    """Return the diagnosis with what to expect in a region that was asked for."""
+    from weld_twin_core.effects.setup_motion import of_the_robot
+    from weld_twin_core.twin.posterior import usual_sigma
+    from weld_twin_core.twin.twin import Twin
+    from weld_twin_nodes.offline.region import region
+
+    if told is None or found.posterior is None:
+        return found
+    judged, _ = region(robot, told)
+    twin = Twin(found.model.twin(0).robot, of_the_robot(found.model.known + found.model.found))
+    sigma = usual_sigma(found.posterior, twin, recording, judged)
+    return replace(found, posterior=replace(found.posterior, region=(told, sigma)))
 
 
 def _changes(args: argparse.Namespace) -> dict[int, SetUpChange]:

@@ -86,7 +86,7 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     add('--spread', 'DEG', text, type=float, rare=True)
     add('--model', 'FILE', 'diagnosis.json: plan what to measure on top of it')
     text = 'where the tool is to be sure, with --model: a program, a bag, or a box X,Y,Z:X,Y,Z (corners '
-    text += 'in the base frame, mm); the whole reach unless told'
+    text += 'in the base frame, mm); the whole reach if left out'
     add('--region', 'R', text)
     add('--out', 'FOLDER', 'where the plan goes, instead of DIR', rare=True)
 

@@ -77,8 +77,8 @@ def _load() -> None:
     from weld_twin_core import diagnosis  # noqa: F401
     from weld_twin_msgs_py import bags, robots  # noqa: F401
 
-    from ..report import diagnosis_files  # noqa: F401
-    from .commands import diagnose  # noqa: F401
+    from .cli.commands import diagnose  # noqa: F401
+    from .report import diagnosis_files  # noqa: F401
 
     gc.freeze()  # the forks share these pages
 

@@ -96,7 +96,10 @@ def test_package_names_the_project_where_it_lies_and_what_changed(package):
         found.urls == []
     )  # the project has no address of its own yet; one that leads nowhere is none
     text = (ROOT / 'src' / package / 'CHANGELOG.rst').read_text()
-    assert changes.get_changelog_from_path(str(ROOT / 'src' / package), package) is not None
+    changelog = changes.get_changelog_from_path(str(ROOT / 'src' / package), package)
+    day = changelog.get_date_of_version(found.version).date().isoformat()  # bloom wants one
+    assert f'## {found.version} ({day})\n' in (ROOT / 'CHANGELOG.md').read_text()
+    assert day == str(yaml.safe_load((ROOT / 'CITATION.cff').read_text())['date-released'])
     assert text.splitlines()[1] == f'Changelog for package {package}'
     assert (
         '(https://www.ros.org/reps/rep-2004.html)'

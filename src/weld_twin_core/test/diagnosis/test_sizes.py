@@ -1,0 +1,49 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How large small errors are, learned from an arm; and those that its data cannot show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, weighed
+
+SMALL = 40
+"""Coordinates of one family."""
+
+
+def arm(seed, truth):
+    """Return rows of an arm whose small errors are given, and one error that a frame hides."""
+    rng = np.random.default_rng(seed)
+    frame, own = rng.normal(size=(1, 300)), rng.normal(size=(SMALL, 300))
+    columns = np.concatenate([frame, own, 0.7 * frame])
+    residual = truth @ columns[1 : 1 + SMALL] + rng.normal(size=300)
+    zero = np.zeros(SMALL + 2)
+    group = np.array([-1, *[0] * SMALL, 0])
+    prior = Prior(zero, np.array([1e3, *[5.0] * (SMALL + 1)]), group, np.array([False]))
+    return weighed(Rows(columns, residual, 1.0), prior, 1.0)
+
+
+def test_an_arm_with_next_to_no_errors_is_known_better_than_by_least_squares():
+    known = arm(1, np.zeros(SMALL))
+    # Least squares know each to one over the root of 300 rows.
+    assert np.sqrt(np.diag(known.covariance))[1 : 1 + SMALL].mean() < 0.5 / np.sqrt(300.0)
+    assert np.abs(known.mean[1:]).max() < 0.1
+
+
+def test_errors_that_are_there_are_not_drawn_back():
+    truth = np.where(np.arange(SMALL) % 8 == 0, 4.0, 0.0)
+    known = arm(2, truth)
+    off = (known.mean[1 : 1 + SMALL] - truth) / np.sqrt(np.diag(known.covariance))[1 : 1 + SMALL]
+    assert np.abs(off).max() < 4.0 and np.sqrt((off**2).mean()) < 1.3
+
+
+def test_what_a_frame_hides_is_as_wide_as_the_family_has_it():
+    sound, rough = (arm(3, truth) for truth in (np.zeros(SMALL), np.full(SMALL, 4.0)))
+    hidden = [float(np.sqrt(each.covariance[-1, -1])) for each in (sound, rough)]
+    # A third of the usual 5 from an arm without errors: four of its kind are believed beside forty seen.
+    assert 0.5 < hidden[0] < 2.5 < hidden[1] < 8.0
+    # Together with the frame it is known, for that is what was measured.
+    both = np.array([1.0, 0.7])
+    pair = rough.covariance[np.ix_([0, -1], [0, -1])]
+    assert np.sqrt(both @ pair @ both) < 0.2

@@ -1,0 +1,288 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Other sets of effects that explain the recordings: the search, without what it took in early.
+
+An effect that enters early may stand for several, and then keeps them out: a base that moved for
+a zero and a spring. No exchange of one effect for another leads away from there. So each effect
+found is forbidden in turn, and the set is completed without it, by products of columns alone:
+these are computed once, and a set costs a small system of equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Array
+from ..algebra.definite import unit_diagonal
+from ..algebra.fit import Fit, design, fit
+from .library import Library
+from .seed_systems import SINGULAR, Choice, SeedSystems, evidence, ranking
+from .selection import Workspace, backward, implausible, merged
+
+BEGUN = 12
+"""Effects that a set is begun with, in turn; bounds the time."""
+COMPLETED = 3
+"""Sets of these, the best with one effect more, that are completed; bounds the time."""
+LONGEST = 6
+"""Effects that a set gains at most: cells have one to six causes."""
+AHEAD = 1.0
+"""Evidence [nats] by which another set must be ahead to be taken: less is rounding."""
+ROUNDS = 4
+"""Sets taken one after the other at most; bounds the time."""
+
+_Site = tuple[str, str | None]
+
+
+class Other(NamedTuple):
+    """
+    A set of effects that does without one that was found.
+
+    Attributes
+    ----------
+    instead_of : tuple of str and (str or None)
+        Family and joint of what it does without.
+    fit : Fit
+    ahead : float
+        By how much evidence [nats] it is ahead of what was found; less than nothing where behind.
+
+    """
+
+    instead_of: _Site
+    fit: Fit
+    ahead: float
+
+    def newcomers(self, now: Fit) -> list[_Site]:
+        """Return what it has that was not found, what entered first before the others."""
+        had = _sites(now)
+        return [site for site in _sites(self.fit) if site not in had]
+
+
+@dataclass(frozen=True, eq=False)
+class Sets:
+    """
+    Sets of a library's units about one fit of the frames, to first order.
+
+    Attributes
+    ----------
+    library : Library
+    normal : array, shape (P, P)
+        Products of the frames' columns.
+    pull : array, shape (P,)
+        Their products with the residual.
+    rss : float
+        Sum of squares of the residual.
+    products : array, shape (K, P + 1)
+        Products of the library's columns with the frames' and with the residual.
+    count : float
+        Number of independent rows.
+    enter_nats : float
+        Evidence [nats] that a unit must be worth.
+
+    """
+
+    library: Library
+    normal: Array
+    pull: Array
+    rss: float
+    products: Array
+    count: float
+    enter_nats: float
+    _cross: dict[int, Array] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def about(cls, work: Workspace, bare: Fit, count: float) -> Sets:
+        """
+        Return the sets about a fit without any effect found.
+
+        Parameters
+        ----------
+        bare : Fit
+        count : float
+            Number of independent rows.
+
+        """
+        own, _ = design(work.problem, bare.model, work.scale)
+        residual = bare.residual
+        products = work.library.products(np.concatenate([own, residual[None]]))
+        return cls(
+            work.library, own @ own.T, own @ residual, bare.rss, products, count,
+            work.beliefs.enter_nats,
+        )  # fmt: skip
+
+    def worth(self, chosen: Sequence[Choice]) -> float:
+        """Return the evidence [nats] of a set against the frames alone; each unit costs its entry."""
+        columns = _columns(chosen)
+        cost = sum(float(np.log(choice.unit.trials)) + self.enter_nats for choice in chosen)
+        gain = _gain(*self._equations(columns)) - self._bare_gain
+        left = self.rss - self._bare_gain
+        return evidence(left, gain, float(len(columns)), self.count) - cost
+
+    @cached_property
+    def _bare_gain(self) -> float:
+        return _gain(self.normal, self.pull)
+
+    def beside(self, chosen: Sequence[Choice]) -> list[Choice]:
+        """Return what every unit is worth beside a set, most evidence first."""
+        columns = _columns(chosen)
+        normal, pull = self._equations(columns)
+        between = [self._cross[c][:, None] for c in columns]
+        products = np.concatenate([self.products[:, :-1], *between, self.products[:, -1:]], axis=1)
+        systems: SeedSystems = self.library.systems.given(normal, pull, self.rss, products)
+        return ranking(systems, self.library.units, self.count)
+
+    def _equations(self, columns: list[int]) -> tuple[Array, Array]:
+        """Return the normal equations of the frames and some columns."""
+        self._know(columns)
+        cross = self.products[columns, :-1]
+        own = np.array([self._cross[c][columns] for c in columns]).reshape(2 * (len(columns),))
+        normal = np.block([[self.normal, cross.T], [cross, own]])
+        return normal, np.concatenate([self.pull, self.products[columns, -1]])
+
+    def _know(self, columns: Sequence[int]) -> None:
+        """Work out the products of some columns with all others, where that was not done."""
+        new = [c for c in dict.fromkeys(columns) if c not in self._cross]
+        if new:
+            rows = self.library.products(np.stack([self.library.column(c) for c in new]))
+            self._cross.update(zip(new, rows.T, strict=True))
+
+    def of(self, wanted: Sequence[_Site]) -> list[Choice]:
+        """Return some units as a set, each with the seed that serves it best beside the others."""
+        chosen: list[Choice] = []
+        left = set(wanted)
+        while best := next((c for c in self.beside(chosen) if c.unit.site in left), None):
+            chosen.append(best)
+            left.remove(best.unit.site)
+        return chosen
+
+    def without(self, start: list[Choice], never: _Site) -> list[Choice]:
+        """Return the best set that begins with another and lacks a unit."""
+        entering = self._entering(start, never)[:BEGUN]
+        self._know(_columns(entering))
+        begun = [[*start, first] for first in entering]
+        more = {_names(one): one for one in (self._grown(one, never, 1) for one in begun)}
+        best = sorted(more.values(), key=self.worth)[-COMPLETED:]
+        return max((self._grown(one, never, LONGEST) for one in best), key=self.worth, default=[])
+
+    def _entering(self, chosen: Sequence[Choice], never: _Site) -> list[Choice]:
+        """Return what earns a place beside a set, most evidence first."""
+        taken = {never, *_names(chosen)}
+        return [
+            c for c in self.beside(chosen) if c.nats > self.enter_nats and c.unit.site not in taken
+        ]
+
+    def _grown(self, chosen: list[Choice], never: _Site, most: int) -> list[Choice]:
+        """Return a set with what else earns a place, one unit after the other."""
+        for _ in range(most):
+            entering = self._entering(chosen, never)
+            if not entering:
+                break
+            chosen = self._pruned([*chosen, entering[0]])
+        return chosen
+
+    def _pruned(self, chosen: list[Choice]) -> list[Choice]:
+        """Return a set without what is not worth its place, the least first."""
+        while chosen:
+            less = [chosen[:k] + chosen[k + 1 :] for k in range(len(chosen))]
+            best = max(less, key=self.worth)
+            if self.worth(chosen) >= self.worth(best):
+                break
+            chosen = best
+        return chosen
+
+
+def reconsidered(
+    work: Workspace, now: Fit, effective: Callable[[Fit], float]
+) -> tuple[Fit, list[Other]]:
+    """
+    Return the best set that doing without one effect at a time leads to, and others near it.
+
+    Parameters
+    ----------
+    now : Fit
+        What the search found.
+    effective : callable
+        Number of independent rows of a fit.
+
+    """
+    for _ in range(ROUNDS):
+        others = _others(work, now, effective)
+        best = max(others, key=lambda other: other.ahead, default=None)
+        if best is None or best.ahead < AHEAD:
+            return now, others
+        now = backward(work, best.fit, effective)
+    return now, []
+
+
+def _others(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> list[Other]:
+    """Return the best set without each effect found, where it is near what was found."""
+    bare = fit(work.problem, now.model.with_found(()), work.scale, None, 4)
+    sets = Sets.about(work, bare, effective(now))
+    chosen, out = sets.of(_sites(now)), []
+    least = sets.worth(chosen) - work.beliefs.rival_nats
+    for site in _sites(now):
+        other = sets.without([c for c in chosen if c.unit.site != site], site)
+        if other and sets.worth(other) > least:
+            own = _fitted(work, now, other)
+            if not implausible(own.model):
+                out.append(Other(site, own, ahead(work, own, now, effective)))
+    return out
+
+
+def _fitted(work: Workspace, now: Fit, chosen: Sequence[Choice]) -> Fit:
+    """Return the fit of a set; what was found before starts at its values."""
+    known = {(effect.name, effect.site): effect for effect in now.model.found}
+    found = tuple(known[site] for site in _names(chosen) if site in known)
+    for choice in chosen:
+        if choice.unit.site not in known:
+            found = merged(found, choice.effect())
+    return fit(work.problem, now.model.with_found(found), work.scale, None, 8)
+
+
+def ahead(work: Workspace, own: Fit, now: Fit, effective: Callable[[Fit], float]) -> float:
+    """
+    Return by how much evidence [nats] one set is ahead of another.
+
+    An effect more costs what it costs to enter: that two errors happen to be one is seldom.
+
+    Parameters
+    ----------
+    own, now : Fit
+        The one and the other, on the workspace's problem and scale.
+    effective : callable
+        Number of independent rows of a fit.
+
+    """
+    trials = {unit.site: float(np.log(unit.trials)) for unit in work.library.units}
+
+    def cost(found: Fit) -> float:
+        return sum(trials.get(site, 0.0) + work.beliefs.enter_nats for site in _sites(found))
+
+    more = float(own.coordinates.size - now.coordinates.size)
+    count = effective(min((now, own), key=lambda f: f.rss))
+    return evidence(now.rss, now.rss - own.rss, more, count) - cost(own) + cost(now)
+
+
+def _columns(chosen: Sequence[Choice]) -> list[int]:
+    return [int(column) for choice in chosen for column in choice.columns]
+
+
+def _names(chosen: Sequence[Choice]) -> tuple[_Site, ...]:
+    return tuple(sorted((c.unit.site for c in chosen), key=str))
+
+
+def _sites(found: Fit) -> list[_Site]:
+    return [(effect.name, effect.site) for effect in found.model.found]
+
+
+def _gain(normal: Array, pull: Array) -> float:
+    """Return by how much the sum of squares falls where columns are fitted."""
+    if not pull.size:
+        return 0.0
+    scaled, size = unit_diagonal(normal, SINGULAR)
+    return float(pull / size @ np.linalg.solve(scaled, pull / size))

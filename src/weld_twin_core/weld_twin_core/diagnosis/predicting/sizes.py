@@ -1,0 +1,251 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How large every small error of this arm is: models weighed by what they say of the recordings.
+
+No arm is exact, but most of what it could have it has next to nothing of. Every coordinate therefore
+has one of a few sizes, and a model is a choice of sizes. Models are drawn as often as the recordings
+vouch for them [1]_: coordinates given the sizes, sizes given the coordinates, in turn. What sizes are
+usual is learned along, family by family and from all families together. What no data could show, for
+it is one with a fitted frame or does nothing in them, is as wide as machines have it, but for what the
+others of its family show: that an arm is good in one thing is no witness of what nobody looked at.
+
+References
+----------
+.. [1] E. I. George, R. E. McCulloch, "Variable selection via Gibbs sampling", Journal of the American
+   Statistical Association 88, 1993.
+
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg.lapack import dpotri
+
+from ...arrays import Array
+
+SIZES = np.array([0.001, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0])
+"""Sizes of an error in units of what machines have: a thousandth is none that an instrument sees."""
+BELIEF = np.array([0.2, 0.15, 0.15, 0.15, 0.15, 0.15, 0.05])
+"""How often each size comes before anything is known of this arm. A judgement: real arms have a third
+of their small errors at a usual size, simulated ones hardly any, and either shows within a few."""
+POOLED, OWN = 3.0, 4.0
+"""So many coordinates' worth of belief in that, and in what all families together show, for each."""
+OPEN = 0.05
+"""Part of what a coordinate does in the data that fitted frames do not do, up to which it is hidden: a
+judgement, for noise leaves nothing to be told by a twentieth."""
+USUAL = 0.3
+"""Size from which on an error is one that machines usually have."""
+SWEEPS, LEARNING, EVERY = 240, 60, 3
+"""Models drawn, those until the chain has forgotten its start, and of the others which are looked at."""
+SEED = 1
+"""Of the draws: the same recordings give the same posterior."""
+NOISE_TRUST = 8.0
+"""So many rows' worth of belief in the noise expected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """
+    Where coordinates lie before the data.
+
+    Attributes
+    ----------
+    middle, width : array, shape (P,)
+        Counted from the fit; standard deviation of a usual one.
+    group : array of int, shape (P,)
+        Family, -1 for frames, which are as wide as they are.
+    gears : array of bool, shape (G,)
+        Families that are a gear's. How even gears are says nothing of an arm's geometry.
+
+    """
+
+    middle: Array
+    width: Array
+    group: NDArray[np.int_]
+    gears: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """
+    Whitened rows at the fitted model, in units of its noise.
+
+    ``columns`` (P, rows) are those of the coordinates of a `Prior`, ``residual`` (rows,) is what
+    the model leaves, ``share`` the part of the rows that count as independent.
+    """
+
+    columns: Array
+    residual: Array
+    share: float
+
+
+class Weighed(NamedTuple):
+    """
+    All models together.
+
+    Attributes
+    ----------
+    mean : array, shape (P,)
+    covariance : array, shape (P, P)
+    shown, open : array, shape (P,)
+        Width of the one prior that stands for all sizes: by precision, as it counts where data show
+        a coordinate, and by variance, as it counts where they do not.
+    noise : float
+        Variance of a row.
+    rough : float
+        Share of the small errors that are of a usual size, among those of the geometry or those of
+        the gears, whichever are rougher.
+
+    """
+
+    mean: Array
+    covariance: Array
+    shown: Array
+    open: Array
+    noise: float
+    rough: float
+
+
+def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
+    """
+    Return the coordinates given rows, over all models.
+
+    Parameters
+    ----------
+    rows : Rows
+        What was measured, as linear equations.
+    prior : Prior
+        What is known of the coordinates before.
+    expected : float
+        Variance of a row before anything is known.
+
+    """
+    chain = _Chain(rows, prior, expected)
+    for sweep in range(SWEEPS):
+        chain.step(look=sweep >= LEARNING and sweep % EVERY == 0)
+    seen, width = chain.seen, prior.width
+    mean = seen.mean / seen.count
+    covariance = seen.square / seen.count - np.outer(mean, mean)
+    covariance = 0.5 * (covariance + covariance.T) * np.outer(width, width)
+    return Weighed(
+        width * mean,
+        covariance,
+        width * np.sqrt(seen.count / seen.precision),
+        width * np.sqrt(seen.variance / seen.count),
+        seen.noise / seen.count,
+        float(seen.usual.max() / seen.count),
+    )
+
+
+def hidden(columns: Array, frames: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """
+    Return which coordinates no data like these could show, shape (P,).
+
+    Parameters
+    ----------
+    columns : array, shape (P, rows)
+    frames : array of bool, shape (P,)
+        Coordinates of fitted frames.
+
+    """
+    basis = np.linalg.svd(columns[frames], full_matrices=False)[2]
+    own = np.linalg.norm(columns, axis=1)
+    left = np.linalg.norm(columns - (columns @ basis.T) @ basis, axis=1)
+    return np.asarray(~frames & (left <= OPEN * own))
+
+
+@dataclass
+class _Seen:
+    """Sums over the models looked at, coordinates in units of their widths."""
+
+    mean: Array
+    square: Array
+    precision: Array
+    variance: Array
+    usual: Array
+    noise: float = 0.0
+    count: int = 0
+
+
+@dataclass
+class _Chain:
+    """One model after the other."""
+
+    rows: Rows
+    prior: Prior
+    expected: float
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(SEED))
+
+    def __post_init__(self) -> None:
+        rows, prior = self.rows, self.prior
+        unit = rows.columns * prior.width[:, None]
+        self.normal, self.right = rows.share * unit @ unit.T, rows.share * unit @ rows.residual
+        self.middle = prior.middle / prior.width
+        self.hidden = hidden(unit, prior.group < 0)
+        self.small = (prior.group >= 0) & ~self.hidden
+        self.size, self.noise = np.where(self.small, SIZES[2], 1.0), self.expected
+        self.belief = np.tile(BELIEF, (prior.gears.size, 1))
+        n = prior.width.size
+        zeros = (np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(2))
+        self.seen = _Seen(*zeros)
+
+    def step(self, *, look: bool) -> None:
+        """Go on to the next model, and take a look at what is known given this one's sizes."""
+        size = self.size
+        system = self.normal * np.outer(size, size) / self.noise
+        # Rounding of the largest entries must not outweigh the prior in open directions.
+        system[np.diag_indices_from(system)] += 1.0 + 1e-14 * float(np.trace(system))
+        lower = cholesky(system, lower=True, check_finite=False)
+        wanted = size * self.right / self.noise + self.middle / size
+        half = solve_triangular(lower, wanted, lower=True, check_finite=False)
+        random = self.rng.standard_normal(size.size)
+        both = np.stack([half, half + random], axis=1)
+        ends = solve_triangular(lower, both, lower=True, trans=1, check_finite=False)
+        mean, drawn = (size[:, None] * ends).T
+        if look:
+            self._look(lower, mean)
+        self._noise(drawn)
+        self._sizes((drawn - self.middle)[self.small])
+
+    def _look(self, lower: Array, mean: Array) -> None:
+        seen, size = self.seen, self.size
+        inverse, _ = dpotri(lower, lower=1)
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        seen.mean += mean
+        seen.square += inverse * np.outer(size, size) + np.outer(mean, mean)
+        seen.precision += size**-2.0
+        seen.variance += size**2
+        usual, gear = size[self.small] >= USUAL, self.prior.gears[self.prior.group[self.small]]
+        seen.usual += [usual[part].mean() if part.any() else 0.0 for part in (gear, ~gear)]
+        seen.noise += self.noise
+        seen.count += 1
+
+    def _noise(self, drawn: Array) -> None:
+        """Draw the variance of a row, given what the coordinates leave."""
+        rows = self.rows
+        rss = rows.share * float(rows.residual @ rows.residual)
+        left = max(rss - 2.0 * self.right @ drawn + drawn @ self.normal @ drawn, 0.0)
+        freedom = rows.share * rows.residual.size + NOISE_TRUST
+        self.noise = float(left + NOISE_TRUST * self.expected) / self.rng.chisquare(freedom)
+
+    def _sizes(self, off: Array) -> None:
+        """Draw the size of every small error, and how often each comes in every family."""
+        group, gears = self.prior.group[self.small], self.prior.gears
+        likely = np.log(self.belief[group]) - np.log(SIZES) - 0.5 * (off[:, None] / SIZES) ** 2
+        chosen = (likely + self.rng.gumbel(size=likely.shape)).argmax(axis=1)
+        self.size[self.small] = SIZES[chosen]
+        counts = np.zeros(self.belief.shape)
+        np.add.at(counts, (group, chosen), 1.0)
+        alike = counts[self.prior.group[self.hidden]] + OWN * BELIEF
+        self.size[self.hidden] = np.sqrt(alike @ SIZES**2 / alike.sum(axis=1))
+        for part in (gears, ~gears):
+            common = counts[part].sum(axis=0) + POOLED * BELIEF
+            drawn = self.rng.standard_gamma(counts[part] + OWN * common / common.sum())
+            drawn = np.maximum(drawn, 1e-300)
+            self.belief[part] = drawn / drawn.sum(axis=1, keepdims=True)

@@ -1,0 +1,113 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What became of every goal: a line in the log, on a topic, and in a file."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from weld_twin_core.twin.goal_correction import CorrectedGoal, Refusal
+from weld_twin_msgs_py.messages.topics import AUDIT
+
+from .cell_node import CellNode
+
+WRITTEN = 1.0
+"""Seconds an ending node gives its disk to take the audit."""
+
+
+class GoalAudit:
+    """
+    Tells of goals for a node, whose parameters ``apply`` and ``audit`` it reads.
+
+    Parameters
+    ----------
+    node : CellNode
+
+    """
+
+    def __init__(self, node: CellNode) -> None:
+        self._node = node
+        self._out = node.offer(AUDIT, awaited=False)
+        self._books = ThreadPoolExecutor(1)
+        self._written: Future[None] | None = None
+
+    def close(self) -> None:
+        """End, when what became of goals is written."""
+        if self._written is not None:
+            wait([self._written], WRITTEN)
+        self._books.shutdown(wait=False, cancel_futures=True)
+
+    def judged(self, model: str | None, found: CorrectedGoal | Refusal, below: str = '') -> None:
+        """Tell of a goal that was worked out; as `settle`."""
+        if isinstance(found, Refusal):
+            self.settle(model, found, 'refused', found.reason, below)
+        else:
+            self.settle(
+                model, found, 'corrected' if found.before else 'nothing to correct', '', below
+            )
+
+    def settle(
+        self,
+        model: str | None,
+        found: CorrectedGoal | Refusal | None,
+        verdict: str,
+        why: str,
+        below: str = '',
+    ) -> None:
+        """
+        Tell what became of a goal.
+
+        Parameters
+        ----------
+        model : str, optional
+            Digest of the model.
+        found : CorrectedGoal or Refusal, optional
+        verdict, why : str
+        below : str
+            What the controller said where it did not take it.
+
+        """
+        largest = None if found is None else found.largest
+        line: dict[str, Any] = {
+            'time': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),
+            'model': model,
+            'applied': self._node.setting('apply'),
+            'verdict': 'rejected by the controller' if below else verdict,
+            'why': below or why,
+            'largest_m': None if largest is None else largest[0],
+            'largest_rad': None if largest is None else largest[1],
+        }
+        if isinstance(found, CorrectedGoal):
+            line |= {
+                'expected_before_m': found.before,
+                'expected_after_m': found.after,
+                'bound_m': found.bound,
+                'waits_s': found.waits,
+                'notes': list(found.notes),
+            }
+        text = json.dumps(line)
+        self._out.publish(AUDIT.message_class()(data=text))
+        told = f'goal {text}'
+        if below or verdict == 'refused':
+            self._node.get_logger().warning(told)
+            self._node.health.say(f'goal {line["verdict"]}: {line["why"]}')
+        else:
+            self._node.get_logger().info(told)
+        self._write(text)
+
+    def _write(self, text: str) -> None:
+        """Add a line to the file beside: poses do not wait for a disk."""
+        path = self._node.setting('audit')
+        if path:
+            self._written = self._books.submit(self._append, path, text)
+
+    def _append(self, path: str, text: str) -> None:
+        try:
+            with Path(path).open('a', encoding='utf-8') as file:
+                file.write(text + '\n')
+        except OSError as error:
+            self._node.warn(path, f"audit '{path}' cannot be written: {error.strerror}")

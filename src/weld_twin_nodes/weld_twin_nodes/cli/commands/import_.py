@@ -35,7 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_bag_output(parser)
     text = 'FILE.csv has joint angles and what was touched; this file describes it'
     add('--contacts', 'ARTEFACT.yaml', text)
-    add('--clamped', 'both ends of the chain hold one bar, and FILE.csv has joint angles alone')
+    text = 'both ends of the chain hold one bar, and FILE.csv has joint angles alone'
+    add('--clamped', text, rare=True)
     text = 'FILE.csv has the joints alone; this one has what the instrument measured'
     add('--measured', 'FILE', text)
     text = 'added to the stamps of --measured'

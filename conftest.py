@@ -29,16 +29,26 @@ def pytest_collection_finish():
 
 
 CELLS = 'cells'
+WHOLE = ('contacts', 'diagnosis', 'report', 'soundness')
+"""Folders whose tests make whole diagnoses, or open pages."""
 
 
 def pytest_collection_modifyitems(items):
     """
     Put the tests that start nodes first, which wait more than they work; then files with slow ones.
 
-    So that nothing that takes long is begun last. The folders come as pyproject.toml lists them.
+    Then whole diagnoses, so that nothing that takes long is begun last. The folders come as
+    pyproject.toml lists them.
     """
-    slow = {item.path for item in items if item.get_closest_marker('slow')}
-    items.sort(key=lambda item: (item.get_closest_marker(CELLS) is None, item.path not in slow))
+    first = {item.path for item in items if item.get_closest_marker('slow')}
+    whole = {item.path for item in items if item.path.parent.name in WHOLE}
+    items.sort(
+        key=lambda item: (
+            item.get_closest_marker(CELLS) is None,
+            item.path not in first,
+            item.path not in whole,
+        )
+    )
 
 
 FIRST_LINE = ('/recording/', '/install/')
@@ -50,6 +60,8 @@ after the other and would else end last; 5 is a third of the weight."""
 
 SOLVED = 'test/diagnosis: solved('
 """Folder, and what its files call for a diagnosis that is made once in a process."""
+HOUSE = 'test/house'
+"""Folder whose tests read all sources, each once in a process."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -74,7 +86,7 @@ def pytest_xdist_make_scheduler(config, log):
     Files with the mark `cells` stand in two lines, those that record or install and the others, so
     that no more than two cells of nodes compete for the processor. Any other file goes to the next
     process that is free, and stays whole, so that its fixtures are made once; files that ask
-    `SOLVED` for the same diagnoses stay together.
+    `SOLVED` for the same diagnoses stay together, and so do those of the `HOUSE`.
     """
     from xdist.scheduler import LoadScopeScheduling
 
@@ -83,6 +95,8 @@ def pytest_xdist_make_scheduler(config, log):
         def _split_scope(self, nodeid):
             file = nodeid.partition('::')[0]
             text = (config.rootpath / file).read_text(encoding='utf-8')
+            if file.startswith(HOUSE):
+                return HOUSE
             if f'mark.{CELLS}' not in text:
                 folder, call = SOLVED.split(': ')
                 return SOLVED if file.startswith(folder) and call in text else file

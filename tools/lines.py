@@ -48,7 +48,8 @@ def main() -> int:
             for room, n in sorted(rooms.items(), key=lambda item: -item[1]):
                 print(f'{n:8,}  {room}')
         print(f'{sum(rooms.values()):8,}  {part}')
-    print(f'{sum(n for (_, room), n in lines.items() if room.endswith("/cli")):8,}  of these cli/')
+    commands = [n for (of, room), n in lines.items() if of == 'product' and room.endswith('/cli')]
+    print(f'{sum(commands):8,}  cli/, of the product')
     return 0
 
 

@@ -1,5 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
+from pathlib import Path
+
 from setuptools import find_packages, setup
 
 NAME = 'weld_twin_lab'
@@ -27,9 +29,12 @@ setup(
         'matplotlib>=3.7,<4',
     ],
     extras_require={'test': ['pytest']},
+    python_requires='>=3.10',
     zip_safe=False,
     maintainer='weld_twin contributors',
     maintainer_email='maintainers@example.org',
     description='Proof of the welding robot digital twin: blind check, plant, benchmarks, campaigns.',
     license='Apache-2.0',
+    long_description=(Path(__file__).resolve().parent / 'README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
 )

@@ -1,5 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
+from pathlib import Path
+
 from setuptools import find_packages, setup
 
 NAME = 'weld_twin_msgs_py'
@@ -27,11 +29,14 @@ setup(
         'lz4>=4,<5',
     ],
     extras_require={'test': ['pytest']},
+    python_requires='>=3.10',
     zip_safe=False,
     maintainer='weld_twin contributors',
     maintainer_email='maintainers@example.org',
     description='Messages, bags, robot files and tables in and out of arrays.',
     license='Apache-2.0',
+    long_description=(Path(__file__).resolve().parent / 'README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
     entry_points={
         'ament_copyright.license': [
             'apache2_short = weld_twin_msgs_py.files.short_licence:APACHE_2'

@@ -1,6 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
@@ -32,11 +33,14 @@ setup(
         'matplotlib>=3.7,<4',
     ],
     extras_require={'cluster': ['distributed'], 'test': ['pytest']},
+    python_requires='>=3.10',
     zip_safe=False,
     maintainer='weld_twin contributors',
     maintainer_email='maintainers@example.org',
     description='Nodes and command line of the welding robot digital twin.',
     license='Apache-2.0',
+    long_description=(Path(__file__).resolve().parent / 'README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
     entry_points={
         'console_scripts': [
             'weld-twin = weld_twin_nodes.cli:main',

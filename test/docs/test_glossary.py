@@ -23,8 +23,8 @@ ORDINARY = (
     'a acceleration against all and apart are as at by can cannot cause controller data direction do '
     'does each effect enter far found from good how if in is it itself joint larger left lies looked '
     'made may measure much motion next of off on only other pass path position recording robot s '
-    'speed spot take tell the them then these this to ur use value we weld were what where which why '
-    'with worst wrong'
+    'speed spot take tell that the them then these this to ur use value we weld were what where which '
+    'why with worst wrong'
 )
 """Words that any reader has, in the questions and heads of the page."""
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Mapping
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -22,11 +23,18 @@ def module_files(root: Path) -> dict[str, Path]:
     return files
 
 
-def imported_names(module: str, file: Path) -> set[str]:
-    """Return the full name of all that a file imports, wherever in the file it stands."""
+@cache
+def parsed(file: Path) -> ast.Module:
+    """Return the tree of a file; all tests of this folder share it."""
+    return ast.parse(file.read_text(encoding='utf-8'))
+
+
+@cache
+def imported_names(module: str, file: Path, *, at_once: bool = False) -> frozenset[str]:
+    """Return the full name of all that a file imports, anywhere in it or as it is imported."""
     package = module if file.name == '__init__.py' else module.rpartition('.')[0]
-    found = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding='utf-8'))):
+    found: set[str] = set()
+    for node in parsed(file).body if at_once else ast.walk(parsed(file)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -34,7 +42,7 @@ def imported_names(module: str, file: Path) -> set[str]:
             base = '.'.join([*(above if node.level else []), *filter(None, [node.module])])
             # `from package import module` runs the package as well
             found |= {base} | {f'{base}.{alias.name}' for alias in node.names}
-    return found
+    return frozenset(found)
 
 
 def import_graph(files: Mapping[str, Path]) -> dict[str, set[str]]:

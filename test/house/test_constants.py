@@ -5,7 +5,7 @@
 import ast
 from itertools import zip_longest
 
-from import_graph import ROOT, module_files
+from import_graph import ROOT, module_files, parsed
 
 UNITS = {'NANOSECOND', 'NANOSECONDS', 'DEGREE', 'PLACES'}
 """Constants whose name says it all."""
@@ -22,9 +22,8 @@ def is_number(value):
     return numbers and not named and not texts
 
 
-def untold(source):
+def untold(body):
     """Return the names of the numbers at the top of a source that no sentence follows."""
-    body = ast.parse(source).body
     out = []
     for node, after in zip_longest(body, body[1:]):
         targets = node.targets if isinstance(node, ast.Assign) else []
@@ -39,10 +38,10 @@ def untold(source):
 
 def test_an_untold_number_is_found():
     source = 'A = 1.0\nB = 2\n"""Two."""\nC, D = 3, np.pi\nE = "x"\nF: float = -1e-3\ng = 5\n'
-    assert untold(source) == ['A', 'C', 'D', 'F']
+    assert untold(ast.parse(source).body) == ['A', 'C', 'D', 'F']
 
 
 def test_every_number_says_what_it_means():
     files = module_files(ROOT / 'src')
-    named = {name: untold(file.read_text(encoding='utf-8')) for name, file in files.items()}
+    named = {name: untold(parsed(file).body) for name, file in files.items()}
     assert {name: found for name, found in named.items() if found} == {}

@@ -59,7 +59,7 @@ def test_who_says_nothing_or_half_or_stalls_keeps_nobody_out(server):
     stalled = connections(server, 24, HEAD)
     began = time.monotonic()
     assert server.get('/')[0] == 200
-    assert time.monotonic() - began < 2.0
+    assert not all(map(is_closed, held))  # nobody had to go before the page came
     person = Person(server)
     person.get()
     status, address, _ = person.drop(files=[('a.csv', TABLE)])

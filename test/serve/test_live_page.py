@@ -40,7 +40,7 @@ def test_the_last_verdict_of_the_nodes_is_shown(tmp_path):
             status = DiagnosticStatus(
                 message=SENTENCE, values=[KeyValue(key='status', value='identified')]
             )
-            until = time.monotonic() + 20.0
+            until = time.monotonic() + 60.0
             text = ''
             while 'elbow_joint' not in text and time.monotonic() < until:
                 publisher.publish(DiagnosticArray(status=[status]))

@@ -55,14 +55,6 @@ def tracked(real, reflector=(0.0, 0.0, 0.0), seed=2):
     )
 
 
-def test_rough_touches_count_by_what_they_are_worth_beside_a_tracker(robot, real):
-    found = touches(*aligned([tracked(real), touched(real)], robot, 'base', ()))
-
-    instrument, *pins = found.problem.loose
-    assert instrument == 1.0
-    np.testing.assert_allclose(pins, SLACK / TRACKER, rtol=0.35)
-
-
 def test_pins_and_a_tracker_name_the_elbow_together_whatever_carried_the_reflector(robot, real):
     beside = (0.0, 0.05, -0.02)
     diagnosis = wt.diagnose(
@@ -84,7 +76,7 @@ def test_pins_and_a_tracker_name_the_elbow_together_whatever_carried_the_reflect
     np.testing.assert_allclose(change.effect.xyz, beside, atol=3e-4)
 
 
-def test_a_posture_in_the_wrong_place_is_told_beside_a_tracker_too(robot, real):
+def test_rough_touches_count_by_what_they_are_worth_and_one_in_a_wrong_place_is_told(robot, real):
     pins = touched(real)
     labels = list(pins.contacts.labels)
     labels[2] = 'left'
@@ -95,3 +87,6 @@ def test_a_posture_in_the_wrong_place_is_told_beside_a_tracker_too(robot, real):
     (told,) = found.told
     assert told.sentence.startswith("Posture 1 of 'left' rests in 'low'")
     assert sum(found.problem.samples) == STATIONS + 3 * EACH - 1
+    instrument, *pins = found.problem.loose
+    assert instrument == 1.0
+    np.testing.assert_allclose(pins, SLACK / TRACKER, rtol=0.35)

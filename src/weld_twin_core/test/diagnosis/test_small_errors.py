@@ -186,7 +186,7 @@ def test_one_wrong_scale_is_not_ten_wrong_links(robot):
 def test_a_sound_arm_at_fifteen_stations_has_no_cause(robot):
     """Dozens of errors whose sizes know what was left out predict pure noise there."""
     together, told = 0, []
-    for seed in range(10):
+    for seed in range(6):
         rng = np.random.default_rng(seed)
         q = rng.uniform(-1.2, 1.2, (15, 6)) + MIDDLE
         motion = wt.JointMotion(np.arange(15.0), q, static=True)
@@ -201,4 +201,4 @@ def test_a_sound_arm_at_fifteen_stations_has_no_cause(robot):
         told += found.effects
         together += bool(found.families)
     assert not told
-    assert together <= 2
+    assert together <= 1

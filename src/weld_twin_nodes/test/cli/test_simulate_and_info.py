@@ -51,19 +51,8 @@ def test_a_joint_offset_moves_the_tool_as_the_arm_turned_by_it(
 ):
     out = tmp_path / 'bag'
     result = weld_twin(
-        'simulate',
-        '--robot',
-        'ur5',
-        '--effects',
-        effects,
-        '--rate',
-        40,
-        '--path',
-        'weave',
-        '--profile',
-        profile,
-        '--out',
-        out,
+        *('simulate', '--robot', 'ur5', '--effects', effects, '--rate', 40, '--path', 'weave'),
+        *('--profile', profile, '--out', out),
     )
     assert result.code == 0, result.err
     recording = read_recording(out, ROBOT)
@@ -82,17 +71,8 @@ def test_a_joint_offset_moves_the_tool_as_the_arm_turned_by_it(
 def test_a_model_that_knows_the_effects_leaves_no_deviation(weld_twin, tmp_path, effects):
     out = tmp_path / 'bag'
     weld_twin(
-        'simulate',
-        '--robot',
-        'ur5',
-        '--effects',
-        effects,
-        '--model',
-        effects,
-        '--profile',
-        'aggressive',
-        '--out',
-        out,
+        *('simulate', '--robot', 'ur5', '--effects', effects, '--model', effects),
+        *('--profile', 'aggressive', '--out', out),
     )
     assert from_messages.metrics(rows(out, '/deviation/metrics')[-1])['max'] < 1e-12
 

@@ -64,6 +64,11 @@ def filled(duration=60.0, effects=(OFFSET,), seconds=12.0):
     return window
 
 
+@pytest.fixture(scope='module')
+def recording():
+    return filled().recording(least=3.0)
+
+
 def test_the_window_holds_its_duration_and_no_more():
     recording = filled(duration=4.0).recording(least=3.0)
     assert recording.joints.t[-1] - recording.joints.t[0] == pytest.approx(4.0, abs=0.03)
@@ -112,8 +117,7 @@ def test_a_job_runs_elsewhere_while_the_caller_goes_on():
     assert worker.take() is None
 
 
-def test_a_job_that_cannot_be_done_answers_with_a_sentence():
-    recording = filled().recording(least=3.0)
+def test_a_job_that_cannot_be_done_answers_with_a_sentence(recording):
     worker = Worker()
     worker.start(Job(recording.with_measured(None), load('ur5')))
     while worker.busy:
@@ -210,9 +214,9 @@ def test_what_the_other_process_says_of_its_end_is_told():
     assert "'str' object has no attribute" in said[0]
 
 
-def test_a_job_under_way_can_be_ended():
+def test_a_job_under_way_can_be_ended(recording):
     worker = Worker()
-    worker.start(Job(filled().recording(least=3.0), load('ur5')))
+    worker.start(Job(recording, load('ur5')))
     worker.stop()
     assert not worker.busy
 
@@ -235,13 +239,11 @@ def test_the_node_is_quiet_until_it_has_evidence_and_then_tells_its_end_too(tmp_
         assert [m.status[0].message for m in said.messages] == ['A gap.', 'No gap.']
 
 
-def test_unsound_data_are_an_error_on_both_topics_until_they_are_mended(tmp_path):
+def test_unsound_data_are_an_error_on_both_topics_until_they_are_mended(recording, tmp_path):
     pytest.importorskip('rclpy', reason='needs ROS 2')
     from weld_twin_nodes.harness import Cell
     from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
 
-    window = filled()
-    recording = window.recording(least=3.0)
     q = np.array(recording.joints.q)
     q[:, [3, 5]] = q[:, [5, 3]]
     swapped = replace(recording, joints=replace(recording.joints, q=q))

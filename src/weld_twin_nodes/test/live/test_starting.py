@@ -46,19 +46,31 @@ def test_a_node_loads_nothing_that_it_needs_for_a_diagnosis_alone(name):
     assert said.stdout == '[]\n'
 
 
-def test_a_mistyped_parameter_is_refused_with_the_one_that_was_meant():
-    result = started('forward_kinematics_twin', '--ros-args', '-p', 'rbot:=ur5')
-    assert result.returncode == 2
-    assert result.stderr.strip() == (
-        "weld_twin: no parameter is called 'rbot'; did you mean 'robot'?"
-    )
-
-
-def test_effects_without_quotes_are_refused_with_the_form_that_is_meant():
-    words = 'effects:=[{effect: backlash, joint: elbow_joint, width: 5e-4}]'
-    result = started('error_injector', '--ros-args', '-p', words)
-    assert result.returncode == 2
-    assert 'in two kinds of quotes' in result.stderr
+@pytest.mark.parametrize(
+    ('name', 'word', 'sentence'),
+    [
+        (
+            'forward_kinematics_twin',
+            'rbot:=ur5',
+            "weld_twin: no parameter is called 'rbot'; did you mean 'robot'?\n",
+        ),
+        (
+            'error_injector',
+            'effects:=[{effect: backlash, joint: elbow_joint, width: 5e-4}]',
+            'in two kinds of quotes',
+        ),
+        (
+            'forward_kinematics_twin',
+            'base_from_tf:=true',
+            'needs the names measuring_frame and base_frame\n',
+        ),
+    ],
+)
+def test_a_parameter_that_cannot_be_is_refused_in_a_sentence(name, word, sentence, capsys):
+    assert import_module(MODULES[name]).main(['--ros-args', '-p', word]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith('weld_twin: ') and sentence in said
+    assert said.count('\n') == 1
 
 
 def test_a_node_that_must_be_secured_and_cannot_does_not_run_open(tmp_path):
@@ -87,12 +99,6 @@ def test_a_base_that_is_to_come_from_tf_needs_its_messages():
     assert result.returncode == 2
     assert 'base_from_tf cannot be done: /tf is not listened to: ' in result.stderr
     assert 'install the package tf2_msgs' in result.stderr
-
-
-def test_a_base_from_tf_needs_both_names():
-    result = started('forward_kinematics_twin', '--ros-args', '-p', 'base_from_tf:=true')
-    assert result.returncode == 2
-    assert 'needs the names measuring_frame and base_frame' in result.stderr
 
 
 def test_a_parameter_of_another_node_may_be_in_a_file_for_all(cell, tmp_path):

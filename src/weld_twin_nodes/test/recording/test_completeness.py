@@ -71,8 +71,9 @@ def listened(cell, topic, count=1):
 def heard_of(cell, recorder_process):
     """Wait until every node has told of itself to the recorder at least once."""
     assert recorder_process.code is None
-    begin = time.monotonic()
-    cell.wait(lambda: time.monotonic() > begin + 1.5, 'the health of the nodes')
+    others = set(cell.node.get_node_names()) - {cell.node.get_name(), 'recorder'}
+    health = HealthListener(cell.node)
+    cell.wait(lambda: all(map(health.of, others)), f'the health of {others}')
 
 
 def finish(cell, process):

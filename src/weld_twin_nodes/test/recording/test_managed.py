@@ -138,18 +138,18 @@ def test_a_recorder_serves_all_else_while_it_waits_for_a_node_that_stands_still(
     twin.signal(signal.SIGSTOP)
     try:
         answer = recorder.begin('deactivate')
-        begun, longest = time.monotonic(), 0.0
+        begun, served = time.monotonic(), 0
         while not answer.done():
-            asked = time.monotonic()
             state = recorder.state
-            longest = max(longest, time.monotonic() - asked)
+            served += state == 'deactivating'
             assert state == 'deactivating' or answer.done()
             assert not recorder.change('activate') or answer.done()
             time.sleep(0.3)
     finally:
         twin.signal(signal.SIGCONT)
     assert answer.result().success
-    assert time.monotonic() - begun > 2.0 > longest
+    assert time.monotonic() - begun > 2.0
+    assert served > 1  # who serves nothing meanwhile answers when it is over
     assert recorder.state == 'inactive'
     assert 'activate is refused: the node is deactivating' in cell.processes[1].log
 

@@ -189,14 +189,8 @@ def diagnosed(folder, robot, weld_twin):
         'import', folder / 'pixels.csv', '--robot', robot, *described, '--out', folder / 'bag'
     ).out
     weld_twin(
-        'diagnose',
-        folder / 'bag',
-        '--robot',
-        robot,
-        '--align',
-        'base,tool',
-        '--out',
-        folder / 'out',
+        *('diagnose', folder / 'bag', '--robot', robot, '--align', 'base,tool'),
+        *('--out', folder / 'out'),
     )
     return said, json.loads((folder / 'out' / 'diagnosis.json').read_text())
 

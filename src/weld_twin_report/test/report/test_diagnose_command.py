@@ -48,21 +48,8 @@ def cell(tmp_path_factory):
     )
     for name, path, seed in (('first', 'line', 1), ('second', 'arc', 2)):
         code = run(
-            'simulate',
-            '--robot',
-            'ur5',
-            '--effects',
-            folder / 'true.yaml',
-            '--path',
-            path,
-            '--profile',
-            'aggressive',
-            '--rate',
-            60,
-            '--seed',
-            seed,
-            '--out',
-            folder / name,
+            *('simulate', '--robot', 'ur5', '--effects', folder / 'true.yaml', '--path', path),
+            *('--profile', 'aggressive', '--rate', 60, '--seed', seed, '--out', folder / name),
         )
         assert code == 0
     return folder
@@ -116,14 +103,8 @@ def test_the_verdict_is_printed(said, found):
 
 def test_what_is_known_is_in_the_twin_from_the_start(cell, tmp_path):
     run(
-        'diagnose',
-        cell / 'first',
-        '--robot',
-        'ur5',
-        '--effects-known',
-        cell / 'true.yaml',
-        '--out',
-        tmp_path / 'rest',
+        *('diagnose', cell / 'first', '--robot', 'ur5', '--effects-known', cell / 'true.yaml'),
+        *('--out', tmp_path / 'rest'),
     )
     data = json.loads((tmp_path / 'rest' / 'diagnosis.json').read_text())
     assert data['gap']['rms_m'] < 1.1 * np.sqrt(3) * 2e-5
@@ -136,14 +117,8 @@ def test_what_is_known_is_in_the_twin_from_the_start(cell, tmp_path):
 
 def test_an_excluded_family_is_never_named(cell, tmp_path):
     run(
-        'diagnose',
-        cell / 'first',
-        '--robot',
-        'ur5',
-        '--exclude-effect',
-        'backlash',
-        '--out',
-        tmp_path / 'd',
+        *('diagnose', cell / 'first', '--robot', 'ur5', '--exclude-effect', 'backlash'),
+        *('--out', tmp_path / 'd'),
     )
     data = json.loads((tmp_path / 'd' / 'diagnosis.json').read_text())
     named = {e['effect'] for e in data['verdict']['effects'] + data['candidates']}
@@ -279,14 +254,8 @@ def test_exports_carry_the_correction_and_leave_the_rest_as_effects(offset_model
     ):
         assert (
             run(
-                'export',
-                offset_model,
-                '--robot',
-                'ur5',
-                '--format',
-                form,
-                '--out',
-                tmp_path / name,
+                *('export', offset_model, '--robot', 'ur5', '--format', form),
+                *('--out', tmp_path / name),
             )
             == 0
         )

@@ -19,6 +19,7 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_nodes.cli import main
+from weld_twin_nodes.cli.in_process import weld_twin
 
 OFFSET = 2e-3
 MODEL_FILES = ('effects.yaml', 'robot.yaml', 'robot.urdf', 'joint_offsets.csv')
@@ -72,13 +73,20 @@ def content(place):
     return json.loads((place / 'diagnosis.json').read_text())
 
 
-def test_a_mistake_is_the_whole_answer_and_leaves_no_model(bags, found, tmp_path, capsys):
-    out = tmp_path / 'd'
+@pytest.fixture(scope='module')
+def unsound(bags, found):
+    """What is left of a diagnosis, and said, after one of a recording with two joints swapped."""
+    out = bags / 'unsound'
     shutil.copytree(found, out)
     assert all((out / name).exists() for name in MODEL_FILES)
-    capsys.readouterr()
-    assert run('diagnose', bags / 'swapped', '--robot', 'ur5', '--out', out) == 3
-    first = capsys.readouterr().out.split('\n\n')[0]
+    said = weld_twin('diagnose', bags / 'swapped', '--robot', 'ur5', '--out', out)
+    assert said.code == 3
+    return out, said.out
+
+
+def test_a_mistake_is_the_whole_answer_and_leaves_no_model(unsound):
+    out, told = unsound
+    first = told.split('\n\n')[0]
     assert first.startswith('Unsound data') and 'swapped' in first
     ours = ['.weld_twin_files.json', 'diagnosis.json', 'report.html']
     assert sorted(path.name for path in out.iterdir()) == ours
@@ -134,11 +142,9 @@ def test_a_sound_recording_says_that_nothing_is_wrong(found):
     assert content(found)['unsound'] == []
 
 
-def test_nothing_is_predicted_from_unsound_data(bags, tmp_path, capsys):
-    out = tmp_path / 'd'
-    assert run('diagnose', bags / 'swapped', '--robot', 'ur5', '--out', out) == 3
-    capsys.readouterr()
-    words = ('simulate', bags / 'sound', '--robot', 'ur5', '--model', out / 'diagnosis.json')
+def test_nothing_is_predicted_from_unsound_data(bags, unsound, tmp_path, capsys):
+    model = unsound[0] / 'diagnosis.json'
+    words = ('simulate', bags / 'sound', '--robot', 'ur5', '--model', model)
     assert run(*words, '--out', tmp_path / 'p') == 2
     err = capsys.readouterr().err
     assert 'its data were unsound' in err and 'swapped' in err and err.count('\n') == 1

@@ -89,7 +89,7 @@ def _card(answer: Answer, told: CauseAnswer, rank: int) -> Html:
     off = told.off_by
     more = [f'and {len(off) - _VALUES} more'] if len(off) > _VALUES else []
     entries: list[tuple[str, Child]] = [
-        ('What is wrong', lines(told.meaning)),
+        ('What that is', lines(told.meaning)),
         ('How sure', _sure(told)),
         ('By how much', lines([*off[:_VALUES], *more])),
         ('Stands on', told.stands_on),

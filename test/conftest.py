@@ -1,0 +1,20 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Make the helper modules of these folders, and the small cells of the core, importable."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from weld_twin_core.arm import catalog
+
+HERE = Path(__file__).parent
+FOLDERS = ('diagnosis', 'house', 'serve', 'soundness')
+sys.path[:0] = [str(HERE / folder) for folder in FOLDERS]
+sys.path.insert(0, str(HERE.parent / 'src/weld_twin_core/test/soundness'))
+
+
+@pytest.fixture
+def ur5():
+    return catalog.load('ur5')

@@ -223,7 +223,7 @@ def _sightings(eyes: tuple[Eye, Eye], board: Motion, rng: np.random.Generator) -
     cameras, rows = [], []
     for c, eye in enumerate(eyes):
         off = np.random.default_rng([c, int(eye.centre[0] * 1e3)]).normal(size=5)
-        bent = [eye.bent[0] + LENS_OFF[2] * off[4], *eye.bent[1:]]
+        bent = np.array([eye.bent[0] + LENS_OFF[2] * off[4], *eye.bent[1:]])
         focal = eye.focal * (1.0 + LENS_OFF[0] * off[0])
         lens = Lens(focal, eye.centre + LENS_OFF[1] * eye.focal * off[1:3], bent)
         cameras.append(Camera(f'camera {c + 1}', lens, 'world', eye.size))

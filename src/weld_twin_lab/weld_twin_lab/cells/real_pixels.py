@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
@@ -75,7 +76,7 @@ def _tracked(path: Path) -> Array:
     return np.array(texts, dtype=float)
 
 
-def _of(bare: Recording, place: Array, rows: Array) -> Recording:
+def _of(bare: Recording, place: Array, rows: NDArray[np.intp]) -> Recording:
     kept = rows[np.isfinite(place[rows]).all(axis=1)]
     return replace(bare, measured=Measurements(bare.joints.t[kept], place[kept]))
 

@@ -83,8 +83,9 @@ def read_contacts(
     Parameters
     ----------
     path : Path or str
-        A text file with a header line: joint columns, ``contact``, and where they apply ``kind``,
-        ``value`` and ``sigma``; or ``Kontakt``, ``Art``, ``Wert``, ``Unsicherheit``.
+        A text file with a header line: joint columns, ``contact`` unless the artefact is one thing,
+        and where they apply ``kind``, ``value`` and ``sigma``; or ``Kontakt``, ``Art``, ``Wert``,
+        ``Unsicherheit``.
     robot : Robot
         Its joint names pick the columns.
     artefact : Artefact, optional
@@ -101,15 +102,17 @@ def read_contacts(
     options = options or TableOptions()
     cells = read_cells(path, options.delimiter, options.decimal)
     said = list(cells.said)
-    columns = _columns(cells)
+    alone = None if artefact is None or len(artefact.contacts) > 1 else artefact.contacts[0].label
+    columns = _columns(cells, alone)
     joints = joint_columns(cells.header, robot, options)
     said.append('joint columns are ' + ', '.join(joints))
-    cells = _kept(cells, options)
+    cells = _once(_kept(cells, options), [*joints, *columns.values()], said)
     q = joint_angles(cells, robot, joints, options, said)
     gaps = np.flatnonzero(~np.isfinite(q).all(axis=1))
     if gaps.size:
         raise DataError(f"table '{path}' line {cells.lines[gaps[0]]} has an empty joint angle")
-    labels = tuple(cells.column(columns['contact']))
+    every = (alone or '',) * len(q)
+    labels = tuple(cells.column(columns['contact'])) if 'contact' in columns else every
     if '' in labels:
         raise DataError(f"table '{path}' line {cells.lines[labels.index('')]} names no contact")
     value = _lengths(cells, columns.get('value'), options, said)
@@ -133,6 +136,24 @@ def read_contacts(
     return Table(recording, tuple(said))
 
 
+def _once(cells: Cells, names: list[str], said: list[str]) -> Cells:
+    """
+    Return the table with one row of every posture.
+
+    Logs that have a row for everything that was noted at a posture repeat the joints to the last
+    digit; two touches never do.
+    """
+    first: dict[tuple[str, ...], int] = {}
+    for k, key in enumerate(zip(*(cells.column(name) for name in names), strict=True)):
+        first.setdefault(key, k)
+    more = len(cells.rows) - len(first)
+    if not more:
+        return cells
+    said.append(f'{more} rows repeat a posture to the last digit; each counts once')
+    kept = list(first.values())
+    return replace(cells, rows=[cells.rows[k] for k in kept], lines=[cells.lines[k] for k in kept])
+
+
 def _touched(contacts: Contacts, known: Artefact) -> list[str]:
     """Return how often each thing was touched, in words."""
     return [
@@ -141,18 +162,23 @@ def _touched(contacts: Contacts, known: Artefact) -> list[str]:
     ]
 
 
-def _columns(cells: Cells) -> dict[str, str]:
-    """Return the columns by use; their unit, if any, is the last word of their name."""
+def _columns(cells: Cells, alone: str | None) -> dict[str, str]:
+    """
+    Return the columns by use; their unit, if any, is the last word of their name.
+
+    Where all that can be touched is one thing, ``alone``, no column has to name it.
+    """
     out: dict[str, str] = {}
     for name in cells.header:
         first = re.split(r'[^0-9a-zäöüß]+', name.lower())[0]
         for use, words in WORDS.items():
             if first in words:
                 out.setdefault(use, name)
-    if 'contact' not in out:
+    if 'contact' not in out and alone is None:
         raise DataError(
             f"table '{cells.path}' has no column 'contact' that says what each posture touched; "
-            'its columns are ' + shortened(cells.header)
+            f'its columns are {shortened(cells.header)}. Where there is one thing to touch, an '
+            'artefact file with it alone will do'
         )
     return out
 

@@ -18,9 +18,15 @@ from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly import Role
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import bag_messages
-from weld_twin_msgs_py.messages.topics import JOINT_STATES, MEASURED_POINT
+from weld_twin_msgs_py.messages.topics import (
+    IMAGE_POINTS,
+    JOINT_STATES,
+    MEASURED_POINT,
+    TopicNames,
+)
 from weld_twin_nodes.live.diagnosis_window import LONGEST, Window
 from weld_twin_nodes.live.diagnosis_worker import Finding, Job, Worker, find
+from weld_twin_nodes.offline.told_cameras import told_cameras
 
 START = 1_700_000_000_000_000_000
 ONE_JOINT = Robot.from_mapping(
@@ -117,6 +123,84 @@ def test_a_job_that_cannot_be_done_answers_with_a_sentence(recording):
     while worker.busy:
         time.sleep(0.05)
     assert 'holds no measured poses' in worker.take()
+
+
+FOCAL = 900.0
+CORNERS = np.array([[c, r, 0.0] for r in range(3) for c in range(4)]) * 0.05
+EYE = 'camera_matrix: [900, 0, 640, 0, 900, 480, 0, 0, 1]\ndistortion_coefficients: []\n'
+BOARD = 'board: chessboard\nsquares: [5, 4]\nsquare: 0.05\n'
+
+
+def images(motion, poses):
+    """Return stamps [s] and rows of target, point, u, v: a pinhole that looks at a board."""
+    rng, out = np.random.default_rng(5), []
+    eye = np.linalg.inv(poses[len(poses) // 2])
+    for t, pose in list(zip(motion.t, poses, strict=True))[::20]:
+        # The camera stands 1.2 m before the board as it is halfway, and sees it square then.
+        there = CORNERS @ (eye @ pose)[:3, :3].T + (eye @ pose)[:3, 3] + [0.0, 0.0, 1.2]
+        where = FOCAL * there[:, :2] / there[:, 2:] + [640.0, 480.0]
+        if (there[:, 2] > 0.3).all():
+            where = where + rng.normal(0.0, 0.05, where.shape)
+            count = np.arange(len(CORNERS))
+            out.append((t, np.column_stack([0 * count, count, where])))
+    assert len(out) >= 20
+    return out
+
+
+def seen_by_a_camera(folder):
+    """Return a window in which a camera sees a board on an arm whose elbow is off, and its files."""
+    (folder / 'eye.yaml').write_text(EYE)
+    (folder / 'board.yaml').write_text(BOARD)
+    motion = wandering()
+    motion = JointMotion(motion.t, 0.5 * motion.q + 0.5 * motion.q[300])
+    twin = Twin(load('ur5'), (effect_from_mapping({**OFFSET, 'offset': 6e-3}),))
+    found = twin.poses(Recording('live', motion))
+    poses = np.tile(np.eye(4), (motion.t.size, 1, 1))
+    poses[:, :3, :3], poses[:, :3, 3] = found.rotation, found.position
+    return motion, images(motion, poses)
+
+
+def test_what_a_camera_sees_is_diagnosed_in_the_other_process(tmp_path):
+    motion, seen = seen_by_a_camera(tmp_path)
+    make, window = bag_messages(), Window(load('ur5'), 60.0)
+    for t, rows in seen[:1]:
+        window.take_image(make.image_points(START + round(t * 1e9), 'eye', rows))
+    assert window.recording(least=3.0) is None
+    for t, q in zip(motion.t, motion.q, strict=True):
+        stamp = START + round(t * 1e9)
+        window.take(Role.JOINTS, make.joint_state(stamp, load('ur5').joint_names, q))
+    for t, rows in seen[1:]:
+        window.take_image(make.image_points(START + round(t * 1e9), 'eye', rows))
+    cameras, targets = told_cameras([f'eye={tmp_path}/eye.yaml'], [f'b={tmp_path}/board.yaml'])
+    job = Job(
+        window.recording(least=3.0),
+        load('ur5'),
+        align=frozenset({'base', 'tool'}),
+        images=window.images,
+        names=TopicNames(cameras=cameras, targets=targets),
+    )
+    finding = find(job)
+    assert finding.stamp == START + round(seen[-1][0] * 1e9)
+    assert finding.status not in ('none', 'unsound')
+    assert any('elbow_joint' in key for key in finding.values)
+
+
+def test_the_node_hears_what_cameras_see(tmp_path):
+    pytest.importorskip('rclpy', reason='needs ROS 2')
+    from weld_twin_nodes.harness import Cell
+    from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
+
+    motion, seen = seen_by_a_camera(tmp_path)
+    with Cell(tmp_path / 'cell') as cell:
+        options = {'cameras': f'eye={tmp_path}/eye.yaml', 'targets': f'b={tmp_path}/board.yaml'}
+        node = cell.add(LiveDiagnosis, robot='ur5', every=600.0, **options)
+        states, where = cell.publisher(JOINT_STATES), cell.publisher(IMAGE_POINTS)
+        names = load('ur5').joint_names
+        states.publish(cell.messages.joint_state(START, names, motion.q[0]))
+        for t, rows in seen[:5]:
+            stamp = START + round(t * 1e9)
+            where.publish(cell.messages.image_points(stamp, 'eye', rows))
+        cell.wait(lambda: len(node._window.images) == 5, 'five images')
 
 
 def test_what_the_other_process_says_of_its_end_is_told():

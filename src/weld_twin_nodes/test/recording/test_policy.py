@@ -35,7 +35,7 @@ WAYS = {
         {'source': 'joint_trajectory'},
     ],
     'recorder': [{'topics': list(BY_NAME)}, {'managed': True}],
-    'live_diagnosis': [{}, {'managed': True}],
+    'live_diagnosis': [{'cameras': 'eye={}/eye.yaml'}, {'managed': True}],
     'compensator': [{'managed': True}],
 }
 """Parameters that between them bring out everything a node can do."""
@@ -77,6 +77,9 @@ def test_the_policy_is_exactly_what_a_node_does(name, tmp_path):
         for k, parameters in enumerate(WAYS.get(name, [{}])):
             if name == 'recorder':
                 parameters = {**parameters, 'out': str(tmp_path / f'bag{k}')}
+            if 'cameras' in parameters:
+                (tmp_path / 'eye.yaml').write_text('camera_matrix: [9, 0, 4, 0, 9, 4, 0, 0, 1]\n')
+                parameters = {'cameras': parameters['cameras'].format(tmp_path)}
             node = cell.add(kind, use_sim_time=True, **parameters)
             assert node.get_name() == name
             for key, query in PERMISSIONS.items():

@@ -119,22 +119,9 @@ def add_cameras(parser: argparse.ArgumentParser) -> None:
 
 def cameras_of(args: argparse.Namespace) -> tuple[tuple[Camera, ...], tuple[Target, ...]]:
     """Return the cameras and targets that the options describe."""
-    from weld_twin_msgs_py.tables import read_camera, read_target
+    from ..offline.told_cameras import told_cameras
 
-    cameras = tuple(read_camera(*_named(text, '--camera')) for text in args.camera)
-    # What a camera on the tool looks at stands still, where nothing else is said.
-    mounts = {camera.mount for camera in cameras}
-    other = 'world' if mounts == {'tool'} else 'tool'
-    return cameras, tuple(read_target(*_named(text, '--target'), other) for text in args.target)
-
-
-def _named(text: str, option: str) -> tuple[str, str]:
-    from weld_twin_core.errors import DataError
-
-    name, mark, path = text.partition('=')
-    if not (name and mark and path):
-        raise DataError(f"{option} takes NAME=FILE, got '{text}'")
-    return name, path
+    return told_cameras(args.camera, args.target)
 
 
 def topics_of(args: argparse.Namespace) -> TopicNames:

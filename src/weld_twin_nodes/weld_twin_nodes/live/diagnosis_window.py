@@ -15,7 +15,9 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.assembly import Intake, Role, Samples, assembled
-from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
+from weld_twin_msgs_py.bags.images import Image
+from weld_twin_msgs_py.messages.from_messages import NANOSECONDS, stamp_ns
+from weld_twin_msgs_py.messages.image_points import points
 
 LONGEST = 50_000
 """Samples of a stream kept at most, whatever its rate."""
@@ -23,6 +25,9 @@ MOTION = 0.02
 """Range [rad or m] some joint must have travelled before a diagnosis makes sense."""
 FEWEST = 50
 """Samples below which a window is not diagnosed: half a second at 100 Hz."""
+
+FEWEST_IMAGES = 20
+"""The same of images: each is a whole pose, and a camera gives few of them in a second."""
 
 Row = tuple[int, Array]
 SIGNALS = (Role.WRENCH, Role.TEMPERATURE)
@@ -61,17 +66,41 @@ class Window:
             robot, measuring_frame=measuring_frame, joint_names=joint_names, mend=True
         )
         self._streams: dict[Role, deque[Row]] = {}
+        self._images: deque[Image] = deque(maxlen=LONGEST)
 
     def reset(self) -> None:
         """Forget everything, as after a jump of the clock."""
         self._streams.clear()
+        self._images.clear()
         self.intake.reset()
 
     @property
     def last(self) -> int | None:
         """Return the stamp of the last measurement [ns]."""
-        measured = self._measured()[1]
+        measured = self._measured()[1] or self._images
         return measured[-1][0] if measured else None
+
+    @property
+    def images(self) -> tuple[Image, ...]:
+        """Return what cameras saw since the first joint state; nothing beside poses or points."""
+        joints = self._streams.get(Role.JOINTS)
+        if not joints or self._measured()[1]:
+            return ()
+        return tuple(image for image in self._images if image[0] >= joints[0][0])
+
+    def take_image(self, message: Any) -> None:
+        """
+        Take the points that a camera found in an image.
+
+        Raises
+        ------
+        DataError
+            It cannot be used; the window is as it was.
+
+        """
+        self._images.append((stamp_ns(message), message.header.frame_id, points(message)))
+        while self._images[-1][0] - self._images[0][0] > self._duration:
+            self._images.popleft()
 
     def take(self, role: Role, message: Any) -> None:
         """
@@ -102,6 +131,8 @@ class Window:
         """
         Return what the window holds, or None while it is too little to be diagnosed.
 
+        What images tell is for whoever has the time: `images`.
+
         Parameters
         ----------
         least : float [s]
@@ -110,10 +141,14 @@ class Window:
         """
         joints = self._streams.get(Role.JOINTS)
         role, measured = self._measured()
-        if not joints or len(measured) < FEWEST or len(joints) < FEWEST:
+        seen = self.images
+        if not joints or len(joints) < FEWEST:
+            return None
+        if len(measured) < FEWEST and len(seen) < FEWEST_IMAGES:
             return None
         epoch = joints[0][0]
-        overlap = min(joints[-1][0], measured[-1][0]) - max(epoch, measured[0][0])
+        first, last = (measured or seen)[0][0], (measured or seen)[-1][0]
+        overlap = min(joints[-1][0], last) - max(epoch, first)
         motion = _samples(joints)
         if (
             overlap * 1e-9 < least
@@ -121,7 +156,8 @@ class Window:
         ):
             return None
         streams = {Role.JOINTS: motion}
-        streams[role] = _samples(dropwhile(lambda row: row[0] < epoch, measured))
+        if measured:
+            streams[role] = _samples(dropwhile(lambda row: row[0] < epoch, measured))
         for side in (Role.SIGMA, *SIGNALS):
             if self._streams.get(side):
                 streams[side] = _samples(self._streams[side])

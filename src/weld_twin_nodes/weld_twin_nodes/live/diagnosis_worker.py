@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
     from weld_twin_core.effects import Effect
     from weld_twin_core.recording import Recording
+    from weld_twin_msgs_py.bags.images import Image
+    from weld_twin_msgs_py.messages.topics import TopicNames
 
 _MODULE = 'weld_twin_nodes.live.diagnosis_worker'
 _NICENESS = 10
@@ -39,6 +41,8 @@ class Job(NamedTuple):
     known: tuple[Effect, ...] = ()
     align: frozenset[str] = frozenset()
     exclude: tuple[str, ...] = ()
+    images: tuple[Image, ...] = ()
+    names: TopicNames | None = None
 
 
 class Finding(NamedTuple):
@@ -127,12 +131,17 @@ class Worker:
 def find(job: Job) -> Finding:
     """Return the finding of a job."""
     from weld_twin_core.diagnosis import diagnose
+    from weld_twin_msgs_py.bags.images import looking
 
     from ..wording.verdict import verdict
     from ..wording.words import found_name
 
+    recording = job.recording
+    if job.images and job.names is not None:
+        # Hundreds of images take seconds: here, where no node waits for them.
+        recording = looking(recording, job.images, job.names, {})
     diagnosis = diagnose(
-        [job.recording], job.robot, align=job.align, known=job.known, exclude=job.exclude
+        [recording], job.robot, align=job.align, known=job.known, exclude=job.exclude
     )
     gap, shrink = diagnosis.gap, diagnosis.shrink
     values: dict[str, Any] = {
@@ -151,7 +160,7 @@ def find(job: Job) -> Finding:
         values[found_name(found)] = {
             key: value for key, value in entry.items() if key not in ('effect', 'joint')
         }
-    measured = job.recording.measured
+    measured = recording.measured
     last = float(measured.t[-1]) if measured is not None else 0.0
     stamp = job.recording.epoch_ns + round(last * 1e9)
     return Finding(stamp, diagnosis.status, ' '.join(verdict(diagnosis)), values)

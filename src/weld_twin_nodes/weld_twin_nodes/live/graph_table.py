@@ -95,7 +95,9 @@ SPOKEN = {
         (t.DEVIATION, t.DEVIATION_METRICS), (*_MEASURED, t.TWIN_BASE, t.TWIN_POSE)
     ),
     'live_diagnosis': _node(
-        (t.DIAGNOSIS, *_MANAGED_SAY), (*_MODEL, *_MEASURED, t.MEASURED_SIGMA), _MANAGED_ANSWER
+        (t.DIAGNOSIS, *_MANAGED_SAY),
+        (*_MODEL, *_MEASURED, t.MEASURED_SIGMA, t.IMAGE_POINTS),
+        _MANAGED_ANSWER,
     ),
     'deviation_markers': _node((t.MARKERS,), (*_MEASURED, t.TWIN_BASE, t.DEVIATION)),
     'contact_marker': _node((t.CONTACT,), (t.JOINT_STATES,), ('~/mark',)),

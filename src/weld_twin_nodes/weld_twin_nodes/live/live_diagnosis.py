@@ -13,12 +13,15 @@ from weld_twin_core.diagnosis.algebra.problem import frames_named
 from weld_twin_msgs_py.assembly import Intake, Role
 from weld_twin_msgs_py.messages.topics import (
     DIAGNOSIS,
+    IMAGE_POINTS,
     JOINT_STATES,
     MEASURED_SIGMA,
     TEMPERATURE,
     TOOL_WRENCH,
+    TopicNames,
 )
 
+from ..offline.told_cameras import told_cameras
 from ..offline.told_twin import build_twin
 from .cell_frames import placed_twin
 from .diagnosis_window import SIGNALS, Window
@@ -57,6 +60,8 @@ class LiveDiagnosis(ManagedNode):
         *MEASURED_SETTINGS,
         Setting('model', '', 'what the twin knows: an effects file or diagnosis.json'),
         Setting('align', '', 'frames fitted along: base, tool, or base,tool'),
+        Setting('cameras', '', 'camera_info of each camera: NAME=FILE, with commas between'),
+        Setting('targets', '', 'what they look at: NAME=FILE, with commas between'),
         Setting('window', 60.0, 'length of the window [s]', 1.0, 600.0),
         Setting('least', 5.0, 'shortest stretch that is diagnosed [s]', 0.5, 600.0),
         Setting('every', 15.0, 'shortest time from one diagnosis to the next [s]', 0.0, 3600.0),
@@ -66,6 +71,7 @@ class LiveDiagnosis(ManagedNode):
         super().__init__('live_diagnosis', **kwargs)
         self._twin = placed_twin(self, build_twin(robot_of(self), self.setting('model')))
         self._align = frames_named(self.setting('align'))
+        self._names = self._looked_with()
         self._window = self._empty_window()
         self._worker = Worker(self.get_logger().warning)
         self._begun = -float('inf')
@@ -77,6 +83,15 @@ class LiveDiagnosis(ManagedNode):
         self._looking: Any = None
         self.start()
 
+    def _looked_with(self) -> TopicNames:
+        """Return what is known of the cameras and of what they look at."""
+        texts = (
+            [part for part in self.setting(name).split(',') if part]
+            for name in ('cameras', 'targets')
+        )
+        cameras, targets = told_cameras(*texts)
+        return TopicNames(cameras=cameras, targets=targets)
+
     def prepare(self) -> None:
         """Nothing is left to look at: robot and model were read when the node started."""
 
@@ -85,6 +100,8 @@ class LiveDiagnosis(ManagedNode):
         for topic, role in INPUTS.items():
             required, held = role is Role.JOINTS, role in SIGNALS
             self.listen(topic, partial(self._take, role), required=required, held=held)
+        if self._names.cameras:
+            self.listen(IMAGE_POINTS, self._take_image)
         self._measured = MeasuredInputs(
             self, partial(self._take, Role.POSE), partial(self._take, Role.POINT)
         )
@@ -123,6 +140,9 @@ class LiveDiagnosis(ManagedNode):
         self._window.take(role, message)
         self.tell_beside(self._window.intake.joints.beside)
 
+    def _take_image(self, message: Any) -> None:
+        self._window.take_image(message)
+
     def time_went_back(self) -> None:
         """Forget the window."""
         if self._measured is not None:
@@ -142,7 +162,16 @@ class LiveDiagnosis(ManagedNode):
         if recording is not None:
             self._begun, self._seen = now, self._window.last
             twin = self._twin
-            self._worker.start(Job(recording, twin.robot, tuple(twin.effects), self._align))
+            self._worker.start(
+                Job(
+                    recording,
+                    twin.robot,
+                    tuple(twin.effects),
+                    self._align,
+                    images=self._window.images if self._names.cameras else (),
+                    names=self._names,
+                )
+            )
 
     def _tell(self, result: Finding | str | None) -> None:
         if isinstance(result, str):

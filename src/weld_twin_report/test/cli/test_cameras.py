@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What cameras measured, from files to causes.
+What cameras measured, and what two hands held, from files to causes.
 
 The arm, the lens and the noise are made here, with formulas of their own: homogeneous matrices of
 Denavit and Hartenberg, and the distortion of the ROS documentation written out.
@@ -12,6 +12,7 @@ import json
 import numpy as np
 import pytest
 import yaml
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from weld_twin_msgs_py.bags.writer import BagWriter
@@ -218,3 +219,63 @@ def test_mistakes_with_cameras_are_named(tmp_path, weld_twin):
         _, found = diagnosed(folder, robot, weld_twin)
         assert found['verdict']['status'] == 'unsound'
         assert [entry['kind'] for entry in found['unsound']] == [kind]
+
+
+# Two arms that hold one bar ------------------------------------------------------------
+
+OFF = 2.4e-3
+MIDDLE = np.array([0.1, 0.2, 0.5, 0.3, 0.6, 0.1, 0.1, 0.15, 0.4, -0.2, 0.8, 0.3])
+FOOT = np.eye(4)
+FOOT[:3, :3], FOOT[:3, 3] = np.diag([-1.0, -1.0, 1.0]), [1.3, 0.1, 0.0]
+
+
+def between(q, zeros):
+    """Return the right hand as the left one has it, (4, 4)."""
+    left, right = flange(q[None, :6], zeros)[0], flange(q[None, 6:], np.zeros(6))[0]
+    return np.linalg.inv(FOOT @ left) @ right
+
+
+def grips(rng, zeros, count):
+    """Return joints of both arms (M, 12) at which the real hands hold the bar."""
+    back, out = np.linalg.inv(between(MIDDLE, zeros)), []
+    while len(out) < count:
+        left = MIDDLE[:6] + rng.uniform(-0.5, 0.5, 6)
+
+        def off(right, left=left):
+            away = back @ between(np.concatenate([left, right]), zeros)
+            turn = Rotation.from_matrix(away[:3, :3]).as_rotvec()
+            return np.concatenate([away[:3, 3], 0.3 * turn])
+
+        found = least_squares(off, MIDDLE[6:], max_nfev=40)
+        if found.cost < 1e-20:
+            out.append(np.concatenate([left, found.x]))
+    return np.array(out)
+
+
+def test_a_bar_clamped_in_both_hands_shows_the_joint_whose_zero_is_off(tmp_path, weld_twin):
+    rng, zeros = np.random.default_rng(6), np.zeros(6)
+    zeros[2] = OFF
+    q = grips(rng, zeros, 40) + rng.normal(0.0, 1.5e-5, (40, 12))
+    names = [f'{side}{k}' for side in 'lr' for k in range(1, 7)]
+    lines = [','.join(names), *(','.join(f'{value:.7f}' for value in row) for row in q)]
+    (tmp_path / 'grips.csv').write_text('\n'.join(lines) + '\n')
+    keys = ('theta_offset', 'd', 'a', 'alpha')
+    each = {
+        side: [
+            dict(zip(keys, map(float, row), strict=True), name=f'{side}{k + 1}')
+            for k, row in enumerate(ROWS)
+        ]
+        for side in 'lr'
+    }
+    foot = {'xyz': FOOT[:3, 3].tolist(), 'quat_xyzw': [0.0, 0.0, 1.0, 0.0]}
+    pair = {'name': 'pair', 'joints': each['r']}
+    pair['workpiece'] = {'base': foot, 'joints': each['l']}
+    (tmp_path / 'pair.yaml').write_text(yaml.safe_dump(pair))
+    robot, bag, out = ('--robot', tmp_path / 'pair.yaml'), tmp_path / 'bag', tmp_path / 'out'
+    said = weld_twin('import', tmp_path / 'grips.csv', '--clamped', *robot, '--out', bag).out
+    assert '40 postures with one bar clamped at both ends' in said
+    weld_twin('diagnose', bag, *robot, '--align', 'tool', '--out', out)
+    found = json.loads((out / 'diagnosis.json').read_text())['verdict']
+    assert found['status'] in ('identified', 'ambiguous')
+    (one,) = [e for e in found['effects'] if (e['effect'], e['joint']) == ('joint_offset', 'l3')]
+    assert one['parameters']['offset'] == pytest.approx(OFF, abs=1e-4)

@@ -18,7 +18,7 @@ from ..frames.alignment import refined
 from ..result import Unsound
 from .base_change import Rest, rest_of, thinned
 from .lag import Lag, lag
-from .limits import BY_ITSELF, LATE_LEFT, LATE_WORTH, RATE_MOST, UNEXPLAINED
+from .limits import BY_ITSELF, HELD, LATE_LEFT, LATE_WORTH, RATE_MOST, TINY, UNEXPLAINED
 from .mending import Mend, as_entry
 from .slips import Settling, Slip, changes
 from .snapshot import Snapshot, snapshot
@@ -84,6 +84,13 @@ class Case:
     def gap(self) -> float:
         """Return the median distance between measured and twin [m]."""
         return float(np.median(np.concatenate([distance(part) for part in self.residuals])))
+
+    @cached_property
+    def held(self) -> bool:
+        """Return whether the tool is where the chain begins, as two arms hold one bar."""
+        still = all((np.ptp(r.seen.position, axis=0) < TINY).all() for r in self.recordings)
+        widest = max(float(np.ptp(q, axis=0).max()) for q in self.motions)
+        return still and self.gap < HELD * widest
 
     @cached_property
     def lags(self) -> list[Lag | None]:

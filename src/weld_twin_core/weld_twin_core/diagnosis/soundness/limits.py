@@ -134,6 +134,9 @@ A cheap quartz is within 100 ppm; more is stamps made by something else than a c
 RATE_MOST = 0.1
 """Rate beyond which it is no clock: rows that do not belong together look like that."""
 
+HELD = 0.03
+"""Gap over the widest motion of a joint [m/rad] below which a tool that never moves is held: a joint
+alone would move it by a lever of half a metre, and arms are off by some millimetres."""
 MOVED = 0.02
 """Motion [rad, m] of a joint that hardly moves: it shows next to nothing, and less may be at rest."""
 STUCK_LEAST, STUCK_STATIONS = 0.5, 4

@@ -54,13 +54,16 @@ def refuse_reused(recordings: Sequence[Recording], holdout: Sequence[Recording])
 
 def _shown(recording: Recording) -> Array:
     """Return what a recording shows: positions, or the postures of contacts."""
-    if recording.contacts is not None:
-        return recording.joints.q
-    return recording.seen.position
+    position = recording.seen.position if recording.contacts is None else None
+    if position is None or (np.ptp(position, axis=0) < TINY).all():
+        return recording.joints.q  # a bar that two arms hold stays where it is in all recordings
+    return position
 
 
 def repeats(case: Case) -> Iterator[Finding]:
     """Yield recordings given twice, samples given twice, and frozen measurements."""
+    if case.held:
+        return
     seen = [r.seen.position for r in case.recordings]
     for i, k in combinations(range(len(seen)), 2):
         same = _common(seen[i], seen[k])

@@ -10,6 +10,7 @@ cameras give --camera and --target; weld-twin detect makes a table of images.
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..options import add_bag_output, add_cameras, add_robot, cameras_of, robot_of
@@ -34,6 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_bag_output(parser)
     text = 'FILE.csv has joint angles and what was touched; this file describes it'
     add('--contacts', 'ARTEFACT.yaml', text)
+    text = 'both ends of the chain hold one bar, and FILE.csv has joint angles alone'
+    add('--clamped', text, rare=True)
     text = 'FILE.csv has the joints alone; this one has what the instrument measured'
     add('--measured', 'FILE', text)
     text = 'added to the stamps of --measured'
@@ -95,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
     options = TableOptions(**{f.name: getattr(args, f.name) for f in fields(TableOptions)})
     if args.contacts is not None:
         return _touched(args, robot, options)
-    recording, said = _read(args, robot, options)
+    recording, said = (_clamped if args.clamped else _read)(args, robot, options)
     measured = recording.measured
     assert measured is not None
     nominal = Twin(robot)
@@ -132,6 +135,27 @@ def _read(args: argparse.Namespace, robot: Robot, options: TableOptions) -> Tabl
     if args.measured is None:
         return read_table(args.file, robot, options)
     return read_two_tables(args.file, args.measured, robot, options, args.clock_offset)
+
+
+def _clamped(args: argparse.Namespace, robot: Robot, options: TableOptions) -> Table:
+    """
+    Return postures in which the tool was one thing with where the chain begins.
+
+    The pose between them is the same in all, and is that of the tool, which is fitted: measured is
+    none at all.
+    """
+    import numpy as np
+
+    from weld_twin_core.contacts import Artefact, Contact
+    from weld_twin_core.recording import Measurements
+    from weld_twin_msgs_py.tables import Table, read_contacts
+
+    touches, said = read_contacts(args.file, robot, Artefact((Contact('bar'),)), options)
+    count = touches.joints.t.size
+    held = Measurements(touches.joints.t, np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)))
+    note = f'{count} postures with one bar clamped at both ends; diagnose with --align tool'
+    said = (*(one for one in said if 'touch' not in one), note)
+    return Table(replace(touches, contacts=None, measured=held, notes=said), said)
 
 
 def _touched(args: argparse.Namespace, robot: Robot, options: TableOptions) -> int:

@@ -233,7 +233,10 @@ class Posterior:
         Standard deviation of position in its worst direction [m], in the middle of the postures
         that were recorded and of those that the joints' limits allow.
     prior_std : array, shape (P,), optional
-        Standard deviation of every coordinate before the data.
+        Standard deviation of every coordinate on machines at large.
+    single : (array, shape (P,), array, shape (P, P)), optional
+        Mean and covariance under that one prior, of which it can be taken off again: what the data
+        alone say. ``mean`` and ``covariance`` are weighed over many.
     region : (str, float), optional
         A region that was asked for, as it was told, and the same standard deviation there [m].
 
@@ -248,6 +251,7 @@ class Posterior:
     recorded_m: float = 0.0
     anywhere_m: float = 0.0
     prior_std: Array | None = None
+    single: tuple[Array, Array] | None = None
     region: tuple[str, float] | None = None
 
     def __post_init__(self) -> None:
@@ -330,6 +334,7 @@ class Posterior:
             mean=self.mean[keep],
             covariance=self.covariance[np.ix_(keep, keep)],
             prior_std=None if self.prior_std is None else self.prior_std[keep],
+            single=None,
         )
 
     def after(self, features: Features, noise: float) -> Posterior:
@@ -471,6 +476,20 @@ def largest_sigma(covariances: Array) -> Array:
     return np.asarray(np.sqrt(np.linalg.eigvalsh(covariances[:, :3, :3])[:, -1]))
 
 
+def _lower(matrix: Array) -> list[list[float]]:
+    """Return the lower triangle of a matrix, row by row."""
+    return [[float(v) for v in row[: k + 1]] for k, row in enumerate(matrix)]
+
+
+def _single(posterior: Posterior) -> dict[str, Any]:
+    """Return the entry ``single_prior``, where it is known."""
+    if posterior.single is None:
+        return {}
+    mean, covariance = posterior.single
+    value = [float(v) for v in posterior.directions.fitted() + mean]
+    return {'single_prior': {'value': value, 'covariance': _lower(covariance)}}
+
+
 def as_dict(posterior: Posterior) -> dict[str, Any]:
     """Return plain numbers, lists and strings: the entry ``posterior`` of diagnosis.json."""
     what, rest = posterior.directions, posterior.discrepancy
@@ -490,9 +509,8 @@ def as_dict(posterior: Posterior) -> dict[str, Any]:
         'effects': [effect.to_mapping() for effect in what.effects],
         'knots': [knots.tolist() for knots in what.knots],
         'coordinates': coordinates,
-        'covariance': [
-            [float(v) for v in row[: k + 1]] for k, row in enumerate(posterior.covariance)
-        ],
+        'covariance': _lower(posterior.covariance),
+        **_single(posterior),
         'discrepancy': {
             'position_m': rest.position,
             'orientation_rad': rest.orientation,

@@ -37,6 +37,7 @@ FAMILIES = (
 SLIDES = ('gear_ratio',)
 """Those that a track has in the plant."""
 STATIONS = 60
+"""Of a cell, as one measures them in an hour."""
 SIGMA, TURN = 3e-5, 5e-5
 """Noise of a tracker's probe: of each coordinate [m], about each axis [rad]."""
 SIZE = (3.0, 8.0)

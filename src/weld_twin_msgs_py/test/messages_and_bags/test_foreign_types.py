@@ -332,6 +332,24 @@ AGAINST_THE_CLOCK = ((-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))
 """Corners of a tag as its detector counts them, x to the right and y down, in half sides."""
 
 
+def detection(cell, tag, middle, board):
+    """Return what apriltag_ros says of a tag on a board that a pinhole sees."""
+    corners = [(*(0.5 * SIDE * np.array(c)), 0.0) for c in AGAINST_THE_CLOCK]
+    there = (np.array(corners) + middle) @ board[:3, :3].T + board[:3, 3]
+    places = FOCAL * there[:, :2] / there[:, 2:] + [640.0, 480.0]
+    return cell.make(
+        'apriltag_msgs/msg/AprilTagDetection',
+        family='tag36h11',
+        id=tag,
+        hamming=0,
+        goodness=0.0,
+        decision_margin=80.0,
+        centre=cell.make('apriltag_msgs/msg/Point', x=0.0, y=0.0),
+        corners=[cell.make('apriltag_msgs/msg/Point', x=x, y=y) for x, y in places],
+        homography=np.zeros(9),
+    )
+
+
 def test_tags_that_a_camera_found_tell_poses(tmp_path):
     cell = Cell()
     eye = np.eye(4)
@@ -346,24 +364,8 @@ def test_tags_that_a_camera_found_tell_poses(tmp_path):
         board[:3, :3] = np.linalg.qr(board[:3, :3])[0] * [-1.0, -1.0, -1.0]
         board[:3, :3] *= np.sign(np.linalg.det(board[:3, :3]))
         boards.append(board)
-        found = []
-        for tag, middle in {**MIDDLES, 99: (0.3, 0.0, 0.0)}.items():
-            corners = [(*(0.5 * SIDE * np.array(c)), 0.0) for c in AGAINST_THE_CLOCK]
-            there = (np.array(corners) + middle) @ board[:3, :3].T + board[:3, 3]
-            places = FOCAL * there[:, :2] / there[:, 2:] + [640.0, 480.0]
-            found.append(
-                cell.make(
-                    'apriltag_msgs/msg/AprilTagDetection',
-                    family='tag36h11',
-                    id=tag,
-                    hamming=0,
-                    goodness=0.0,
-                    decision_margin=80.0,
-                    centre=cell.make('apriltag_msgs/msg/Point', x=0.0, y=0.0),
-                    corners=[cell.make('apriltag_msgs/msg/Point', x=x, y=y) for x, y in places],
-                    homography=np.zeros(9),
-                )
-            )
+        tags = {**MIDDLES, 99: (0.3, 0.0, 0.0)}.items()
+        found = [detection(cell, tag, middle, board) for tag, middle in tags]
         kind = 'apriltag_msgs/msg/AprilTagDetectionArray'
         cell.add('/detections', kind, k, header=cell.header(k, 'eye'), detections=found)
     (tmp_path / 'tags.yaml').write_text(

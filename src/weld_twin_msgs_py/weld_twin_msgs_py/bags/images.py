@@ -80,18 +80,7 @@ def looking(
     """
     cameras, targets = _described(names, made)
     stamps = sorted({ns for ns, _, _ in each})
-    number = {ns: k for k, ns in enumerate(stamps)}
-    columns: list[np.ndarray] = []
-    for ns, camera, found in each:
-        if camera not in cameras:
-            raise DataError(
-                f"the bag has images of camera '{camera}', which is not described; give it with "
-                f'--camera {camera}=FILE'
-            )
-        rows = _labelled(found, targets) if isinstance(found, list) else found
-        place = np.full(len(rows), float(list(cameras).index(camera)))
-        columns.append(np.column_stack([np.full(len(rows), float(number[ns])), place, rows]))
-    whole = np.concatenate(columns)
+    whole = np.concatenate(_rows(each, stamps, cameras, targets))
     if not len(whole):
         raise DataError(
             'the images show no point of a target that is described; give the target with its '
@@ -118,6 +107,27 @@ def looking(
             whole[:, 4:6],
         ),
     )
+
+
+def _rows(
+    each: Sequence[Image],
+    stamps: Sequence[int],
+    cameras: Mapping[str, Camera],
+    targets: Mapping[str, Target],
+) -> list[np.ndarray]:
+    """Return rows of image, camera, target, point, u and v, an array for every image."""
+    number = {ns: float(k) for k, ns in enumerate(stamps)}
+    out = []
+    for ns, camera, found in each:
+        if camera not in cameras:
+            raise DataError(
+                f"the bag has images of camera '{camera}', which is not described; give it with "
+                f'--camera {camera}=FILE'
+            )
+        rows = _labelled(found, targets) if isinstance(found, list) else found
+        before = np.array([number[ns], float(list(cameras).index(camera))])
+        out.append(np.column_stack([np.tile(before, (len(rows), 1)), rows]))
+    return out
 
 
 def _labelled(found: Marks, targets: Mapping[str, Target]) -> np.ndarray:

@@ -111,10 +111,7 @@ def read_contacts(
     gaps = np.flatnonzero(~np.isfinite(q).all(axis=1))
     if gaps.size:
         raise DataError(f"table '{path}' line {cells.lines[gaps[0]]} has an empty joint angle")
-    every = (alone or '',) * len(q)
-    labels = tuple(cells.column(columns['contact'])) if 'contact' in columns else every
-    if '' in labels:
-        raise DataError(f"table '{path}' line {cells.lines[labels.index('')]} names no contact")
+    labels = _labels(cells, columns, alone)
     value = _lengths(cells, columns.get('value'), options, said)
     sigma = _lengths(cells, columns.get('sigma'), options, said)
     kinds = _kinds(cells, columns.get('kind'), labels, value)
@@ -134,6 +131,17 @@ def read_contacts(
         contacts=contacts,
     )
     return Table(recording, tuple(said))
+
+
+def _labels(cells: Cells, columns: Mapping[str, str], alone: str | None) -> tuple[str, ...]:
+    """Return what was touched in every row."""
+    if 'contact' not in columns:
+        return (alone or '',) * len(cells.rows)
+    labels = tuple(cells.column(columns['contact']))
+    if '' in labels:
+        line = cells.lines[labels.index('')]
+        raise DataError(f"table '{cells.path}' line {line} names no contact")
+    return labels
 
 
 def _once(cells: Cells, names: list[str], said: list[str]) -> Cells:

@@ -200,13 +200,18 @@ def _coordinates(
         for k, each in enumerate(told)
         if not each['name'].startswith(PASSING) and count[each['name']] == 1
     ]
+    # What is weighed over many priors cannot be freed of one; files of before 0.1 had one alone.
+    plain = posterior.get(
+        'single_prior',
+        {'value': [each['value'] for each in told], 'covariance': posterior['covariance']},
+    )
     whole = np.zeros((len(told), len(told)))
-    for k, row in enumerate(posterior['covariance']):
+    for k, row in enumerate(plain['covariance']):
         whole[k, : k + 1] = row
         whole[: k + 1, k] = row
     return (
         tuple(told[k]['name'] for k in keep),
-        np.array([float(told[k]['value']) for k in keep]),
+        np.array([float(plain['value'][k]) for k in keep]),
         np.array([float(told[k]['prior_std']) for k in keep]),
         whole[np.ix_(keep, keep)],
     )

@@ -89,7 +89,8 @@ def allowed(
         plausible_arm.discrepancy(model.robot, left, np.array(fine), model.found),
         Domain.of(recordings, model.robot),
         left_open(problem, model),
-        prior_std=models.open,
+        prior_std=prior.width,
+        single=Conditioning(rows, prior, prior.width, models.noise).given(),
     )
     return _with_usual_sigma(posterior, model, problem)
 

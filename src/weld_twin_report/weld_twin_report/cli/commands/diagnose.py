@@ -84,7 +84,7 @@ def _add_setup(parser: argparse.ArgumentParser) -> None:
     )
     text += 'instrument moved; may be given again'
     add('--changed', 'BAG', 'WHAT', text, many=True, rare=True)
-    text = 'what measured: at960, radian, vantage, handyprobe, romer, dial, ..., or its largest '
+    text = 'what measured: at960, at930, at901, at500, gts3800, or its largest '
     text += 'permissible error in mm, such as 0.015+0.006/m; @3 behind it: 3 m away'
     add('--instrument', 'NAME', text, rare=True)
     text = 'describes what the contacts of the bags touched, where they were not imported with it'

@@ -330,7 +330,7 @@ def test_an_impossible_covariance_is_refused_at_the_door(diagnosed, tmp_path, sp
     data = json.loads((out / 'diagnosis.json').read_text())
     named = [each['name'] for each in data['posterior']['coordinates']]
     place = named.index('backlash elbow_joint 0')
-    spoil(data['posterior']['covariance'][place], place)
+    spoil(data['posterior']['single_prior']['covariance'][place], place)
     (out / 'diagnosis.json').write_text(json.dumps(data))
     db = tmp_path / 'history.db'
     told = weld_twin('history', 'add', out, '--cell', 'a', '--at', '2026-03-02', '--db', db)

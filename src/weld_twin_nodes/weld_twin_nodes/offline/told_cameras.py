@@ -8,7 +8,6 @@ from collections.abc import Iterable
 
 from weld_twin_core.cameras import Camera, Target
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.tables import read_camera, read_target
 
 
 def told_cameras(
@@ -23,6 +22,9 @@ def told_cameras(
         A text is no NAME=FILE, or a file cannot be read.
 
     """
+    # Tables load much that a node without cameras has no use for.
+    from weld_twin_msgs_py.tables import read_camera, read_target
+
     lenses = tuple(read_camera(*_named(text, 'camera')) for text in cameras)
     # What a camera on the tool looks at stands still, where nothing else is said.
     other = 'world' if {camera.mount for camera in lenses} == {'tool'} else 'tool'

@@ -28,6 +28,7 @@ include_patterns = [
     'docs/*.md',
     'docs/reference/*.md',
     'docs/results/blind/scores.md',
+    'docs/results/cells/cells.md',
     'docs/results/contacts/contacts.md',
     'docs/results/coverage/coverage.md',
     'docs/results/efforts/efforts.md',

@@ -19,11 +19,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ..algebra.definite import unit_diagonal
-from ..algebra.fit import Fit, design, fit
+from ..algebra.fit import Fit, design, fit, solve_scaled
 from .library import Library
 from .seed_systems import SINGULAR, Choice, SeedSystems, evidence, ranking
-from .selection import Workspace, backward, implausible, merged
+from .selection import Workspace, backward, implausible, merged, sites
 
 BEGUN = 12
 """Effects that a set is begun with, in turn; bounds the time."""
@@ -59,8 +58,8 @@ class Other(NamedTuple):
 
     def newcomers(self, now: Fit) -> list[_Site]:
         """Return what it has that was not found, what entered first before the others."""
-        had = _sites(now)
-        return [site for site in _sites(self.fit) if site not in had]
+        had = sites(now)
+        return [site for site in sites(self.fit) if site not in had]
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,9 +222,9 @@ def _others(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> lis
     """Return the best set without each effect found, where it is near what was found."""
     bare = fit(work.problem, now.model.with_found(()), work.scale, None, 4)
     sets = Sets.about(work, bare, effective(now))
-    chosen, out = sets.of(_sites(now)), []
+    chosen, out = sets.of(sites(now)), []
     least = sets.worth(chosen) - work.beliefs.rival_nats
-    for site in _sites(now):
+    for site in sites(now):
         other = sets.without([c for c in chosen if c.unit.site != site], site)
         if other and sets.worth(other) > least:
             own = _fitted(work, now, other)
@@ -261,7 +260,7 @@ def ahead(work: Workspace, own: Fit, now: Fit, effective: Callable[[Fit], float]
     trials = {unit.site: float(np.log(unit.trials)) for unit in work.library.units}
 
     def cost(found: Fit) -> float:
-        return sum(trials.get(site, 0.0) + work.beliefs.enter_nats for site in _sites(found))
+        return sum(trials.get(site, 0.0) + work.beliefs.enter_nats for site in sites(found))
 
     more = float(own.coordinates.size - now.coordinates.size)
     count = effective(min((now, own), key=lambda f: f.rss))
@@ -276,13 +275,6 @@ def _names(chosen: Sequence[Choice]) -> tuple[_Site, ...]:
     return tuple(sorted((c.unit.site for c in chosen), key=str))
 
 
-def _sites(found: Fit) -> list[_Site]:
-    return [(effect.name, effect.site) for effect in found.model.found]
-
-
 def _gain(normal: Array, pull: Array) -> float:
     """Return by how much the sum of squares falls where columns are fitted."""
-    if not pull.size:
-        return 0.0
-    scaled, size = unit_diagonal(normal, SINGULAR)
-    return float(pull / size @ np.linalg.solve(scaled, pull / size))
+    return float(pull @ solve_scaled(normal, pull, SINGULAR))

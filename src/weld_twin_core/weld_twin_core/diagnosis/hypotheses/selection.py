@@ -87,7 +87,7 @@ def forward(
     """
     steps: list[Step] = []
     now = start
-    taken = _sites(start)
+    taken = sites(start)
     while len(steps) < most:
         systems = work.beside(now.model, now.residual)
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
@@ -186,12 +186,12 @@ def _without_stand_in(work: Workspace, choice: Choice, result: Fit) -> Fit:
     alone = fit(work.problem, possible_part(result.model), work.scale, None, 5)
     systems = work.beside(alone.model, alone.residual)
     ranked = ranking(systems, work.library.units, _rows(work, alone))
-    others = [c for c in ranked if c.unit.site not in sites and not _repeats(c, _sites(alone))]
+    others = [c for c in ranked if c.unit.site not in sites and not _repeats(c, sites(alone))]
     fits = [fitted_with(work, alone.model, other.effect()) for other in others[:SHORTLIST]]
     return min((alone, *fits), key=lambda f: f.rss)
 
 
-def _sites(found: Fit) -> list[tuple[str, str | None]]:
+def sites(found: Fit) -> list[tuple[str, str | None]]:
     """Return what is in the model of a fit."""
     return [(effect.name, effect.site) for effect in found.model.found]
 

@@ -32,7 +32,7 @@ from ..frames.open_directions import VISIBLE, open_directions
 from ..unseen.folds import posture_regions
 from . import plausible_arm
 from .leftover import Unseen, leftover
-from .sizes import Prior, Rows, weighed
+from .sizes import Prior, Rows, weighed, with_prior
 
 ROWS = 9000
 """Rows looked at; more show the same directions."""
@@ -213,14 +213,6 @@ def _prior(what: Directions, model: Model) -> Prior:
     )
 
 
-def _with_prior(information: Array) -> Array:
-    """Return the data's information with a prior of unit width added, in its place."""
-    # Rounding of the largest entries must not outweigh the prior in open directions.
-    jitter = 1.0 + 1e-14 * float(np.trace(information))
-    information[np.diag_indices_from(information)] += jitter
-    return information
-
-
 class Conditioning:
     """
     The coordinates given rows, all of them or all but some.
@@ -259,7 +251,7 @@ class Conditioning:
         if but is not None:
             less = self._unit[:, but]
             system, right = system - less @ less.T, right - less @ self._wanted[but]
-        inverse = inverted(_with_prior(system.copy()))
+        inverse = inverted(with_prior(system.copy()))
         right = right - system @ (self._prior.middle / width)
         mean = self._prior.middle + width * (inverse @ right)
         return mean, inverse * np.outer(width, width)

@@ -143,6 +143,14 @@ def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
     )
 
 
+def with_prior(information: Array) -> Array:
+    """Return the data's information with a prior of unit width added, in its place."""
+    # Rounding of the largest entries must not outweigh the prior in open directions.
+    jitter = 1.0 + 1e-14 * float(np.trace(information))
+    information[np.diag_indices_from(information)] += jitter
+    return information
+
+
 def hidden(columns: Array, frames: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """
     Return which coordinates no data like these could show, shape (P,).
@@ -198,9 +206,7 @@ class _Chain:
     def step(self, *, look: bool) -> None:
         """Go on to the next model, and take a look at what is known given this one's sizes."""
         size = self.size
-        system = self.normal * np.outer(size, size) / self.noise
-        # Rounding of the largest entries must not outweigh the prior in open directions.
-        system[np.diag_indices_from(system)] += 1.0 + 1e-14 * float(np.trace(system))
+        system = with_prior(self.normal * np.outer(size, size) / self.noise)
         lower = cholesky(system, lower=True, check_finite=False)
         wanted = size * self.right / self.noise + self.middle / size
         half = solve_triangular(lower, wanted, lower=True, check_finite=False)

@@ -180,13 +180,13 @@ def _without_stand_in(work: Workspace, choice: Choice, result: Fit) -> Fit:
     An effect taken earlier may have passed for several, and runs beyond what a machine can have
     once the choice explains its part. Then it goes, and what fits best beside the choice comes.
     """
-    sites = {(effect.name, effect.site) for effect in implausible(result.model)}
-    if not sites or choice.unit.site in sites:
+    absurd = {(effect.name, effect.site) for effect in implausible(result.model)}
+    if not absurd or choice.unit.site in absurd:
         return result
     alone = fit(work.problem, possible_part(result.model), work.scale, None, 5)
     systems = work.beside(alone.model, alone.residual)
     ranked = ranking(systems, work.library.units, _rows(work, alone))
-    others = [c for c in ranked if c.unit.site not in sites and not _repeats(c, sites(alone))]
+    others = [c for c in ranked if c.unit.site not in absurd and not _repeats(c, sites(alone))]
     fits = [fitted_with(work, alone.model, other.effect()) for other in others[:SHORTLIST]]
     return min((alone, *fits), key=lambda f: f.rss)
 

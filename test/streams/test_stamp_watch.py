@@ -93,6 +93,13 @@ def test_a_clock_that_jumps_is_no_loss(by):
     assert back == pytest.approx(by, abs=2 * STEP / S)
 
 
+@pytest.mark.parametrize('gone', [1, 120, 2000])
+def test_what_is_lost_beside_a_pause_is_counted(gone):
+    # Five seconds without a message, in which the stamps went on by what is gone and no more.
+    kept, came = without((1000, 1000 + gone)), CAME + (np.arange(N) >= 1000 + gone) * 5.0
+    assert seen(STAMPS[kept], came[kept])[0] == gone
+
+
 def gap_of(size, came_too=True, rush=1.0):
     """Return what is seen of one gap of so many steps between beats that come so much quicker."""
     stamps, came = STAMPS[:400].copy(), CAME[:400] * rush

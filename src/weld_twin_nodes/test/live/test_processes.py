@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import signal
 import sqlite3
+import subprocess
+import sys
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -55,6 +57,21 @@ def test_every_node_ends_quietly_when_told_to(cell, tmp_path, number, nodes):
     for process in processes:
         assert 'Traceback' not in process.log, process.log
     assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
+
+
+TOLD_WHILE_A_CLASS_IS_MADE = """
+import os, signal
+from weld_twin_nodes.live.run_node import run
+raise SystemExit(run(lambda: exec('os.kill(os.getpid(), signal.SIGTERM); import json')))
+"""
+
+
+def test_a_program_told_to_end_while_it_is_still_loading_ends_quietly(tmp_path):
+    program = tmp_path / 'program.py'
+    program.write_text(TOLD_WHILE_A_CLASS_IS_MADE)
+    command = [sys.executable, '-m', program.stem]  # as a node is started
+    done = subprocess.run(command, check=False, capture_output=True, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, b'')
 
 
 BAD_STARTS = {

@@ -62,6 +62,15 @@ def executor(name: str = EXECUTORS[0]) -> Executor:
     return SingleThreadedExecutor()
 
 
+class Ended(BaseException):
+    """
+    The wish to end, before there is a node that could meet it.
+
+    An interpreter that a KeyboardInterrupt has met within ``exec`` of text, as dataclasses are
+    made, kills itself at its end, however that was handled.
+    """
+
+
 class Stop:
     """
     Ctrl-C and SIGTERM as a wish that the node meets in its own time.
@@ -81,7 +90,7 @@ class Stop:
     def _take(self, *_: object) -> None:
         first, self.wished = not self.wished, True
         if first and self.node is None:
-            raise KeyboardInterrupt
+            raise Ended
 
 
 def spin(node: CellNode, stop: Stop) -> None:
@@ -126,7 +135,7 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
         node = stop.node = _made(make)
         gc.freeze()  # what has been loaded stays; looking through it again is a pause of the node
         spin(node, stop)
-    except (KeyboardInterrupt, ExternalShutdownException, ROSInterruptException):
+    except (Ended, ExternalShutdownException, ROSInterruptException):
         pass
     except (
         TwinError,

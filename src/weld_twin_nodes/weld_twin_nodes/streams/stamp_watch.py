@@ -152,8 +152,9 @@ def _seen(step: Array, passed: Array, begin: int, end: int) -> Seen:
         whole <= FEWEST
     )  # the middle of steps that vary is high where some are double
     usual = float(step[few].sum() / whole[few].sum())
-    silence = passed > max(SILENT, 5.0 * usual)
-    gaps = (step > GAP * usual) & ~jumps & (~silence | (excess > SILENT))
+    # A sender that is silent lets its stamps go on with the time; one that lacks a message does not.
+    silence = (passed > max(SILENT, 5.0 * usual)) & (abs(excess) <= SILENT)
+    gaps = (step > GAP * usual) & ~jumps & ~silence
     return Seen(_missing(step, gaps, usual, begin, end), usual, ahead)
 
 

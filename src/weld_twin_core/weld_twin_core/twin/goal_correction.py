@@ -221,16 +221,7 @@ class _Work:
         self._refuse_outside()
         self._refuse_beyond(self.meant, 'the goal itself')
         before = self._missing(self.meant)
-        notes = [
-            f'{name} is not corrected: it hangs on how the controller follows, not on where it goes'
-            for name in not_corrected(self.model)
-        ]
-        if self.lawless:
-            names = ' and '.join(sorted({str(e.site) for e in self.lawless}))
-            notes.append(
-                f'no bound is told: what {names} loses by direction is known without its law, which '
-                'decides where it turns around'
-            )
+        notes = self._left()
         if np.abs(before).max() < NOTHING:
             none = np.zeros((self.goal.t.size, 6))
             return CorrectedGoal(
@@ -258,6 +249,20 @@ class _Work:
             waits,
             (*notes, *more),
         )
+
+    def _left(self) -> list[str]:
+        """Return what is not corrected, and what is not told, in sentences."""
+        out = [
+            f'{name} is not corrected: it hangs on how the controller follows, not on where it goes'
+            for name in not_corrected(self.model)
+        ]
+        if self.lawless:
+            names = ' and '.join(sorted({str(e.site) for e in self.lawless}))
+            out.append(
+                f'no bound is told: what {names} loses by direction is known without its law, which '
+                'decides where it turns around'
+            )
+        return out
 
     def _chosen(self, before: Array) -> tuple[Goal, Array, list[str]]:
         """Return the first way of correcting that keeps the limits and gains; raise why none does."""

@@ -19,6 +19,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arm.robot import Robot
 from ..arrays import Array, readonly
@@ -186,7 +187,7 @@ class Discrepancy:
         turns = np.zeros_like(self.gears) if self.turns is None else self.turns
         object.__setattr__(self, 'turns', readonly(turns, (None,), 'turns'))
 
-    def covariance(self, joint_columns: Array, beyond: Array, turned: Array) -> Array:
+    def covariance(self, joint_columns: Array, beyond: Array, turned: NDArray[np.bool_]) -> Array:
         """
         Return its part of the covariance, shape (M, 6, 6).
 
@@ -206,7 +207,7 @@ class Discrepancy:
         out[:, np.arange(6), np.arange(6)] += everywhere**2
         return np.asarray(out)
 
-    def sizes(self, beyond: Array, turned: Array) -> tuple[Array, Array]:
+    def sizes(self, beyond: Array, turned: NDArray[np.bool_]) -> tuple[Array, Array]:
         """
         Return standard deviations at the tool, shape (M, 6), and in every joint, shape (n, M).
 
@@ -409,7 +410,7 @@ class Posterior:
             raise ModelError(f'the posterior has no base frame {setup}')
         return self.directions.columns(features, setup, framed=framed)
 
-    def _levers(self, features: Features) -> tuple[Array, Array, Array]:
+    def _levers(self, features: Features) -> tuple[Array, Array, NDArray[np.bool_]]:
         """
         Return d pose / d joint, shape (n, 6, M), and of every joint where it is.
 
@@ -418,7 +419,9 @@ class Posterior:
         joints = [features.column(('q', i)) for i in range(features.twin.robot.n)]
         motion, at = features.recording.joints, features.at
         q, _ = motion.at(at)
-        turned = just_turned(motion, at) if np.any(self.discrepancy.turns) else np.zeros(q.shape)
+        turned = np.zeros(q.shape, dtype=bool)
+        if np.any(self.discrepancy.turns):
+            turned = just_turned(motion, at)
         return np.stack(joints), self.domain.beyond(q), turned
 
 

@@ -148,17 +148,14 @@ def leftover(
     e, v, levered = part(slice(3, 6))
     # Without measured turns the tool turns as much as it shifts on an arm of a metre.
     turn = _size(e, v + gear**2 * levered, np.eye(3)) if e.size else position
-    noise = _noise(problem, floor)
+    noise = _noise(problem, floor, scale.position)
     common = _common(errors, moments, pairs, weight > TRUSTED)
-    noise = None if noise is None else noise / scale.position
     share = _of_the_arm(*common, noise, rough, problem.at_rest)
-    turns = _at_turns(problem, samples, errors, moments, lost)
+    turns = _at_turns(problem, errors, moments, lost)
     return Rest(position * share, turn * share, gear * share, turns)
 
 
-def _at_turns(
-    problem: Problem, samples: list[Index], errors: list[Array], moments: list[Array], lost: Array
-) -> Array:
+def _at_turns(problem: Problem, errors: list[Array], moments: list[Array], lost: Array) -> Array:
     """
     Return how far joints may be off where they have just turned around, shape (n,) [rad or m].
 
@@ -167,12 +164,11 @@ def _at_turns(
     be lost: evenly likely ones have this standard deviation.
     """
     out = np.zeros(lost.size)
-    seen = np.array([k for k, index in enumerate(samples) if index.size >= 3], dtype=int)
+    seen = np.array([k for k, error in enumerate(errors) if error.size >= 3], dtype=int)
     if not lost.any() or problem.at_rest or not seen.size:
         return out
     excess = np.array([_excess(errors[k], errors[k], moments[k]) for k in seen])
-    pairs = [(r.joints, r.measured.t) for r in problem.recordings if r.measured is not None]
-    near = np.concatenate([just_turned(*pair) for pair in pairs])[seen]
+    near = np.concatenate([_turned(problem, k) for k in range(len(problem.recordings))])[seen]
     for i in np.flatnonzero(lost):
         here, beside = excess[near[:, i]], excess[~near[:, i]]
         if min(here.size, beside.size) < FEW:
@@ -181,6 +177,14 @@ def _at_turns(
         if here.mean() - beside.mean() > CLEAR * doubt:
             out[i] = lost[i] / np.sqrt(3.0)
     return out
+
+
+def _turned(problem: Problem, k: int) -> NDArray[np.bool_]:
+    """Return which joints have just turned at the samples of a recording; none where it touched."""
+    recording = problem.recordings[k]
+    if recording.measured is None or problem.contact(k) is not None:
+        return np.zeros((problem.samples[k], recording.joints.q.shape[1]), dtype=bool)
+    return just_turned(recording.joints, recording.measured.t)
 
 
 def _common(
@@ -334,13 +338,13 @@ def _size(errors: Array, moments: Array, shape: Array) -> float:
     return float(np.sqrt(high))
 
 
-def _noise(problem: Problem, floor: NoiseFloor) -> float | None:
-    """Return the instrument's noise [m], told with the data or seen in them; None where neither is."""
+def _noise(problem: Problem, floor: NoiseFloor, unit: float) -> float | None:
+    """Return the instrument's noise in units [m], told with the data or seen in them; None without."""
     told = [
         float(np.median(r.measured.sigma))
         for r in problem.recordings
         if r.measured is not None and r.measured.sigma is not None
     ]
     if told:
-        return float(np.mean(told))
-    return floor.sigma if floor.independent else None
+        return float(np.mean(told)) / unit
+    return floor.sigma / unit if floor.independent else None

@@ -28,7 +28,7 @@ from .drawn import Drawn
 from .features import Features
 from .goal_motion import Course, Goal, course, fine_times
 from .posterior import pose_covariances
-from .program_accuracy import likely_rms
+from .program_accuracy import accuracy
 from .program_correction import BETTER, NOTHING
 from .program_model import ProgramModel, missing
 from .reversals import approached, is_play, play_steps, spread
@@ -126,8 +126,8 @@ class CorrectedGoal:
     before, after : float [m]
         Expected RMS distance of the real tool from where the goal means it.
     bound : float, optional [m]
-        RMS distance that is told beforehand not to be exceeded; None where the model says nothing
-        of how sure it is.
+        Largest distance on the way that is told beforehand not to be exceeded; None where the model
+        says nothing of how sure it is.
     waits : float [s]
         How much later the goal begins, so that the correction sets in smoothly.
     notes : tuple of str
@@ -352,7 +352,7 @@ class _Work:
         return np.unique(np.linspace(0, count - 1, min(SURE_AT, count)).round().astype(int))
 
     def _bound(self, after: Array) -> float | None:
-        """Return the RMS distance that is told not to be exceeded [m]."""
+        """Return the largest distance on the way that is told not to be exceeded [m]."""
         posterior = self.model.posterior
         if posterior is None:
             return None
@@ -362,7 +362,8 @@ class _Work:
         )
         # Where joints turn around more is left than beside, and few places would miss that.
         near = np.searchsorted(self._places, np.arange(len(after))).clip(max=self._places.size - 1)
-        return likely_rms(after, Drawn(near, same, own), HOLDS)
+        found = accuracy([after], [Drawn(near, same, own)])
+        return None if found is None else found.likely_within(HOLDS)
 
     def _added(self, found: Goal, at: Array) -> Array:
         """Return what a corrected goal adds to the pose at stamps, shape (N, 6), seen from the base."""

@@ -54,12 +54,16 @@ class Accuracy(NamedTuple):
             return None
         return float((self.worsts <= tolerance).mean(axis=1).min())
 
+    def likely_within(self, probability: float) -> float | None:
+        """Return the least tolerance [m] that is kept all the way with a probability."""
+        if self.worsts is None:
+            return None
+        return float(np.quantile(self.worsts, probability, axis=1).max())
+
     @property
     def sure_within(self) -> float | None:
         """Return the least tolerance [m] that is kept all the way with `SURE` probability."""
-        if self.worsts is None:
-            return None
-        return float(np.quantile(self.worsts, SURE, axis=1).max())
+        return self.likely_within(SURE)
 
 
 def conforms(probability: float) -> str:
@@ -104,24 +108,6 @@ def accuracy(gaps: Sequence[Array], drawn: Sequence[Drawn | None]) -> Accuracy |
         (float(ends[0, 0]), float(ends[1, 0])),
         np.stack([same[1], own[1]]),
     )
-
-
-def likely_rms(gap: Array, drawn: Drawn, share: float) -> float:
-    """
-    Return the RMS distance [m] that stays within for a share of the models the recordings allow.
-
-    Parameters
-    ----------
-    gap : array, shape (N, 6) [m, rad]
-        What is missing by the model.
-    drawn : Drawn
-        Of the same samples.
-    share : float
-        Between 0 and 1.
-
-    """
-    found = [_drawn([(gap[:, :3], drawn.near, off)])[0] for off in (drawn.same, drawn.own)]
-    return float(np.quantile(found, share, axis=1).max())
 
 
 def _drawn(parts: Sequence[tuple[Array, NDArray[np.int_], Array]]) -> tuple[Array, Array]:

@@ -102,6 +102,7 @@ def test_a_thermometer_read_every_ten_seconds_is_silent_when_it_misses_one(clock
 def test_the_node_itself_tells_what_lasts_each_time_and_what_happened_once():
     health = Health('twin', 1.0)
     health.lasting['/x'] = 'nobody hears'
+    health.say('nobody hears')
     health.say('time went back')
     assert health.statuses()[0][:3] == ('twin', WARN, 'nobody hears; time went back')
     assert health.statuses()[0][:3] == ('twin', WARN, 'nobody hears')

@@ -158,7 +158,8 @@ class Health:
     def statuses(self) -> list[Status]:
         """Return the node itself and each of its inputs, since the last call."""
         now = time.monotonic()
-        told = [*filter(None, [self.fault]), *self.lasting.values(), *self._said[-3:]]
+        every = [*filter(None, [self.fault]), *self.lasting.values(), *self._said[-3:]]
+        told = list(dict.fromkeys(every))  # what begins to last is said, too
         own = Status(
             self._node,
             ERROR if self.fault else WARN if told else OK,

@@ -18,7 +18,7 @@ from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..result import Site
 from .library import Library, build
-from .other_sets import reconsidered
+from .other_sets import Sets, reconsidered
 from .rivals import Rival, rivals
 from .selection import (
     Workspace,
@@ -253,8 +253,11 @@ def settled(
     work: Workspace, now: Fit, effective: Callable[[Fit], float], progress: Progress
 ) -> tuple[Fit, tuple[tuple[Rival, ...], ...]]:
     """Return the fit in which every effect is the best in its place, and its rivals."""
+    if not now.model.found:
+        return now, ()
+    sets = Sets.about(work, now)
     for attempt in range(SWAPS + 1):
-        now, others = reconsidered(work, now, effective)
+        now, others = reconsidered(work, now, sets, effective)
         progress('other sets weighed')
         slots = []
         for k, effect in enumerate(now.model.found):

@@ -369,9 +369,7 @@ def on_all_joints(robot, entries):
     return effects_from_list(out, robot)
 
 
-@pytest.mark.parametrize(
-    ('name', 'kind'), [('ur10', moving), ('abb_irb120', moving), ('franka_panda', stations)]
-)
+@pytest.mark.parametrize(('name', 'kind'), [('abb_irb120', moving), ('franka_panda', stations)])
 def test_ordinary_effects_raise_no_warning(name, kind):
     rng = np.random.default_rng(11)
     robot = catalog.load(name)

@@ -70,9 +70,14 @@ def test_a_domain_in_which_somebody_speaks_who_holds_no_lock_is_passed_over(same
 
 def test_a_domain_is_free_again_once_its_holder_is_killed(same_start):
     command = [sys.executable, '-c', HOLD, str(same_start)]
-    holder = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    theirs = int(holder.stdout.readline())
-    holder.kill()
-    holder.communicate()
-    with own_domain() as ours:
-        assert ours == theirs
+    for _ in range(5):  # somebody else on this machine may take it first
+        holder = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        theirs = int(holder.stdout.readline())
+        holder.kill()
+        holder.communicate()
+        with own_domain() as ours:
+            if ours == theirs:
+                return
+    pytest.fail('no domain of a holder that was killed was given again')

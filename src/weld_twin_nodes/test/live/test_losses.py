@@ -22,6 +22,8 @@ STEP = 2_000_000
 """Stamps of a controller at 500 Hz [ns]."""
 BURST = 12_000
 """More than twice what a queue keeps."""
+SOON = 2.7
+"""Seconds within which a node ends that waits 2 s for who stands still."""
 TWIN, ANALYZER = 'forward_kinematics_twin', 'deviation_analyzer'
 
 
@@ -30,11 +32,14 @@ class Bench:
 
     def __init__(self, cell, robot):
         self.cell, self.robot = cell, robot
-        self.twin, self.analyzer = cell.start(TWIN), cell.start(ANALYZER)
+        self.begin()
         self.health = HealthListener(cell.node)
         self.poses = cell.collect('/twin/tool_pose')
         self.out = cell.publisher(JOINT_STATES)
         self.stamp, self.sent = S, 0
+
+    def begin(self):
+        self.twin, self.analyzer = self.cell.start(TWIN), self.cell.start(ANALYZER)
 
     def send(self, count):
         for _ in range(count):
@@ -146,13 +151,26 @@ def ended(process):
     return time.monotonic() - begun
 
 
-def test_a_node_ends_soon_though_who_listens_to_it_stands_still(bench):
+def longer_for_it(bench):
+    """Return how much longer the twin takes to end with an analyzer that stands still [s]."""
     bench.analyzer.signal(signal.SIGSTOP)
     bench.send(100)
     try:
         spent = ended(bench.twin)
     finally:
         bench.analyzer.signal(signal.SIGCONT)
-    # How long a node takes to end with nobody in its way is the machine's own, and its load's.
-    assert spent - ended(bench.analyzer) < 2.7
     assert 'without waiting for it any longer' in bench.twin.log
+    # How long a node takes to end with nobody in its way is the machine's own, and its load's.
+    return spent - ended(bench.analyzer)
+
+
+def test_a_node_ends_soon_though_who_listens_to_it_stands_still(bench):
+    longer = longer_for_it(bench)
+    for _ in range(2):  # a busy machine makes an end longer, and none shorter
+        if longer < SOON:
+            break
+        bench.begin()
+        bench.cell.meet()
+        bench.steady(1.5)
+        longer = longer_for_it(bench)
+    assert longer < SOON

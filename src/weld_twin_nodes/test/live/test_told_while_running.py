@@ -68,13 +68,10 @@ class Bench:
         """Return what `ros2 param dump` writes: all that is listed, in one question."""
         client = AsyncParameterClient(self.cell.node, node)
         self.cell.wait(client.services_are_ready, f'the parameters of {node}')
-        listed = client.list_parameters()
-        self.cell.wait(listed.done, 'the list')
-        names = sorted(listed.result().result.names)
-        asked = client.get_parameters(names)
-        self.cell.wait(asked.done, 'the values')
-        assert len(asked.result().values) == len(names)
-        values = [parameter_value_to_python(value) for value in asked.result().values]
+        names = sorted(self.cell.ask(client.list_parameters, 'the list').result.names)
+        told = self.cell.ask(lambda: client.get_parameters(names), 'the values').values
+        assert len(told) == len(names)
+        values = [parameter_value_to_python(value) for value in told]
         return {
             name: list(value) if isinstance(value, list) or hasattr(value, 'typecode') else value
             for name, value in zip(names, values, strict=True)

@@ -10,8 +10,9 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import rclpy
@@ -160,9 +161,25 @@ class Cell:
         """Set a parameter of a running node, as `ros2 param set` does."""
         client = AsyncParameterClient(self.node, node)
         self.wait(client.services_are_ready, f'the parameters of {node}')
-        future = client.set_parameters([Parameter(name, value=value)])
-        self.wait(future.done, f'{node} to take {name}')
-        return future.result().results[0]
+        wanted = [Parameter(name, value=value)]
+        answer = self.ask(partial(client.set_parameters, wanted), f'{node} to take {name}')
+        return cast('SetParametersResult', answer.results[0])
+
+    def ask(self, question: Callable[[], Any], what: str) -> Any:
+        """
+        Return the answer to a question that may be put more than once.
+
+        Parameters
+        ----------
+        question : callable
+            Puts it to a service, and returns the future of the answer.
+        what : str
+            What is waited for, in words.
+
+        """
+        asked = _Asked(question)
+        self.wait(asked.answered, what)
+        return asked.answer()
 
     def trigger(self, service: str) -> Trigger.Response:
         """Call a Trigger service."""
@@ -170,9 +187,8 @@ class Cell:
             self._services[service] = self.node.create_client(Trigger, service)
         client = self._services[service]
         self.wait(client.service_is_ready, service)
-        asked = _Asked(client, Trigger.Request())
-        self.wait(asked.answered, f'{service} to answer')
-        return asked.answer()
+        answer = self.ask(partial(client.call_async, Trigger.Request()), f'{service} to answer')
+        return cast('Trigger.Response', answer)
 
     # Streams ---------------------------------------------------------------------------------
 
@@ -347,9 +363,8 @@ class Cell:
                 continue
             client = self.node.create_client(GetParameters, f'/{process.name}/get_parameters')
             self.wait(client.service_is_ready, f'the parameters of {process.name}')
-            self.wait(
-                _Asked(client, GetParameters.Request()).answered, f'{process.name} to answer'
-            )
+            question = partial(client.call_async, GetParameters.Request())
+            self.ask(question, f'{process.name} to answer')
             self.node.destroy_client(client)
 
     def _logs(self) -> Iterator[str]:
@@ -372,15 +387,15 @@ class _Asked:
     A server may not know yet who asks, and its answer is lost; one that was killed seems ready.
     """
 
-    def __init__(self, client: Client, question: Any) -> None:
-        self._client, self._question = client, question
+    def __init__(self, question: Callable[[], Any]) -> None:
+        self._question = question
         self._answers: list[Any] = []
         self._due = time.monotonic()
 
     def answered(self) -> bool:
         """Return whether there is an answer; ask anew where it stays out."""
         if time.monotonic() >= self._due:
-            self._answers.append(self._client.call_async(self._question))
+            self._answers.append(self._question())
             self._due = time.monotonic() + AGAIN
         return any(answer.done() for answer in self._answers)
 

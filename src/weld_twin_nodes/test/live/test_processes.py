@@ -40,7 +40,7 @@ OWN_WAYS = ('recorder', 'live_diagnosis')
 """Nodes that do more at their end than the others: one completes a bag, one has a process."""
 
 
-def test_nodes_end_quietly_when_told_to_by_a_system(cell, tmp_path):
+def test_nodes_end_quietly_when_told_to_end(cell, tmp_path):
     """Ctrl-C ends all of them quietly, as they are installed: `test/install/test_colcon.py`."""
     processes = [
         cell.start(name, **({'out': str(tmp_path / 'bag')} if name == 'recorder' else {}))

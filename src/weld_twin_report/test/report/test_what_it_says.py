@@ -43,7 +43,8 @@ def part(page, start, end):
 
 
 @pytest.mark.parametrize(
-    ('confidence', 'said'), [(0.28, 'Partly identified'), (0.5, 'Identified'), (None, 'Identified')]
+    ('confidence', 'said'),
+    [(0.28, 'Partly identified'), (0.5, 'Identified'), (None, 'Identified')],
 )
 def test_an_answer_that_is_rather_wrong_as_a_whole_is_not_called_identified(confidence, said):
     assert Answer(replace(PLAY, status='identified', confidence=confidence)).status == said

@@ -86,14 +86,16 @@ def recorded(
 
 
 @cache
-def solved(*effects, robot='ur5', seed=1, exclude=(), align=(), **options):
+def solved(*effects, robot='ur5', seed=1, exclude=(), align=(), experiment=False, **options):
     """Return the diagnosis of a recording with effects, each a tuple (name, key, value, ...)."""
     arm = load(robot)
     true = [
         {'effect': e[0], **dict(zip(e[1::2], map(_plain, e[2::2]), strict=True))} for e in effects
     ]
     recording = recorded(arm, true, seed, **options)
-    return diagnose([recording], arm, exclude=exclude, align=frozenset(align))
+    return diagnose(
+        [recording], arm, exclude=exclude, align=frozenset(align), experiment=experiment
+    )
 
 
 def _plain(value):

@@ -78,7 +78,10 @@ ANSWERS = {
     'parallel': ((('link_offset', 'joint', 'elbow_joint', 'dd', 4e-4),), {}),
     'unknown': (
         (('backlash', 'joint', 'elbow_joint', 'width', 1.5e-3),),
-        {'exclude': ('backlash', 'friction', 'hysteresis', 'gear_ratio_by_direction')},
+        {
+            'exclude': ('backlash', 'friction', 'hysteresis', 'gear_ratio_by_direction'),
+            'experiment': True,
+        },
     ),
     'points': ((('backlash', 'joint', 'elbow_joint', 'width', 8e-4),), {'orientation': False}),
     'stations': (

@@ -40,7 +40,7 @@ def holds(found, truth=1.2e-5):
 def test_arbitrary_base_and_tool_frames_are_found_and_the_cause_with_them():
     robot, base, tool = load('ur5'), frame(1), frame(11)
     recording = recorded(robot.with_frames(base=base, tool=tool), [SPRING], static=70)
-    answer = diagnose([recording], robot, align=frozenset({'base', 'tool'}))
+    answer = diagnose([recording], robot, align=frozenset({'base', 'tool'}), experiment=False)
     assert {('joint_compliance', 'shoulder_lift_joint')} in sites(answer)
     assert holds(spring(answer))
     np.testing.assert_allclose(answer.model.bases[0], base, atol=1e-4)
@@ -55,7 +55,7 @@ def test_two_recordings_each_have_a_base_frame_of_their_own():
         recorded(robot.with_frames(base=base), [SPRING], seed, static=70, name=f'set-up {seed}')
         for seed, base in enumerate(bases)
     ]
-    answer = diagnose(recordings, robot, align=frozenset({'base'}))
+    answer = diagnose(recordings, robot, align=frozenset({'base'}), experiment=False)
     assert sites(answer) == [{('joint_compliance', 'shoulder_lift_joint')}]
     assert holds(spring(answer))
     for found, base in zip(answer.model.bases, bases, strict=True):
@@ -66,7 +66,7 @@ def test_an_effect_known_beforehand_is_not_diagnosed_again():
     robot = load('ur5')
     known = effect('joint_compliance', joint='shoulder_lift_joint', compliance=1.2e-5)
     recording = recorded(robot, [SPRING], static=70, richness=0.0)
-    answer = diagnose([recording], robot, known=[known])
+    answer = diagnose([recording], robot, known=[known], experiment=False)
     assert (answer.status, answer.effects) == ('none', ())
     assert answer.gap.rms_m == pytest.approx(FLOOR, rel=0.1)
     assert answer.as_dict()['model']['known'] == [known.to_mapping()]
@@ -78,7 +78,7 @@ def test_held_out_recordings_judge_the_shrink():
         recorded(robot, [SPRING], seed, static=n, name=name)
         for seed, n, name in ((1, 70, 'seen'), (2, 50, 'unseen'))
     )
-    answer = diagnose([seen], robot, holdout=[unseen])
+    answer = diagnose([seen], robot, holdout=[unseen], experiment=False)
     shrink = answer.shrink
     assert shrink.held_out == 'unseen'
     assert shrink.rms_after_m == pytest.approx(FLOOR, rel=0.15)
@@ -94,18 +94,18 @@ def made_up(**changes):
 
 def test_a_recording_without_measurements_is_refused_by_name():
     with pytest.raises(DataError, match='odd holds no measured poses or points'):
-        diagnose([made_up(measured=None)], load('ur5'))
+        diagnose([made_up(measured=None)], load('ur5'), experiment=False)
 
 
 def test_no_measurement_at_all_is_refused_too():
     empty = Measurements(np.zeros(0), np.zeros((0, 3)))
     with pytest.raises(DataError, match='odd holds no measured poses or points'):
-        diagnose([made_up(measured=empty)], load('ur5'))
+        diagnose([made_up(measured=empty)], load('ur5'), experiment=False)
 
 
 def test_clocks_that_do_not_overlap_are_unsound_with_both_spans():
     late = Measurements(1000.0 + np.arange(50) / 10.0, np.zeros((50, 3)))
-    answer = diagnose([made_up(measured=late)], load('ur5'))
+    answer = diagnose([made_up(measured=late)], load('ur5'), experiment=False)
     (item,) = answer.unsound
     assert answer.status == 'unsound' and item.kind == 'clock'
     assert '0.000 to 9.900 s against 1000.000 to 1004.900 s' in item.sentence

@@ -57,7 +57,7 @@ def test_a_base_put_back_wrongly_shows_on_a_block_at_a_known_place(robot):
     rng, shift = np.random.default_rng(1), np.array([0.003, -0.002, 0.0])
     recording = felt(moved(robot, shift), block(at=AT), rng)
 
-    diagnosis = wt.diagnose(recording, robot)
+    diagnosis = wt.diagnose(recording, robot, experiment=False)
 
     assert named(diagnosis) == [('base_pose', None)]
     np.testing.assert_allclose(diagnosis.effects[0].effect.xyz, shift, atol=2e-4)
@@ -82,7 +82,7 @@ def test_a_base_that_is_not_known_is_found_beside_the_cause(robot):
     bent = replace(robot, theta=robot.theta + 0.002 * (np.arange(6) == 2))
     recording = felt(moved(bent, shift), block(at=AT), rng)
 
-    diagnosis = wt.diagnose(recording, robot, align='base')
+    diagnosis = wt.diagnose(recording, robot, align='base', experiment=False)
 
     assert named(diagnosis) == [('joint_offset', 'elbow_joint')]
     base = diagnosis.model.bases[0]

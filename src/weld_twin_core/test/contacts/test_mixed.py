@@ -64,7 +64,10 @@ def test_kinds_of_contact_together_name_the_elbow(robot):
     other = reached(real, np.tile([-0.2, 0.45, 0.3], (60, 1)), rng, 12)
 
     diagnosis = wt.diagnose(
-        wt.Recording('block', motion, contacts=touched), robot, holdout=[pinned(other)]
+        wt.Recording('block', motion, contacts=touched),
+        robot,
+        holdout=[pinned(other)],
+        experiment=False,
     )
 
     (named,) = diagnosis.effects

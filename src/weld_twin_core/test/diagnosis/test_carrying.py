@@ -40,7 +40,7 @@ def scaled(robot):
 
 
 def test_a_joint_at_rest_shows_its_gear_ratio_as_a_zero(robot, scaled):
-    found = wt.diagnose(motion(robot, scaled, 0.0), robot)
+    found = wt.diagnose(motion(robot, scaled, 0.0), robot, experiment=False)
     (group,) = told(found)
     assert {('joint_offset', STILL), ('gear_ratio', STILL)} <= group
     assert found.status == 'ambiguous'
@@ -48,7 +48,7 @@ def test_a_joint_at_rest_shows_its_gear_ratio_as_a_zero(robot, scaled):
 
 def test_where_a_held_out_motion_moves_the_joint_the_one_that_carries_over_is_named(robot, scaled):
     train, moved = motion(robot, scaled, 0.0), motion(robot, scaled, 0.9, seed=4)
-    found = wt.diagnose(train, robot, holdout=[moved])
+    found = wt.diagnose(train, robot, holdout=[moved], experiment=False)
     assert (found.status, told(found)) == ('identified', [{('gear_ratio', STILL)}])
     (effect,) = found.model.found
     assert effect.scale == pytest.approx(1e-3, rel=0.05)

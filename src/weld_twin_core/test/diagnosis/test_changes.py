@@ -108,14 +108,16 @@ def test_one_recording_changes_nothing(robot):
 def test_only_constant_errors_may_change(robot):
     """Play that grew is no constant error; the sentence lists those that are."""
     with pytest.raises(ModelError, match="may_change: 'backlash' is no error that stays the same"):
-        wt.diagnose([day(robot, 1), day(robot, 2)], robot, may_change='backlash')
+        wt.diagnose([day(robot, 1), day(robot, 2)], robot, may_change='backlash', experiment=False)
 
 
 def test_a_whole_diagnosis(robot):
     """The common errors are the verdict, the change stands beside them."""
     pair = [day(robot, 1), day(robot, 2, JointOffset('elbow_joint', 1e-3))]
     rest = [name for name in REGISTRY if name not in ('joint_offset', 'link_twist')]
-    found = wt.diagnose(pair, robot, exclude=rest, may_change='joint_offset, tool_pose')
+    found = wt.diagnose(
+        pair, robot, exclude=rest, may_change='joint_offset, tool_pose', experiment=False
+    )
     assert {(f.effect.name, f.effect.site) for f in found.effects} == {
         (e.name, e.site) for e in COMMON
     }

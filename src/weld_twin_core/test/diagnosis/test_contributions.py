@@ -21,7 +21,7 @@ def cell():
     noise = np.random.default_rng(3).normal(scale=NOISE, size=(plan.motion.t.size, 3))
     real = wt.Twin(robot, [LAG, ZERO, PLAY]).poses(seam).position + noise
     measured = seam.with_measured(wt.Measurements(plan.motion.t, real))
-    return robot, seam, noise, wt.diagnose(measured, robot)
+    return robot, seam, noise, wt.diagnose(measured, robot, experiment=False)
 
 
 def rms(deviation):
@@ -54,5 +54,7 @@ def test_what_is_left_and_all_parts_are_the_figures_of_the_diagnosis(cell):
 def test_where_no_cause_is_named_nothing_can_be_thought_away(cell):
     robot, seam, noise, _ = cell
     bare = wt.Twin(robot).poses(seam).position + noise
-    found = wt.diagnose(seam.with_measured(wt.Measurements(seam.joints.t, bare)), robot)
+    found = wt.diagnose(
+        seam.with_measured(wt.Measurements(seam.joints.t, bare)), robot, experiment=False
+    )
     assert found.status == 'none' and found.contributions is None

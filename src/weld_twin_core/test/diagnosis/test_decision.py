@@ -15,8 +15,7 @@ import pytest
 
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
-from weld_twin_core.diagnosis.many.weighed_families import WeighedFamily
-from weld_twin_core.diagnosis.result import Site
+from weld_twin_core.diagnosis.result import Family, Site
 from weld_twin_core.diagnosis.unseen.leftover_structure import Structure
 from weld_twin_core.diagnosis.verdict.decision import Left, decide
 from weld_twin_core.diagnosis.verdict.evidence import Evidence
@@ -295,7 +294,7 @@ def test_what_is_spread_far_wider_than_noise_is_unknown(times, status):
 
 def family(effect, rms=3e-5, size=1e-4, growths=(0.5, 0.5), like=(), chosen=True):
     site = Site(effect, ELBOW)
-    return WeighedFamily(effect, growths, chosen, ((site, size),), rms, ((site, 1.0),), like)
+    return Family(effect, growths, chosen, ((site, size),), rms, ((site, 1.0),), like)
 
 
 def of_families(*families, **changes):

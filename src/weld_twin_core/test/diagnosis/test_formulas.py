@@ -69,20 +69,22 @@ def first(found):
 
 
 def test_an_instrument_that_errs_by_a_law_of_its_own_is_no_scale():
-    found = wt.diagnose(recorded(instrument=far_off), wt.load('ur5'))
+    found = wt.diagnose(recorded(instrument=far_off), wt.load('ur5'), experiment=False)
     assert found.status == 'unknown'
     assert first(found) == ('instrument', 'place')
     assert 'instrument' in found.reasons[0]
 
 
 def test_an_instrument_with_a_wrong_unit_is_told_by_its_name():
-    found = wt.diagnose(recorded(instrument=lambda p: 1.0001 * p), wt.load('ur5'))
+    found = wt.diagnose(
+        recorded(instrument=lambda p: 1.0001 * p), wt.load('ur5'), experiment=False
+    )
     assert [named.effect.name for named in found.effects] == ['measurement_scale']
 
 
 @pytest.mark.parametrize('bend', [jumping, worn_in_the_middle])
 def test_lost_motion_of_another_law_is_placed_and_not_named(bend):
-    found = wt.diagnose(recorded(bend), wt.load('ur5'))
+    found = wt.diagnose(recorded(bend), wt.load('ur5'), experiment=False)
     assert found.status == 'unknown'
     place, dependence = first(found)
     assert place == 'elbow_joint'
@@ -90,11 +92,13 @@ def test_lost_motion_of_another_law_is_placed_and_not_named(bend):
 
 
 def test_an_encoder_that_rounds_is_placed_though_its_family_was_taken_out():
-    found = wt.diagnose(recorded(rounded), wt.load('ur5'), exclude=('quantization',))
+    found = wt.diagnose(
+        recorded(rounded), wt.load('ur5'), exclude=('quantization',), experiment=False
+    )
     assert found.status == 'unknown'
     assert first(found)[0] == 'elbow_joint'
 
 
 def test_noise_of_the_instrument_comes_from_no_joint():
-    found = wt.diagnose(recorded(noise=(2e-5, 3e-5, 4e-5)), wt.load('ur5'))
+    found = wt.diagnose(recorded(noise=(2e-5, 3e-5, 4e-5)), wt.load('ur5'), experiment=False)
     assert found.status == 'none'

@@ -31,7 +31,9 @@ def solved(effects, seed=5):
     real = wt.Twin(robot, effects).poses(wt.Recording('swings', motion))
     noise = np.random.default_rng(seed).normal(scale=NOISE, size=real.position.shape)
     measured = wt.Measurements(motion.t, real.position + noise)
-    return wt.diagnose(wt.Recording('swings', motion, measured=measured), robot), noise
+    return wt.diagnose(
+        wt.Recording('swings', motion, measured=measured), robot, experiment=False
+    ), noise
 
 
 def true_shares(effects, noise):

@@ -51,7 +51,7 @@ def stations(effects, count=80, seed=5):
 
 def test_an_excluded_twin_of_what_was_found_is_told_beside_it():
     recording = stations([wt.effects.LinkOffset('shoulder_pan_joint', dd=8e-4)])
-    found = wt.diagnose(recording, wt.load('ur5'), exclude=('link_offset',))
+    found = wt.diagnose(recording, wt.load('ur5'), exclude=('link_offset',), experiment=False)
     (group,) = found.indistinguishable
     told = {(site.effect, site.joint) for site in group}
     assert ('link_offset', 'shoulder_pan_joint') in told
@@ -59,7 +59,7 @@ def test_an_excluded_twin_of_what_was_found_is_told_beside_it():
 
 def test_an_excluded_error_that_is_no_twin_is_not_told():
     recording = stations([wt.effects.JointOffset('elbow_joint', offset=6e-4)])
-    found = wt.diagnose(recording, wt.load('ur5'), exclude=('link_length',))
+    found = wt.diagnose(recording, wt.load('ur5'), exclude=('link_length',), experiment=False)
     assert found.status == 'identified'
     assert [(s.effect, s.joint) for s in found.indistinguishable[0]] == [
         ('joint_offset', 'elbow_joint')
@@ -80,7 +80,7 @@ def swinging(effects, noise, moved=1.0):
 
 def test_play_that_was_taken_out_is_told_beside_friction_where_noise_hides_their_curves():
     recording = swinging([wt.effects.Backlash('elbow_joint', width=4e-4)], 8e-5)
-    found = wt.diagnose(recording, wt.load('ur5'), exclude=('backlash',))
+    found = wt.diagnose(recording, wt.load('ur5'), exclude=('backlash',), experiment=False)
     assert found.status == 'ambiguous'
     (group,) = found.indistinguishable
     assert {('friction', 'elbow_joint'), ('backlash', 'elbow_joint')} <= {
@@ -100,7 +100,7 @@ def test_a_wobble_of_a_bearing_at_rest_is_told_beside_the_twist_that_it_is_there
 
 def test_nothing_stands_in_for_play_that_was_taken_out_where_its_curve_shows():
     recording = swinging([wt.effects.Backlash('elbow_joint', width=3e-3)], 1e-5)
-    found = wt.diagnose(recording, wt.load('ur5'), exclude=('backlash',))
+    found = wt.diagnose(recording, wt.load('ur5'), exclude=('backlash',), experiment=False)
     assert found.status == 'unknown'
     assert found.effects == ()
     assert not any(candidate.site.effect == 'backlash' for candidate in found.candidates)
@@ -117,7 +117,7 @@ def test_play_that_a_load_holds_on_one_flank_is_told_beside_an_offset_to_that_si
     real = wt.Twin(robot, [wt.effects.JointOffset(joint, offset=offset)]).poses(commanded)
     drawn = np.random.default_rng(3).normal(scale=NOISE, size=real.position.shape)
     measured = wt.Measurements(t, real.position + drawn)
-    found = wt.diagnose(commanded.with_measured(measured), robot)
+    found = wt.diagnose(commanded.with_measured(measured), robot, experiment=False)
     named = {(s.effect, s.joint) for group in found.indistinguishable for s in group}
     assert ('joint_offset', joint) in named
     assert (('loaded_play', joint) in named) is told

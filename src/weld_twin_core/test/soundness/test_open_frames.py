@@ -32,7 +32,7 @@ def robot():
 
 
 def test_frames_that_were_right_stay_right_all_over_the_workspace(robot):
-    found = wt.diagnose(recorded(robot, robot), robot, align='base,tool')
+    found = wt.diagnose(recorded(robot, robot), robot, align='base,tool', experiment=False)
     assert found.posterior.left_open
     fitted = found.model.twin(0).robot
     q = postures_within_limits(robot, 100)
@@ -45,7 +45,7 @@ def test_a_moved_base_is_fitted_all_the_same(robot):
     base = np.array(robot.T_world_base)
     base[:3, 3] += [0.004, -0.006, 0.005]
     recording = recorded(robot, robot.with_frames(base=base))
-    found = wt.diagnose(recording, robot, align='base,tool')
+    found = wt.diagnose(recording, robot, align='base,tool', experiment=False)
     fitted = found.model.twin(0)
     t = recording.measured.t
     left = fitted.poses(recording, t).position - recording.measured.position

@@ -76,17 +76,9 @@ def test_degrees_in_radian_fields_are_named(ur5, placed):
     assert 'in degrees where radians belong' in wrong(ur5, 'units', bad)
 
 
-@pytest.mark.parametrize(
-    ('factor', 'words'), [(1e3, 'millimetres where metres'), (1.0 / 0.0254, 'inches')]
-)
-def test_units_of_positions_are_named(ur5, placed, factor, words):
-    bad = remeasured(placed, position=placed.measured.position * factor)
-    assert words in wrong(ur5, 'units', bad)
-
-
-def test_a_joint_that_counts_the_other_way_is_named(ur5, placed):
-    bad = rejointed(placed, placed.joints.q * [1, 1, -1, 1, 1, 1])
-    assert "'elbow_joint' counts the other way" in wrong(ur5, 'sign', bad)
+def test_positions_in_inches_are_named(ur5, placed):
+    bad = remeasured(placed, position=placed.measured.position / 0.0254)
+    assert 'inches' in wrong(ur5, 'units', bad)
 
 
 def test_two_joints_that_count_the_other_way_are_both_named(ur5, placed):
@@ -128,8 +120,9 @@ def test_two_mix_ups_at_once_are_both_named(ur5, placed):
     bad = remeasured(bad, position=bad.measured.position * 1e3)
     found = looked_at(ur5, bad).unsound
     assert {item.kind for item in found} == {'units', 'sign'}
-    assert any('illimetres' in item.sentence for item in found)
-    assert any(item.at == ('elbow_joint',) for item in found)
+    assert any('millimetres where metres' in item.sentence for item in found)
+    (sign,) = (item for item in found if item.kind == 'sign')
+    assert sign.at == ('elbow_joint',) and 'counts the other way' in sign.sentence
 
 
 def test_an_instrument_frame_nobody_asked_to_align_is_named(ur5, rng):
@@ -369,9 +362,7 @@ def on_all_joints(robot, entries):
     return effects_from_list(out, robot)
 
 
-@pytest.mark.parametrize(
-    ('name', 'kind'), [('ur10', moving), ('abb_irb120', moving), ('franka_panda', stations)]
-)
+@pytest.mark.parametrize(('name', 'kind'), [('abb_irb120', moving), ('franka_panda', stations)])
 def test_ordinary_effects_raise_no_warning(name, kind):
     rng = np.random.default_rng(11)
     robot = catalog.load(name)

@@ -122,10 +122,6 @@ class Beliefs:
     """RMS on unseen stations, as a share of that of the few, that the many must stay below. A
     judgement."""
 
-    member: float = _many(0.3)
-    """RMS at the tool, as a share of what all of them leave, from which an effect counts as one of
-    the many: a few large ones that tiny ones mend are one cause that the library lacks."""
-
     tied_from: int = _many(3)
     """Coordinates of one kind from which on they share a learned size: a variance learned from
     two numbers says nothing."""

@@ -187,38 +187,52 @@ class Site:
 @dataclass(frozen=True)
 class Family:
     """
-    Many small errors of one kind, fitted together.
+    Many small errors of one kind, fitted together, and how much worse unseen data get without it.
 
     Attributes
     ----------
-    effect : str
-    named : bool
-        Whether unseen data get worse without it; one that is not is exchangeable here.
+    growths : tuple of float
+        By what share the RMS error of each part left out, stretches of time and regions of
+        posture, grows without it, all other kinds chosen and the frames fitted anew. Of a kind that
+        was not chosen: by what share it shrinks with it.
+    chosen : bool
+        Whether it is among the kinds that explain unseen data together.
+    members : tuple of (Site, float)
+        Its members and how far each moves the tool, RMS [m], largest first.
     rms_m : float
         What it accounts for at the tool on unseen data: the root of how much the squared error
         grows without it, the other kinds that are needed fitted anew, [m].
-    members : tuple of (Site, float)
-        Its members and how far each moves the tool, RMS [m], largest first.
-    growth : float
-        By what share the error on unseen data grows without it, all others fitted anew: the median
-        over the parts left out.
     needed : tuple of (Site, float)
         The members without which unseen data get worse, each with its share of the kind.
     like : tuple of (Site, float)
         What would do nearly as well in its place, and how nearly: 1 is as well.
     share : float
-        Share of the squared gap that it takes off unseen data.
+        Share of the squared unseen gap that it takes off; all that are chosen add up to what they
+        take off together.
+    named : bool
+        Whether the verdict names it; one that it does not is exchangeable here.
 
     """
 
     effect: str
-    named: bool
-    rms_m: float
+    growths: tuple[float, ...]
+    chosen: bool
     members: tuple[tuple[Site, float], ...]
-    growth: float = 0.0
+    rms_m: float = 0.0
     needed: tuple[tuple[Site, float], ...] = ()
     like: tuple[tuple[Site, float], ...] = ()
     share: float = 0.0
+    named: bool = False
+
+    @property
+    def growth(self) -> float:
+        """Return by what share the error grows without it in the median part left out."""
+        return float(np.median(self.growths)) if self.growths else 0.0
+
+    def missed(self, worth: float) -> bool:
+        """Return whether unseen data get worse without it: in the median part, and better in none."""
+        told = self.chosen and len(self.growths) > 1
+        return told and self.growth >= worth and min(self.growths) >= 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``verdict.families``."""

@@ -19,7 +19,7 @@ from weld_twin_lab.transfer.degenerate import (
     tried,
 )
 
-DRAWS = 36
+DRAWS = 24
 """Recordings drawn; `weld-twin lab degenerate` draws thousands."""
 VALUES = {
     'robot': ROBOTS,

@@ -23,7 +23,6 @@ from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_nodes.harness import Cell, CellTimeout
-from weld_twin_nodes.harness.process import MODULES
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.error_injector import ErrorInjector
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
@@ -41,18 +40,16 @@ OWN_WAYS = ('recorder', 'live_diagnosis')
 """Nodes that do more at their end than the others: one completes a bag, one has a process."""
 
 
-@pytest.mark.parametrize(
-    ('number', 'nodes'), [(signal.SIGINT, tuple(MODULES)), (signal.SIGTERM, OWN_WAYS)]
-)
-def test_every_node_ends_quietly_when_told_to(cell, tmp_path, number, nodes):
+def test_nodes_end_quietly_when_told_to_end(cell, tmp_path):
+    """Ctrl-C ends all of them quietly, as they are installed: `test/install/test_colcon.py`."""
     processes = [
         cell.start(name, **({'out': str(tmp_path / 'bag')} if name == 'recorder' else {}))
-        for name in nodes
+        for name in OWN_WAYS
     ]
-    wait_for_nodes(cell, nodes)
+    wait_for_nodes(cell, OWN_WAYS)
     cell.trigger('/recorder/counts')
     for process in processes:
-        process.signal(number)
+        process.signal(signal.SIGTERM)
     assert [process.end() for process in processes] == [0] * len(processes)
     for process in processes:
         assert 'Traceback' not in process.log, process.log

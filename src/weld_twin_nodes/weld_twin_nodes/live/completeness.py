@@ -78,6 +78,10 @@ class SentBook:
         """Return the nodes of the project that were met and have not told anything at all."""
         return [node for node in self._listened if _ours(node) and node not in self._heard]
 
+    def told_by(self, nodes: Collection[str]) -> list[str]:
+        """Return which of some nodes have told of themselves."""
+        return sorted(self._heard.keys() & set(nodes))
+
     def meet(self, node: str, now: float) -> None:
         """Take note at every look [s] that a node publishes something that is recorded."""
         passed = now - self._looked.get(node, now)

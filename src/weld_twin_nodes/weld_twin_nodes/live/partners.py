@@ -44,18 +44,18 @@ def unheard_publishers(
         else:
             reason = _gap(info.qos_profile, wanted.to_rclpy())
         if reason:
-            out.append(f'{topic}: {_name(info)} {reason}; nothing of it arrives')
+            out.append(f'{topic}: {full_name(info)} {reason}; nothing of it arrives')
     return out
 
 
 def senders(node: Node, topic: str) -> set[str]:
     """Return the full names of the nodes that publish a topic."""
-    return {_name(info) for info in node.get_publishers_info_by_topic(topic)}
+    return {full_name(info) for info in node.get_publishers_info_by_topic(topic)}
 
 
 def readers(node: Node, topic: str) -> set[str]:
     """Return the full names of the nodes that subscribe to a topic."""
-    return {_name(info) for info in node.get_subscriptions_info_by_topic(topic)}
+    return {full_name(info) for info in node.get_subscriptions_info_by_topic(topic)}
 
 
 def elsewhere(node: Node, topic: str, own: str, kinds: Sequence[str]) -> str:
@@ -82,7 +82,7 @@ def elsewhere(node: Node, topic: str, own: str, kinds: Sequence[str]) -> str:
             if publishers:
                 space = name.removesuffix(own) or '/'
                 return (
-                    f'{topic} has no publisher, but {_name(publishers[0])} publishes {name}: '
+                    f'{topic} has no publisher, but {full_name(publishers[0])} publishes {name}: '
                     f'start this node in the namespace {space}, or remap the topic'
                 )
     return ''
@@ -97,7 +97,7 @@ class Senders:
     def changed(self, node: Node, topic: str) -> str:
         """Return in a sentence that others publish it than before, empty where they do not."""
         infos = node.get_publishers_info_by_topic(topic)
-        now = frozenset(map(_name, _named(infos)))
+        now = frozenset(map(full_name, _named(infos)))
         if not now or len(now) < len({info.node_name for info in infos}):
             return ''  # the graph does not have their names yet
         before = self._before
@@ -119,7 +119,7 @@ def unreached_subscribers(node: Node, topic: str, kind: str, offered: Qos) -> li
         else:
             reason = _gap(offered.to_rclpy(), info.qos_profile)
         if reason:
-            out.append(f'{topic}: {_name(info)} {reason}; it receives nothing')
+            out.append(f'{topic}: {full_name(info)} {reason}; it receives nothing')
     return out
 
 
@@ -144,5 +144,11 @@ def _named(infos: Sequence[Any]) -> list[Any]:
     return [info for info in infos if UNKNOWN not in info.node_name]
 
 
-def _name(info: Any) -> str:
+def full_name(info: Any) -> str:
+    """Return the name of an endpoint's node with its namespace."""
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+
+
+def named(node: str) -> str:
+    """Return the full name of a node as it is told; the graph may lack it at first."""
+    return 'a publisher whose name is not known yet' if UNKNOWN in node else node

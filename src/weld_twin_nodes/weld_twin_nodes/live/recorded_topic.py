@@ -24,6 +24,7 @@ from . import qos_events
 from .cell_node import CellNode
 from .message_classes import message_class
 from .outputs import Sent, header_stamp
+from .partners import full_name
 
 DEEP = 10_000
 """
@@ -130,9 +131,7 @@ class RecordedTopic:
 
     def publishing_nodes(self) -> set[str]:
         """Return the full names of the nodes that publish it."""
-        return {
-            f'{info.node_namespace.rstrip("/")}/{info.node_name}' for info in self.publishers()
-        }
+        return {full_name(info) for info in self.publishers()}
 
     def adapt(self) -> None:
         """Subscribe anew where a publisher has come that the subscription does not suit."""

@@ -20,6 +20,7 @@ from .completeness import AT_START, SentBook, Shortfall, shortfall
 from .neighbour_health import Statuses
 from .offered_channel import offered_channel
 from .outputs import Sent
+from .partners import named
 from .recorded_topic import RecordedTopic
 
 _TEXT = decoder(ROBOT_DESCRIPTION.type)
@@ -138,10 +139,10 @@ class RecordingRun:
             self._book.take(values, time.monotonic())
 
     def counts(self) -> dict[str, Any]:
-        """Return the messages written by topic, and those dropped."""
+        """Return the messages written by topic, those dropped, and who told how many were sent."""
         written, dropped = self._bag.counts()
         counts = {topic: written.get(topic, 0) for topic in self._topics}
-        return {**counts, 'dropped': dropped}
+        return {**counts, 'dropped': dropped, 'told_by': self._book.told_by(self._meet())}
 
     # Ending ----------------------------------------------------------------------------------
 
@@ -221,7 +222,7 @@ class RecordingRun:
         silent = set(self._book.never_told())
         if self._ending_since is not None:
             silent.update(self._untold())
-        sentences += [f'{node} has not told what it sent' for node in sorted(silent)]
+        sentences += [f'{named(node)} has not told what it sent' for node in sorted(silent)]
         if not self._joins:
             sentences += self._book.unheard(self._publishers)
         for k, sentence in enumerate(sentences):

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
 from weld_twin_core.diagnosis.result import Cause, Diagnosis, Found, Site
+from weld_twin_core.diagnosis.verdict.decision import LIKELIER
 from weld_twin_core.effects import REGISTRY
 
 _PARAMETERS = {
@@ -32,6 +33,8 @@ STATUS = {
     'none': 'No gap',
     'unsound': 'Unsound data',
 }
+PARTLY = 'Partly identified'
+"""Where causes are told, and it is likelier than not that one more acts or one of them does not."""
 REGIMES = {
     'static': 'constant or by angle',
     'reversal': 'at reversals',
@@ -186,9 +189,16 @@ def open_sets(diagnosis: Diagnosis) -> list[tuple[Site, ...]]:
 
 
 def status_word(diagnosis: Diagnosis) -> str:
-    """Return the status as people read it: what only no motion can decide is no open question."""
+    """
+    Return the status as people read it.
+
+    What only no motion can decide is no open question. Causes that stand by themselves, of which
+    the whole is rather wrong than right, are a part of what there is.
+    """
     closed = diagnosis.status == 'ambiguous' and diagnosis.same and not open_sets(diagnosis)
-    return STATUS['identified' if closed else diagnosis.status]
+    status = 'identified' if closed else diagnosis.status
+    doubtful = diagnosis.confidence is not None and diagnosis.confidence < LIKELIER
+    return PARTLY if status == 'identified' and doubtful else STATUS[status]
 
 
 def same_words(diagnosis: Diagnosis, *sites: Site) -> list[str]:

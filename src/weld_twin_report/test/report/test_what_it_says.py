@@ -42,6 +42,14 @@ def part(page, start, end):
     return plain(page[page.index(start) : page.index(end)])
 
 
+@pytest.mark.parametrize(
+    ('confidence', 'said'),
+    [(0.28, 'Partly identified'), (0.5, 'Identified'), (None, 'Identified')],
+)
+def test_an_answer_that_is_rather_wrong_as_a_whole_is_not_called_identified(confidence, said):
+    assert Answer(replace(PLAY, status='identified', confidence=confidence)).status == said
+
+
 def unknown(size):
     """Return play that a curve over the angle stands for, by so much at the ends of the angle."""
     robot = load('kuka_kr6_r900')

@@ -12,13 +12,13 @@ these are computed once, and a set costs a small system of equations.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays import Array
+from ..algebra.alias import outside, span_of
 from ..algebra.fit import Fit, design, fit, solve_scaled
 from .library import Library
 from .seed_systems import SINGULAR, Choice, SeedSystems, evidence, ranking
@@ -65,90 +65,75 @@ class Other(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class Sets:
     """
-    Sets of a library's units about one fit of the frames, to first order.
+    Sets of a library's units, to first order, with the frames taken out of all that is compared.
 
     Attributes
     ----------
     library : Library
-    normal : array, shape (P, P)
-        Products of the frames' columns.
-    pull : array, shape (P,)
-        Their products with the residual.
-    rss : float
-        Sum of squares of the residual.
-    products : array, shape (K, P + 1)
-        Products of the library's columns with the frames' and with the residual.
-    count : float
-        Number of independent rows.
+    systems : SeedSystems
+        The normal equations of all seeds.
+    frames : array, shape (K, P)
+        Products of the library's columns with what spans the frames.
+    right : array, shape (K,)
+        Products of its columns with the residual.
     enter_nats : float
         Evidence [nats] that a unit must be worth.
+    count : float
+        Number of independent rows.
 
     """
 
     library: Library
-    normal: Array
-    pull: Array
-    rss: float
-    products: Array
-    count: float
+    systems: SeedSystems
+    frames: Array
+    right: Array
     enter_nats: float
+    count: float = 1.0
     _cross: dict[int, Array] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def about(cls, work: Workspace, bare: Fit, count: float) -> Sets:
-        """
-        Return the sets about a fit without any effect found.
-
-        Parameters
-        ----------
-        bare : Fit
-        count : float
-            Number of independent rows.
-
-        """
-        own, _ = design(work.problem, bare.model, work.scale)
-        residual = bare.residual
-        products = work.library.products(np.concatenate([own, residual[None]]))
-        return cls(
-            work.library, own @ own.T, own @ residual, bare.rss, products, count,
-            work.beliefs.enter_nats,
-        )  # fmt: skip
+    def about(cls, work: Workspace, now: Fit) -> Sets:
+        """Return the sets about a fit, of which nothing but the frames stays."""
+        bare = fit(work.problem, now.model.with_found(()), work.scale, None, 4)
+        span = span_of(design(work.problem, bare.model, work.scale)[0])
+        residual = outside(bare.residual, span)
+        products = work.library.products(np.concatenate([span, residual[None]]))
+        frames, right = products[:, :-1], products[:, -1]
+        rss, pull = float(residual @ residual), np.zeros(len(span))
+        systems = work.library.systems.given(np.eye(len(span)), pull, rss, products)
+        return cls(work.library, systems, frames, right, work.beliefs.enter_nats)
 
     def worth(self, chosen: Sequence[Choice]) -> float:
         """Return the evidence [nats] of a set against the frames alone; each unit costs its entry."""
         columns = _columns(chosen)
         cost = sum(float(np.log(choice.unit.trials)) + self.enter_nats for choice in chosen)
-        gain = _gain(*self._equations(columns)) - self._bare_gain
-        left = self.rss - self._bare_gain
-        return evidence(left, gain, float(len(columns)), self.count) - cost
-
-    @cached_property
-    def _bare_gain(self) -> float:
-        return _gain(self.normal, self.pull)
-
-    def beside(self, chosen: Sequence[Choice]) -> list[Choice]:
-        """Return what every unit is worth beside a set, most evidence first."""
-        columns = _columns(chosen)
         normal, pull = self._equations(columns)
-        between = [self._cross[c][:, None] for c in columns]
-        products = np.concatenate([self.products[:, :-1], *between, self.products[:, -1:]], axis=1)
-        systems: SeedSystems = self.library.systems.given(normal, pull, self.rss, products)
-        return ranking(systems, self.library.units, self.count)
+        gain = float(pull @ solve_scaled(normal, pull, SINGULAR))
+        return evidence(self.systems.rss, gain, float(len(columns)), self.count) - cost
+
+    def beside(self, chosen: Sequence[Choice], least: float = -np.inf) -> list[Choice]:
+        """Return what units are worth beside a set, more than the least, most evidence first."""
+        columns = _columns(chosen)
+        systems = self.systems
+        if columns:
+            normal, pull = self._equations(columns)
+            products = np.column_stack([*(self._cross[c] for c in columns), self.right])
+            systems = systems.given(normal, pull, systems.rss, products)
+        return ranking(systems, self.library.units, self.count, least)
 
     def _equations(self, columns: list[int]) -> tuple[Array, Array]:
-        """Return the normal equations of the frames and some columns."""
+        """Return the normal equations of some columns."""
         self._know(columns)
-        cross = self.products[columns, :-1]
-        own = np.array([self._cross[c][columns] for c in columns]).reshape(2 * (len(columns),))
-        normal = np.block([[self.normal, cross.T], [cross, own]])
-        return normal, np.concatenate([self.pull, self.products[columns, -1]])
+        normal = np.array([self._cross[c][columns] for c in columns])
+        return normal.reshape(2 * (len(columns),)), self.right[columns]
 
     def _know(self, columns: Sequence[int]) -> None:
         """Work out the products of some columns with all others, where that was not done."""
         new = [c for c in dict.fromkeys(columns) if c not in self._cross]
         if new:
             rows = self.library.products(np.stack([self.library.column(c) for c in new]))
-            self._cross.update(zip(new, rows.T, strict=True))
+            rows -= self.frames @ self.frames[new].T
+            self._cross.update(zip(new, rows.T.copy(), strict=True))
 
     def of(self, wanted: Sequence[_Site]) -> list[Choice]:
         """Return some units as a set, each with the seed that serves it best beside the others."""
@@ -171,9 +156,7 @@ class Sets:
     def _entering(self, chosen: Sequence[Choice], never: _Site) -> list[Choice]:
         """Return what earns a place beside a set, most evidence first."""
         taken = {never, *_names(chosen)}
-        return [
-            c for c in self.beside(chosen) if c.nats > self.enter_nats and c.unit.site not in taken
-        ]
+        return [c for c in self.beside(chosen, self.enter_nats) if c.unit.site not in taken]
 
     def _grown(self, chosen: list[Choice], never: _Site, most: int) -> list[Choice]:
         """Return a set with what else earns a place, one unit after the other."""
@@ -196,7 +179,7 @@ class Sets:
 
 
 def reconsidered(
-    work: Workspace, now: Fit, effective: Callable[[Fit], float]
+    work: Workspace, now: Fit, sets: Sets, effective: Callable[[Fit], float]
 ) -> tuple[Fit, list[Other]]:
     """
     Return the best set that doing without one effect at a time leads to, and others near it.
@@ -205,12 +188,14 @@ def reconsidered(
     ----------
     now : Fit
         What the search found.
+    sets : Sets
+        Of the workspace's library.
     effective : callable
         Number of independent rows of a fit.
 
     """
     for _ in range(ROUNDS):
-        others = _others(work, now, effective)
+        others = _others(work, now, replace(sets, count=effective(now)), effective)
         best = max(others, key=lambda other: other.ahead, default=None)
         if best is None or best.ahead < AHEAD:
             return now, others
@@ -218,10 +203,10 @@ def reconsidered(
     return now, []
 
 
-def _others(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> list[Other]:
+def _others(
+    work: Workspace, now: Fit, sets: Sets, effective: Callable[[Fit], float]
+) -> list[Other]:
     """Return the best set without each effect found, where it is near what was found."""
-    bare = fit(work.problem, now.model.with_found(()), work.scale, None, 4)
-    sets = Sets.about(work, bare, effective(now))
     chosen, out = sets.of(sites(now)), []
     least = sets.worth(chosen) - work.beliefs.rival_nats
     for site in sites(now):
@@ -273,8 +258,3 @@ def _columns(chosen: Sequence[Choice]) -> list[int]:
 
 def _names(chosen: Sequence[Choice]) -> tuple[_Site, ...]:
     return tuple(sorted((c.unit.site for c in chosen), key=str))
-
-
-def _gain(normal: Array, pull: Array) -> float:
-    """Return by how much the sum of squares falls where columns are fitted."""
-    return float(pull @ solve_scaled(normal, pull, SINGULAR))

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...effects.effect import Effect
-from ..algebra.fit import Fit, fit
+from ..algebra.fit import Fit
 from ..result import Site
 from .other_sets import Other
 from .seed_systems import Choice, evidence, ranking
@@ -70,7 +70,7 @@ def rivals(
 
     """
     effect = now.model.found[k]
-    rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
+    rest = work.without(now, k).fit
     ranked, tried = contenders(work, rest, effective(now), now.model.found)
     own = next((c for c in ranked if c.unit.site == (effect.name, effect.site)), None)
     # One count for all rivals: see `select`.

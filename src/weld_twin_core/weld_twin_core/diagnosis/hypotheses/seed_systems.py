@@ -333,7 +333,9 @@ class Choice:
         return self.unit.seeds[self.seed].from_atoms(coefficients)
 
 
-def ranking(systems: SeedSystems, units: Sequence[Unit], effective: float) -> list[Choice]:
+def ranking(
+    systems: SeedSystems, units: Sequence[Unit], effective: float, least: float = -np.inf
+) -> list[Choice]:
     """
     Return every unit's best choice, most evidence first.
 
@@ -345,21 +347,26 @@ def ranking(systems: SeedSystems, units: Sequence[Unit], effective: float) -> li
         What may enter, each as a whole.
     effective : float
         Number of independent rows.
+    least : float
+        Evidence [nats] that a choice must exceed.
 
     """
     grown = systems.grown(effective)
-    count = sum(len(unit.seeds) for unit in units)
-    nats, group, row = np.full(count, -np.inf), np.zeros(count, int), np.zeros(count, int)
+    first = np.cumsum([0, *(len(unit.seeds) for unit in units)])
+    nats, group, row = (
+        np.full(first[-1], -np.inf),
+        np.zeros(first[-1], int),
+        np.zeros(first[-1], int),
+    )
     for k, (alike, each) in enumerate(zip(systems.alike, grown, strict=True)):
         nats[alike.seeds], group[alike.seeds] = each.nats, k
         row[alike.seeds] = np.arange(alike.seeds.size)
-    found, at = list[Choice](), 0
-    for unit in units:
-        best = at + int(np.argmax(nats[at : at + len(unit.seeds)]))
-        if np.isfinite(nats[best]):
-            worth = float(nats[best] - np.log(unit.trials))
-            k, r = int(group[best]), int(row[best])
-            chosen = np.flatnonzero(grown[k].chosen[r])
-            found.append(Choice(unit, best - at, worth, systems.alike[k], r, chosen))
-        at += len(unit.seeds)
+    worth = np.maximum.reduceat(nats, first[:-1]) if units else nats
+    worth = worth - np.log([unit.trials for unit in units])
+    found = []
+    for u in np.flatnonzero(worth > least).tolist():
+        seed = int(np.argmax(nats[first[u] : first[u + 1]]))
+        k, r = group[first[u] + seed], row[first[u] + seed]
+        chosen = np.flatnonzero(grown[k].chosen[r])
+        found.append(Choice(units[u], seed, float(worth[u]), systems.alike[k], int(r), chosen))
     return sorted(found, key=lambda choice: -choice.nats)

@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -23,6 +25,22 @@ SHORTLIST = 4
 """Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
 
 
+class Less(NamedTuple):
+    """
+    A fit without one of the effects found.
+
+    Attributes
+    ----------
+    fit : Fit
+    size : float
+        RMS change of the residual [noise] as the effect goes, before anything is fitted anew.
+
+    """
+
+    fit: Fit
+    size: float
+
+
 @dataclass(frozen=True, eq=False)
 class Workspace:
     """
@@ -35,6 +53,19 @@ class Workspace:
     scale: Scale
     library: Library
     beliefs: Beliefs
+    _less: WeakKeyDictionary[Fit, dict[int, Less]] = field(
+        default_factory=WeakKeyDictionary, init=False, repr=False
+    )
+
+    def without(self, now: Fit, k: int) -> Less:
+        """Return the fit without found effect k of another, made once."""
+        known = self._less.setdefault(now, {})
+        if k not in known:
+            model = now.model.without(k)
+            change = self.problem.whitened(self.problem.residuals(model), self.scale)
+            size = float(np.sqrt(((change - now.residual) ** 2).mean()))
+            known[k] = Less(fit(self.problem, model, self.scale, None, 4), size)
+        return known[k]
 
     def beside(self, model: Model, residual: Array) -> SeedSystems:
         """
@@ -92,8 +123,8 @@ def forward(
         systems = work.beside(now.model, now.residual)
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
         # only the fit with a choice tells how many rows were independent.
-        ranked = ranking(systems, work.library.units, _rows(work, now))
-        ranked = [c for c in ranked if c.nats > work.beliefs.enter_nats and not _repeats(c, taken)]
+        ranked = ranking(systems, work.library.units, _rows(work, now), work.beliefs.enter_nats)
+        ranked = [choice for choice in ranked if not _repeats(choice, taken)]
         if not ranked:
             break
         best, impossible = _refined(work, now, ranked, effective)
@@ -231,8 +262,7 @@ def restarted(work: Workspace, now: Fit) -> Fit:
     for k, effect in enumerate(now.model.found):
         if not searched(effect):
             continue
-        rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
-        again = fitted_with(work, rest.model, effect)
+        again = fitted_with(work, work.without(now, k).fit.model, effect)
         if again.rss < now.rss and not implausible(again.model):
             found = list(again.model.found)
             found.insert(k, found.pop())
@@ -244,9 +274,8 @@ def backward(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fi
     """Return the fit with every effect dropped that is not needed given the others, the least first."""
     now = restarted(work, now)
     while now.model.found:
-        every = range(len(now.model.found))
-        less = [fit(work.problem, now.model.without(k), work.scale, None, 4) for k in every]
-        sizes = [_size(work, now, now.model.without(k)) for k in every]
+        each = [work.without(now, k) for k in range(len(now.model.found))]
+        less, sizes = [one.fit for one in each], [one.size for one in each]
         reasons = (
             _worthless(work, now, less, effective),
             _negligible(work, sizes),
@@ -299,9 +328,3 @@ def _misfit(work: Workspace, now: Fit, less: Sequence[Fit], sizes: Sequence[floa
     least = int(np.argmin([one.rss for one in less]))
     taken = max(less[least].rss - now.rss, 0.0) / now.residual.size
     return least if np.sqrt(taken) <= most else None
-
-
-def _size(work: Workspace, now: Fit, less: Model) -> float:
-    """Return the RMS change [noise] of the residual that a model with less makes."""
-    change = work.problem.whitened(work.problem.residuals(less), work.scale) - now.residual
-    return float(np.sqrt((change**2).mean()))

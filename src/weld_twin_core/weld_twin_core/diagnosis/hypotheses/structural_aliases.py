@@ -129,7 +129,7 @@ def _also(
     parts = _parts(found, k, exclude)
     if not seeds and not parts and outside is None:
         return [], None
-    rest = fit(work.problem, now.model.without(k), work.scale, None, 4)
+    rest = work.without(now, k).fit
     count, most = found.effective(now), max(rival.nats for rival in slot)
     alike = [_in_place(found, features, rest, slot, seed, count) for seed in seeds]
     alike += _together(found, rest, parts, count)

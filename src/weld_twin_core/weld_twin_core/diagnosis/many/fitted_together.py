@@ -20,15 +20,13 @@ from ...arrays import Array
 from ...effects.effect import Effect, Stage
 from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
-from ..algebra.alias import outside, span_of
-from ..algebra.fit import design
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import ways_to_divide
 from ..unseen.unseen_stretches import Unseen
-from .shrinkage import believed, groups, learned_precision, predicted
+from .shrinkage import predicted
 from .small_errors import many_small
 
 BEAR = (10, 30, 100)
@@ -39,15 +37,6 @@ could not tell.
 """
 PLENTY = 600
 """Stations from which on only the richest is fitted: they bear all of it, and time is saved."""
-ONCE = 1
-"""Order of the waves that two places of contacts bear: once a turn, as an eccentric scale or gear
-makes."""
-PLENTY_PLACES = 5
-"""Places of contacts from which on sizes are learned: of eight places of an arm, learned sizes and
-those of machines at large predicted a ninth alike (0.23, 0.37 and 0.20 mm both), of three the latter
-did better (0.54 mm RMS on each left out instead of 0.61)."""
-CREEPS = 1.0
-"""Growth of the squared unseen error without a creep from which on it stays: the error doubles."""
 FEW_COLUMNS = 200
 """Coordinates up to which sizes are learned anew for every part that is left out: with more there are
 so many stations that sizes hardly hang on some of them, and it would take minutes."""
@@ -75,28 +64,18 @@ def fitted_together(
     if not found.problem.at_rest or stations < BEAR[0]:
         return found
     progress('many small errors at once: fitting them together')
-    steps = _steps(found.problem, stations)
-    best, left, dropped = found, np.inf, tuple[str, ...]()
-    for less in steps:
+    best, left = found, np.inf
+    for less in _steps(found.problem, stations):
         trial = _together(found, (*exclude, *less), beliefs, progress)
         remains = unseen_rms(trial)
         if remains < beliefs.better * left:
-            best, left, dropped = trial, remains, less
-    best, left = _without_creep(found, best, left, (*exclude, *dropped), beliefs, progress)
+            best, left = trial, remains
     few = unseen_rms(found)
-    # Several that were chosen on the parts left out as well have their lead by that.
-    chosen = len(found.final.model.found) >= beliefs.several and _relearned(best)
-    better = found.crowded or left < (1.0 if chosen else beliefs.better) * few
-    if not better:
-        better = left < CHOSEN * few and _many(found, best, beliefs)
-    better = better and (found.crowded or not _one_and_crumbs(best, beliefs))
     if not (found.final.model.found or found.crowded) and _by_chance(found, best):
         return found
-    if better and found.problem.untracked and PLACES - 1 <= found.problem.places < PLENTY_PLACES:
-        trial = _carrying(found, exclude, steps[0], beliefs, progress)
-        if found.problem.places < PLACES or unseen_rms(trial) < left:
-            return trial
-    if better:
+    # Several that were chosen on the parts left out as well have their lead by that.
+    chosen = len(found.final.model.found) >= beliefs.several and _relearned(best)
+    if found.crowded or left < (1.0 if chosen else beliefs.better) * few:
         return best
     return replace(found, many=best) if left < CHOSEN * few else found
 
@@ -133,99 +112,18 @@ def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:
     return steps[:1] if problem.places < PLACES else steps
 
 
-def _carrying(
-    found: Search,
-    exclude: Sequence[str],
-    less: Sequence[str],
-    beliefs: Beliefs,
-    progress: Callable[[str], None],
-) -> Search:
-    """
-    Return the fit of all families that carries over from two places of contacts to a third.
-
-    Few places hardly show some kinds, and sizes learned there would say that there are none of
-    them; so all are as large as machines have them. Of 14 pairs of places of three arms, each
-    judged on the others, this left 0.31 mm instead of 0.33 mm in the mean, and 0.49 mm instead of
-    0.84 mm at the worst place of the three with the largest rest.
-    """
-    waves = {name for name, kind in REGISTRY.items() if kind.traits.waves is not None}
-    less = tuple(name for name in less if name not in waves)
-    return _together(found, (*exclude, *less), beliefs, progress, orders=ONCE)
-
-
-def _without_creep(
-    found: Search,
-    best: Search,
-    left: float,
-    exclude: Sequence[str],
-    beliefs: Beliefs,
-    progress: Callable[[str], None],
-) -> tuple[Search, float]:
-    """
-    Return the many without what creeps with time, unless a creep pays very much.
-
-    Chosen among few, a creep takes up the geometry of postures that were visited in an order: plane
-    by plane, each is a little later. Stretches left out lie between others and hardly tell; beyond
-    the recording the creep goes on and the arm does not. On a grid of a real arm that was measured
-    plane by plane, its first fifth predicted the rest to 0.83 mm with a creep and to 0.12 without.
-    """
-    creeps = {
-        e.name
-        for e in best.final.model.found
-        if e.traits.depends_on == 'time' and not e.traits.dated
-    }
-    creeps -= {
-        name for name, kind in REGISTRY.items() if kind.traits.of_setup or kind.traits.common
-    }
-    if not creeps:
-        return best, left
-    trial = _together(found, (*exclude, *creeps), beliefs, progress)
-    remains = unseen_rms(trial)
-    grows = (remains / max(left, 1e-12)) ** 2 - 1.0
-    return (best, left) if grows > CREEPS else (trial, remains)
-
-
-def _one_and_crumbs(found: Search, beliefs: Beliefs) -> bool:
-    """
-    Return whether contacts show a large cause or two, and nothing else that counts.
-
-    Of three or four places left out in turn, tiny errors by the dozen predict some better by chance.
-    """
-    whole = found.problem.untracked and found.problem.places >= PLACES
-    return whole and _members(found, beliefs) < beliefs.several
-
-
-def _many(found: Search, best: Search, beliefs: Beliefs) -> bool:
-    """Return whether there are many, in sum and beside the few."""
-    many = _members(best, beliefs) >= beliefs.many
-    return many and members_beside(found, best, beliefs) >= beliefs.many
-
-
-def _members(found: Search, beliefs: Beliefs) -> int:
-    """Return how many effects move the tool by much of what all of them leave."""
-    unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    least = beliefs.member * unseen.rms(unseen.whole)
-    # Of errors so small the columns tell what each does, without a run of the twin for each.
-    x = np.concatenate([np.zeros(unseen.frames), found.final.coordinates])
-    each = (unseen.columns.chosen(np.arange(part.start, part.stop)) for part in unseen.parts)
-    moved = (own.mixed(x[part]) for own, part in zip(each, unseen.parts, strict=True))
-    return sum(unseen.rms(rows) > least for rows in moved)
-
-
 def _together(
     found: Search,
     exclude: Sequence[str],
     beliefs: Beliefs,
     progress: Callable[[str], None],
-    orders: int | None = None,
 ) -> Search:
     """Return the fit of all families but some, and but those that no machine has so large."""
     refused = list(found.refused)
     while True:
         model = found.small.model
         kept = model.with_found(tuple(e for e in model.found if e.name not in exclude))
-        fitted = many_small(found.problem, kept, exclude, beliefs, progress, orders)
-        final, scale, precision = fitted
+        final, scale, precision = many_small(found.problem, kept, exclude, beliefs, progress)
         robot = final.model.robot
         absurd = [effect for effect in final.model.found if _too_large(robot, effect)]
         if not absurd:
@@ -297,41 +195,3 @@ def _unseen(found: Search, each: Unseen) -> Array:
 def _relearned(found: Search) -> bool:
     """Return whether the sizes of many are learned anew for every part left out."""
     return found.dense and found.final.coordinates.size <= FEW_COLUMNS
-
-
-def members_beside(few: Search, many: Search, beliefs: Beliefs) -> int:
-    """
-    Return how many of many effects move the tool by much of what all of them leave.
-
-    Parameters
-    ----------
-    few, many : Search
-        What was found one by one, and all kinds fitted together.
-
-    """
-    unseen = Unseen.of(many.problem, many.scale, many.final, many.precision)
-    problem, scale, model = many.problem, many.scale, few.final.model
-    have = {effect.key for effect in model.found}
-    others = tuple(effect for effect in many.final.model.found if effect.key not in have)
-    if not others:
-        return 0
-    span = span_of(design(problem, model, scale)[0])
-    features = problem.features(model)
-    each = [
-        outside(
-            problem.whitened(problem.effect_columns(features, effect, atoms=False), scale), span
-        )
-        for effect in others
-    ]
-    columns = np.concatenate(each)
-    residual = outside(problem.whitened(problem.residuals(model), scale), span)
-    normal, right = columns @ columns.T, columns @ residual
-    rss = float(residual @ residual)
-    labels, scales = groups(others, beliefs)
-    held = believed(model.with_found(others))
-    ridge, _ = learned_precision(normal, right, rss, residual.size, labels, scales, held)
-    mean = np.linalg.lstsq(normal + np.diag(ridge), right, rcond=1e-12)[0]
-    parts = mean[:, None] * columns
-    least = beliefs.member * unseen.rms(unseen.whole)
-    ends = np.cumsum([len(part) for part in each])[:-1]
-    return sum(unseen.rms(part.sum(axis=0)) > least for part in np.split(parts, ends))

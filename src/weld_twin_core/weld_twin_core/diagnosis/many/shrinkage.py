@@ -64,8 +64,6 @@ def learned_precision(
     labels: Array,
     scales: Array,
     believed: Array | None = None,
-    *,
-    learn: bool = True,
 ) -> tuple[Array, float]:
     """
     Return the prior precision that maximises the evidence, shape (K,), and the freedom it leaves.
@@ -81,8 +79,6 @@ def learned_precision(
     believed : array, shape (K,), optional
         Precision of machines at large: the spread learned of this one starts there and is never
         wider, and what is fitted freely has it. Nothing is believed when left out.
-    learn : bool
-        Else what is believed of machines stays as it is, and only the noise is learned.
 
     """
     if not scales.size:
@@ -94,7 +90,7 @@ def learned_precision(
     usual = _usual(scales, believed)
     variance, most = _first_variances(labels, usual)
     members, count = labels[tied], variance.size
-    learned_of = (learn | ~np.isfinite(most)) & (np.bincount(members, minlength=count) > 0)
+    learned_of = np.bincount(members, minlength=count) > 0
     noise, room = 1.0, np.empty_like(normal)
     for _ in range(ROUNDS):
         precision = _precision(tied, variance, labels, usual)
@@ -160,39 +156,23 @@ def _precision(tied: NDArray[np.bool_], variance: Array, labels: Array, usual: A
 
 
 def shrunk_step(
-    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs, *, learn: bool = True
+    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs
 ) -> tuple[Model, Scale]:
-    """
-    Return the model after one linear step with learned priors, and the noise it leaves.
-
-    Parameters
-    ----------
-    learn : bool
-        Whether sizes are learned; see `learned_precision`.
-
-    """
-    model, _, freedom = _learned(problem, model, scale, beliefs, learn=learn)
+    """Return the model after one linear step with learned priors, and the noise it leaves."""
+    model, _, freedom = _learned(problem, model, scale, beliefs)
     return model, robust_scale(problem, problem.residuals(model), freedom=freedom)
 
 
 def shrunk_fit(
-    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs, *, learn: bool = True
+    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs
 ) -> tuple[Fit, Array]:
-    """
-    Return the fit with learned priors, and their precision, shape (K,).
-
-    Parameters
-    ----------
-    learn : bool
-        Whether sizes are learned; see `learned_precision`.
-
-    """
-    model, precision, _ = _learned(problem, model, scale, beliefs, learn=learn)
+    """Return the fit with learned priors, and their precision, shape (K,)."""
+    model, precision, _ = _learned(problem, model, scale, beliefs)
     return fit(problem, model, scale, precision, iterations=1), precision
 
 
 def _learned(
-    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs, *, learn: bool
+    problem: Problem, model: Model, scale: Scale, beliefs: Beliefs
 ) -> tuple[Model, Array, float]:
     """Return the model after one linear step, the prior precision learned, and its freedom."""
     residual = problem.whitened(problem.residuals(model), scale)
@@ -203,7 +183,7 @@ def _learned(
     normal[:frames, :frames] += np.diag(frame_ridge)
     right[:frames] -= frame_ridge * off
     sizes, rss = Sizes.of(model, beliefs), float(residual @ residual)
-    precision, freedom, step = sizes.learned(normal, right, rss, residual.size, learn=learn)
+    precision, freedom, step = sizes.learned(normal, right, rss, residual.size)
     trial = stepped(problem, model, step)
     moved, x_moved = problem.whitened(problem.residuals(trial), scale), coordinates(trial)
     if moved @ moved + precision @ x_moved**2 > rss + precision @ sizes.now**2:
@@ -238,7 +218,7 @@ class Sizes:
         return cls(coordinates(model), *groups(model.found, beliefs), believed(model))
 
     def learned(
-        self, normal: Array, right: Array, rss: float, rows: int, *, learn: bool = True
+        self, normal: Array, right: Array, rss: float, rows: int
     ) -> tuple[Array, float, Array]:
         """
         Return the prior precision learned, the freedom that it leaves, and the step to where it leads.
@@ -247,8 +227,6 @@ class Sizes:
         ----------
         normal, right, rss, rows
             Normal equations of the frames, with what is believed of these, and of all coordinates.
-        learn : bool
-            See `learned_precision`.
 
         """
         frames = len(right) - self.now.size
@@ -258,7 +236,6 @@ class Sizes:
             self.labels,
             self.scales,
             self.believed,
-            learn=learn,
         )
         ridge = np.concatenate([np.zeros(frames), precision])
         pull = ridge * np.concatenate([np.zeros(frames), self.now])

@@ -43,41 +43,25 @@ def many_small(
     exclude: Sequence[str],
     beliefs: Beliefs,
     progress: Callable[[str], None],
-    orders: int | None = None,
 ) -> tuple[Fit, Scale, Array]:
-    """
-    Return the fit of all families together, its noise and its prior precision.
-
-    Parameters
-    ----------
-    orders : int, optional
-        The most orders of waves, where the measurements are too few to learn any size from; all
-        that they tell when left out, and sizes are learned.
-
-    """
-    learn = orders is None
-    everything = model.with_found(_everything(problem, model, exclude, beliefs, orders))
+    """Return the fit of all families together, its noise and its prior precision."""
+    everything = model.with_found(_everything(problem, model, exclude, beliefs))
     scale = robust_scale(problem, problem.residuals(model))
-    model, scale = shrunk_step(problem, everything, scale, beliefs, learn=learn)
+    model, scale = shrunk_step(problem, everything, scale, beliefs)
     model = model.with_found(tuple(effect.fit.turned() for effect in model.found))
     progress('families fitted together')
-    if learn:
-        model = with_lines(problem, model, scale, beliefs)
-        progress('lines of high order looked for')
+    model = with_lines(problem, model, scale, beliefs)
+    progress('lines of high order looked for')
     if 'base' in problem.align:
         model = with_setup(problem, model, scale, beliefs)
         progress('motion of the set-up looked for')
-    model, scale = shrunk_step(problem, model, scale, beliefs, learn=learn)
-    result, precision = shrunk_fit(problem, model, scale, beliefs, learn=learn)
+    model, scale = shrunk_step(problem, model, scale, beliefs)
+    result, precision = shrunk_fit(problem, model, scale, beliefs)
     return result, scale, precision
 
 
 def _everything(
-    problem: Problem,
-    model: Model,
-    exclude: Sequence[str],
-    beliefs: Beliefs,
-    orders: int | None,
+    problem: Problem, model: Model, exclude: Sequence[str], beliefs: Beliefs
 ) -> tuple[Effect, ...]:
     """Return every effect that fits linearly, at zero unless the search has found its value."""
     features = problem.features(model)
@@ -88,7 +72,9 @@ def _everything(
     small: Sequence[Effect]
     for kind in candidate_kinds(exclude, problem.align):
         if kind.stage in (Stage.SERVO, Stage.CLOCK) or not kind.traits.common:
-            out += [e for e in model.found if e.name == kind.name]
+            # Postures visited in an order look like a creep, which goes on where the arm does not.
+            if kind.traits.depends_on != 'time':
+                out += [e for e in model.found if e.name == kind.name]
             continue
         for joint in joints_of(kind, model.robot):
             view = features[moved_most(features, joint)].view
@@ -96,9 +82,9 @@ def _everything(
                 continue
             if kind.traits.waves is None:
                 small = _as_found(kind.search.small(view, joint, most), have)
-            elif orders is not None or _travel(view, joint) >= beliefs.wave_range:
+            elif _travel(view, joint) >= beliefs.wave_range:
                 told = orders_told(features, str(joint))
-                small = kind.search.small(view, joint, min(orders or most, told))
+                small = kind.search.small(view, joint, min(most, told))
             else:
                 small = []
             out += [effect for effect in small if not hardly_moves(features, effect)]

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..result import Site
+from ..result import Family, Site
 from ..unseen.folds import STRETCHES
 from ..unseen.unseen_stretches import Unseen
 from .shrinkage import believed
@@ -33,54 +33,7 @@ MOST_LIKE = 2
 Members = Mapping[str, Sequence[int]]
 
 
-@dataclass(frozen=True)
-class WeighedFamily:
-    """
-    One kind of error, and how much worse unseen data get without it.
-
-    Attributes
-    ----------
-    growths : tuple of float
-        By what share the RMS error of each part left out, stretches of time and regions of
-        posture, grows without it, all other kinds chosen and the frames fitted anew. Of a kind that
-        was not chosen: by what share it shrinks with it.
-    chosen : bool
-        Whether it is among the kinds that explain unseen data together.
-    members : tuple of (Site, float)
-        Its members and how far each moves the tool, RMS [m], largest first.
-    rms_m : float
-        What it accounts for on unseen data, RMS [m].
-    needed : tuple of (Site, float)
-        The members that unseen data need, each with its share of the kind, largest first.
-    like : tuple of (Site, float)
-        What would do nearly as well in its place, on the joint where it does most, and how nearly.
-    share : float
-        Share of the squared unseen gap that it takes off; all that are chosen add up to what they
-        take off together.
-
-    """
-
-    effect: str
-    growths: tuple[float, ...]
-    chosen: bool
-    members: tuple[tuple[Site, float], ...]
-    rms_m: float = 0.0
-    needed: tuple[tuple[Site, float], ...] = ()
-    like: tuple[tuple[Site, float], ...] = ()
-    share: float = 0.0
-
-    @property
-    def median(self) -> float:
-        """Return the growth in the median part."""
-        return float(np.median(self.growths)) if self.growths else 0.0
-
-    def named(self, worth: float) -> bool:
-        """Return whether unseen data get worse without it: in the median part, and better in none."""
-        told = self.chosen and len(self.growths) > 1
-        return told and self.median >= worth and min(self.growths) >= 0.0
-
-
-def weighed_families(found: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[WeighedFamily, ...]:
+def weighed_families(found: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[Family, ...]:
     """
     Return what every kind of the final model accounts for on unseen data.
 
@@ -111,8 +64,8 @@ def weighed_families(found: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[W
 
 
 def _with_shares(
-    families: Sequence[WeighedFamily], case: _Case, chosen: Sequence[int]
-) -> tuple[WeighedFamily, ...]:
+    families: Sequence[Family], case: _Case, chosen: Sequence[int]
+) -> tuple[Family, ...]:
     """Return the kinds with their shares of what those chosen take off together."""
     bare, left = (float((case.left(kept) ** 2).mean()) for kept in ((), chosen))
     explained = max(1.0 - left / max(bare, TINY**2), 0.0)
@@ -249,14 +202,14 @@ def _weighed(
     name: str,
     sizes: tuple[tuple[Site, float], ...],
     worth: float,
-) -> WeighedFamily:
+) -> Family:
     """Return one kind with all that is told of it."""
     others = _all(members, chosen, name)
     own = list(members[name])
     growths = tuple(case.growth([*others, *own], others).tolist())
     before, after = (float((case.left(kept) ** 2).mean()) for kept in (others, [*others, *own]))
     fall = max(before - after, 0.0)
-    out = WeighedFamily(name, growths, name in chosen, sizes, rms_m=float(np.sqrt(fall)))
+    out = Family(name, growths, name in chosen, sizes, rms_m=float(np.sqrt(fall)))
     if name not in chosen:
         return out
     like = []

@@ -198,11 +198,12 @@ def _of_families(left: Left) -> Verdict:
     for told in left.evidence.families or ():
         members = tuple(item for item in told.members if item[1] > beliefs.member_least_m)
         if members:
-            named = told.named(beliefs.family_worth)
-            needed = tuple(item for item in told.needed if item[1] >= beliefs.joint_worth)
-            like = tuple(item for item in told.like if item[1] >= beliefs.joint_worth)
-            more = told.median, needed, like, told.share
-            families.append(Family(told.effect, named, told.rms_m, members, *more))
+            needed, like = (
+                tuple(item for item in part if item[1] >= beliefs.joint_worth)
+                for part in (told.needed, told.like)
+            )
+            named = told.missed(beliefs.family_worth)
+            families.append(replace(told, named=named, members=members, needed=needed, like=like))
     families.sort(key=lambda family: -family.rms_m)
     sets = tuple(group for family in families if family.named for group in _sets_of(family))
     reason = (

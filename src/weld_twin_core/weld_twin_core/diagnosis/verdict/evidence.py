@@ -13,8 +13,8 @@ from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
-from ..many.weighed_families import WeighedFamily, weighed_families
-from ..result import Shrink, Site
+from ..many.weighed_families import weighed_families
+from ..result import Family, Shrink, Site
 from ..unseen.chance import chance_ratio, may_be_chance
 from ..unseen.folds import ways_to_divide
 from ..unseen.leftover_structure import Structure
@@ -45,7 +45,7 @@ class Evidence:
         What would explain the rest best but no machine has, in words.
     lacking : tuple of str
         What was taken out of the library and fits clearly better than what was found, in words.
-    families : tuple of WeighedFamily, optional
+    families : tuple of Family, optional
         Where many small errors were fitted together: what each kind accounts for.
     least : float, optional
         Least RMS [m] on held-out data over what could be in the model, one rival at a time; left
@@ -74,7 +74,7 @@ class Evidence:
     parts: tuple[float, ...]
     refused: tuple[str, ...] = ()
     lacking: tuple[str, ...] = ()
-    families: tuple[WeighedFamily, ...] | None = None
+    families: tuple[Family, ...] | None = None
     least: float | None = None
     chance: float = 1.0
     leverage: float = 1.0

@@ -148,11 +148,10 @@ def leftover(
     e, v, levered = part(slice(3, 6))
     # Without measured turns the tool turns as much as it shifts on an arm of a metre.
     turn = _size(e, v + gear**2 * levered, np.eye(3)) if e.size else position
-    noise = _noise(problem, floor, scale.position)
     common = _common(errors, moments, pairs, weight > TRUSTED)
-    share = _of_the_arm(*common, noise, rough, problem.at_rest)
-    turns = _at_turns(problem, errors, moments, lost)
-    return Rest(position * share, turn * share, gear * share, turns)
+    share = _of_the_arm(*common, _noise(problem, floor, scale.position), rough, problem.at_rest)
+    at_turns = _at_turns(problem, errors, moments, lost)
+    return Rest(position * share, turn * share, gear * share, at_turns)
 
 
 def _at_turns(problem: Problem, errors: list[Array], moments: list[Array], lost: Array) -> Array:

@@ -29,7 +29,7 @@ def test_a_rival_that_earns_no_place_takes_none_from_what_was_found(monkeypatch)
             return (own,)
         idle = fitted_with(work, now.model.without(k), IDLE)
         assert [e.name for e in idle.model.found] == ['joint_offset', 'gear_ratio']
-        return Rival(Site(IDLE.name, IDLE.site), 6.7, idle, 0.6), own
+        return Rival(Site(IDLE.name, IDLE.site), 7.7, idle, 0.6), own
 
     monkeypatch.setattr(search, 'rivals', rivals)
     kept, slots = search.settled(work, now, lambda found: float(found.residual.size), str)

@@ -181,12 +181,24 @@ def cell(folder, *, zeros, side=0.025, mirrored=False, names=None, told=1.0, cou
     return robot_file(folder)
 
 
+def described(folder):
+    """Return the options that say what is in the pixels."""
+    return [
+        *(f'--camera={name}={folder / name}.yaml' for name in LENSES),
+        f'--target=board={folder / "board.yaml"}',
+    ]
+
+
 def diagnosed(folder, robot, weld_twin):
     """Return what `import` says of the pixels, and the diagnosis."""
-    described = [f'--camera={name}={folder / name}.yaml' for name in LENSES]
-    described.append(f'--target=board={folder / "board.yaml"}')
     said = weld_twin(
-        'import', folder / 'pixels.csv', '--robot', robot, *described, '--out', folder / 'bag'
+        'import',
+        folder / 'pixels.csv',
+        '--robot',
+        robot,
+        *described(folder),
+        '--out',
+        folder / 'bag',
     ).out
     weld_twin(
         *('diagnose', folder / 'bag', '--robot', robot, '--align', 'base,tool'),
@@ -203,6 +215,13 @@ def test_pixels_of_two_cameras_name_the_joint_whose_zero_is_off(tmp_path, weld_t
     assert named == [('joint_offset', 'axis_3')]
     assert found['verdict']['effects'][0]['parameters']['offset'] == pytest.approx(2e-3, abs=2e-4)
     assert (tmp_path / 'out' / 'report.html').is_file()
+    alike = weld_twin(
+        *('diagnose', tmp_path / 'pixels.csv', '--robot', robot, *described(tmp_path)),
+        *('--align', 'base,tool', '--out', tmp_path / 'straight'),
+    ).out
+    assert '40 of 40 images tell a pose' in alike
+    straight = json.loads((tmp_path / 'straight' / 'diagnosis.json').read_text())
+    assert straight['verdict'] == found['verdict']
 
 
 def test_mistakes_with_cameras_are_named(tmp_path, weld_twin):
@@ -216,7 +235,11 @@ def test_mistakes_with_cameras_are_named(tmp_path, weld_twin):
         folder = tmp_path / kind
         folder.mkdir()
         robot = cell(folder, zeros=zeros, count=16, **mistake)
-        _, found = diagnosed(folder, robot, weld_twin)
+        weld_twin(
+            *('diagnose', folder / 'pixels.csv', '--robot', robot, *described(folder)),
+            *('--align', 'base,tool', '--out', folder / 'out'),
+        )
+        found = json.loads((folder / 'out' / 'diagnosis.json').read_text())
         assert found['verdict']['status'] == 'unsound'
         assert [entry['kind'] for entry in found['unsound']] == [kind]
 

@@ -18,7 +18,7 @@ from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..result import Site
 from .library import Library, build
-from .other_sets import Sets, reconsidered
+from .other_sets import AHEAD, Sets, reconsidered
 from .rivals import Rival, rivals
 from .selection import (
     Workspace,
@@ -35,7 +35,7 @@ FIT_ROWS = 30000
 ROUNDS = 3
 """Times that a library is built anew at what was found; the second seldom changes anything."""
 SWAPS = 3
-"""Times that a rival may take an effect's place before the search stops asking."""
+"""Times that a rival that is clearly ahead may take an effect's place before the search stops asking."""
 Progress = Callable[[str], None]
 
 
@@ -263,8 +263,8 @@ def settled(
         for k, effect in enumerate(now.model.found):
             slots.append(rivals(work, now, k, effective, others))
             progress(f'rivals of {Site(effect.name, effect.site)} weighed')
-            leader = slots[-1][0]
-            if leader.fit is not now and attempt < SWAPS:
+            leader, own = slots[-1][0], next(r for r in slots[-1] if r.fit is now)
+            if leader.nats > own.nats + AHEAD and attempt < SWAPS:
                 swapped = backward(work, leader.fit, effective)
                 # A rival that does not earn a place itself takes none from what did.
                 if leader.site in [Site(e.name, e.site) for e in swapped.model.found]:

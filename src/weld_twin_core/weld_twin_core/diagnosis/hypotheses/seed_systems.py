@@ -364,7 +364,7 @@ def ranking(
     worth = np.maximum.reduceat(nats, first[:-1]) if units else nats
     worth = worth - np.log([unit.trials for unit in units])
     found = []
-    for u in np.flatnonzero(worth > least):
+    for u in np.flatnonzero(worth > least).tolist():
         seed = int(np.argmax(nats[first[u] : first[u + 1]]))
         k, r = group[first[u] + seed], row[first[u] + seed]
         chosen = np.flatnonzero(grown[k].chosen[r])

@@ -30,6 +30,7 @@ from weld_twin_nodes.cli.options import (
     twin_of,
 )
 from weld_twin_nodes.cli.parsing import Adder
+from weld_twin_nodes.cli.table_options import add_table_options, table_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -47,6 +48,8 @@ LINES = 'WELD_TWIN_PROGRESS'
 """Variable of the environment: 'lines' has every step told as a line on stderr."""
 BRANDS = ('abb', 'fanuc', 'kuka', 'ur', 'yaskawa')
 """Makers whose controllers the page knows; the page has their names."""
+TABLES = ('.csv', '.tsv', '.txt', '.dat', '.dg')
+"""Endings of files that are tables of text, read as `weld-twin import` reads them."""
 UNSOUND = 3
 """Exit code where data or set-up are wrong."""
 MEASUREMENTS = 40_000
@@ -58,7 +61,7 @@ JOINT_STATES = 150_000
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     add = Adder(parser)
-    add('bags', 'BAG', 'recordings of the cell, of one robot', nargs='+')
+    add('bags', 'BAG', 'recordings of the cell, or tables of stations, of one robot', nargs='+')
     add_robot(parser)
     add_output(parser, 'directory for the results')
     _add_setup(parser)
@@ -66,6 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_sheet(parser)
     _add_next(parser)
     add_topics(parser)
+    add_table_options(parser, rare=True)
 
 
 def _add_setup(parser: argparse.ArgumentParser) -> None:
@@ -217,9 +221,13 @@ def _read(
     out: list[Recording] = []
     for path in (*args.bags, *args.holdout):
         tell(f'reading {path}')
-        # Two clocks are for the checks of the data to name.
-        found = read_recording(path, robot, topics, one_clock=False, needs_measurements=True)
-        found = _described(found, args.contacts)
+        if Path(path).suffix.lower() in TABLES:
+            found, said = table_of(args, robot, path)
+            print(*said, sep='\n')
+        else:
+            # Two clocks are for the checks of the data to name.
+            found = read_recording(path, robot, topics, one_clock=False, needs_measurements=True)
+            found = _described(found, args.contacts)
         out.append(found if what is None else measured_by(found, what, own_frame=own_frame))
     return out
 

@@ -248,6 +248,14 @@ def test_the_bound_is_of_the_largest_distance_on_the_way():
     assert 1.62 < out.bound / (1e-3 * far.max()) < 1.88
 
 
+def test_no_bound_is_told_of_what_hangs_on_direction_without_a_law():
+    sides = [-2e-4, 2e-4]
+    curve = {'effect': 'joint_curve', 'joint': 'elbow_joint', 'values': sides, 'over': 'direction'}
+    out = corrected_goal(model(offset(2e-3), curve, posterior=sure()), goal())
+    assert out.bound is None
+    assert any('no bound is told: what elbow_joint loses by direction' in n for n in out.notes)
+
+
 def test_what_has_no_error_passes_as_it_came():
     out = corrected_goal(model(posterior=sure()), goal())
     assert (out.before, out.largest) == (0.0, (0.0, 0.0))

@@ -19,6 +19,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arm.robot import Robot
 from ..arrays import Array, readonly
@@ -29,6 +30,7 @@ from ..sequences import halton
 from .domain import Domain
 from .expected_effort import with_expected_effort
 from .features import Features
+from .turns import just_turned
 from .twin import Twin
 
 DRAWS = 400
@@ -166,6 +168,9 @@ class Discrepancy:
         errors too fine to be carried over.
     reach : float [rad or m]
         Distance beyond what was recorded at which a curve counts in full.
+    turns : array, shape (n,), optional [rad or m]
+        How far every joint may be off, on top of that, where it has just turned around: laws of lost
+        motion differ there alone. None for nothing.
 
     """
 
@@ -174,12 +179,15 @@ class Discrepancy:
     gears: Array
     curves: Array
     reach: float
+    turns: Array | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'gears', readonly(self.gears, (None,), 'gears'))
         object.__setattr__(self, 'curves', readonly(self.curves, (None,), 'curves'))
+        turns = np.zeros_like(self.gears) if self.turns is None else self.turns
+        object.__setattr__(self, 'turns', readonly(turns, (None,), 'turns'))
 
-    def covariance(self, joint_columns: Array, beyond: Array) -> Array:
+    def covariance(self, joint_columns: Array, beyond: Array, turned: NDArray[np.bool_]) -> Array:
         """
         Return its part of the covariance, shape (M, 6, 6).
 
@@ -189,15 +197,17 @@ class Discrepancy:
             d pose / d joint.
         beyond : array, shape (M, n)
             How far every joint is from where it was recorded.
+        turned : array of bool, shape (M, n)
+            Whether it has just turned around.
 
         """
-        everywhere, gears = self.sizes(beyond)
+        everywhere, gears = self.sizes(beyond, turned)
         moved = joint_columns * gears[:, None]
         out = np.einsum('nim,njm->mij', moved, moved)
         out[:, np.arange(6), np.arange(6)] += everywhere**2
         return np.asarray(out)
 
-    def sizes(self, beyond: Array) -> tuple[Array, Array]:
+    def sizes(self, beyond: Array, turned: NDArray[np.bool_]) -> tuple[Array, Array]:
         """
         Return standard deviations at the tool, shape (M, 6), and in every joint, shape (n, M).
 
@@ -205,12 +215,16 @@ class Discrepancy:
         ----------
         beyond : array, shape (M, n)
             How far every joint is from where it was recorded.
+        turned : array of bool, shape (M, n)
+            Whether it has just turned around.
 
         """
         apart = np.minimum(beyond.T / self.reach, 1.0)
         grown = 1.0 + (ELSEWHERE - 1.0) * apart
         own = np.repeat([self.position, self.orientation], 3) * grown.max(axis=0)[:, None]
-        return own, np.hypot(self.gears[:, None] * grown, self.curves[:, None] * apart)
+        assert self.turns is not None
+        parts = self.gears[:, None] * grown, self.curves[:, None] * apart, (turned * self.turns).T
+        return own, np.sqrt(sum(part**2 for part in parts))
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +332,7 @@ class Posterior:
         # A model that is not the middle of what is allowed is off by that much too.
         ways = np.column_stack([self.factor, self.mean])
         moved = np.tensordot(ways, self._columns(features, setup), axes=(0, 0))
-        return moved, self.discrepancy.covariance(*_levers(self.domain, features))
+        return moved, self.discrepancy.covariance(*self._levers(features))
 
     def without_clocks(self) -> Posterior:
         """Return how sure poses of a motion to come are, whose place nobody stamps."""
@@ -350,7 +364,7 @@ class Posterior:
 
         """
         columns = self._columns(features, 0)[:, :3].transpose(0, 2, 1)
-        own = self.discrepancy.covariance(*_levers(self.domain, features))[:, :3, :3]
+        own = self.discrepancy.covariance(*self._levers(features))[:, :3, :3]
         count = own.shape[0]
         rest = np.zeros((count, 3, count, 3))
         rest[np.arange(count), :, np.arange(count), :] = own + noise**2 * np.eye(3)
@@ -383,8 +397,8 @@ class Posterior:
         own, joints = unit((count, 3)), unit((count, features.twin.robot.n))
         steps = self.mean + unit((count, self.factor.shape[1])) @ self.factor.T
         columns = self._columns(features, setup, framed=framed)[:, :3]
-        levers, beyond = _levers(self.domain, features)
-        everywhere, gears = self.discrepancy.sizes(beyond)
+        levers, *where = self._levers(features)
+        everywhere, gears = self.discrepancy.sizes(*where)
         return np.asarray(
             np.tensordot(columns, steps, axes=(0, 1)).transpose(1, 2, 0)
             + np.tensordot(levers[:, :3] * gears[:, None], joints, axes=(0, 1)).transpose(1, 2, 0)
@@ -396,12 +410,19 @@ class Posterior:
             raise ModelError(f'the posterior has no base frame {setup}')
         return self.directions.columns(features, setup, framed=framed)
 
+    def _levers(self, features: Features) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """
+        Return d pose / d joint, shape (n, 6, M), and of every joint where it is.
 
-def _levers(domain: Domain, features: Features) -> tuple[Array, Array]:
-    """Return d pose / d joint, shape (n, 6, M), and how far joints are from where recorded, (M, n)."""
-    joints = [features.column(('q', i)) for i in range(features.twin.robot.n)]
-    q, _ = features.recording.joints.at(features.at)
-    return np.stack(joints), domain.beyond(q)
+        How far from where it was recorded, and whether it has just turned around, shape (M, n) each.
+        """
+        joints = [features.column(('q', i)) for i in range(features.twin.robot.n)]
+        motion, at = features.recording.joints, features.at
+        q, _ = motion.at(at)
+        turned = np.zeros(q.shape, dtype=bool)
+        if np.any(self.discrepancy.turns):
+            turned = just_turned(motion, at)
+        return np.stack(joints), self.domain.beyond(q), turned
 
 
 def pose_covariances(
@@ -517,6 +538,7 @@ def as_dict(posterior: Posterior) -> dict[str, Any]:
             'gears': [float(v) for v in rest.gears],
             'curves': [float(v) for v in rest.curves],
             'reach': rest.reach,
+            'turns': np.asarray(rest.turns).tolist(),
         },
         'recorded': posterior.domain.as_dict(),
         'left_open': list(posterior.left_open),

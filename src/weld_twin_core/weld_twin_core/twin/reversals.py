@@ -10,6 +10,7 @@ it is wanted as the joint is from there.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -43,6 +44,13 @@ class Spread(NamedTuple):
 def is_play(effect: Effect) -> bool:
     """Tell whether an effect is lost motion, which hangs on where a joint came from."""
     return isinstance(effect, MemoryEffect) and effect.stage == Stage.PLAY
+
+
+def lost_motion(robot: Robot, plays: Sequence[Effect], recording: Recording) -> Array:
+    """Return by how much play displaces every joint at every sample, shape (N, n) [rad or m]."""
+    twin = Twin(robot, plays)
+    shift, _ = run_all(twin.effects, twin.joint_view(recording), False)
+    return np.zeros_like(recording.joints.q) if shift is None else np.asarray(shift)
 
 
 def approached(recording: Recording, came: Array | None, stands: Array | None = None) -> Recording:
@@ -90,15 +98,12 @@ def play_steps(
         Sign of the last motion of every joint before the first sample; 0 where it is not known.
 
     """
-    twin, motion = Twin(robot, plays), recording.joints
+    motion = recording.joints
     steps = np.zeros_like(motion.q)
     for _ in range(ROUNDS):
         moved = JointMotion(motion.t, motion.q + steps, motion.qd)
         before = approached(replace(recording, joints=moved), came)
-        shift, _ = run_all(twin.effects, twin.joint_view(before), False)
-        if shift is None:
-            break
-        steps = -np.asarray(shift)[-motion.t.size :]
+        steps = -lost_motion(robot, plays, before)[-motion.t.size :]
     return steps
 
 

@@ -25,6 +25,8 @@ LOCKED = {'heard': [9, 0, 0, 0], 'recorded': [9, 0, 0, 0], **WELL}
 
 def test_security_is_shown_when_strangers_get_through_without_keys_alone():
     assert verdict({'open': OPEN, 'enforced': LOCKED})
+    timely = {**OPEN, 'topics': {**TOPICS, '/diagnosis': 1}}
+    assert verdict({'open': timely, 'enforced': LOCKED})
 
 
 @pytest.mark.parametrize(

@@ -171,14 +171,13 @@ def _failures(score: Score) -> Html:
 
 
 def _failure(case: Judged, score: Score) -> tuple[str, ...]:
-    reason = score.errors.get(case.name) or score.reasons.get(case.name, '')
     return (
         case.name,
         f'{case.kind}, {case.robot}, {case.motion}',
         f'{case.truth} ({case.stratum:.1f})',
         f'{case.status}: {case.said or "-"}',
         f'{case.confidence:.2f}',
-        reason,
+        score.errors.get(case.name, ''),
     )
 
 

@@ -50,8 +50,6 @@ class Score:
         By case name, where causes were named.
     costs : dict
         Median and largest seconds and memory of a diagnosis.
-    reasons : mapping
-        Why a case went wrong, by name, where somebody has found out.
     errors : mapping
         By case name, why there is no verdict.
     own : mapping
@@ -63,7 +61,6 @@ class Score:
     cases: list[Judged]
     shrinks: dict[str, Achieved]
     costs: dict[str, float]
-    reasons: Mapping[str, str]
     errors: Mapping[str, str]
     own: Mapping[str, str]
 
@@ -110,7 +107,6 @@ class Score:
             'reliability': [{**b._asdict(), 'right': b.right._asdict()} for b in bins],
             'costs': self.costs,
             'errors': dict(self.errors),
-            'reasons': dict(self.reasons),
             'own': dict(self.own),
             'shrinks': {name: value._asdict() for name, value in self.shrinks.items()},
             'cases': [case.as_dict() for case in self.cases],
@@ -123,7 +119,6 @@ def score(
     results: Path,
     *,
     seal_given: str = '',
-    reasons: Mapping[str, str] | None = None,
 ) -> Score:
     """
     Return the score of verdicts.
@@ -134,8 +129,6 @@ def score(
         As `make` and `diagnose_cases` wrote them.
     seal_given : str, optional
         The seal as printed before the diagnosis; left out, the one stored holds.
-    reasons : mapping, optional
-        Why a case went wrong, by its name.
 
     Raises
     ------
@@ -167,7 +160,6 @@ def score(
         judged,
         shrinks,
         _costs(list(verdicts.values())),
-        reasons or {},
         {name: verdict['error'] for name, verdict in verdicts.items() if verdict['error']},
         own,
     )

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from weld_twin_msgs_py.files import markdown
+from weld_twin_msgs_py.messages.topics import DIAGNOSIS
 
 from ..study import option, options
 
@@ -78,7 +79,8 @@ def verdict(result: dict[str, Any]) -> bool:
     Return whether strangers get through without keys, and nobody but the driver with them.
 
     All nodes must have run, and ended with code 0.
-    What the nodes made of the driver's joint states without keys, they make with keys too.
+    What the nodes made of the driver's joint states without keys, they make with keys too; but for a
+    verdict, which may be there in time in the one trial and not in the other.
     """
     if any(way not in result for way in WAYS):
         return False
@@ -88,7 +90,8 @@ def verdict(result: dict[str, Any]) -> bool:
     shown = all(count > 0 for count in (*free['heard'], *free['recorded']))
     through = locked['heard'][0] > 0 and locked['recorded'][0] > 0
     kept_out = not any((*locked['heard'][1:], *locked['recorded'][1:]))
-    return bool(shown and through and kept_out and set(free['topics']) <= set(locked['topics']))
+    made = set(free['topics']) - {DIAGNOSIS.name}
+    return bool(shown and through and kept_out and made <= set(locked['topics']))
 
 
 def table(result: dict[str, Any]) -> str:

@@ -105,7 +105,7 @@ def users_page(found: Mapping[str, Any]) -> str:
     lead = (
         f'# Users of the server\n\n`weld-twin lab users{found["options"]}`\n\n'
         f'What is dropped is {found["recording"]}; the server has one worker. Each user is '
-        f'{found["browser"]}. The first in line has no place to see. Malicious files are those of '
+        'a plain client. The first in line has no place to see. Malicious files are those of '
         '`weld-twin lab campaign fuzz`.\n\n'
     )
     if 'hostile' in found:

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from http.cookiejar import CookieJar
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from weld_twin_core.errors import DataError
 
@@ -70,18 +70,6 @@ def server(place: Path, *words: str) -> Iterator[str]:
             process.terminate()
 
 
-class Person(Protocol):
-    """Somebody who drops recordings and looks at pages."""
-
-    def drop(self, files: Sequence[Path], **fields: str) -> tuple[int, str, str]:
-        """Drop a recording; return status, address and text of what comes."""
-        ...
-
-    def look(self, address: str) -> str:
-        """Return the page of a recording as it is now; empty while it changes."""
-        ...
-
-
 class Visitor:
     """Somebody with a plain client: it keeps cookies and follows what the server says."""
 
@@ -124,7 +112,7 @@ class Visitor:
         return self.page(address)[2]
 
 
-def wait(visitor: Person, address: str) -> str:
+def wait(visitor: Visitor, address: str) -> str:
     """Return the page of a recording that is finished."""
     return wait_all([(visitor, address)])[0].text
 
@@ -138,7 +126,7 @@ class Waited:
     until: float = 0.0
 
 
-def wait_all(waiting: Sequence[tuple[Person, str]]) -> list[Waited]:
+def wait_all(waiting: Sequence[tuple[Visitor, str]]) -> list[Waited]:
     """
     Return what each visitor was told while he waited, and at last.
 
@@ -170,7 +158,7 @@ def _places(text: str) -> list[int]:
     return [int(told) for told in re.findall(r'Waiting: (\d+) before it', text)]
 
 
-def at_once(visitors: Sequence[Person], files: Sequence[Path], **fields: str) -> dict[str, Any]:
+def at_once(visitors: Sequence[Visitor], files: Sequence[Path], **fields: str) -> dict[str, Any]:
     """Return how long users take who drop the same recording at once."""
     began = time.perf_counter()
     dropped = [visitor.drop(files, **fields) for visitor in visitors]

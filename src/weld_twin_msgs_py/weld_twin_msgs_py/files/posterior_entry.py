@@ -56,6 +56,7 @@ def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:
         readonly(rest['gears'], (robot.n,), 'posterior.discrepancy.gears'),
         readonly(rest['curves'], (robot.n,), 'posterior.discrepancy.curves'),
         max(_size(rest['reach'], 'reach'), 1e-9),
+        readonly(rest.get('turns', np.zeros(robot.n)), (robot.n,), 'posterior.discrepancy.turns'),
     )
     return Posterior(
         what,

@@ -21,6 +21,7 @@ from ...effects.setup_motion import of_the_robot
 from ...recording import Recording
 from ...twin.domain import Domain
 from ...twin.posterior import Directions, Posterior, postures_within_limits, usual_sigma
+from ...twin.reversals import is_play, lost_motion
 from ...twin.twin import Twin
 from ..algebra.definite import inverted
 from ..algebra.designed import designed
@@ -77,7 +78,8 @@ def allowed(
     models = weighed(rows, prior, _expected(problem, scale))
     system = Conditioning(rows, prior, models.shown, models.noise)
     unseen = _unseen(problem, model, scale, precision, rows)
-    left = leftover(problem, scale, unseen, system.given, floor, models.rough)
+    lost = _lost(problem, model)
+    left = leftover(problem, scale, unseen, system.given, floor, models.rough, lost)
     curves = np.split(
         models.open, what.count - np.cumsum([k.size for k in what.knots[::-1]])[::-1]
     )
@@ -177,6 +179,15 @@ def _turns(problem: Problem, model: Model, scale: Scale) -> Array:
         shape = (joints.size, problem.rows[k], problem.samples[k])
         parts.append(np.reshape(columns, shape))
     return problem.whitened(parts, scale)
+
+
+def _lost(problem: Problem, model: Model) -> Array:
+    """Return how much motion every joint was found to lose in the recordings, shape (n,) [rad or m]."""
+    plays = [effect for effect in model.known + model.found if is_play(effect)]
+    if not plays:
+        return np.zeros(model.robot.n)
+    shifts = [lost_motion(model.robot, plays, recording) for recording in problem.recordings]
+    return np.asarray(np.max([np.ptp(shift, axis=0) for shift in shifts], axis=0))
 
 
 def _thinned(problem: Problem, scale: Scale) -> tuple[Problem, Scale]:

@@ -23,6 +23,7 @@ from scipy.special import chdtri
 
 from ...arrays import Array
 from ...recording import Recording
+from ...twin.turns import just_turned
 from ..algebra.definite import Index
 from ..algebra.designed import Design
 from ..algebra.fit import TRUSTED, solve_scaled
@@ -39,6 +40,12 @@ ROUGH = 0.5
 real arms under a tracker it is 0.3 to 0.6, and their stations repeat better than models predict."""
 STEPS = 60
 """Halvings of the bracket in which the size is sought; far below rounding."""
+
+FEW = 12
+"""Samples after turns of a joint below which they tell nothing of what is left there."""
+CLEAR = 2.0
+"""Standard errors by which more must be left there than elsewhere: a bound that is told too wide does
+less harm than one too narrow."""
 
 Given = Callable[[NDArray[np.bool_]], tuple[Array, Array]]
 """Mean and covariance of the coordinates given all rows but those of a mask."""
@@ -75,11 +82,17 @@ class Unseen:
 
 
 class Rest(NamedTuple):
-    """What is left over: per axis at the tool [m], about each axis [rad], in every gear [rad]."""
+    """
+    What is left over: per axis at the tool [m], about each axis [rad], in every gear [rad].
+
+    ``turns``, shape (n,) [rad or m], is what is left over in joints that have just turned around,
+    on top of that.
+    """
 
     position: float
     orientation: float
     gear: float
+    turns: Array
 
 
 def leftover(
@@ -89,6 +102,7 @@ def leftover(
     given: Given,
     floor: NoiseFloor,
     rough: float,
+    lost: Array,
 ) -> Rest:
     """
     Return the standard deviations of what is left over.
@@ -101,6 +115,8 @@ def leftover(
         What the recordings themselves say of the instrument's noise.
     rough : float
         Share of the arm's small errors that are of a usual size.
+    lost : array, shape (n,) [rad or m]
+        How much motion was found to be lost in every joint.
 
     """
     samples = _by_sample(problem)
@@ -130,11 +146,43 @@ def leftover(
     e, v, levered = part(slice(3, 6))
     # Without measured turns the tool turns as much as it shifts on an arm of a metre.
     turn = _size(e, v + gear**2 * levered, np.eye(3)) if e.size else position
-    noise = _noise(problem, floor)
+    noise = _noise(problem, floor, scale.position)
     common = _common(errors, moments, pairs, weight > TRUSTED)
-    noise = None if noise is None else noise / scale.position
     share = _of_the_arm(*common, noise, rough, problem.at_rest)
-    return Rest(position * share, turn * share, gear * share)
+    turns = _at_turns(problem, errors, moments, lost)
+    return Rest(position * share, turn * share, gear * share, turns)
+
+
+def _at_turns(problem: Problem, errors: list[Array], moments: list[Array], lost: Array) -> Array:
+    """
+    Return how far joints may be off where they have just turned around, shape (n,) [rad or m].
+
+    Laws of lost motion differ on that way alone, and look alike on the rest of a recording. Where more
+    is left there than elsewhere, the law that was found does not hold, and any part of the motion may
+    be lost: evenly likely ones have this standard deviation.
+    """
+    out = np.zeros(lost.size)
+    seen = np.array([k for k, error in enumerate(errors) if error.size >= 3], dtype=int)
+    if not lost.any() or problem.at_rest or not seen.size:
+        return out
+    excess = np.array([_excess(errors[k], errors[k], moments[k]) for k in seen])
+    near = np.concatenate([_turned(problem, k) for k in range(len(problem.recordings))])[seen]
+    for i in np.flatnonzero(lost):
+        here, beside = excess[near[:, i]], excess[~near[:, i]]
+        if min(here.size, beside.size) < FEW:
+            continue
+        doubt = np.sqrt(here.var() / here.size + beside.var() / beside.size)
+        if here.mean() - beside.mean() > CLEAR * doubt:
+            out[i] = lost[i] / np.sqrt(3.0)
+    return out
+
+
+def _turned(problem: Problem, k: int) -> NDArray[np.bool_]:
+    """Return which joints have just turned at the samples of a recording; none where it touched."""
+    recording = problem.recordings[k]
+    if recording.measured is None or problem.contact(k) is not None:
+        return np.zeros((problem.samples[k], recording.joints.q.shape[1]), dtype=bool)
+    return just_turned(recording.joints, recording.measured.t)
 
 
 def _common(
@@ -287,13 +335,13 @@ def _size(errors: Array, moments: Array, shape: Array) -> float:
     return float(np.sqrt(high))
 
 
-def _noise(problem: Problem, floor: NoiseFloor) -> float | None:
-    """Return the instrument's noise [m], told with the data or seen in them; None where neither is."""
+def _noise(problem: Problem, floor: NoiseFloor, unit: float) -> float | None:
+    """Return the instrument's noise in units [m], told with the data or seen in them; None without."""
     told = [
         float(np.median(r.measured.sigma))
         for r in problem.recordings
         if r.measured is not None and r.measured.sigma is not None
     ]
     if told:
-        return float(np.mean(told))
-    return floor.sigma if floor.independent else None
+        return float(np.mean(told)) / unit
+    return floor.sigma / unit if floor.independent else None

@@ -153,5 +153,10 @@ def discrepancy(robot: Robot, rest: Rest, fine: Array, found: Sequence[Effect]) 
             fine[joint] = max(fine[joint], effect.twin.off_outside())
     turning = np.where(robot.prismatic, 0.0, 1.0)
     return Discrepancy(
-        rest.position, rest.orientation, rest.gear * turning, fine * turning, SPACING
+        rest.position,
+        rest.orientation,
+        rest.gear * turning,
+        fine * turning,
+        SPACING,
+        rest.turns,
     )

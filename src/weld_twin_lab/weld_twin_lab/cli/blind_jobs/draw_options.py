@@ -10,7 +10,6 @@ from weld_twin_core.errors import DataError
 
 from ...study import REQUIRED, listed, option
 
-REASONS = option('--reasons', '', 'FILE', 'YAML file of case names and why they went wrong')
 DRAW = (
     option('--cases', 400, 'N', 'how many (default: 400)', dest='count'),
     option('--seed', REQUIRED, 'S', 'decides the cases', type=int),

@@ -8,15 +8,15 @@ The truths lie beside the cases then; nothing but the code keeps the diagnosis f
 from __future__ import annotations
 
 from ...study import Study, options, study
-from .draw_options import DRAW, REASONS
+from .draw_options import DRAW
 from .make import made
 from .score import diagnosed_and_scored
 
-add_arguments = options(*DRAW, REASONS, out='where everything goes', pool=True)
+add_arguments = options(*DRAW, out='where everything goes', pool=True)
 
 
 @study
 def run(study: Study) -> None:
     """Run what is not done yet, and print the measures."""
     made(study, study.out / 'cases', study.out / 'truths')
-    diagnosed_and_scored(study, study.args.reasons)
+    diagnosed_and_scored(study)

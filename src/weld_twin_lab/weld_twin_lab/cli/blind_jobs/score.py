@@ -10,8 +10,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from weld_twin_nodes.offline.output_directory import write_owned
+
 from ...study import DONE, REQUIRED, Study, option, options, study
-from .draw_options import REASONS
 
 if TYPE_CHECKING:
     from ...blind.measures import Measure
@@ -22,7 +23,6 @@ add_arguments = options(
     option('--truths', REQUIRED, 'DIR', 'their truths'),
     option('--results', REQUIRED, 'DIR', 'verdicts of blind diagnose'),
     option('--seal', '', 'HASH', 'the seal as it was printed before the diagnosis'),
-    REASONS,
     out='where score.json and score.html go',
 )
 
@@ -30,42 +30,36 @@ add_arguments = options(
 @study
 def run(study: Study) -> None:
     """Score, write, and print the measures."""
-    from ...blind.score_files import read_reasons, write_score
     from ...blind.scoring import score
 
     args = study.args
-    result = score(
-        Path(args.cases),
-        Path(args.truths),
-        Path(args.results),
-        seal_given=args.seal,
-        reasons=read_reasons(args.reasons),
-    )
-    write_score(study.out, result)
-    print_score(result)
+    places = (Path(args.cases), Path(args.truths), Path(args.results))
+    _written(study, score(*places, seal_given=args.seal))
 
 
-def diagnosed_and_scored(study: Study, reasons: str = '', *, with_holdout: bool = True) -> None:
+def diagnosed_and_scored(study: Study, *, with_holdout: bool = True) -> None:
     """Diagnose cases whose truths lie beside them, score, write, and print the measures."""
     from ...blind import layout
     from ...blind.diagnosing import diagnose_cases
-    from ...blind.score_files import read_reasons, write_score
     from ...blind.scoring import score
 
     cases, truths, results = (study.out / name for name in ('cases', 'truths', 'verdicts'))
     with study.runner('diagnosing', results / DONE) as runner:
         diagnose_cases(cases, results, runner, allow_readable=True, with_holdout=with_holdout)
-    result = score(cases, truths, results, reasons=read_reasons(reasons))
-    write_score(study.out, result)
-    print_score(result)
+    _written(study, score(cases, truths, results))
     print(f'report: {study.out / layout.PAGE}')
 
 
-def print_score(result: Score) -> None:
-    """Print the measures as a table."""
+def _written(study: Study, result: Score) -> None:
+    """Write the score as JSON and as a page, and print the measures as a table."""
     from rich.console import Console
     from rich.table import Table
 
+    from ...blind import layout
+    from ...blind.score_page import score_page
+
+    write_owned(study.out / layout.PAGE, score_page(result))
+    write_owned(study.out / layout.SCORE, layout.text(layout.SCORE, result.as_dict()))
     table = Table(box=None)
     for head in ('measure', 'value', '95 % interval', 'of', 'goal'):
         table.add_column(head, justify='left' if head == 'measure' else 'right')

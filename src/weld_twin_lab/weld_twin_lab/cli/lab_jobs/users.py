@@ -17,8 +17,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 from ...study import Study, option, options, study
 
 if TYPE_CHECKING:
-    from ...fleet.users import Person
+    from ...fleet.users import Visitor
 
 LONGEST = 120
 """Signs of a refusal in the table."""
@@ -42,7 +42,6 @@ add_arguments = options(
     option('--robot', '', 'R', 'its robot, a bundled one'),
     option('--users', 20, 'N', 'who wait at once (default: 20)'),
     option('--hostile', 200, 'N', 'connections in bad faith; 0: none'),
-    option('--chromium', False, None, 'users have Chromium, not a plain client'),
     out='directory for the results',
 )
 
@@ -69,7 +68,7 @@ def run(study: Study) -> bool:
 
 def _measured(args: argparse.Namespace, place: Path) -> dict[str, Any]:
     from ...fleet.made_list import make_one
-    from ...fleet.users import at_once, server
+    from ...fleet.users import Visitor, at_once, server
 
     if args.bag:
         bag, robot, align = Path(args.bag), args.robot, ''
@@ -79,17 +78,16 @@ def _measured(args: argparse.Namespace, place: Path) -> dict[str, Any]:
         files, robot, align = [*sorted(bag.iterdir()), own], str(own), 'base'
     fields = {'robot': Path(robot).name, 'align': align}
     command = _command(bag, robot, align, place)
-    with server(place / 'served') as root, _people(root, args.chromium) as somebody:
+    with server(place / 'served') as root:
+        somebody = partial(Visitor, root)
         ones = [_one(somebody(), files, fields) for _ in range(3)]  # the first starts the worker
         one = sorted(ones)[1]
         many = at_once([somebody() for _ in range(args.users)], files, **fields)
         beside = _beside(root, somebody, files, fields, args, many) if args.hostile else None
         malicious = _malicious(somebody, place)
     return {
-        'options': f' {args.bag} --robot {args.robot}' * bool(args.bag)
-        + ' --chromium' * args.chromium,
+        'options': f' {args.bag} --robot {args.robot}' * bool(args.bag),
         'recording': str(args.bag or 'a recording of 60 s, moving, made by the plant'),
-        'browser': 'a Chromium profile' if args.chromium else 'a plain client',
         'command_s': command,
         'one_user_s': one,
         'one_user_all_s': ones,
@@ -103,7 +101,7 @@ def _measured(args: argparse.Namespace, place: Path) -> dict[str, Any]:
 
 def _beside(
     root: str,
-    somebody: Callable[[], Person],
+    somebody: Callable[[], Visitor],
     files: Sequence[Path],
     fields: dict[str, str],
     args: argparse.Namespace,
@@ -131,19 +129,7 @@ def _beside(
     }
 
 
-@contextmanager
-def _people(root: str, chromium: bool) -> Iterator[Callable[[], Person]]:
-    from ...fleet.users import Visitor
-    from ...fleet.users_in_chromium import chromium_users
-
-    if not chromium:
-        yield lambda: Visitor(root)
-        return
-    with chromium_users(root) as somebody:
-        yield somebody
-
-
-def _one(visitor: Person, files: Sequence[Path], fields: dict[str, str]) -> float:
+def _one(visitor: Visitor, files: Sequence[Path], fields: dict[str, str]) -> float:
     """Return how long one user takes from drop to sheet [s]."""
     from ...fleet.users import wait
 
@@ -167,7 +153,7 @@ def _command(bag: Path, robot: str, align: str, place: Path) -> float:
     return sorted(took)[1]
 
 
-def _malicious(somebody: Callable[[], Person], place: Path) -> dict[str, str]:
+def _malicious(somebody: Callable[[], Visitor], place: Path) -> dict[str, str]:
     """Return what became of every malicious file of the campaign that the server might take."""
     from ...campaigns.fuzzing.malicious import harms
 
@@ -183,7 +169,7 @@ def _malicious(somebody: Callable[[], Person], place: Path) -> dict[str, str]:
     return out
 
 
-def _dropped(visitor: Person, files: Sequence[Path]) -> str:
+def _dropped(visitor: Visitor, files: Sequence[Path]) -> str:
     """Return 'refused' and why, or that it was taken."""
     from ...fleet.users import wait
 

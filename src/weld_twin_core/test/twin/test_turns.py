@@ -1,0 +1,105 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Where joints have just turned around, and what a wrong law of lost motion leaves there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.arm.chain import forward
+from weld_twin_core.diagnosis.algebra.fit import fit, robust_scale
+from weld_twin_core.diagnosis.algebra.noise_floor import noise_floor
+from weld_twin_core.diagnosis.algebra.prior import effect_precision
+from weld_twin_core.diagnosis.algebra.problem import Model, Problem
+from weld_twin_core.diagnosis.predicting.allowed import allowed
+from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.twin.domain import Domain
+from weld_twin_core.twin.goal_correction import Start, corrected_goal
+from weld_twin_core.twin.goal_motion import Goal
+from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior
+from weld_twin_core.twin.program_model import ProgramModel
+from weld_twin_core.twin.turns import just_turned
+
+HOME = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+WIDTH = 7e-4
+
+
+def test_a_joint_has_just_turned_for_a_milliradian_after_its_turn():
+    t = np.arange(0.0, 6.0, 0.01)
+    q = np.zeros((t.size, 2))
+    q[:, 0] = 0.01 * np.abs(t - 2.0)  # turns at 2 s, and goes 0.01 rad a second
+    q[:, 1] = 1e-3 * t
+    q[100:200, 1] = q[100, 1]  # stands still, and goes on
+    noisy = q + 2e-6 * np.random.default_rng(1).normal(size=q.shape)
+    for motion in (JointMotion(t, q), JointMotion(t, noisy)):
+        turned = just_turned(motion, t)
+        assert not turned[:, 1].any()
+        expected = (t >= 2.0) & (t < 2.1)
+        assert (turned[:, 0] != expected).sum() <= 2
+    assert not just_turned(JointMotion(t, q, None, True), t).any()  # stations
+
+
+def played(q, width):
+    """Return where a joint is behind a gap that it crosses, sample by sample."""
+    out, at = np.empty_like(q), q[0]
+    for k, value in enumerate(q):
+        at = min(max(at, value - 0.5 * width), value + 0.5 * width)
+        out[k] = at
+    return out
+
+
+@pytest.mark.parametrize(
+    ('law', 'sure'),
+    [
+        ({'effect': 'backlash', 'width': WIDTH}, True),
+        ({'effect': 'friction', 'windup': 0.5 * WIDTH, 'travel': 0.7 * WIDTH}, False),
+    ],
+)
+def test_a_law_of_lost_motion_that_does_not_hold_shows_where_joints_turn(law, sure):
+    robot, rng = load('ur5'), np.random.default_rng(5)
+    t = np.arange(0.0, 40.0, 0.02)
+    q = HOME + 0.5 * np.sin(np.outer(t, rng.uniform(0.5, 1.3, 6)) + rng.uniform(0.0, 6.0, 6))
+    real = q.copy()
+    real[:, 2] = played(q[:, 2], WIDTH)
+    seen = forward(robot, real)[:, :3, 3] + rng.normal(scale=2e-5, size=(t.size, 3))
+    recording = Recording('free', JointMotion(t, q), Measurements(t, seen))
+    problem = Problem((recording,))
+    effect = effect_from_mapping({**law, 'joint': 'elbow_joint'})
+    start = Model(robot, (robot.T_world_base,), (), (effect,))
+    precision = effect_precision(start)
+    scale = robust_scale(problem, problem.residuals(start))
+    found = fit(problem, start, scale, precision)
+    scale = robust_scale(problem, problem.residuals(found.model))
+    floor = noise_floor(problem, problem.residuals(found.model))
+    turns = allowed(problem, found.model, scale, precision, floor).discrepancy.turns
+    assert not np.delete(turns, 2).any()
+    # Any part of what is lost is as likely: the standard deviation of even chances over the gap.
+    assert turns[2] == pytest.approx(0.0 if sure else WIDTH / np.sqrt(3.0), rel=0.1)
+
+
+def test_what_is_not_known_of_a_turn_counts_in_the_bound_of_goals_that_turn():
+    robot, turns = load('ur5'), np.array([4e-4, 0.0, 0.0, 0.0, 0.0, 0.0])
+    domain = Domain(robot.joint_names, (((-4.0, 4.0),),) * 6, (0.02,) * 6, (True,) * 6)
+    rest = Discrepancy(1e-5, 1e-6, np.zeros(6), np.zeros(6), 1.0, turns)
+    known = Posterior(Directions((), 1, ()), np.zeros(0), np.zeros((0, 0)), rest, domain)
+    off = effect_from_mapping(
+        {'effect': 'joint_offset', 'joint': 'shoulder_lift_joint', 'offset': 5e-4}
+    )
+    t = np.linspace(0.0, 2.0, 21)
+    q = np.tile(HOME, (21, 1))
+    q[:, 0] += 0.1 * np.sin(0.25 * np.pi * t) ** 2
+    sure = replace(known, discrepancy=replace(rest, turns=None))
+    bounds = {}
+    for came in (1.0, -1.0):
+        start = Start(q[0], False, came * np.ones(6))
+        for law, posterior in (('known', sure), ('open', known)):
+            model = ProgramModel(robot, (off,), posterior)
+            bounds[law, came] = corrected_goal(model, Goal(t, q), None, start).bound
+    assert bounds['known', -1.0] == bounds['known', 1.0] == bounds['open', 1.0]
+    lever = np.hypot(*forward(robot, HOME)[:2, 3])
+    assert bounds['open', -1.0] == pytest.approx(1.645 * 4e-4 * lever, rel=0.1)

@@ -100,6 +100,15 @@ def test_what_is_lost_beside_a_pause_is_counted(gone):
     assert seen(STAMPS[kept], came[kept])[0] == gone
 
 
+@pytest.mark.parametrize('waiting', [1, 8, 60, 700])
+def test_what_a_node_lost_that_stood_still_is_no_jump_of_a_clock(waiting):
+    # It goes on with the few messages that still waited, and then with those of now.
+    kept, came = without((500 + waiting, 2500)), CAME.copy()
+    came[500:2500] = CAME[2500] - 1e-3 + np.arange(2000) * 1e-7
+    missing, ahead, back = seen(STAMPS[kept], came[kept])
+    assert (missing, ahead, back) == (2000 - waiting, 0.0, 0.0)
+
+
 def gap_of(size, came_too=True, rush=1.0):
     """Return what is seen of one gap of so many steps between beats that come so much quicker."""
     stamps, came = STAMPS[:400].copy(), CAME[:400] * rush

@@ -18,10 +18,12 @@ pytestmark = pytest.mark.cells
 
 S = 1_000_000_000
 Q = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
-STEP = 2_000_000
-"""Stamps of a controller at 500 Hz [ns]."""
-BURST = 12_000
-"""More than twice what a queue keeps."""
+STEP = 4_000_000
+"""Stamps of a controller at 250 Hz [ns]."""
+KEPT = 500
+"""What the queues of this cell keep: two seconds."""
+BURST = 3 * KEPT
+"""Sent while a node stands still: more than its queue and the middleware's (512) keep."""
 SOON = 2.7
 """Seconds within which a node ends that waits 2 s for who stands still."""
 TWIN, ANALYZER = 'forward_kinematics_twin', 'deviation_analyzer'
@@ -39,7 +41,15 @@ class Bench:
         self.stamp, self.sent = S, 0
 
     def begin(self):
-        self.twin, self.analyzer = self.cell.start(TWIN), self.cell.start(ANALYZER)
+        self.twin, self.analyzer = (
+            self.cell.start(
+                node,
+                qos_overrides={
+                    topic: {'subscription': {'reliability': 'best_effort', 'depth': KEPT}}
+                },
+            )
+            for node, topic in ((TWIN, JOINT_STATES.name), (ANALYZER, '/twin/tool_pose'))
+        )
 
     def send(self, count):
         for _ in range(count):
@@ -47,13 +57,6 @@ class Bench:
             self.sent += 1
             names = self.robot.joint_names
             self.out.publish(self.cell.messages.joint_state(self.stamp, names, Q))
-
-    def paced(self, count):
-        """Send as fast as the twin keeps up."""
-        for _ in range(count // 200):
-            done = len(self.poses) + 200
-            self.send(200)
-            self.cell.wait(lambda done=done: len(self.poses) >= done, 'the twin')
 
     def values(self, node, topic):
         return self.health.values.get(f'/{node}: {topic}', {})
@@ -84,16 +87,23 @@ class Bench:
     def wait_said(self, process, sentence):
         self.cell.wait(lambda: sentence in process.log, sentence)
 
-    def steady(self, seconds):
-        """Send in real time for a while."""
-        end = time.monotonic() + seconds
+    def steady(self, count):
+        """Send at most in real time: stamps that run ahead of it are those of a clock that was set."""
+        last = self.sent + count
 
         def over():
             self.send(10)
             time.sleep(10 * STEP / S)
-            return time.monotonic() > end
+            return self.sent >= last
 
         self.cell.wait(over, 'some time')
+
+    def overrun(self, process):
+        """Send more than its queue keeps while a node stands still."""
+        process.signal(signal.SIGSTOP)
+        self.steady(BURST)
+        process.signal(signal.SIGCONT)
+        self.steady(KEPT // 2)
 
 
 @pytest.fixture(scope='module')
@@ -103,17 +113,14 @@ def bench(tmp_path_factory, robot):
 
 
 def test_a_burst_that_overruns_a_node_is_told_with_the_number_and_its_end(bench):
-    bench.steady(1.5)
+    bench.steady(KEPT)
     topic = JOINT_STATES.name
     bench.early = bench.settled(bench.unheard)  # what was sent before the two had met
     assert bench.number(TWIN, topic, 'lost') == 0
-    bench.twin.signal(signal.SIGSTOP)
-    bench.send(BURST)
-    bench.twin.signal(signal.SIGCONT)
-    bench.steady(1.0)
+    bench.overrun(bench.twin)
     bench.wait_said(bench.twin, 'missing messages, by the gaps between its stamps')
     told = bench.health.told[f'/{TWIN}']
-    due = 'one is due every 2 ms'
+    due = 'one is due every 4 ms'
     bench.cell.wait(lambda: any(due in text for level, text in told if level == 'warn'), due)
 
 
@@ -121,9 +128,7 @@ def test_what_one_node_of_the_project_sends_and_another_does_not_get_is_counted(
     topic = '/twin/tool_pose'
     before = bench.settled(bench.apart)  # one of the two may have met the twin a little later
     assert bench.number(ANALYZER, topic, 'lost') == 0
-    bench.analyzer.signal(signal.SIGSTOP)
-    bench.paced(BURST // 2)
-    bench.analyzer.signal(signal.SIGCONT)
+    bench.overrun(bench.analyzer)
     bench.wait_said(bench.analyzer, f'messages that /{TWIN} sent did not arrive')
 
     def counted():  # the tap of this process keeps up, and has all that was sent
@@ -140,14 +145,16 @@ def test_the_end_of_a_loss_is_told_with_what_is_missing_in_all(bench):
     assert lost == bench.unheard() - bench.early
     assert lost > BURST // 4
     assert f'no more messages go missing; {lost:,} are missing in all' in bench.twin.log
-    assert bench.twin.log.count('by the gaps') == 1
+    # Each loss is told once when it begins and once when it is over, however many a busy machine has.
+    told = bench.twin.log.count('by the gaps')
+    assert told == bench.twin.log.count('no more messages go missing')
 
 
 def ended(process):
     """Return how long a process takes to end when it is asked to [s]."""
     begun = time.monotonic()
     process.interrupt()
-    assert process.end(timeout=15.0) == 0
+    assert process.end() == 0
     return time.monotonic() - begun
 
 
@@ -171,6 +178,6 @@ def test_a_node_ends_soon_though_who_listens_to_it_stands_still(bench):
             break
         bench.begin()
         bench.cell.meet()
-        bench.steady(1.5)
+        bench.steady(KEPT)
         longer = longer_for_it(bench)
     assert longer < SOON

@@ -89,7 +89,7 @@ def test_a_node_that_cannot_start_says_why_in_a_line_and_exits_with_2(cell, tmp_
         for what, (node, parameters, sentence) in BAD_STARTS.items()
     }
     for what, (process, sentence) in started.items():
-        assert process.end(60.0) == 2, what
+        assert process.end() == 2, what
         said = [line for line in process.log.splitlines() if line.startswith('weld_twin: ')]
         assert len(said) == 1, process.log
         assert sentence in said[0], what

@@ -24,6 +24,9 @@ GRACE = 20.0
 """Seconds a process has to end after SIGINT before it is killed."""
 AGAIN = 1.0
 """Seconds after which it is told again."""
+PATIENCE = 60.0
+"""Seconds in which a process ends by itself, or never will: nine that load at once on two busy cores
+have taken twenty."""
 LOOK = 0.02
 """Seconds between two looks at whether a process has ended."""
 
@@ -87,7 +90,7 @@ class NodeProcess:
         """Send a signal."""
         self._process.send_signal(number)
 
-    def end(self, timeout: float = GRACE) -> int:
+    def end(self, timeout: float = PATIENCE) -> int:
         """Wait for the process to end by itself; return its exit code."""
         return self._process.wait(timeout)
 

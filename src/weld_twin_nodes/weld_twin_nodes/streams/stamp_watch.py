@@ -139,11 +139,14 @@ def _seen(step: Array, passed: Array, begin: int, end: int) -> Seen:
     beat = step.size >= FEWEST
     usual = float(np.median(step)) if beat else np.inf
     excess = step - passed
-    jumps: Flags = excess > JUMPED_ANYHOW
-    for k in np.flatnonzero(excess > JUMPED).tolist() if beat else ():
+    # What was held up comes late, and is on time again later: no message comes before its stamp.
+    early = np.concatenate([[0.0], np.cumsum(excess)])
+    over = early[1:] - np.maximum.accumulate(early)[:-1]
+    jumps: Flags = over > JUMPED_ANYHOW
+    for k in np.flatnonzero(over > JUMPED).tolist() if beat else ():
         jumps[k] |= not _rushed(step, passed, k)
     judged = (np.arange(step.size) >= begin) & (np.arange(step.size) < end)
-    ahead = float(excess[jumps & judged].max(initial=0.0))
+    ahead = float(over[jumps & judged].max(initial=0.0))
     whole = np.maximum(np.round(step / usual), 1.0)
     on_beat = abs(step / usual - whole) <= ON_BEAT
     if not beat or np.mean(on_beat) < REGULAR:

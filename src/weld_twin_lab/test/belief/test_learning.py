@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import binom
 
 from weld_twin_core.diagnosis.calibration.weights import calibration_from
+from weld_twin_core.errors import DataError
 from weld_twin_lab.belief.bound import bounded, precise, upper_limit
 from weld_twin_lab.belief.judged import Example
 from weld_twin_lab.belief.learning import count_of, learned
@@ -84,6 +85,11 @@ def test_too_few_cases_are_told_as_sure_of_nothing():
     content = learned(examples(20, 7), {}, risk=0.002)
     assert content['sure_from']['answer'] > 1.0
     assert content['card']['bounds']['answer']['sure'] == 0.0
+
+
+def test_a_kind_of_statement_without_examples_is_told_in_a_sentence():
+    with pytest.raises(DataError, match='too few to learn from'):
+        learned(examples(20, 7, kinds=list(TERMS)[:1]), {}, risk=0.002)
 
 
 def test_of_the_sure_ones_as_few_are_wrong_as_promised():

@@ -167,7 +167,6 @@ def test_the_page_escapes_what_it_did_not_write_and_names_every_failure():
         costs,
         {'case_0001': '<script>alert(1)</script>'},
         {},
-        {},
     )
     page = score_page(score)
     assert '<script' not in page

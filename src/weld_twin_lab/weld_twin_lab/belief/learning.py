@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.calibration.features import ONLY
 from weld_twin_core.diagnosis.calibration.weights import SCHEMA
+from weld_twin_core.errors import DataError
 
 from .bound import Bound, bounded, precise
 from .judged import Example
@@ -61,10 +62,21 @@ def learned(
     risk : float
         Probability that an answer may be sure and wrong.
 
+    Raises
+    ------
+    DataError
+        There are too few examples of a kind of statement.
+
     """
     statements, parts = {}, {}
     for kind in TERMS:
-        terms, table, signs = _of_kind([e for e in examples if e.kind == kind], kind)
+        own = [example for example in examples if example.kind == kind]
+        if len(own) < FOLDS:
+            raise DataError(
+                f'{len(own)} examples of {kind!r} are too few to learn from; draw some hundreds of '
+                'cases'
+            )
+        terms, table, signs = _of_kind(own, kind)
         statements[kind] = _content(table, terms, signs)
         counts = (table.weight >= OF_TODAY) | (kind not in CAUSES)
         parts[kind] = _unseen(table, signs)[counts], table.right[counts]

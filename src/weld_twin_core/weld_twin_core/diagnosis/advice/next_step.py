@@ -70,7 +70,6 @@ def next_step(
 
     Parameters
     ----------
-    found : Search
     verdict : Verdict
         With the confidence that it has earned.
     limits : Limits, optional

@@ -122,7 +122,6 @@ def normals(
     ----------
     problem, model, alternatives, scale
         As `at_hand` takes them.
-    candidate : Candidate
     now : Side
         As `at_hand` returned it.
 
@@ -179,7 +178,6 @@ def at_hand(
 
     Parameters
     ----------
-    problem : Problem
     model : Model
         What is believed so far; everything is taken about it.
     alternatives : sequence of Alternative

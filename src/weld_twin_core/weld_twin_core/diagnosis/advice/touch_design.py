@@ -119,7 +119,6 @@ class Design:
             With its frames as found.
         effects : sequence of Effect
             The errors that take part, as large as they were found.
-        scale : Scale
 
         """
         # A base that is fitted along counts as known: another touch tells more of it anyway.

@@ -20,6 +20,9 @@ from .independent_rows import measured_axes, robust_spread
 from .prior import effect_precision, frame_prior
 from .problem import Model, Problem, Scale
 
+STRAIGHT = 1e-6
+"""Share of what is left by which a step may miss what its equations foretold, for it to be the last:
+where the residual is as good as linear, another step finds nothing."""
 DAMPING, DAMPED = 1e-9, 1e6
 """Least and greatest damping of a step, in units of the columns: from Gauss-Newton to none."""
 HUBER = 3.0
@@ -153,17 +156,19 @@ def _descended(start: _Point, iterations: int, tolerance: float) -> _Point:
     """Return the place that Levenberg and Marquardt lead to."""
     here, damping = start, DAMPING
     for _ in range(iterations):
-        there = None
+        there, (normal, right) = None, here.normal_equations
         while damping < DAMPED:
-            there = here.stepped(solve_scaled(*here.normal_equations, damping))
+            step = solve_scaled(normal, right, damping)
+            there = here.stepped(step)
             if there.cost <= here.cost:
                 break
             there, damping = None, max(damping * 100.0, 1e-6)
         if there is None:
             break
         gain = (here.cost - there.cost) / max(here.cost, 1e-300)
+        foretold = here.cost - float((2.0 * right - normal @ step) @ step)
         here, damping = there, max(damping * 0.01, DAMPING)
-        if gain < tolerance:
+        if gain < tolerance or abs(there.cost - foretold) < STRAIGHT * there.cost:
             break
     return here
 

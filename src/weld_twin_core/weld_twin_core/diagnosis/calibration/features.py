@@ -60,7 +60,6 @@ def of_situation(
         The effects found.
     unseen : Unseen
         Of its final model.
-    evidence : Evidence
     rival : Curved or None
         The free-form explanation in place of all names.
 
@@ -105,7 +104,6 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
 
     Parameters
     ----------
-    row : Row
     size : float
         How far the effect moves the tool, RMS in units of noise.
     wandered : float
@@ -141,7 +139,6 @@ def of_level(row: Row, level: str, rival: Curved | None) -> Numbers:
 
     Parameters
     ----------
-    row : Row
     level : str
         'place' or 'dependence'.
     rival : Curved or None
@@ -165,7 +162,6 @@ def of_rest(cause: Cause, level: str, form: FreeForm | None) -> Numbers:
         With the weights of the groups that found it.
     level : str
         'place' or 'dependence'.
-    form : FreeForm or None
 
     """
     listed = [p for _, p in (cause.place if level == 'place' else cause.dependence)]

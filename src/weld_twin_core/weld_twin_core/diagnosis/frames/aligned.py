@@ -39,7 +39,6 @@ def aligned(
 
     Parameters
     ----------
-    recordings : Recording, or sequence of Recording
     robot : Robot
         The nominal model.
     align : str or iterable of str
@@ -72,7 +71,6 @@ def frames_only(recording: Recording, robot: Robot, align: frozenset[str]) -> Mo
     ----------
     recording : Recording
         With measurements.
-    robot : Robot
     align : frozenset of str
         Which frames are fitted: 'base', 'tool' or both.
 

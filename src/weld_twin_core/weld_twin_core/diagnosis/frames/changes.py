@@ -110,7 +110,6 @@ def with_changes(
         What is believed so far; its effects are fitted along.
     families : sequence of str
         What may differ; see `families_named`.
-    beliefs : Beliefs
     precision : array, shape (K,), optional
         Prior precision of the effects of ``model``; that of machines at large when left out.
 

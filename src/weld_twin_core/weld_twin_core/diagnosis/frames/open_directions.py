@@ -60,8 +60,6 @@ def shown(
 
     Parameters
     ----------
-    problem : Problem
-    model : Model
     moving : bool
         Leave out frame columns that move nothing at all.
 

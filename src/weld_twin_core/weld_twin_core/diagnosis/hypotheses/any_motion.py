@@ -58,7 +58,6 @@ def same_error(robot: Robot, one: Effect, other: Effect) -> bool:
 
     Parameters
     ----------
-    robot : Robot
     one, other : Effect
         Their families and joints count, not their values.
 
@@ -75,7 +74,6 @@ def never_parted(
 
     Parameters
     ----------
-    robot : Robot
     align : frozenset of str
         Frames that are fitted, 'base' and 'tool'.
     sets : sequence of sequence of Site
@@ -102,7 +100,6 @@ def always(robot: Robot, one: Effect, other: Effect, align: frozenset[str]) -> b
 
     Parameters
     ----------
-    robot : Robot
     one, other : Effect
         Their families and joints count, not their values.
     align : frozenset of str

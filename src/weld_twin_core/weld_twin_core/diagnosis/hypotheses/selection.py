@@ -123,11 +123,12 @@ def forward(
         systems = work.beside(now.model, now.residual)
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
         # only the fit with a choice tells how many rows were independent.
-        ranked = ranking(systems, work.library.units, _rows(work, now), work.beliefs.enter_nats)
+        rows = float(now.residual.size - work.problem.frame_count)
+        ranked = ranking(systems, work.library.units, rows, work.beliefs.enter_nats)
         ranked = [choice for choice in ranked if not _repeats(choice, taken)]
         if not ranked:
             break
-        best, impossible = _refined(work, now, ranked, effective)
+        best, impossible = _best_of(work, now, _close(work, ranked), effective)
         if best is None:
             for effect in impossible:
                 refused(effect)
@@ -139,53 +140,28 @@ def forward(
     return steps
 
 
-def _rows(work: Workspace, now: Fit) -> float:
-    """Return the number of rows that are left once the frames are fitted."""
-    return float(now.residual.size - work.problem.frame_count)
-
-
 def _repeats(choice: Choice, taken: list[tuple[str, str | None]]) -> bool:
     """Return whether a unit is in the model already and its kind cannot take in another."""
     kind = type(choice.unit.seeds[0])
     return choice.unit.site in taken and not kind.search.joins
 
 
-def _refined(
-    work: Workspace,
-    now: Fit,
-    ranked: list[Choice],
-    effective: Callable[[Fit], float],
-) -> tuple[Step | None, list[Effect]]:
-    """
-    Return the best of the leading choices after a nonlinear fit of each.
-
-    Beside it, effects that would have done but that no machine has.
-    """
-    best, impossible = _best_of(
-        work, now, _close(work, ranked, work.beliefs.close_share), effective
-    )
-    if best is None and impossible:
-        # Part of a wave that no gear has is a plausible ratio of the gear, fitted a little worse.
-        wider = _close(work, ranked, work.beliefs.rival_share)
-        best, _ = _best_of(work, now, wider, effective)
-    return best, impossible
-
-
-def _close(work: Workspace, ranked: list[Choice], share: float) -> list[Choice]:
+def _close(work: Workspace, ranked: list[Choice]) -> list[Choice]:
     """Return the choices whose evidence is close to the best."""
     best = ranked[0].nats
-    slack = max(work.beliefs.close_nats, share * best)
+    slack = max(work.beliefs.close_nats, work.beliefs.close_share * best)
     return [c for c in ranked if c.nats > best - slack]
 
 
 def _best_of(
     work: Workspace, now: Fit, close: list[Choice], effective: Callable[[Fit], float]
 ) -> tuple[Step | None, list[Effect]]:
-    """Return the best of some choices after a nonlinear fit of each, and those refused."""
-    tried = [
-        (c, _without_stand_in(work, c, fitted_with(work, now.model, c.effect())))
-        for c in close[:SHORTLIST]
-    ]
+    """
+    Return the best of some choices after a nonlinear fit of each.
+
+    Beside it, effects that would have done but that no machine has.
+    """
+    tried = [(c, fitted_with(work, now.model, c.effect())) for c in close[:SHORTLIST]]
     # One count for all, that of the fit which leaves least: a worse model explains less and would
     # otherwise be allowed more rows.
     count = effective(min((f for _, f in tried), key=lambda f: f.rss))
@@ -202,24 +178,6 @@ def _best_of(
         if not absurd and (best is None or nats > best.nats):
             best = Step(choice.unit, nats, result)
     return best, impossible
-
-
-def _without_stand_in(work: Workspace, choice: Choice, result: Fit) -> Fit:
-    """
-    Return the fit without what stood in for others while a choice was missing.
-
-    An effect taken earlier may have passed for several, and runs beyond what a machine can have
-    once the choice explains its part. Then it goes, and what fits best beside the choice comes.
-    """
-    absurd = {(effect.name, effect.site) for effect in implausible(result.model)}
-    if not absurd or choice.unit.site in absurd:
-        return result
-    alone = fit(work.problem, possible_part(result.model), work.scale, None, 5)
-    systems = work.beside(alone.model, alone.residual)
-    ranked = ranking(systems, work.library.units, _rows(work, alone))
-    others = [c for c in ranked if c.unit.site not in absurd and not _repeats(c, sites(alone))]
-    fits = [fitted_with(work, alone.model, other.effect()) for other in others[:SHORTLIST]]
-    return min((alone, *fits), key=lambda f: f.rss)
 
 
 def sites(found: Fit) -> list[tuple[str, str | None]]:

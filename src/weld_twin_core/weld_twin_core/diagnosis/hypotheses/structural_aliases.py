@@ -67,10 +67,8 @@ def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beli
 
     Parameters
     ----------
-    found : Search
     exclude : sequence of str
         Families taken out of the library.
-    beliefs : Beliefs
 
     """
     named = found.slots[: len(found.small.model.found)]

@@ -194,19 +194,7 @@ class Folds:
 
     @classmethod
     def of(cls, columns: Array, target: Array, labels: Array) -> Folds:
-        """
-        Divide the rows by folds.
-
-        Parameters
-        ----------
-        columns : array, shape (P, rows)
-            Features, whitened.
-        target : array, shape (rows,)
-            What they are to explain, whitened.
-        labels : array of int, shape (rows,)
-            The fold that each row belongs to.
-
-        """
+        """Divide the rows by folds."""
         together = bool((np.diff(labels) >= 0).all())
         order = None if together else np.argsort(labels, kind='stable')
         ends = np.cumsum(np.unique(labels, return_counts=True)[1]).tolist()

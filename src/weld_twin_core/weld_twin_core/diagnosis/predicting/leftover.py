@@ -109,8 +109,6 @@ def leftover(
 
     Parameters
     ----------
-    problem, scale : Problem, Scale
-    unseen : Unseen
     given : callable
         Mean and covariance of the uncertain coordinates given all rows but those of a mask.
     floor : NoiseFloor
@@ -220,7 +218,6 @@ def _of_the_arm(
         Variance of what is left, and what of it neighbours have in common [noise of the fit].
     noise : float, optional
         Standard deviation of the instrument [noise of the fit]; None where nothing tells it.
-    rough : float
     at_rest : bool
         Whether stations were measured, which lie apart.
 

@@ -98,8 +98,6 @@ def plan_stations(
 
     Parameters
     ----------
-    robot : Robot
-    count : int
     tolerance : float [m]
         Of the tool's position, in any direction.
     noise : float [m]
@@ -142,14 +140,12 @@ def plan_more(
 
     Parameters
     ----------
-    posterior : Posterior
     twin : Twin
         The fitted model.
     region : (array, array), shapes (K, n) and (C, n)
         Postures at which it is judged how sure the model is, and those that may be measured.
     count : int
         Stations; at most as many as may be measured.
-    given : Wanted
 
     Raises
     ------
@@ -183,7 +179,6 @@ def clear_postures(robot: Robot, spread: float) -> Array:
 
     Parameters
     ----------
-    robot : Robot
     spread : float [rad]
         Half the range of every joint.
 

@@ -144,7 +144,6 @@ def examine(
 
     Parameters
     ----------
-    given : Given
     known : sequence of Effect
         In the twin from the start.
     apply : bool

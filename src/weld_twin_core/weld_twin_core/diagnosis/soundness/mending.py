@@ -167,8 +167,6 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
 
     Parameters
     ----------
-    given : Given
-    k : int
     late : float [s]
         How late its measurements are in the middle.
     rate : float [s/s]
@@ -210,8 +208,6 @@ def stamped_evenly(
 
     Parameters
     ----------
-    given : Given
-    k : int
     first, step : float [s]
         The first stamp, and the time from one to the next.
     lost : array of int

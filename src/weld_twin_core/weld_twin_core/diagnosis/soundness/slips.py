@@ -144,8 +144,6 @@ def changes(
     ----------
     problem : Problem
         The measurements that ``rest`` is of.
-    rest : Rest
-    joints : sequence of str
     largest : float [m]
         How far the largest gaps are; nothing moved twice as far.
 

@@ -103,7 +103,6 @@ def gathered(
         What generic columns still find beside it.
     shrink : Shrink
         On held-out recordings or on stretches taking their turn.
-    floor, beliefs
     least : float or None
         As `borne_out` gives it.
     chance : float

@@ -222,8 +222,7 @@ def _read(
     for path in (*args.bags, *args.holdout):
         tell(f'reading {path}')
         if Path(path).suffix.lower() in TABLES:
-            found, said = table_of(args, robot, path)
-            print(*said, sep='\n')
+            found, _ = table_of(args, robot, path)  # what was assumed is in its notes
         else:
             # Two clocks are for the checks of the data to name.
             found = read_recording(path, robot, topics, one_clock=False, needs_measurements=True)

@@ -397,8 +397,8 @@ class Posterior:
         own, joints = unit((count, 3)), unit((count, features.twin.robot.n))
         steps = self.mean + unit((count, self.factor.shape[1])) @ self.factor.T
         columns = self._columns(features, setup, framed=framed)[:, :3]
-        levers, *where = self._levers(features)
-        everywhere, gears = self.discrepancy.sizes(*where)
+        levers, beyond, turned = self._levers(features)
+        everywhere, gears = self.discrepancy.sizes(beyond, turned)
         return np.asarray(
             np.tensordot(columns, steps, axes=(0, 1)).transpose(1, 2, 0)
             + np.tensordot(levers[:, :3] * gears[:, None], joints, axes=(0, 1)).transpose(1, 2, 0)

@@ -79,7 +79,9 @@ def test_a_law_of_lost_motion_that_does_not_hold_shows_where_joints_turn(law, su
     turns = allowed(problem, found.model, scale, precision, floor).discrepancy.turns
     assert not np.delete(turns, 2).any()
     # Any part of what is lost is as likely: the standard deviation of even chances over the gap.
-    assert turns[2] == pytest.approx(0.0 if sure else WIDTH / np.sqrt(3.0), rel=0.1)
+    assert (turns[2] == pytest.approx(WIDTH / np.sqrt(3.0), rel=0.1)) is not sure
+    if sure:  # as much as noise of 0.02 mm hides at half a metre
+        assert 0.0 < turns[2] < 1e-4
 
 
 def test_what_is_not_known_of_a_turn_counts_in_the_bound_of_goals_that_turn():

@@ -159,25 +159,25 @@ def _unseen(problem: Problem, model: Model, scale: Scale, precision: Array, rows
     pull, x = np.zeros(own.count), np.zeros(own.count)
     if precision.size:
         pull[-precision.size :], x[-precision.size :] = precision, coordinates(model)
+    levers = _levers(problem, model, scale)
     return Unseen(
         own,
         pull,
         pull * x,
         rows.columns,
-        _turns(problem, model, scale),
+        levers[~np.asarray(model.robot.prismatic)],
+        levers,
         rows.residual,
         posture_regions(problem),
     )
 
 
-def _turns(problem: Problem, model: Model, scale: Scale) -> Array:
-    """Return the whitened columns of turning joints, shape (n, rows)."""
-    joints = np.flatnonzero(~np.asarray(model.robot.prismatic))
-    parts = []
+def _levers(problem: Problem, model: Model, scale: Scale) -> Array:
+    """Return the whitened columns of the joints, shape (n, rows)."""
+    count, parts = model.robot.n, []
     for k, maker in enumerate(problem.features(model)):
-        columns = [problem.seen(k, maker.column(('q', int(i)))) for i in joints]
-        shape = (joints.size, problem.rows[k], problem.samples[k])
-        parts.append(np.reshape(columns, shape))
+        columns = [problem.seen(k, maker.column(('q', i))) for i in range(count)]
+        parts.append(np.reshape(columns, (count, problem.rows[k], problem.samples[k])))
     return problem.whitened(parts, scale)
 
 

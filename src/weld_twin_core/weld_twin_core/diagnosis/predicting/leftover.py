@@ -43,6 +43,8 @@ STEPS = 60
 
 FEW = 12
 """Samples after turns of a joint below which they tell nothing of what is left there."""
+PEAK = 1.7321
+"""Largest size of an error that grows from nothing and goes again, in that of its RMS: a triangle's."""
 CLEAR = 2.0
 """Standard errors by which more must be left there than elsewhere: a bound that is told too wide does
 less harm than one too narrow."""
@@ -66,6 +68,8 @@ class Unseen:
         Those of the coordinates that are uncertain.
     turns : array, shape (n, rows)
         Those of the joints that turn.
+    levers : array, shape (n, rows)
+        Those of all joints.
     residual : array, shape (rows,)
     labels : array, shape (rows,)
         Block of like posture of every row.
@@ -77,6 +81,7 @@ class Unseen:
     pull: Array
     columns: Array
     turns: Array
+    levers: Array
     residual: Array
     labels: Array
 
@@ -148,17 +153,24 @@ def leftover(
     turn = _size(e, v + gear**2 * levered, np.eye(3)) if e.size else position
     common = _common(errors, moments, pairs, weight > TRUSTED)
     share = _of_the_arm(*common, _noise(problem, floor, scale.position), rough, problem.at_rest)
-    at_turns = _at_turns(problem, errors, moments, lost)
+    at_turns = _at_turns(problem, unseen, samples, errors, moments, lost)
     return Rest(position * share, turn * share, gear * share, at_turns)
 
 
-def _at_turns(problem: Problem, errors: list[Array], moments: list[Array], lost: Array) -> Array:
+def _at_turns(
+    problem: Problem,
+    unseen: Unseen,
+    samples: list[Index],
+    errors: list[Array],
+    moments: list[Array],
+    lost: Array,
+) -> Array:
     """
     Return how far joints may be off where they have just turned around, shape (n,) [rad or m].
 
     Laws of lost motion differ on that way alone, and look alike on the rest of a recording. Where more
     is left there than elsewhere, the law that was found does not hold, and any part of the motion may
-    be lost: evenly likely ones have this standard deviation.
+    be lost: evenly likely ones have this standard deviation. Else it is as much as the noise may hide.
     """
     out = np.zeros(lost.size)
     seen = np.array([k for k, error in enumerate(errors) if error.size >= 3], dtype=int)
@@ -170,9 +182,13 @@ def _at_turns(problem: Problem, errors: list[Array], moments: list[Array], lost:
         here, beside = excess[near[:, i]], excess[~near[:, i]]
         if min(here.size, beside.size) < FEW:
             continue
-        doubt = np.sqrt(here.var() / here.size + beside.var() / beside.size)
-        if here.mean() - beside.mean() > CLEAR * doubt:
-            out[i] = lost[i] / np.sqrt(3.0)
+        doubt = CLEAR * np.sqrt(here.var() / here.size + beside.var() / beside.size)
+        more, out[i] = here.mean() - beside.mean(), lost[i] / np.sqrt(3.0)
+        if more <= doubt:
+            size = np.mean(
+                [(unseen.levers[i, samples[k][:3]] ** 2).mean() for k in seen[near[:, i]]]
+            )
+            out[i] = min(out[i], PEAK * np.sqrt(max(more + doubt, 0.0) / max(size, 1e-300)))
     return out
 
 

@@ -13,8 +13,8 @@ import argparse
 import json
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
@@ -27,6 +27,7 @@ from .compensating import NOTHING
 from .latency import pose_table
 
 if TYPE_CHECKING:
+    from .compensating.drawn_cells import Arm
     from .compensating.trial import Known
 
 WORSE = (2e-5, 0.05)
@@ -36,14 +37,20 @@ WORTH = 0.5
 CORRECTED = 0.95
 """Share of those that must be."""
 HELD = (0.88, 0.95)
-"""Share of the corrected goals whose RMS distance, over the way, must stay within what was told."""
-OF_AN_ARM = 8
-"""Goals of each arm that is judged without nodes: bounds of one arm hold or fail together, for they are
+"""Share of the corrected goals whose largest distance, on the way, must stay within what was told."""
+IN_A_CELL, WITHOUT = 24, 8
+"""Goals of each arm in a cell, and without nodes: bounds of one arm hold or fail together, for they are
 told of one model."""
+APART = 1000
+"""Between the seeds of the arms in cells and of those without."""
 SLOWER = 1.5
 """Times the latency of a relay that copies which poses may take."""
 POSES = 500.0
 """Poses a second in the race."""
+SIZES = ('before_m', 'after_m', 'best_m')
+"""RMS distances of a goal [m]: as it is, corrected, and corrected by the true causes."""
+LARGEST = ('worst_m', 'bound_m')
+"""Its largest distance when it is corrected [m], and what was told of that."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,49 +79,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return what became of every goal and of every change, and the race."""
     from .building.message_packages import messages_importable
-    from .compensating.drawn_cells import HOMES
 
     with messages_importable(), _beside() as beside:
-        from .compensating.drawn_cells import right_and_wrong
         from .compensating.trial import other_arm
 
         known = _before(args)
-        each = -(-args.goals // len(HOMES))
-        models = {
-            name: beside.submit(right_and_wrong, name, args.seed)
-            for name in unfinished(known, each)
-        }
-        without = _without_cell(args.without_cell, args.seed, known, beside)
-        _in_cells(args, each, known, models, without, tell)
+        without = _Without(args, known, beside)
+        _in_cells(args, known, without, tell)
         other = other_arm(args.seed)
         tell(other)
         poses = race(args, tell)
-        while without:
-            wait(without, return_when=FIRST_COMPLETED)
-            _gather(without, known)
+        while without.look(patience=None):
             tell(f'{len(known.without)} goals without a cell: {_told(known.without)}')
             _keep(args, known, 0.0)
     return _made(args, known, other, poses)
 
 
 def _in_cells(
-    args: argparse.Namespace,
-    each: int,
-    known: Known,
-    models: Mapping[str, Future[Any]],
-    without: list[Future[Any]],
-    tell: Callable[[str], None],
+    args: argparse.Namespace, known: Known, without: _Without, tell: Callable[[str], None]
 ) -> None:
     """Try every arm that is not through yet; what the next one needs is learned meanwhile."""
+    from .compensating.drawn_cells import right_and_wrong
     from .compensating.trial import tried
 
-    begun = time.monotonic()
-    for name, model in models.items():
-        for said in tried(name, args.seed, each, model.result(), known):
-            tell(f'{name}: {said}')
-            _gather(without, known)
+    begun, arms = time.monotonic(), unfinished(known, args.goals, args.seed)
+    models = [without.beside.submit(right_and_wrong, arm) for arm in arms[:1]]
+    for k, arm in enumerate(arms):
+        model = models[k].result()
+        models += [without.beside.submit(right_and_wrong, later) for later in arms[k + 1 : k + 2]]
+        for said in tried(arm, IN_A_CELL, model, known):
+            tell(f'{arm.name} {arm.seed}: {said}')
+            without.look()
             _keep(args, known, time.monotonic() - begun)
-        tell(f'{name}: {_told([row for row in known.rows if row["robot"] == name])}')
+        tell(f'{arm.name} {arm.seed}: {_told(arm.of(known.rows))}')
+        _keep(args, known, time.monotonic() - begun)
 
 
 def _made(
@@ -125,13 +123,6 @@ def _made(
     return {**found, 'seed': args.seed, 'goals': known.rows, 'goals_without': known.without}
 
 
-def _gather(without: list[Future[Any]], known: Known) -> None:
-    """Take over the goals without a cell that are judged."""
-    for own in [each for each in without if each.done()]:
-        without.remove(own)
-        known.without.extend(own.result())
-
-
 def _keep(args: argparse.Namespace, known: Known, seconds: float) -> None:
     """Write what is known so far, for `--go-on`."""
     from .keeping.result_file import write_result
@@ -139,14 +130,18 @@ def _keep(args: argparse.Namespace, known: Known, seconds: float) -> None:
     write_result(args.out, 'compensator', seconds, _made(args, known, '', None))
 
 
-def unfinished(known: Known, each: int) -> list[str]:
-    """Return the arms that lack a change, or some of so many goals."""
-    from .compensating.drawn_cells import HOMES
+def unfinished(known: Known, goals: int, seed: int) -> list[Arm]:
+    """Return the arms that lack a change, or some of their goals."""
+    from .compensating.drawn_cells import arms_of
     from .compensating.trial import CHANGES
 
     changed = {change['robot'] for change in known.changes if change['change'] == CHANGES[-1]}
-    calm = [row['robot'] for row in known.rows if not row['after']]
-    return [name for name in HOMES if name not in changed or calm.count(name) < each]
+    return [
+        arm
+        for arm in arms_of(goals, IN_A_CELL, seed)
+        if sum(not row['after'] for row in arm.of(known.rows)) < IN_A_CELL
+        or (arm.changed and arm.name not in changed)
+    ]
 
 
 def race(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any] | None:
@@ -166,19 +161,30 @@ def _beside() -> Iterator[Executor]:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _without_cell(
-    goals: int, seed: int, known: Known, beside: Executor
-) -> list[Future[list[dict[str, Any]]]]:
-    """Begin to judge goals without nodes, arm after arm, those that are not known yet."""
-    from .compensating.drawn_cells import HOMES
-    from .compensating.without_cell import judged
+class _Without:
+    """Goals judged without nodes, an arm at a time, whenever the cell leaves a process beside time."""
 
-    kinds, done = [*HOMES], {row['arm'] for row in known.without}
-    return [
-        beside.submit(judged, kinds[k % len(kinds)], seed + 1 + k, OF_AN_ARM)
-        for k in range(-(-goals // OF_AN_ARM))
-        if seed + 1 + k not in done
-    ]
+    def __init__(self, args: argparse.Namespace, known: Known, beside: Executor) -> None:
+        from .compensating.drawn_cells import arms_of
+
+        self.beside, self._known = beside, known
+        done = {row['arm'] for row in known.without}
+        arms = arms_of(args.without_cell, WITHOUT, args.seed + APART)
+        self._left = [arm for arm in arms if arm.seed not in done]
+        self._now: list[Future[list[dict[str, Any]]]] = []
+
+    def look(self, patience: float | None = 0.0) -> bool:
+        """Take over what is judged, and go on; return whether there was anything to wait for."""
+        from .compensating.without_cell import judged
+
+        waited = wait(self._now, patience)
+        for own in waited.done:
+            self._now.remove(own)
+            self._known.without.extend(own.result())
+        if not self._now and self._left:
+            arm = self._left.pop(0)
+            self._now.append(self.beside.submit(judged, arm.name, arm.seed, WITHOUT))
+        return bool(waited.done or self._now)
 
 
 def _before(args: argparse.Namespace) -> Known:
@@ -211,6 +217,26 @@ def worth(row: dict[str, Any]) -> bool:
     return bool(row['inside'] and row['best_m'] <= (1.0 - WORTH) * row['before_m'])
 
 
+def _held(row: dict[str, Any]) -> bool:
+    return bool(row['worst_m'] <= row['bound_m'])
+
+
+def spread(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return in how many arms all, most and fewer than half of the bounds held."""
+    arms: dict[tuple[str, int], list[bool]] = {}
+    for row in rows:
+        if row['verdict'] == 'corrected' and row['bound_m'] is not None:
+            arms.setdefault((row['robot'], row['arm']), []).append(_held(row))
+    shares = [sum(held) / len(held) for held in arms.values()]
+    return {
+        'arms': len(arms),
+        'all': sum(share == 1.0 for share in shares),
+        'most': sum(share >= HELD[0] for share in shares),
+        'fewer_than_half': sum(share < 0.5 for share in shares),
+        'least': min(shares, default=None),
+    }
+
+
 def counted(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return what goals come to."""
     import numpy as np
@@ -219,8 +245,9 @@ def counted(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     bound = [row for row in done if row['bound_m'] is not None]
     to_do = [row for row in rows if worth(row)]
     middle = {
-        key: float(np.median([row[key] for row in done])) if done else None
-        for key in ('before_m', 'after_m', 'best_m', 'bound_m')
+        key: float(np.median([row[key] for row in of])) if of else None
+        for keys, of in ((SIZES, done), (LARGEST, bound))
+        for key in keys
     }
     return {
         'goals': len(rows),
@@ -232,7 +259,7 @@ def counted(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         'outside': sum(not row['inside'] for row in rows),
         'outside_corrected': sum(not row['inside'] for row in done),
         'bounds': len(bound),
-        'held': sum(row['after_m'] <= row['bound_m'] for row in bound),
+        'held': sum(_held(row) for row in bound),
         'median': middle,
     }
 
@@ -246,10 +273,9 @@ def summary(
 ) -> dict[str, Any]:
     """Return what all of it comes to, and whether it passed."""
     calm = [row for row in rows if not row['after']]
-    kinds = list(dict.fromkeys(row['after'] for row in rows))
     unchanged = [c for c in changes if c['change'] == NOTHING]
     totals, beside = counted(calm), counted(without)
-    after = {kind: counted([r for r in rows if r['after'] == kind]) for kind in kinds if kind}
+    after = _counted_by('after', [row for row in rows if row['after']])
     held = (totals['held'] + beside['held']) / ((totals['bounds'] + beside['bounds']) or 1)
     goals = {
         'none worse': not any(worse(row) for row in (*rows, *without)),
@@ -266,11 +292,12 @@ def summary(
         'passed': all(goals.values()),
         'reached': goals,
         'held': held,
+        'spread': spread((*calm, *without)),
         'totals': totals,
-        'robots': _by_arm(calm),
+        'robots': _counted_by('robot', calm),
         'without_cell': {
             'arms': len({row['arm'] for row in without}),
-            'robots': _by_arm(without),
+            'robots': _counted_by('robot', without),
             'totals': beside,
         },
         'after_a_change': after,
@@ -280,9 +307,9 @@ def summary(
     }
 
 
-def _by_arm(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    names = dict.fromkeys(row['robot'] for row in rows)
-    return {name: counted([row for row in rows if row['robot'] == name]) for name in names}
+def _counted_by(key: str, rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    names = dict.fromkeys(row[key] for row in rows)
+    return {name: counted([row for row in rows if row[key] == name]) for name in names}
 
 
 HEAD = (
@@ -295,6 +322,7 @@ HEAD = (
     'before, mm',
     'after',
     'true causes',
+    'at most',
     'bound reported',
     'within it',
 )
@@ -308,15 +336,28 @@ def table(result: dict[str, Any]) -> str:
     if more and more['robots']:
         arms = [*more['robots'].items(), ('all', more['totals'])]
         lines.append(markdown.table(HEAD, *(_row(name, one) for name, one in arms)))
+    lines.append(_spread(result))
     poses = result['poses']
     if poses is not None:
         lines.append(pose_table(poses))
     return '\n\n'.join(lines)
 
 
+def _spread(result: dict[str, Any]) -> str:
+    """Return how differently bounds held in the arms of both tables."""
+    found = result['spread']
+    if not found['arms']:
+        return ''
+    return (
+        f'{result["held"]:.1%} of all bounds held: all of them in {found["all"]} of {found["arms"]} '
+        f'arms, at least {HELD[0]:.0%} in {found["most"]}, fewer than half in '
+        f'{found["fewer_than_half"]}; {found["least"]:.0%} in the worst'
+    )
+
+
 def _row(name: str, one: dict[str, Any]) -> tuple[str, ...]:
     """Return a row of an arm."""
-    middle = [one['median'][key] for key in ('before_m', 'after_m', 'best_m', 'bound_m')]
+    middle = [one['median'][key] for key in (*SIZES, *LARGEST)]
     return (
         name,
         str(one['goals']),

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,9 +44,38 @@ NOISE = (2e-5, 1e-4)
 """Standard deviation of a measured coordinate there [m]: a laser tracker, a good camera."""
 REST = (5e-6, 5e-5)
 """Size of what joints are off by besides their causes [rad], from arm to arm: a gear of a new robot is
-within 0.03 mrad of even, an encoder within 0.01."""
+within 0.03 mrad of even, an encoder within 0.01. Links are off by as much at half a metre."""
+LEVER = 0.5
+"""Length of a link [m] that turns the one into the other."""
+FINE = (5, 20)
+"""Least and largest order of an error of a gear that bends faster than a model follows [1/rev]."""
+FINE_SHARE = 0.3
+"""Part of the size that this error has: teeth are cut finer than wheels are centred."""
 TRIES = 200
 """Goals that are drawn for an arm before it is given up: many are out of its reach."""
+
+
+class Arm(NamedTuple):
+    """
+    An arm that goals are drawn for.
+
+    Attributes
+    ----------
+    name : str
+    seed : int
+        Decides what it is off by, what is learned of it, and its goals.
+    changed : bool
+        Whether its cell is changed after the goals.
+
+    """
+
+    name: str
+    seed: int
+    changed: bool
+
+    def of(self, rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Return the rows of this arm."""
+        return [row for row in rows if (row['robot'], row['arm']) == (self.name, self.seed)]
 
 
 class DrawnGoal(NamedTuple):
@@ -99,19 +128,27 @@ def drawn_causes(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]
 
 
 def drawn_rest(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Return what every joint of a real arm is off by besides: no cause worth a name, a curve."""
+    """Return what every joint and link of a real arm is off by besides: no cause worth a name."""
     size = float(np.exp(rng.uniform(*np.log(REST))))
-    return [
-        {
-            'effect': 'transmission_ripple',
-            'joint': joint,
-            'amplitude': abs(float(rng.normal(scale=size))),
-            'order': order,
-            'phase': float(rng.uniform(-np.pi, np.pi)),
-        }
-        for joint in robot.joint_names
-        for order in (1.0, 2.0)
-    ]
+    out: list[dict[str, Any]] = []
+    for joint in robot.joint_names:
+        out += [
+            {'effect': 'joint_offset', 'joint': joint, 'offset': float(rng.normal(scale=size))},
+            {'effect': 'link_twist', 'joint': joint, 'dalpha': float(rng.normal(scale=size))},
+            {'effect': 'link_length', 'joint': joint, 'da': LEVER * float(rng.normal(scale=size))},
+        ]
+        fine = float(rng.integers(FINE[0], FINE[1] + 1))
+        out += [
+            {
+                'effect': 'transmission_ripple',
+                'joint': joint,
+                'amplitude': share * abs(float(rng.normal(scale=size))),
+                'order': order,
+                'phase': float(rng.uniform(-np.pi, np.pi)),
+            }
+            for order, share in ((1.0, 1.0), (2.0, 1.0), (fine, FINE_SHARE))
+        ]
+    return out
 
 
 def learned(robot: Robot, causes: list[dict[str, Any]], rng: np.random.Generator) -> Learned:
@@ -129,10 +166,17 @@ def learned(robot: Robot, causes: list[dict[str, Any]], rng: np.random.Generator
     return Learned(diagnosis_text(found, ()), noise)
 
 
-def right_and_wrong(name: str, seed: int) -> tuple[Learned, Learned]:
-    """Return what is learned of an arm, and of one of the same kind with other causes."""
-    robot, causes, rng = cell_of(name, seed)
-    return learned(robot, causes, rng), learned(robot, drawn_causes(robot, rng), rng)
+def right_and_wrong(arm: Arm) -> tuple[Learned, Learned | None]:
+    """Return what is learned of an arm, and of one of its kind with other causes if it is changed."""
+    robot, causes, rng = cell_of(arm.name, arm.seed)
+    right = learned(robot, causes, rng)
+    return right, learned(robot, drawn_causes(robot, rng), rng) if arm.changed else None
+
+
+def arms_of(goals: int, each: int, seed: int) -> list[Arm]:
+    """Return arms that have so many goals each, all kinds in turn; the first of a kind is changed."""
+    kinds = [*HOMES]
+    return [Arm(kinds[k % len(kinds)], seed + k, k < len(kinds)) for k in range(-(-goals // each))]
 
 
 def drawn_goal(robot: Robot, rng: np.random.Generator) -> DrawnGoal:
@@ -193,18 +237,18 @@ def _along(bare: Robot, begin: Array, rng: np.random.Generator) -> Goal | None:
     return Goal(t, q, qd) if rng.random() < 0.7 else Goal(t, q)
 
 
-def goals_of(name: str, seed: int, first: int, count: int) -> Iterator[DrawnGoal]:
+def goals_of(of: Arm, first: int, count: int) -> Iterator[DrawnGoal]:
     """Yield goals of an arm, counted from 0; each is the same whichever were drawn before it."""
-    robot, arm = load(name), sorted(HOMES).index(name)
+    robot, kind = load(of.name), sorted(HOMES).index(of.name)
     for k in range(first, first + count):
-        yield drawn_goal(robot, np.random.default_rng([seed, arm, k]))
+        yield drawn_goal(robot, np.random.default_rng([of.seed, kind, k]))
 
 
 def cell_of(name: str, seed: int) -> tuple[Robot, list[dict[str, Any]], np.random.Generator]:
-    """Return an arm, its causes, and what draws all else of its cell."""
+    """Return an arm, all that it is off by, and what draws all else of its cell."""
     rng = np.random.default_rng([seed, sorted(HOMES).index(name)])
     robot = load(name)
-    return robot, drawn_causes(robot, rng), rng
+    return robot, drawn_causes(robot, rng) + drawn_rest(robot, rng), rng
 
 
 def true_effects(robot: Robot, causes: list[dict[str, Any]]) -> tuple[Effect, ...]:

@@ -36,6 +36,7 @@ from . import NOTHING
 from .drawn_cells import (
     HOMES,
     INSIDE,
+    Arm,
     DrawnGoal,
     Learned,
     cell_of,
@@ -44,7 +45,7 @@ from .drawn_cells import (
     true_effects,
 )
 
-PACE = 10.0
+PACE = 20.0
 """How many times as fast as they say goals run: nothing in these cells hangs on speed."""
 RETURN = 1.5
 """Length of a way back, or to where a goal begins [s]."""
@@ -77,12 +78,12 @@ class CellTrial:
     """A cell that goals are sent to."""
 
     def __init__(
-        self, cell: Cell, folder: Path, name: str, seed: int, models: tuple[Learned, Learned]
+        self, cell: Cell, folder: Path, arm: Arm, models: tuple[Learned, Learned | None]
     ) -> None:
         from control_msgs.action import FollowJointTrajectory
 
-        self.cell, self.kind, self.name = cell, FollowJointTrajectory, name
-        self.robot, self.causes, self.rng = cell_of(name, seed)
+        self.cell, self.kind, self.arm, self.name = cell, FollowJointTrajectory, arm, arm.name
+        self.robot, self.causes, self.rng = cell_of(arm.name, arm.seed)
         self.right, self.wrong = models
         self.model = folder / 'diagnosis.json'
         self.model.write_text(self.right.text)
@@ -159,8 +160,8 @@ class CellTrial:
         s = (0.5 - 0.5 * np.cos(np.pi * t / RETURN))[:, None]
         self.run(Goal(t, here + s * (q - here)), through=False)
 
-    def off(self, goal: Goal, waits: float = 0.0) -> float:
-        """Return the RMS distance of the real tool from where the goal meant it on the last run [m]."""
+    def off(self, goal: Goal, waits: float = 0.0) -> tuple[float, float]:
+        """Return how far the real tool was from where the last goal meant it, RMS and most [m]."""
         track = {stamp + self._late: t - waits for stamp, t in self.controller.track}
         self.measured_until(max(track))
         meant, real = [], []
@@ -175,7 +176,8 @@ class CellTrial:
         apart = np.array(real) - forward(self.robot, way.q)[:, :3, 3]
         # The arm is looked at more often where it turns; each look stands for its part of the time.
         share = np.gradient(np.array(meant)) if len(meant) > 1 else np.ones(1)
-        return float(np.sqrt(np.average((apart**2).sum(axis=1), weights=share)))
+        squares = (apart**2).sum(axis=1)
+        return float(np.sqrt(np.average(squares, weights=share))), float(np.sqrt(squares.max()))
 
     def measured_until(self, stamp: int) -> None:
         """Wait until the tool was measured at a stamp [ns]."""
@@ -200,13 +202,15 @@ class CellTrial:
         best = self._best(goal, Start(goal.q[0], False, came))
         return {
             'robot': self.name,
+            'arm': self.arm.seed,
             'after': after,
             'inside': drawn.inside,
             'verdict': line['verdict'],
             'why': line['why'],
-            'before_m': offs[0],
-            'after_m': offs[1] if taken else offs[0],
-            'best_m': min(best, offs[0]),
+            'before_m': offs[0][0],
+            'after_m': offs[-1][0],
+            'worst_m': offs[-1][1],
+            'best_m': min(best, offs[0][0]),
             'expected_m': line.get('expected_after_m'),
             'bound_m': line.get('bound_m'),
             'largest_m': line.get('largest_m'),
@@ -227,6 +231,7 @@ class CellTrial:
         # The tracker that the model was learned with; goals are judged without its noise.
         noise = {'effect': 'measurement_noise', 'sigma': self.right.noise}
         if what == 'wrong model':
+            assert self.wrong is not None
             self.model.write_text(self.wrong.text)
             self._reload()
         elif what == 'clock jumped':
@@ -283,33 +288,38 @@ def _load(robot: Robot) -> tuple[dict[str, Any], ...]:
 
 
 def tried(
-    name: str, seed: int, goals: int, models: tuple[Learned, Learned], known: Known
+    arm: Arm, goals: int, models: tuple[Learned, Learned | None], known: Known
 ) -> Iterator[str]:
     """
     Add what becomes of the goals of one arm, and of its changes, to what is known already.
 
     Yields what came of it so far, again and again.
     """
-    done = sum(row['robot'] == name and not row['after'] for row in known.rows)
-    changes = {change['change'] for change in known.changes if change['robot'] == name}
+    done = sum(not row['after'] for row in arm.of(known.rows))
     with _cell() as (cell, folder):
-        trial = CellTrial(cell, folder, name, seed, models)
-        for k, drawn in enumerate(goals_of(name, seed, done, goals - done), done + 1):
+        trial = CellTrial(cell, folder, arm, models)
+        for k, drawn in enumerate(goals_of(arm, done, goals - done), done + 1):
             known.rows.append(trial.judged(drawn, ''))
             if k % 10 == 0:
                 yield f'{k} of {goals} goals'
-        # Nothing is changed first: that too could be taken for a change.
-        for k, what in enumerate((NOTHING, *CHANGES)):
-            if what in changes:
-                continue
-            found = trial.changed(what)
-            if what != NOTHING:
-                for drawn in goals_of(name, seed, AFTER + EACH * k, EACH):
-                    known.rows.append(trial.judged(drawn, what))
-            known.changes.append(found)
-            yield str(found)
-            if what != CHANGES[-1]:
-                trial.restore()
+        if arm.changed:
+            yield from _changed(trial, known)
+
+
+def _changed(trial: CellTrial, known: Known) -> Iterator[str]:
+    """Change the cell in every way that is not known yet, nothing first: that too could be noticed."""
+    changes = {c['change'] for c in known.changes if c['robot'] == trial.name}
+    for k, what in enumerate((NOTHING, *CHANGES)):
+        if what in changes:
+            continue
+        found = trial.changed(what)
+        if what != NOTHING:
+            for drawn in goals_of(trial.arm, AFTER + EACH * k, EACH):
+                known.rows.append(trial.judged(drawn, what))
+        known.changes.append(found)
+        yield str(found)
+        if what != CHANGES[-1]:
+            trial.restore()
 
 
 @contextmanager

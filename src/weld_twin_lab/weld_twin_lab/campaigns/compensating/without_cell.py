@@ -21,20 +21,15 @@ from weld_twin_core.twin.reversals import approached
 from weld_twin_core.twin.twin import Twin
 from weld_twin_nodes.offline.correcting import program_model
 
-from .drawn_cells import cell_of, drawn_goal, drawn_rest, learned, true_effects
+from .drawn_cells import cell_of, drawn_goal, learned, true_effects
 
 LIMITS = GoalLimits(acceleration=20.0)
 """As a compensator has them that is told nothing else."""
 
 
 def judged(name: str, seed: int, goals: int) -> list[dict[str, Any]]:
-    """
-    Return what becomes of the goals of one arm that stands where each of them begins.
-
-    Beside its causes it has what every real arm has: joints that are off by a little anywhere.
-    """
+    """Return what becomes of the goals of one arm that stands where each of them begins."""
     robot, causes, rng = cell_of(name, seed)
-    causes += drawn_rest(robot, rng)
     with TemporaryDirectory() as place:
         file = Path(place) / 'diagnosis.json'
         file.write_text(learned(robot, causes, rng).text)
@@ -48,23 +43,25 @@ def judged(name: str, seed: int, goals: int) -> list[dict[str, Any]]:
         goal, inside = drawn_goal(robot, rng)
         start = Start(goal.q[0], False, rng.choice([-1.0, 1.0], robot.n))
         found, best = (corrected_goal(each, goal, LIMITS, start) for each in (model, true))
-        before = _off(true, goal, goal, start)
+        before, _ = _off(true, goal, goal, start)
         row = {'robot': name, 'arm': seed, 'after': '', 'inside': inside, 'before_m': before}
         row['best_m'] = before if isinstance(best, Refusal) else best.after
         if isinstance(found, Refusal):
             row |= {'verdict': 'refused', 'after_m': before, 'bound_m': None}
         else:
-            after = _off(true, found.goal.later(-found.waits), goal, start)
-            row |= {'verdict': 'corrected', 'after_m': after, 'bound_m': found.bound}
+            after, worst = _off(true, found.goal.later(-found.waits), goal, start)
+            row |= {'verdict': 'corrected', 'after_m': after, 'worst_m': worst}
+            row |= {'bound_m': found.bound}
         rows.append(row)
     return rows
 
 
-def _off(true: ProgramModel, run: Goal, goal: Goal, start: Start) -> float:
-    """Return the RMS distance of the arm with the true causes from where a goal means it [m]."""
+def _off(true: ProgramModel, run: Goal, goal: Goal, start: Start) -> tuple[float, float]:
+    """Return how far the arm with the true causes is from where a goal means it, RMS and most [m]."""
     at: Array = fine_times(goal)
     way = Recording('goal', JointMotion(at, course(run, at).q))
     came = approached(way, start.came, start.q)
     real = Twin(true.robot, true.effects).poses(came).position[-at.size :]
     apart = real - forward(true.robot, course(goal, at).q)[:, :3, 3]
-    return float(np.sqrt((apart**2).sum(axis=1).mean()))
+    squares = (apart**2).sum(axis=1)
+    return float(np.sqrt(squares.mean())), float(np.sqrt(squares.max()))

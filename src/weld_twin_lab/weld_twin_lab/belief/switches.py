@@ -58,7 +58,6 @@ MECHANISMS = {
     'negligible': Mechanism('hypotheses.selection', '_negligible', no),
     'misfit': Mechanism('hypotheses.selection', '_misfit', no),
     'starts_again': Mechanism('hypotheses.selection', 'restarted', second),
-    'stand_ins': Mechanism('hypotheses.selection', '_without_stand_in', third),
     'taken_out_alike': Mechanism('hypotheses.structural_aliases', '_outside', no),
     'taken_out_constants': Mechanism('hypotheses.structural_aliases', '_same_anywhere', nothing),
     'constants_here': Mechanism('hypotheses.structural_aliases', '_constants_here', nothing),

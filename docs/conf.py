@@ -27,9 +27,7 @@ root_doc = 'docs/index'
 include_patterns = [
     'docs/*.md',
     'docs/reference/*.md',
-    'docs/results/blind/scores.md',
     'docs/results/cells/cells.md',
-    'docs/results/contacts/contacts.md',
     'docs/results/coverage/coverage.md',
     'docs/results/efforts/efforts.md',
     'docs/results/real_arms/*.md',
@@ -56,7 +54,6 @@ extensions = [
     'command_reference',
     'node_reference',
     'range_table',
-    'score_tables',
 ]
 
 # Pages ------------------------------------------------------------------------------------------

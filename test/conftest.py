@@ -11,7 +11,7 @@ from weld_twin_core.arm import catalog
 
 HERE = Path(__file__).parent
 FOLDERS = ('diagnosis', 'house', 'serve', 'soundness')
-sys.path[:0] = [str(HERE / folder) for folder in FOLDERS]
+sys.path[:0] = [str(HERE), *(str(HERE / folder) for folder in FOLDERS)]
 sys.path.insert(0, str(HERE.parent / 'src/weld_twin_core/test/soundness'))
 
 

@@ -1,45 +1,74 @@
 #!/usr/bin/env python3
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-r"""
+"""
 Break the code on purpose, one place at a time, and count how often the tests notice.
 
-    tools/in_env python tools/mutants.py            the decision of a diagnosis
-    tools/in_env python tools/mutants.py --module weld_twin_core.diagnosis.algebra.gram \
-        --tests test/diagnosis/test_normal_equations.py
+    tools/in_env python tools/mutants.py                     200 drawn from the whole diagnosis
+    tools/in_env python tools/mutants.py --room weld_twin_core.twin --draw 60
 
-Mutants: a comparison flipped, or moved by its boundary; a number 25 % up or down; a branch that is
-never taken; 'and' for 'or'. A default of a dataclass is a number like any other. Each mutant runs
-in a process of its own, forked from one that has imported everything else, so a mutant costs
-little more than its tests. Exits with 1 when fewer than --least of them are caught.
+A mutant is a comparison turned round or moved to its boundary, a number 25 % up or down, a sign, a
+term that is dropped, two arguments exchanged, the least for the most, 'and' for 'or', or a branch
+that is taken never or always. Defaults of functions and of dataclasses count as well.
+
+The tests run once as they are, and it is noted which functions each of them runs. Then a process is
+forked for every mutant. It puts the broken function in the place of the right one and runs the tests
+that reach it, what sees most first, until one fails. Exits with 1 when fewer than --least are
+caught.
 """
 
 from __future__ import annotations
+import __future__
 
 import argparse
 import ast
-import contextlib
 import copy
+import dataclasses
+import functools
 import importlib
-import importlib.abc
-import importlib.util
-import io
 import os
+import pickle
+import random
+import re
+import resource
 import sys
+import tempfile
+import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from importlib.machinery import ModuleSpec
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import FrameType, FunctionType, ModuleType
+from typing import Any, NamedTuple
+
+for threads in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS'):
+    os.environ[threads] = '1'
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = [ROOT / 'src' / name for name in ('weld_twin_core', 'weld_twin_msgs_py')]
-DIAGNOSIS = 'weld_twin_core.diagnosis'
-MODULES = tuple(f'{DIAGNOSIS}.{name}' for name in ('verdict.decision', 'beliefs'))
-TESTS = ('src/weld_twin_core/test/diagnosis/test_decision.py',)
-LEAST = 0.9
-"""Share to catch: 33 of 37 kinds were the goal when this began."""
-FIELDS = '_verdict'
-"""Of the beliefs only those are broken that the verdict reads; the others need whole searches."""
+ENGINE = 'weld_twin_core.diagnosis'
+TESTS = {
+    'test/diagnosis': 'kept_answers verdict standard_errors unseen_stretches swapped_rivals fit '
+    'atoms noise_and_interval learned_priors many_small_errors springs_at_rest evidence '
+    'normal_equations definite impossible_effects steps_by_hand',
+    'src/weld_twin_core/test/diagnosis': 'needed_kinds planned sizes arm_or_field decision '
+    'learned_sizes stray_readings folds',
+    'src/weld_twin_core/test/soundness': 'alignment gravity mends soundness trials',
+    'src/weld_twin_core/test/advice': 'next_experiment',
+}
+"""What asks about the engine, folder by folder: files of tests that take a second or two at most.
+Other rooms are asked about by the files that import the modules drawn."""
+QUICK = 'not slow and not cells'
+CHEAP, SLOW, SPENT = 0.2, 6.0, 12.0
+"""Seconds that a test takes which is asked at once, that one may take, and all of them together."""
+FIRST = 'test_kept_answers'
+"""What sees most is asked first of the others."""
+LONGEST = 30
+"""Seconds of processor time after which a mutant that comes to no end is caught."""
+ALIKE = {
+    f'{ENGINE}.levels.free_form.Folds.of: np.diff(labels) >= 0 -> np.diff(labels) < 0': (
+        'rows that lie fold by fold are sorted once more, to the same order'
+    ),
+}
+"""Mutants that nobody can see, each with the reason: they are set aside."""
 
 FLIPPED: dict[type[ast.cmpop], tuple[type[ast.cmpop], ...]] = {
     ast.Lt: (ast.GtE,),
@@ -53,140 +82,444 @@ FLIPPED: dict[type[ast.cmpop], tuple[type[ast.cmpop], ...]] = {
     ast.Is: (ast.IsNot,),
     ast.IsNot: (ast.Is,),
 }
-"""Strict comparisons of measured numbers are not moved to their boundary: it is never met."""
+"""The second is the first moved to its boundary. That is done where something is counted: measured
+numbers never meet it."""
+COUNTS = ('size', 'count', 'ndim', 'shape')
+GUARD = 1e-9
+"""Smaller numbers keep divisions from zero, and larger ones stand for no bound."""
+SIGNS: dict[type[ast.operator], type[ast.operator]] = {
+    ast.Add: ast.Sub,
+    ast.Sub: ast.Add,
+    ast.Mult: ast.Div,
+    ast.Div: ast.Mult,
+}
+EXTREMES = {'min': 'max', 'max': 'min', 'minimum': 'maximum', 'maximum': 'minimum'}
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+Ran = set[tuple[str, int]]
+"""Functions, by file and first line."""
 
 
-def places(tree: ast.Module, beliefs: bool) -> Iterator[tuple[ast.AST, str]]:
-    """Yield what may be broken: a node of the tree, and how."""
-    for node in ast.walk(tree):
-        if beliefs:
-            if isinstance(node, ast.Call) and getattr(node.func, 'id', '') == FIELDS:
-                yield from ((node.args[0], how) for how in ('less', 'more'))
+class Place(NamedTuple):
+    """What may be broken: the number of its node, how, and the names and line of what holds it."""
+
+    module: str
+    node: int
+    how: str
+    holder: tuple[str, ...]
+    line: int
+
+
+# What may be broken --------------------------------------------------------------------------
+
+
+def holders(tree: ast.Module) -> Iterator[tuple[tuple[str, ...], ast.stmt]]:
+    """Yield functions, methods, and what is assigned in modules and classes, each with its names."""
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef):
+            yield from (((node.name, *name_of(own)), own) for own in node.body if name_of(own))
+        elif name_of(node):
+            yield name_of(node), node
+
+
+def name_of(node: ast.stmt) -> tuple[str, ...]:
+    """Return the name that a statement makes; nothing where it makes none."""
+    if isinstance(node, Function):
+        return (node.name,)
+    target = node.targets[0] if isinstance(node, ast.Assign) else getattr(node, 'target', None)
+    made = isinstance(target, ast.Name) and getattr(node, 'value', None) is not None
+    return (target.id,) if made and isinstance(target, ast.Name) else ()
+
+
+def places(module: str, tree: ast.Module) -> Iterator[Place]:
+    """Yield all that may be broken in a module."""
+    number = {id(node): k for k, node in enumerate(ast.walk(tree))}
+    for holder, top in holders(tree):
+        within = isinstance(top, Function)
+        for node in reached(top):
+            line = getattr(top, 'lineno', 0)
+            for how in ways(node, within=within):
+                yield Place(module, number[id(node)], how, holder, line)
+
+
+def reached(top: ast.AST) -> Iterator[ast.AST]:
+    """Yield nodes that do something when the code runs: no annotation, no decorator, no claim."""
+    for field, value in ast.iter_fields(top):
+        if field in ('annotation', 'returns', 'decorator_list'):
             continue
-        if isinstance(node, ast.Compare):
-            yield from ((node, f'compare {k}') for k in range(len(FLIPPED[type(node.ops[0])])))
-        elif isinstance(node, ast.If | ast.IfExp):
-            yield node, 'never'
-            yield node, 'always'
-        elif isinstance(node, ast.BoolOp):
-            yield node, 'and or'
-        elif isinstance(node, ast.Constant) and movable(node.value):
-            yield from ((node, how) for how in ('less', 'more'))
+        for node in value if isinstance(value, list) else [value]:
+            if isinstance(node, ast.AST) and not isinstance(node, ast.Assert | ast.Raise):
+                yield node
+                yield from reached(node)
+
+
+def ways(node: ast.AST, *, within: bool) -> list[str]:
+    """Return the ways in which a node may be broken."""
+    if isinstance(node, ast.Compare):
+        most = len(FLIPPED[type(node.ops[0])]) if counts(node) else 1
+        return [f'compare {k}' for k in range(most)]
+    if isinstance(node, ast.If | ast.IfExp):
+        return ['never', 'always']
+    if isinstance(node, ast.BoolOp):
+        return ['and or']
+    if isinstance(node, ast.BinOp) and type(node.op) in SIGNS:
+        return ['sign', 'dropped']
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        return ['sign']
+    if isinstance(node, ast.Call) and within:
+        extreme = ['extreme'] if last_name(node.func) in EXTREMES else []
+        plain = [arg for arg in node.args if not isinstance(arg, ast.Starred)]
+        return extreme or (['exchanged'] if len(plain) == len(node.args) == 2 else [])
+    if isinstance(node, ast.Constant) and movable(node.value):
+        return ['less', 'more']
+    return []
+
+
+def counts(node: ast.Compare) -> bool:
+    """Return whether a comparison is one of whole numbers."""
+    return any(
+        (isinstance(side, ast.Constant) and type(side.value) is int)
+        or (isinstance(side, ast.Attribute) and side.attr in COUNTS)
+        or (isinstance(side, ast.Call) and last_name(side.func) == 'len')
+        for side in (node.left, *node.comparators)
+    )
+
+
+def last_name(node: ast.expr) -> str:
+    """Return the last name of what is called."""
+    return node.attr if isinstance(node, ast.Attribute) else getattr(node, 'id', '')
 
 
 def movable(value: object) -> bool:
-    """Return whether a constant is a number that can be moved; 25 % of 0.0 is nothing."""
-    return type(value) is int or (type(value) is float and value != 0.0)
+    """Return whether a constant is a number on whose size something hangs: no zero, and no guard."""
+    return type(value) is int or (type(value) is float and GUARD < abs(value) < 1.0 / GUARD)
 
 
-def broken(tree: ast.Module, number: int, beliefs: bool) -> tuple[ast.Module, str]:
-    """Return a copy of the tree broken at one place, and what was done in words."""
+def broken(tree: ast.Module, place: Place) -> tuple[ast.stmt, str]:
+    """Return what holds a place, broken there, and in words what was done."""
     tree = copy.deepcopy(tree)
-    node, how = list(places(tree, beliefs))[number]
-    before = ast.unparse(node)
-    if isinstance(node, ast.Compare):
+    node: Any = next(node for k, node in enumerate(ast.walk(tree)) if k == place.node)
+    line, how = getattr(node, 'lineno', place.line), place.how
+    before = ast.unparse(node.test if how in ('never', 'always') else node)
+    if how.startswith('compare'):
         node.ops[0] = FLIPPED[type(node.ops[0])][int(how.split()[1])]()
-    elif isinstance(node, ast.If | ast.IfExp):
-        before = f'if {ast.unparse(node.test)}'
+    elif how in ('never', 'always'):
         node.test = ast.Constant(how == 'always')
-    elif isinstance(node, ast.BoolOp):
+    elif how == 'and or':
         node.op = ast.And() if isinstance(node.op, ast.Or) else ast.Or()
-    elif isinstance(node, ast.Constant):
+    elif how == 'exchanged':
+        node.args.reverse()
+    elif how == 'extreme':
+        key = 'attr' if isinstance(node.func, ast.Attribute) else 'id'
+        setattr(node.func, key, EXTREMES[last_name(node.func)])
+    elif how in ('less', 'more'):
         node.value = moved(node.value, how)
-    after = how if isinstance(node, ast.If | ast.IfExp) else ast.unparse(node)
-    line = getattr(node, 'lineno', 0)
-    return ast.fix_missing_locations(tree), f'line {line}: {before}  ->  {after}'
+    elif isinstance(node, ast.UnaryOp):
+        node.op = ast.UAdd()
+    elif how == 'sign':
+        node.op = SIGNS[type(node.op)]()
+    else:
+        node.op, node.right = ast.Add(), ast.Constant(0)
+    after = how if how in ('never', 'always') else ast.unparse(node)
+    top = next(top for holder, top in holders(tree) if (holder, top.lineno) == place[3:])
+    words = f'{".".join(place.holder)}, line {line}: {before}  ->  {after}'
+    return ast.fix_missing_locations(top), ' '.join(words.split())
 
 
-def moved(value: object, how: str) -> float:
+def moved(value: float, how: str) -> float:
     """Return a number 25 % less or more; whole ones by one at least."""
-    assert isinstance(value, int | float)
     way = 1 if how == 'more' else -1
-    if isinstance(value, int):
-        return value + way * max(1, round(0.25 * abs(value)))
-    return value * (1.0 + 0.25 * way)
+    return value + way * (max(1, round(0.25 * abs(value))) if type(value) is int else 0.25 * value)
 
 
-class Broken(importlib.abc.MetaPathFinder, importlib.abc.InspectLoader):
-    """Imports one module from another code than its file's."""
-
-    def __init__(self, name: str, code: CodeType) -> None:
-        self.name, self.code = name, code
-
-    def find_spec(self, name: str, path: object, target: object = None) -> ModuleSpec | None:
-        return importlib.util.spec_from_loader(name, self) if name == self.name else None
-
-    def get_source(self, name: str) -> None:
-        return None
-
-    def get_code(self, name: str) -> CodeType:
-        return self.code
-
-    def exec_module(self, module: ModuleType) -> None:
-        exec(self.code, module.__dict__)
+# How it is put in place ----------------------------------------------------------------------
 
 
-def survives(name: str, tree: ast.Module, file: Path, tests: Sequence[str]) -> bool:
-    """Return whether all tests pass with a broken module."""
-    child = os.fork()
-    if child == 0:
-        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            sys.meta_path.insert(0, Broken(name, compile(tree, str(file), 'exec')))
-            os._exit(int(run(tests) != 0))
-    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+def put(place: Place, top: ast.stmt) -> None:
+    """Put what is broken in the place of what is right, in this process."""
+    module = importlib.import_module(place.module)
+    owner: Any = module
+    for name in place.holder[:-1]:
+        owner = getattr(owner, name)
+    if isinstance(top, Function):
+        put_function(module, owner, top)
+    else:
+        put_value(module, owner, place.holder[-1], top)
+    forget()
 
 
-def run(tests: Sequence[str]) -> int:
-    """Run tests in this process; 0 when all pass."""
-    import pytest
+def forget() -> None:
+    """Forget what functions of this project, and of its tests, keep of earlier calls."""
+    for module in list(sys.modules.values()):
+        if str(getattr(module, '__file__', '')).startswith(str(ROOT)):
+            for held in list(vars(module).values()):
+                inside = vars(held).values() if isinstance(held, type) else ()
+                for made in (held, *inside):
+                    if isinstance(made, functools._lru_cache_wrapper):
+                        made.cache_clear()
 
-    options = ['-q', '-x', '-p', 'no:cacheprovider', '--no-header', '--import-mode=importlib']
-    return int(pytest.main([*options, *tests]))
+
+def put_function(module: ModuleType, owner: Any, top: ast.stmt) -> None:
+    """Give a function the code and the defaults of its broken copy."""
+    assert isinstance(top, Function)
+    own = copy.copy(top)
+    own.decorator_list = []
+    body: list[ast.stmt] = [own]
+    if owner is not module:
+        body = [ast.ClassDef(owner.__name__, [], [], body, [])]
+    whole = ast.fix_missing_locations(ast.Module(body, []))
+    flag = __future__.annotations.compiler_flag
+    space = dict(module.__dict__)
+    exec(compile(whole, str(module.__file__), 'exec', flag, dont_inherit=True), space)
+    made = space[owner.__name__].__dict__[own.name] if owner is not module else space[own.name]
+    right = plain(owner.__dict__[own.name])
+    right.__code__ = made.__code__
+    right.__defaults__, right.__kwdefaults__ = made.__defaults__, made.__kwdefaults__
 
 
-def prepare(modules: Sequence[str]) -> None:
-    """Import what never changes, so that every process starts with it."""
-    for place in PACKAGES:
-        sys.path.insert(0, str(place))
-    import pytest  # noqa: F401
+def plain(held: Any) -> FunctionType:
+    """Return the function within a property, a cache, a class method."""
+    while not isinstance(held, FunctionType):
+        held = next(
+            inner
+            for key in ('fget', 'func', '__func__', '__wrapped__')
+            if (inner := getattr(held, key, None)) is not None
+        )
+    inner = getattr(held, '__wrapped__', held)  # what a context manager holds
+    assert isinstance(inner, FunctionType)
+    return inner
 
-    for name in modules:
-        importlib.import_module(name)
-    # The rooms of what will be broken are imported anew; what lies outside of them only hands
-    # objects on, and stays.
-    rooms = {name.rpartition('.')[0] for name in modules} - {DIAGNOSIS}
-    for name in list(sys.modules):
-        if name in modules or name.rpartition('.')[0] in rooms:
-            del sys.modules[name]
+
+def put_value(module: ModuleType, owner: Any, name: str, top: Any) -> None:
+    """Give a module or a class another value, and everybody who imported it."""
+    value = eval(compile(ast.Expression(top.value), '', 'eval'), {**vars(module), **vars(owner)})
+    if owner is not module:
+        if isinstance(value, dataclasses.Field):
+            value = value.default
+        if dataclasses.is_dataclass(owner):
+            put_default(owner, name, value)
+        setattr(owner, name, value)
+        return
+    right = getattr(module, name)
+    for other in list(sys.modules.values()):
+        if vars(other).get(name) is right:
+            setattr(other, name, value)
+
+
+def put_default(owner: Any, name: str, value: Any) -> None:
+    """Give a parameter of a dataclass another default."""
+    begin = owner.__init__
+    if name in (begin.__kwdefaults__ or {}):
+        begin.__kwdefaults__[name] = value
+        return
+    names = begin.__code__.co_varnames[: begin.__code__.co_argcount]
+    late = list(begin.__defaults__ or ())
+    late[names.index(name) - len(names)] = value
+    begin.__defaults__ = tuple(late)
+
+
+# How it is noticed ---------------------------------------------------------------------------
+
+
+class Asked:
+    """A plugin of pytest: the tests once as they are, then those that reach a mutant, broken."""
+
+    def __init__(
+        self,
+        drawn: Sequence[Place],
+        files: dict[str, Path],
+        trees: dict[str, ast.Module],
+        jobs: int,
+    ) -> None:
+        self.drawn, self.files, self.trees, self.jobs = list(drawn), files, trees, jobs
+        self.told: list[tuple[Place, str, bool]] = []
+        self.spent = 0.0
+
+    def pytest_runtestloop(self, session: Any) -> bool:
+        """Run everything in the place of the usual loop."""
+        begin = time.monotonic()
+        reach = self.right(session.items)
+        print(f'{len(reach)} tests as they are: {time.monotonic() - begin:.0f} s', flush=True)
+        running: dict[int, tuple[Place, str]] = {}
+        while self.drawn or running:
+            while self.drawn and len(running) < self.jobs:
+                place = self.drawn.pop()
+                top, words = broken(self.trees[place.module], place)
+                child = os.fork()
+                if child == 0:
+                    os._exit(self.child(place, top, reach))
+                running[child] = place, words
+            child, status = os.wait()
+            place, words = running.pop(child)
+            self.told.append((place, words, status != 0))
+            if status == 0:
+                print(f'survives: {place.module}.{words}', flush=True)
+        self.spent = time.monotonic() - begin
+        return True
+
+    def right(self, items: Sequence[Any]) -> list[tuple[float, Ran, Any]]:
+        """Return the seconds of every test, the functions that it runs, and the test."""
+        children: dict[int, Path] = {}
+        with tempfile.TemporaryDirectory() as place:
+            for k in range(1, self.jobs):
+                file = Path(place) / f'{k}'
+                child = os.fork()
+                if child == 0:
+                    file.write_bytes(pickle.dumps(self.ran(items, k)))
+                    os._exit(0)
+                children[child] = file
+            told = self.ran(items, 0)
+            for child, file in children.items():
+                os.waitpid(child, 0)
+                told |= pickle.loads(file.read_bytes())
+        out = [(*told[k], item) for k, item in enumerate(items)]
+        failed = [item.nodeid for _, ran, item in out if ran is None]
+        if failed:
+            sys.exit(f'nothing is broken yet, and these fail: {", ".join(failed)}')
+        asked = [(seconds, ran, item) for seconds, ran, item in out if ran and seconds < SLOW]
+        return sorted(
+            asked, key=lambda each: (each[0] > CHEAP, FIRST not in each[2].nodeid, each[0])
+        )
+
+    def ran(self, items: Sequence[Any], part: int) -> dict[int, tuple[float, Ran | None]]:
+        """Return the seconds of a part of the tests, and what each runs; None of one that fails."""
+        watched, out = {str(file) for file in self.files.values()}, {}
+        for k in range(part, len(items), self.jobs):
+            ran: Ran = set()
+
+            def noted(frame: FrameType, _: str, __: object, ran: Ran = ran) -> None:
+                code = frame.f_code
+                if code.co_filename in watched:
+                    ran.add((code.co_filename, code.co_firstlineno))
+
+            begin = time.process_time()
+            sys.settrace(noted)
+            failed = fails(items[k])
+            sys.settrace(None)
+            out[k] = time.process_time() - begin, None if failed else ran
+        return out
+
+    def child(self, place: Place, top: ast.stmt, reach: Sequence[Any]) -> int:
+        """Return 1 in a process of its own where a test notices a mutant, else 0."""
+        resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST))
+        file = str(self.files[place.module])
+        first = min([place.line, *(d.lineno for d in getattr(top, 'decorator_list', []))])
+        try:
+            put(place, top)
+        except Exception as error:  # as an import would fail
+            print(f'not put: {place}: {error!r}', flush=True)
+            return 1
+        spent = 0.0
+        for seconds, ran, item in reach:
+            inside = not isinstance(top, Function) or (file, first) in ran
+            if inside and fails(item):
+                return 1
+            spent += seconds * inside
+            if spent > SPENT:
+                break
+        return 0
+
+
+def fails(item: Any) -> bool:
+    """Run a test, and return whether it fails."""
+    from _pytest.runner import runtestprotocol
+
+    item._initrequest()
+    with open(os.devnull, 'w') as quiet:
+        kept, sys.stderr = sys.stderr, quiet
+        try:
+            return any(report.failed for report in runtestprotocol(item, log=False))
+        finally:
+            sys.stderr = kept
+
+
+def asking(rooms: Sequence[str], drawn: Sequence[Place]) -> list[str]:
+    """Return the files of tests that ask about drawn mutants of rooms."""
+    if rooms == [ENGINE]:
+        return [
+            str(file)
+            for folder, names in TESTS.items()
+            for name in names.split()
+            for file in sorted(Path(folder).glob(f'test_{name}.py'))
+        ]
+    wanted = {tuple(place.module.rsplit('.', 1)) for place in drawn}
+    out = []
+    for file in sorted(
+        [*Path('test').rglob('test_*.py'), *Path('src').glob('*/test/**/test_*.py')]
+    ):
+        text = file.read_text(encoding='utf-8')
+        if any(
+            f'{room}.{name} ' in text or f'{room} import {name}' in text for room, name in wanted
+        ):
+            out.append(str(file))
+    return out
+
+
+def modules(rooms: Sequence[str]) -> dict[str, Path]:
+    """Return the modules of rooms and their files."""
+    out = {}
+    for name in rooms:
+        inside = Path(name.replace('.', '/'))
+        base = next(p for p in (ROOT / 'src').iterdir() if (p / inside.parts[0]).is_dir())
+        whole = base / inside
+        found = sorted(whole.rglob('*.py')) if whole.is_dir() else [whole.with_suffix('.py')]
+        for file in found:
+            if file.name != '__init__.py':
+                out['.'.join(file.relative_to(base).with_suffix('').parts)] = file
+    return out
+
+
+def told(asked: Asked, least: float) -> int:
+    """Tell how many of each room were caught."""
+    caught, total, aside = Counter[str](), Counter[str](), 0
+    for place, words, noticed in asked.told:
+        room = '.'.join(place.module.split('.')[1:3])
+        alike = not noticed and f'{place.module}.{without_line(words)}' in ALIKE
+        aside += alike
+        total[room] += not alike
+        caught[room] += noticed
+    for room in sorted(total):
+        print(f'{room}: {caught[room]} of {total[room]}')
+    share = caught.total() / max(total.total(), 1)
+    print(
+        f'{caught.total()} of {total.total()} mutants caught ({share:.0%}), {aside} more set aside, '
+        f'in {asked.spent:.0f} s, of the processor {worked():.0f} s'
+    )
+    return int(share < least)
+
+
+def worked() -> float:
+    """Return the processor time of this process and of its children [s]."""
+    used = [resource.getrusage(of) for of in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in used)
+
+
+def without_line(words: str) -> str:
+    """Return what was done without the line, which moves."""
+    return re.sub(r', line \d+:', ':', words)
 
 
 def main() -> int:
-    """Break everything once, and tell what nobody noticed."""
+    """Break drawn places, and tell what nobody noticed."""
     parser = argparse.ArgumentParser(description=__doc__.strip().partition('\n')[0])
-    parser.add_argument('--module', action='append', metavar='NAME', help='may be repeated')
-    parser.add_argument('--tests', action='append', metavar='FILE', help='may be repeated')
-    parser.add_argument('--least', type=float, default=LEAST, metavar='SHARE')
+    parser.add_argument('--room', action='append', metavar='NAME', help='may be repeated')
+    parser.add_argument('--tests', action='append', metavar='PATH', help='may be repeated')
+    parser.add_argument('--draw', type=int, default=200, metavar='N', help='0 for all')
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--least', type=float, default=0.85, metavar='SHARE')
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1)
     args = parser.parse_args()
-    modules, tests = args.module or MODULES, args.tests or TESTS
     os.chdir(ROOT)
-    prepare(modules)
-    caught, total = 0, 0
-    for name in modules:
-        file = next(
-            path
-            for place in PACKAGES
-            if (path := place / (name.replace('.', '/') + '.py')).is_file()
-        )
-        tree, beliefs = ast.parse(file.read_text(encoding='utf-8')), name.endswith('.beliefs')
-        for number in range(len(list(places(tree, beliefs)))):
-            mutant, words = broken(tree, number, beliefs)
-            total += 1
-            if survives(name, mutant, file, tests):
-                print(f'survives: {name.rpartition(".")[2]}, {words}', flush=True)
-            else:
-                caught += 1
-    print(f'{caught} of {total} mutants caught ({caught / max(total, 1):.0%})')
-    return int(caught < args.least * total)
+    import pytest
+
+    rooms = args.room or [ENGINE]
+    files = modules(rooms)
+    trees = {name: ast.parse(file.read_text(encoding='utf-8')) for name, file in files.items()}
+    every = [place for name, tree in trees.items() for place in places(name, tree)]
+    drawn = random.Random(args.seed).sample(every, min(args.draw or len(every), len(every)))
+    asked = Asked(drawn, files, trees, args.jobs)
+    options = ['-q', '-n', '0', '-p', 'no:cacheprovider', '--no-header', '-s', '-m', QUICK]
+    pytest.main([*options, *(args.tests or asking(rooms, drawn))], plugins=[asked])
+    return told(asked, args.least)
 
 
 if __name__ == '__main__':

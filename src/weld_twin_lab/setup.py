@@ -10,7 +10,7 @@ setup(
     name=NAME,
     version='0.1.0',
     packages=find_packages(),
-    package_data={NAME: ['py.typed', '**/*.css']},
+    package_data={NAME: ['py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
@@ -26,7 +26,6 @@ setup(
         'PyYAML>=6,<7',
         'lz4>=4,<5',
         'rich>=13,<16',
-        'matplotlib>=3.7,<4',
     ],
     extras_require={'test': ['pytest']},
     python_requires='>=3.10',

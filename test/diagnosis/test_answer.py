@@ -67,6 +67,7 @@ SCHEMA = {
         'rms_after_m': NUMBER,
         'ratio': NUMBER,
         'ci95': [NUMBER],
+        'elsewhere_ci95': [NUMBER],
         'held_out': TEXT,
     },
     'unexplained': {'rms_m': NUMBER, 'above_noise': FLAG, 'structure': [TEXT]},

@@ -9,8 +9,9 @@ from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
 from weld_twin_core.diagnosis.algebra.fit import fit
+from weld_twin_core.diagnosis.algebra.learned_sizes import learned_precision
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.many.shrinkage import groups, learned_precision, shrunk_fit
+from weld_twin_core.diagnosis.many.shrinkage import groups, shrunk_fit
 
 ROWS = 150
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What takes the place of what was found: what earns it by its own numbers, alone or in company."""
 
+import pytest
 from diagnosis_cells import effect, tiny
 
 from weld_twin_core.diagnosis.beliefs import Beliefs
@@ -45,3 +46,28 @@ def test_what_stands_for_several_gives_way_to_them():
     assert {(e.name, e.site) for e in kept.model.found} == {(e.name, e.site) for e in TRUE}
     assert kept.rss < 0.1 * now.rss
     assert len(slots) == 2
+
+
+@pytest.mark.parametrize('back', [0.0, 0.4])
+def test_the_model_holds_the_likeliest_of_twins_and_not_the_one_that_came_first(monkeypatch, back):
+    problem, model = tiny(TRUE)
+    first = effect('gear_ratio', joint='elbow_joint')
+    work, now, _ = search._workspace(problem, model.with_found((first, TRUE[1])), (), Beliefs())
+
+    def rivals(work, now, k, effective, others):
+        own, other = (
+            now.model.found[k],
+            TRUE[0] if now.model.found[k].name == first.name else first,
+        )
+        sites = Site(own.name, own.site), Site(other.name, other.site)
+        if own.name == TRUE[1].name:
+            return (Rival(sites[0], 9.0, now, 1.0),)
+        instead = fitted_with(work, now.model.without(k), other)
+        ahead = 0.4 if own.name == first.name else back
+        order = Rival(sites[1], 9.0, instead, 0.55), Rival(sites[0], 9.0 - ahead, now, 0.45)
+        return order if ahead else order[::-1]
+
+    monkeypatch.setattr(search, 'rivals', rivals)
+    monkeypatch.setattr(search, 'reconsidered', lambda work, now, sets, effective: (now, ()))
+    kept, _ = search.settled(work, now, lambda found: float(found.residual.size), str)
+    assert {(e.name, e.site) for e in kept.model.found} == {(e.name, e.site) for e in TRUE}

@@ -10,9 +10,9 @@ from datetime import datetime, timedelta, timezone
 
 import numpy as np
 import pytest
+from own_postgres import NoServer, postgres
 
 from weld_twin_core.errors import DataError
-from weld_twin_lab.fleet.postgres import NoServer, postgres
 from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.history import Database, Entry
 

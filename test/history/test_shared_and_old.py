@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from own_postgres import NoServer, place_of, postgres, start, stop
 
 from weld_twin_core.errors import DataError
-from weld_twin_lab.fleet.made_history import fill, made
-from weld_twin_lab.fleet.postgres import NoServer, place_of, postgres, start, stop
+from weld_twin_lab.benchmark.made_history import fill, made
 from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.history import Database, Unavailable
 

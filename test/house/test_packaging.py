@@ -30,7 +30,6 @@ MODULES = {
     'urdf-parser-py': 'urdf_parser_py',
     'pin': 'pinocchio',
     'SALib': 'SALib',
-    'roboticstoolbox-python': 'roboticstoolbox',
     'scikit-learn': 'sklearn',
 }
 """Modules of the distributions that are called otherwise."""

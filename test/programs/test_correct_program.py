@@ -155,6 +155,33 @@ end
 """
 
 
+def test_what_is_expected_counts_the_way_and_what_an_encoder_rounds(tmp_path):
+    # Outward from the base, with all points but one at the beginning. A base joint that stands off
+    # moves the tool by its distance from the axis; an encoder in steps by up to half a step of that.
+    way = [0.4 + 0.001 * k for k in range(15)] + [0.7]
+    moves = [f'  movel(p[{-x}, 0.1, 0.25, 2.12, 2.31, 0.0], v=0.1)' for x in way]
+    start = '  movej([-0.2, -1.39, 1.95, -2.13, -1.57, 0.08])'
+    (tmp_path / 'out.script').write_text('\n'.join(['def seam():', start, *moves, 'end', '']))
+    off, step = 8e-4, 1e-3
+    pan = 'joint: shoulder_pan_joint'
+    (tmp_path / 'found.yaml').write_text(
+        f'- {{effect: joint_offset, {pan}, offset: {off}}}\n'
+        f'- {{effect: quantization, {pan}, step: {step}}}\n'
+    )
+    said = weld_twin(
+        *('correct', tmp_path / 'out.script', '--robot', 'ur5', '--out', tmp_path / 'out'),
+        *('--model', tmp_path / 'found.yaml', '--max-correction', '5mm', '1deg'),
+    )
+    assert said.code == 0, said.err
+    expected = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']
+    before, after = (expected[when]['rms_m'] for when in ('before', 'after'))
+    along = np.linspace(0.4, 0.7, 3001)
+    reach = np.sqrt((along**2 + 0.1**2).mean())
+    # Rounding errors are spread evenly over a step, and here over a hundred and fifty of them.
+    assert abs(before / (reach * np.hypot(off, step / np.sqrt(12.0))) - 1.0) < 0.15
+    assert abs(after / (reach * step / np.sqrt(12.0)) - 1.0) < 0.3
+
+
 def test_a_seam_beyond_the_cap_is_left_whole(tmp_path):
     said = corrected(tmp_path, SEAM, '--max-correction', '0.2mm', '1deg', offset=5e-4)
     assert said.code == 0, said.err

@@ -42,7 +42,7 @@ PROGRAMS = {
     'csv': ('ur5', ('bracket.csv',)),
 }
 FUZZED = 50
-"""Broken texts a language; `weld-twin lab programs` tries thousands."""
+"""Broken texts a language."""
 
 
 def context(robot, language):
@@ -128,6 +128,16 @@ def test_a_spline_move_of_kuka_brings_its_own_tool_base_and_speed():
     step, other = read('krl', (text,), 'kuka_kr16_2').steps
     assert (step.tool.name, step.base.name, step.speed, step.stop) == ('4', '2', 0.25, False)
     assert other.end is None and 'tool or base' in other.why
+
+
+@pytest.mark.parametrize(
+    ('speed', 'told'), [('[18.30, 50,50,50]', 0.0183), ('v200', 0.2), ('[1.5E2,500,0,0]', 0.15)]
+)
+def test_an_abb_move_is_as_fast_as_its_line_says(speed, told):
+    point = '[[900,0,800],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]'
+    text = f'MODULE m\nPROC main()\nMoveL {point}, {speed}, fine, tool0;\nENDPROC\nENDMODULE\n'
+    (step,) = read('rapid', (text,), 'abb_irb1600').steps
+    assert abs(step.speed - told) < 1e-9
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,9 @@ import sys
 
 import numpy as np
 import pytest
+from own_postgres import NoServer, postgres
 
 from weld_twin_core.arm import catalog
-from weld_twin_lab.fleet.postgres import NoServer, postgres
 from weld_twin_nodes.cli.in_process import weld_twin
 
 ROBOT = 'kuka_kr6_r900'

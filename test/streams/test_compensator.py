@@ -10,6 +10,8 @@ with that zero written into the robot file by hand.
 from __future__ import annotations
 
 import json
+import os
+import signal
 import time
 
 import numpy as np
@@ -41,6 +43,7 @@ from weld_twin_msgs_py.messages.topics import (
     TOOL_WRENCH,
 )
 from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.live import compensator
 
 pytestmark = pytest.mark.cells
 
@@ -343,6 +346,80 @@ def test_a_model_exchanged_meanwhile_counts_from_the_next_goal_on(planner):
     planner.result(handle)
 
 
+def test_another_model_named_while_it_is_inactive_counts_when_it_is_active_again(planner):
+    other = planner.model.with_name('other.json')
+    write_model(other, 2.0 * OFF)
+    handle, before = planner.send(planner.goal(sway()))
+    planner.result(handle)
+    planner.go('deactivate')
+    for file in (other, planner.model):
+        assert planner.cell.set_parameter('compensator', 'model', str(file)).successful
+        planner.go('activate')
+        planner.to(HOME)
+        handle, line = planner.send(planner.goal(sway()))
+        planner.result(handle)
+        planner.go('deactivate')
+        share = 2.0 if file == other else 1.0
+        assert line['largest_m'] == pytest.approx(share * before['largest_m'], rel=1e-3)
+    planner.go('activate')
+
+
+def test_a_goal_that_is_worked_out_meanwhile_is_not_sent_by_what_was_known_before(planner):
+    """Whichever comes first: no goal goes out by a model that does not count any more."""
+    long, count = planner.goal(sway(10.0, count=6000)), len(planner.controller.goals)
+    asked = planner.client.send_goal_async(long)
+    planner.go('deactivate')
+    planner.cell.wait(asked.done, 'the answer')
+    assert not asked.result().accepted
+    planner.cell.wait(lambda: 'not active' in planner.audit[-1]['why'], 'the reason')
+    planner.go('activate')
+    told = len(planner.audit)
+    asked = planner.client.send_goal_async(long)
+    write_model(planner.model, 0.5 * OFF)
+    before = planner.audit[-1]['model']
+    planner.cell.wait(lambda: planner.cell.trigger('/compensator/reload').success, 'the model')
+    planner.cell.wait(lambda: asked.done() and len(planner.audit) > told, 'the answer')
+    assert not asked.result().accepted or planner.audit[-1]['model'] != before
+    if asked.result().accepted:
+        planner.cell.wait(asked.result().cancel_goal_async().done, 'the cancel')
+    else:
+        assert len(planner.controller.goals) == count
+
+
+def test_two_of_one_name_are_told_and_a_disk_that_does_not_answer_keeps_none(tmp_path, messages):
+    model, audit = tmp_path / 'diagnosis.json', tmp_path / 'audit'
+    write_model(model)
+    os.mkfifo(audit)  # nobody reads it, so that whoever opens it waits for ever
+    with Cell(tmp_path / 'cell') as cell:
+        planner = Planner(cell, model, apply=True, audit=str(audit), use_sim_time=True)
+        other = cell.start('compensator', robot='ur5', model=str(model), managed=False)
+        for process in (planner.process, other):
+            cell.wait(lambda: 'another node of the name /compensator' in process.log, 'the other')  # noqa: B023
+        assert other.stop() == 0
+        planner.go('configure', 'activate')
+        planner.to(HOME)
+        handle, _ = planner.send(planner.goal(sway()))
+        assert handle.accepted
+        assert 'nothing has come on /clock' in planner.process.log
+        planner.process.signal(signal.SIGTERM)
+        assert planner.process.end(20.0) == 0
+        assert f"'{audit}' has not taken all lines" in planner.process.log
+
+
+@pytest.mark.parametrize(
+    ('controller', 'sentence'),
+    [
+        ('/', 'names no controller'),
+        ('/compensator', 'names no controller'),
+        ('arm controller', 'is no name'),
+    ],
+)
+def test_goals_go_to_a_controller_that_is_named(controller, sentence, messages, capsys):
+    words = ['--ros-args', '-p', f'controller:={controller}']
+    assert compensator.main(words) == 2
+    assert sentence in capsys.readouterr().err
+
+
 def test_deviations_that_the_model_does_not_leave_withdraw_it(planner):
     deviation = planner.cell.publisher(DEVIATION)
 
@@ -358,6 +435,37 @@ def test_deviations_that_the_model_does_not_leave_withdraw_it(planner):
     deviate()
     planner.cell.wait(lambda: 'does not hold' in planner.process.log, 'the notice')
     planner.refused(planner.goal(sway()), 'does not hold any more')
+    planner.cell.node.destroy_publisher(deviation)
+
+
+def test_at_rest_nothing_is_promised_of_a_joint_that_loses_motion_without_a_law(planner):
+    """A curve over direction says what is lost on the way, and at rest not on which side."""
+    lost = {'effect': 'joint_curve', 'joint': NAMES[1], 'over': 'direction', 'knots': [-1.0, 1.0]}
+    write_model(planner.model, OFF, {**lost, 'values': [-3e-4, 3e-4]})
+    assert planner.cell.trigger('/compensator/reload').success
+    seen(planner.cell, 0.5)  # in which the arm stands
+    deviation, before = (
+        planner.cell.publisher(DEVIATION),
+        planner.process.log.count('does not hold'),
+    )
+
+    def deviate(stamps):
+        for stamp in stamps:
+            deviation.publish(planner.cell.messages.vector3(stamp, np.array([3e-4, 0.0, 0.0])))
+        planner.cell.meet()
+
+    now = planner.cell.node.get_clock().now().nanoseconds
+    deviate(now - k * 4_000_000 for k in range(40))
+    handle, line = planner.send(planner.goal(sway()))
+    assert handle.accepted, line
+    assert 'no bound is told' in ' '.join(line['notes'])
+    planner.result(handle)
+    track = planner.controller.track
+    fast = [stamp for stamp, t in track if 0.3 < t < 0.7]
+    assert len(fast) > 20
+    deviate(fast)
+    told = lambda: planner.process.log.count('does not hold') > before  # noqa: E731
+    planner.cell.wait(told, 'the notice')
     planner.cell.node.destroy_publisher(deviation)
 
 

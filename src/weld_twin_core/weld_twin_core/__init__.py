@@ -159,16 +159,16 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     """Import what a public name stands for, when it is used first (PEP 562)."""
     if name in _ROOMS:
-        found: Any = import_module(f'.{_ROOMS[name]}', __name__)
+        result: Any = import_module(f'.{_ROOMS[name]}', __name__)
     else:
         home = next((module for module, names in _HOMES.items() if name in names), None)
         if home is None:
             raise AttributeError(
                 f'weld_twin_core has no public name {name!r}; dir(weld_twin_core) lists them'
             )
-        found = getattr(import_module(f'.{home}', __name__), name)
-    globals()[name] = found
-    return found
+        result = getattr(import_module(f'.{home}', __name__), name)
+    globals()[name] = result
+    return result
 
 
 def __dir__() -> list[str]:

@@ -238,8 +238,8 @@ class _Point:
     @property
     def cost(self) -> float:
         """Return the weighted squares and what priors add."""
-        left = self.weight[:, None] * self.rows[0]
-        return float((left**2).sum() + (self.state.unknowns**2).sum())
+        remaining = self.weight[:, None] * self.rows[0]
+        return float((remaining**2).sum() + (self.state.unknowns**2).sum())
 
     @cached_property
     def reduced(self) -> _Taken:
@@ -293,10 +293,6 @@ def adjusted(seen: Sightings) -> Adjusted:
     """
     Return the poses that images tell.
 
-    Parameters
-    ----------
-    seen : Sightings
-
     Raises
     ------
     DataError
@@ -315,16 +311,16 @@ def adjusted(seen: Sightings) -> Adjusted:
         np.zeros(0),
     )
     state = replace(state, unknowns=np.zeros(state.sizes.size))
-    told = np.ones(len(seen.image)) if seen.sigma is None else 1.0 / seen.sigma
+    reported = np.ones(len(seen.image)) if seen.sigma is None else 1.0 / seen.sigma
     for _ in range(REWEIGHTED):
-        weight, _ = _weights(state, told)
+        weight, _ = _weights(state, reported)
         state = _descended(_Point.at(state, weight)).state
-    state = _loosened(state, told)
-    weight, noise = _weights(state, told)
+    state = _loosened(state, reported)
+    weight, noise = _weights(state, reported)
     return _told(_Point.at(state, weight), noise)
 
 
-def _loosened(state: _State, told: Array) -> _State:
+def _loosened(state: _State, reported: Array) -> _State:
     """
     Return the state with points of targets as well known as the images say, never better.
 
@@ -333,7 +329,7 @@ def _loosened(state: _State, told: Array) -> _State:
     """
     said = [target.sigma for target in state.seen.targets]
     for _ in range(LEARNED):
-        weight, _ = _weights(state, told)
+        weight, _ = _weights(state, reported)
         normal = _Point.at(state, weight).reduced.normal
         known = 1.0 - np.diag(np.linalg.inv(normal + np.eye(len(normal))))
         at = state.unknowns.size - sum(t.points.size for t in state.seen.targets)
@@ -356,11 +352,6 @@ def seen_by(recording: Recording, seen: Sightings) -> Recording:
     """
     Return a recording with the poses that images tell, and what the images say of the lenses.
 
-    Parameters
-    ----------
-    recording : Recording
-    seen : Sightings
-
     Raises
     ------
     DataError
@@ -368,25 +359,25 @@ def seen_by(recording: Recording, seen: Sightings) -> Recording:
 
     """
     seen, said = _upright(seen)
-    found = adjusted(seen)
-    images, poses = len(seen.t), found.measured.t.size
+    result = adjusted(seen)
+    images, poses = len(seen.t), result.measured.t.size
     notes = [
         *said,
-        f'{poses} of {images} images tell a pose; points are found within {found.pixel:.2f} px',
+        f'{poses} of {images} images tell a pose; points are found within {result.pixel:.2f} px',
     ]
-    for camera, lens in zip(seen.cameras, found.lenses, strict=True):
+    for camera, lens in zip(seen.cameras, result.lenses, strict=True):
         longer = 100.0 * (lens.focal / camera.lens.focal - 1.0).mean()
         notes.append(f'camera {camera.name!r}: the images have the focal length {longer:+.2f} %')
     notes += [
         f'points of target {target.name!r} are off by {1e3 * sigma:.2f} mm, not by '
         f'{1e3 * target.sigma:.2f} mm as was said'
-        for target, sigma in zip(seen.targets, found.known, strict=True)
+        for target, sigma in zip(seen.targets, result.known, strict=True)
         if sigma > LOOSER * target.sigma
     ]
     return replace(
         recording,
-        images=replace(seen, fitted=Fitted(found.pixel, found.off)),
-        measured=found.measured,
+        images=replace(seen, fitted=Fitted(result.pixel, result.off)),
+        measured=result.measured,
         notes=(*recording.notes, *notes),
     )
 
@@ -424,16 +415,16 @@ def _lies(seen: Sightings, c: int) -> bool:
     return bool((most > BEYOND * size).any() and (most <= BEYOND * size[::-1]).all())
 
 
-def _weights(state: _State, told: Array) -> tuple[Array, float]:
+def _weights(state: _State, reported: Array) -> tuple[Array, float]:
     """Return the weight of every sighting [1/px], and the noise of a coordinate [px]."""
-    residual = state.rows()[0] * told[:, None]
+    residual = state.rows()[0] * reported[:, None]
     # Poses took their share of the noise: six numbers of every stamp, and of unknowns some.
     free = max(1.0 - (6 * len(state.tool) + UNKNOWNS) / max(residual.size, 1), 0.05)
     spread = NORMAL * float(np.median(np.abs(residual))) / np.sqrt(free)
     spread = max(float(spread), LEAST_PIXEL)
     off = np.sqrt((residual**2).mean(axis=1)) / spread
-    weight = told / spread * np.minimum(1.0, HUBER / np.maximum(off, 1e-12))
-    return np.asarray(weight), spread / float(np.median(told))
+    weight = reported / spread * np.minimum(1.0, HUBER / np.maximum(off, 1e-12))
+    return np.asarray(weight), spread / float(np.median(reported))
 
 
 def _descended(here: _Point) -> _Point:

@@ -36,7 +36,6 @@ class Bursts(NamedTuple):
 
     Attributes
     ----------
-    number : int
     every : float [s]
         Median time from burst to burst.
     first, step : float [s]

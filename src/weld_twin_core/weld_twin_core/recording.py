@@ -328,9 +328,6 @@ class Recording:
 
     Attributes
     ----------
-    name : str
-    joints : JointMotion
-    measured : Measurements, optional
     wrench : Signal, value shape (K, 6) [N, N m], optional
         Force and torque on the tool, in ``wrench_frame``.
     wrench_frame : str
@@ -405,9 +402,9 @@ class Recording:
         )
         for name, signal, wanted in sides:
             if signal is not None and signal.value.shape[1:] != wanted:
-                told = ', '.join(['K', *map(str, wanted)]) if wanted else 'K,'
+                reported = ', '.join(['K', *map(str, wanted)]) if wanted else 'K,'
                 raise DataError(
-                    f'{name} of recording {self.name!r} must have shape ({told}), '
+                    f'{name} of recording {self.name!r} must have shape ({reported}), '
                     f'got {signal.value.shape}'
                 )
 
@@ -435,11 +432,11 @@ class Recording:
     @cached_property
     def _at_measured(self) -> tuple[Array, Array, Array | None, Array | None, Array | None]:
         assert self.measured is not None
-        found = self._looked_up(self.measured.t)
-        for value in found:
+        result = self._looked_up(self.measured.t)
+        for value in result:
             if value is not None:
                 value.setflags(write=False)
-        return found
+        return result
 
     def _looked_up(
         self, t: Array

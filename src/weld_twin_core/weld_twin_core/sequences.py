@@ -16,10 +16,6 @@ def halton(dimensions: int, count: int) -> Array:
     """
     Return Halton's points [1]_ without the first, which is the origin, shape (count, dimensions).
 
-    Parameters
-    ----------
-    dimensions, count : int
-
     References
     ----------
     .. [1] J. H. Halton, "On the efficiency of certain quasi-random sequences of points in evaluating

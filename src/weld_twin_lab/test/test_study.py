@@ -33,7 +33,8 @@ def test_a_folder_with_something_else_in_it_is_refused(tmp_path):
     Study(Namespace(out=tmp_path / 'not there yet')).refuse_foreign('parts')
     ours = Study(Namespace(out=tmp_path))
     (tmp_path / 'parts').mkdir()
-    ours.refuse_foreign('parts')
+    ours.write('result', {})  # and is made again when it was done
+    ours.refuse_foreign('parts', 'result.json')
     (tmp_path / 'thesis.tex').touch()
     with pytest.raises(DataError, match='something else'):
-        ours.refuse_foreign('parts')
+        ours.refuse_foreign('parts', 'result.json')

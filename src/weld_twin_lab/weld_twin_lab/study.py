@@ -21,7 +21,9 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from weld_twin_core import __version__
@@ -29,6 +31,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_nodes.cli.options import add_pool
 from weld_twin_nodes.offline.output_directory import write_owned
+from weld_twin_nodes.offline.owned_files import LIST
 
 if TYPE_CHECKING:
     from weld_twin_nodes.offline.task_pool import Runner, Task
@@ -193,7 +196,7 @@ class Study:
             It holds another name than ``ours``, or is no folder.
 
         """
-        out = self.out
+        out, ours = self.out, (*ours, LIST)
         if out.exists() and not (out.is_dir() and all(p.name in ours for p in out.iterdir())):
             raise DataError(f"'{out}' holds something else already; choose another place")
 
@@ -206,7 +209,13 @@ def head(schema: str, **more: Any) -> dict[str, Any]:
 def study(run: Callable[[Study], bool | None]) -> Callable[[argparse.Namespace], int]:
     """Return the subcommand of a study; one that returns False has missed a goal."""
 
+    @wraps(run)
     def command(args: argparse.Namespace) -> int:
         return MISSED if run(Study(args)) is False else 0
 
     return command
+
+
+def job(text: str | None, add_arguments: Add) -> SimpleNamespace:
+    """Return a job of a proof, as `add_command` takes it: what its help says, and its options."""
+    return SimpleNamespace(__doc__=text, add_arguments=add_arguments)

@@ -115,28 +115,28 @@ def _run(asked: dict[str, Any], out: int) -> NoReturn:
     resource.setrlimit(resource.RLIMIT_FSIZE, (asked['file'],) * 2)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     os.environ['WELD_TWIN_PROGRESS'] = 'lines'
-    told, printed = Telling(out), io.StringIO()
+    reported, printed = Telling(out), io.StringIO()
     code = 1
     try:
         if asked.get('folder'):
             os.chdir(asked['folder'])
-        with contextlib.redirect_stderr(told), contextlib.redirect_stdout(printed):
+        with contextlib.redirect_stderr(reported), contextlib.redirect_stdout(printed):
             from weld_twin_nodes.cli.main import main as command
 
             code = command([str(word) for word in asked['words']])
     except SystemExit as stop:
         code = stop.code if isinstance(stop.code, int) else 1
     except MemoryError:
-        told.last = _TOO_MUCH
+        reported.last = _TOO_MUCH
     except BaseException as error:
         short = any(sign in str(error) for sign in _NO_ROOM)
-        told.last = _TOO_MUCH if short else f'{type(error).__name__}: {error}'
+        reported.last = _TOO_MUCH if short else f'{type(error).__name__}: {error}'
     used = resource.getrusage(resource.RUSAGE_SELF)
     answer(
         out,
         {
             'code': code,
-            'said': told.last,
+            'said': reported.last,
             'memory': used.ru_maxrss * KIB,
             'cpu_s': used.ru_utime + used.ru_stime,
         },

@@ -122,6 +122,18 @@ def test_where_all_is_told_apart_no_reason_is_given():
     assert decide(evidence(SURE)).reasons == ()
 
 
+def test_beliefs_that_are_given_decide():
+    told = evidence(slot((PLAY, 0.9), (OFFSET, 0.1)))
+    assert decide(told).status == 'identified'
+    assert decide(told, replace(Beliefs(), sure=0.95)).status == 'ambiguous'
+
+
+@pytest.mark.parametrize(('errors', 'structured'), [(2.9, False), (3.1, True)])
+def test_a_structure_counts_from_three_standard_errors_on(errors, structured):
+    told = evidence(SURE, structure=left_over(0.08, errors))
+    assert Left(told, Beliefs()).structured == structured
+
+
 # Named, or without a name -----------------------------------------------------------------------
 
 
@@ -139,8 +151,18 @@ def test_unlikely_names_make_a_gap_unknown_where_they_explain_more_than_the_othe
     pair = SURE, slot((OFFSET, 1.0))
     verdict = decide(evidence(*pair, believed=(0.9, 0.2), parts=parts))
     assert verdict.status == status
-    assert verdict.sets == (((PLAY,), (OFFSET,)) if status == 'identified' else ((PLAY,),))
+    assert verdict.sets == ((PLAY,),)
     assert status == 'identified' or str(OFFSET) in verdict.reasons[-1]
+
+
+@pytest.mark.parametrize(('nameless', 'status'), [(0.5, 'identified'), (0.51, 'unknown')])
+def test_a_gap_is_unknown_where_a_cause_without_a_name_is_likelier_than_not(nameless, status):
+    pair = SURE, slot((OFFSET, 1.0))
+    verdict = decide(evidence(*pair, believed=(0.9, 0.2), parts=(0.9, 0.1), nameless=nameless))
+    assert (verdict.status, verdict.sets) == (status, ((PLAY,),))
+    alone = decide(evidence(SURE, nameless=nameless))
+    assert (alone.status, alone.sets) == (status, ((PLAY,),))
+    assert status == 'identified' or 'not in the library' in alone.reasons[0]
 
 
 def test_what_is_left_makes_a_gap_unknown_where_it_is_more_than_what_is_named():

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from weld_twin_core.diagnosis.many.shrinkage import learned_precision
+from weld_twin_core.diagnosis.algebra.learned_sizes import learned_precision
 
 ROWS = 400
 SPREAD = 3.0

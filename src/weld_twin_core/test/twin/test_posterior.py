@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -157,6 +159,32 @@ def test_only_the_discrepancy_grows_with_the_distance():
     np.testing.assert_allclose(got[3, 2, 2], 2.0**2 * 4e-10, rtol=1e-9)
 
 
+def test_effects_at_the_middle_move_the_tool_as_far_as_the_models_in_the_middle_do():
+    robot, joint = load('ur5'), load('ur5').joint_names[1]
+    found = (
+        REGISTRY['link_twist'](joint, 4e-4),
+        REGISTRY['transmission_ripple'](joint, 2e-4, 2.0, 0.3),
+        REGISTRY['backlash'](joint, 5e-4),
+    )
+    wave = found[1].search.with_orders(np.array([1.0, 2.0]))
+    kinds = (REGISTRY['joint_offset'](joint, 0.0), found[0], wave)
+    what = Directions((), 1, kinds)
+    known = posterior(robot, what, np.diag(np.full(what.count, 1e-10)))
+    mean = np.array([3e-5, -2e-5, 1e-5, 2e-5, -1e-5, 3e-5])
+    known = replace(known, mean=mean, middle=0.5)
+    effects, rest = known.centred(found)
+    np.testing.assert_allclose(rest.mean, 0.5 * mean, rtol=1e-9)
+    assert found[2] in effects
+    still = Recording('m', JointMotion(np.arange(7.0), np.linspace(-1.0, 1.0, 42).reshape(7, 6)))
+    fitted = Twin(robot, found)
+    features = Features(fitted, still, still.joints.t)
+    foretold = 0.5 * np.tensordot(mean, what.columns(features, 0), axes=(0, 0))[:3].T
+    moved = Twin(robot, effects).poses(still).position - fitted.poses(still).position
+    np.testing.assert_allclose(moved, foretold, atol=2e-8)
+    same, nothing = replace(known, middle=0.0).centred(found)
+    assert (same, nothing.mean.tolist()) == (found, mean.tolist())
+
+
 def test_a_covariance_that_cannot_be_is_refused():
     robot = load('ur5')
     what = Directions(('base',), 1, ())
@@ -209,6 +237,23 @@ def test_a_motion_to_come_is_not_late_by_the_clock_of_the_instrument():
     moving = Recording('m', JointMotion(t, np.outer(np.sin(3.0 * t), np.ones(6))))
     seen = Features(Twin(robot, effects), moving, t)
     bare = posterior(robot, Directions((), 1, effects[::2]), np.diag([1e-8, 4e-8]))
-    told = late.without_clocks().pose_covariance(seen)
+    told = late.of_the_arm().pose_covariance(seen)
     np.testing.assert_allclose(told, bare.pose_covariance(seen), rtol=1e-9, atol=1e-18)
     assert np.trace(late.pose_covariance(seen)[0, :3, :3]) > 100.0 * np.trace(told[0, :3, :3])
+
+
+def test_what_may_be_the_arms_instead_of_the_instruments_is_no_less_the_arms():
+    """
+    An instrument was found to read 60 ppm short where it is an upper arm that is too short.
+
+    What is measured is the same either way. What the arm does on its own is not.
+    """
+    robot, scale = load('ur5'), 6e-5
+    arm = REGISTRY['link_length'](robot.joint_names[1], 0.0)
+    stretched = Recording('m', JointMotion(np.arange(2.0), np.zeros((2, 6))))
+    seen = Features(Twin(robot, (arm,)), stretched, stretched.joints.t)
+    short = -scale * (-0.425 - 0.39225)  # the two links of a UR5 lie along x of its base
+    what = Directions((), 1, (REGISTRY['measurement_scale'](-scale), arm))
+    allowed = posterior(robot, what, np.diag([1e-16, 1e-16]), np.array([scale, short]))
+    for told, off in ((allowed, 0.0), (allowed.of_the_arm(), short)):
+        np.testing.assert_allclose(told.drawn(seen)[0, :, 0].mean(), off, atol=1e-7)

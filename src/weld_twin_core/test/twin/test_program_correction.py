@@ -4,9 +4,12 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 import weld_twin_core as wt
 from weld_twin_core.motion.programs import Move, MoveProgram, Use, travel
+from weld_twin_core.twin.drawn import Drawn
+from weld_twin_core.twin.program_accuracy import accuracy
 from weld_twin_core.twin.program_correction import Caps, correct_program
 from weld_twin_core.twin.program_model import ProgramModel
 
@@ -94,3 +97,22 @@ def test_what_was_found_of_another_tool_is_left_out(ur5):
     model = ProgramModel(ur5, (bent,))
     assert len(model.twin(EYE).effects) == 1
     assert not model.twin(moved(EYE, 0, 0, 0.1)).effects
+
+
+def test_a_move_from_rest_to_rest_takes_as_long_as_its_speed_says(ur5):
+    # A tenth of the speed at a stop, all of it after 0.135 of the way: dt = ds / v, by quadrature.
+    there = seam(ur5, Move('linear', use(1), EYE, speed=0.05, stop=True))
+    (piece,) = travel(ur5, there).pieces
+    first, last = (int(piece.ends[k]) for k in (0, 1))
+    near = quad(lambda s: 1.0 / (0.1 + s / 0.15), 0.0, 0.135)[0]
+    wanted = 0.1 / 0.05 * (1.0 - 2 * 0.135 + 2 * near)
+    stay = 0.3
+    assert abs(piece.motion.t[last] - piece.motion.t[first] - stay - wanted) < 1e-9
+
+
+def test_the_model_that_was_found_lies_within_what_is_expected():
+    # Every drawn model is off by a millimetre; the one found is not, and is allowed as well.
+    off = np.zeros((1, 50, 3))
+    off[..., 0] = 1e-3
+    found = accuracy([np.zeros((4, 6))], [Drawn(np.zeros(4, dtype=int), off, off)])
+    assert (found.low, found.high) == (0.0, pytest.approx(1e-3))

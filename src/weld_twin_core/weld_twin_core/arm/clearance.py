@@ -63,7 +63,6 @@ def body(robot: Robot, q: Array) -> Body:
 
     Parameters
     ----------
-    robot : Robot
     q : array, shape (..., n) [rad or m]
 
     """
@@ -131,7 +130,6 @@ def free(robot: Robot, q: Array, seen: Array, box: Array | None = None) -> Array
 
     Parameters
     ----------
-    robot : Robot
     q : array, shape (N, n) [rad or m]
     seen : array, shape (K, n) [rad or m]
         Postures that the arm was in: whatever is near there is no collision, for the arm was there.
@@ -149,7 +147,6 @@ class Space:
 
     Parameters
     ----------
-    robot : Robot
     seen : array, shape (K, n) [rad or m]
     box : array, shape (2, 3), optional [m]
 

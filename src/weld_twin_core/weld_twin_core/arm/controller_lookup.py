@@ -23,10 +23,6 @@ def controller_frames(robot: Robot) -> ControllerFrames:
     of any other robot file the rows begin at the base and end at the flange, which a tool frame
     without a length turns.
 
-    Parameters
-    ----------
-    robot : Robot
-
     """
     if robot.controller is not None:
         return robot.controller

@@ -31,7 +31,6 @@ def point_force_torque(
 
     Parameters
     ----------
-    robot : Robot
     chain : Frames
         The chain at the samples.
     point, force : array, shape (3, ...) [m, N]
@@ -65,7 +64,6 @@ def payload_torque(robot: Robot, chain: Frames, mass: Array | float, com: Array)
 
     Parameters
     ----------
-    robot : Robot
     chain : Frames
         The chain at the samples.
     mass : float, or array broadcasting with the samples [kg]
@@ -88,7 +86,6 @@ def wrench_rotation(robot: Robot, chain: Frames, frame: str) -> Array:
 
     Parameters
     ----------
-    robot : Robot
     chain : Frames
         The chain at the samples.
     frame : str
@@ -115,7 +112,6 @@ def wrench_torque(robot: Robot, chain: Frames, wrench: Array, frame: str = 'tool
 
     Parameters
     ----------
-    robot : Robot
     chain : Frames
         The chain at the samples.
     wrench : array, shape (..., 6) [N, N m]
@@ -215,7 +211,6 @@ def torque_slope(
 
     Parameters
     ----------
-    robot : Robot
     chain : Frames
         The chain at the samples.
     wrench : array, shape (..., 6), optional [N, N m]
@@ -295,7 +290,6 @@ def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
 
     Parameters
     ----------
-    robot : Robot
     chain : Frames
         The chain at the samples.
     i : int

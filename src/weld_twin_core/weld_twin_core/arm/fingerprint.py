@@ -21,10 +21,6 @@ def fingerprint(robot: Robot) -> str:
     Rows and kinds of its joints count. Names, limits, masses, and where the arm stands and what
     tool it carries do not.
 
-    Parameters
-    ----------
-    robot : Robot
-
     """
     angles = np.stack([robot.alpha, robot.theta, robot.beta])
     turned = np.angle(np.exp(1j * (angles + 0.25 * GRID))) - 0.25 * GRID

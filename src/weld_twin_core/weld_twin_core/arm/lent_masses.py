@@ -30,10 +30,6 @@ def with_lent_masses(robot: Robot) -> Robot:
     """
     Return the robot with the masses of the bundled arm whose axes are its own, where it has none.
 
-    Parameters
-    ----------
-    robot : Robot
-
     Returns
     -------
     Robot

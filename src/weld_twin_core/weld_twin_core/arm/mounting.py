@@ -31,10 +31,6 @@ def rising(robot: Robot) -> float:
 
     The second axis tells it; where that meets the foot, z of the link that it stands in does.
 
-    Parameters
-    ----------
-    robot : Robot
-
     """
     if robot.n > 1 and not robot.prismatic[0]:
         chain = frames(robot.with_frames(base=np.eye(4)), np.zeros(robot.n))

@@ -27,7 +27,6 @@ def least_step(robot: Robot, q: Array, off: Array) -> Array:
 
     Parameters
     ----------
-    robot : Robot
     q : array, shape (M, n) [rad or m]
     off : array, shape (M, 3) [m]
         The way that the tool point has to go.
@@ -46,7 +45,6 @@ def reaching(robot: Robot, points: Array, start: Array) -> tuple[Array, NDArray[
 
     Parameters
     ----------
-    robot : Robot
     points : array, shape (M, 3) [m]
     start : array, shape (M, n) [rad or m]
 

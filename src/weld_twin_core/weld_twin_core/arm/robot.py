@@ -243,10 +243,6 @@ class Robot:
         """
         Return the position of a joint in the chain, counted from 0.
 
-        Parameters
-        ----------
-        joint : str
-
         Raises
         ------
         ModelError

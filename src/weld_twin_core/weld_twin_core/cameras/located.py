@@ -42,7 +42,6 @@ def located(lens: Lens, points: Array, pixels: Array) -> Array | None:
 
     Parameters
     ----------
-    lens : Lens
     points : array, shape (N, 3) [m]
         In the target's frame.
     pixels : array, shape (N, 2) [px]
@@ -118,11 +117,11 @@ def _nearest(matrix: Array) -> Array:
 
 def _refined(pose: Array, own: Array, flat: Array) -> tuple[float, Array]:
     """Return the squared distance that is left and the pose after least squares."""
-    cost, left, columns = _seen(pose, own, flat)
+    cost, remaining, columns = _seen(pose, own, flat)
     for _ in range(STEPS):
         normal = columns.T @ columns
         normal[np.diag_indices(6)] *= 1.0 + DAMPED
-        step = np.linalg.lstsq(normal, columns.T @ left, rcond=1e-14)[0]
+        step = np.linalg.lstsq(normal, columns.T @ remaining, rcond=1e-14)[0]
         there = pose.copy()
         there[:3, :3] = rotation_matrix(step[3:]) @ pose[:3, :3]
         there[:3, 3] += step[:3]
@@ -130,7 +129,7 @@ def _refined(pose: Array, own: Array, flat: Array) -> tuple[float, Array]:
         if not then[0] < cost:
             break
         gain, pose = cost - then[0], there
-        cost, left, columns = then
+        cost, remaining, columns = then
         if gain < 1e-6 * cost:
             break
     return cost, pose
@@ -146,5 +145,5 @@ def _seen(pose: Array, own: Array, flat: Array) -> tuple[float, Array, Array]:
     by_point[:, 0, 0] = by_point[:, 1, 1] = 1.0 / depth
     by_point[:, :, 2] = -ray / depth[:, None]
     columns = np.concatenate([by_point, -by_point @ skew(turned)], axis=2).reshape(-1, 6)
-    left = (flat - ray).ravel()
-    return float(left @ left), left, columns
+    remaining = (flat - ray).ravel()
+    return float(remaining @ remaining), remaining, columns

@@ -28,7 +28,6 @@ class Camera:
 
     Attributes
     ----------
-    name : str
     lens : Lens
         As it was calibrated; the diagnosis takes how far that may be off into account.
     mount : str
@@ -66,7 +65,6 @@ class Target:
 
     Attributes
     ----------
-    name : str
     labels : tuple of str
         One for every point.
     points : array, shape (P, 3) [m]
@@ -140,8 +138,6 @@ class Sightings:
 
     Attributes
     ----------
-    cameras : tuple of Camera
-    targets : tuple of Target
     t : array, shape (M,) [s]
         Stamps of the images, strictly increasing; images of several cameras share a stamp.
     image, camera, target, point : array of int, shape (N,)

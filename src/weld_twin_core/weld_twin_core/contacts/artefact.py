@@ -20,11 +20,6 @@ class Artefact:
     """
     What is touched, and what is known of it.
 
-    Attributes
-    ----------
-    contacts : tuple of Contact
-    ties : tuple of Tie
-
     Raises
     ------
     DataError

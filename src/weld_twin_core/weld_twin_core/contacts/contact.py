@@ -29,7 +29,6 @@ class Contact:
 
     Attributes
     ----------
-    label : str
     kind : str
         'point', 'length' (distance from a centre), 'sphere', 'line' or 'plane'.
     radius : float, optional [m]

@@ -21,7 +21,6 @@ class Contacts:
 
     Attributes
     ----------
-    artefact : Artefact
     labels : tuple of str
         What each posture touched.
     value : array, shape (M,) [m], optional

@@ -29,10 +29,6 @@ def described(entry: Mapping[str, Any]) -> tuple[tuple[Contact, ...], tuple[Tie,
     """
     Return the contacts and ties of an artefact file; see `Artefact.from_mapping`.
 
-    Parameters
-    ----------
-    entry : mapping
-
     Raises
     ------
     DataError
@@ -40,8 +36,8 @@ def described(entry: Mapping[str, Any]) -> tuple[tuple[Contact, ...], tuple[Tie,
 
     """
     if not isinstance(entry, Mapping) or not set(entry) <= set(ENTRIES):
-        found = ', '.join(map(str, entry)) if isinstance(entry, Mapping) else 'no mapping'
-        raise DataError(f'an artefact has contacts, blocks, distances and angles; got {found}')
+        result = ', '.join(map(str, entry)) if isinstance(entry, Mapping) else 'no mapping'
+        raise DataError(f'an artefact has contacts, blocks, distances and angles; got {result}')
     contacts = [_contact(str(label), what) for label, what in _mapped(entry, 'contacts')]
     ties: list[Tie] = []
     for label, what in _mapped(entry, 'blocks'):

@@ -33,7 +33,6 @@ def spreads(contacts: Contacts, points: Array) -> dict[str, Array]:
 
     Parameters
     ----------
-    contacts : Contacts
     points : array, shape (M, 3) [m]
 
     """
@@ -56,7 +55,6 @@ def lengths(contacts: Contacts, points: Array) -> list[Length]:
 
     Parameters
     ----------
-    contacts : Contacts
     points : array, shape (M, 3) [m]
 
     """

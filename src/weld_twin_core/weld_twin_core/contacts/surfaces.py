@@ -28,7 +28,6 @@ class Surface:
 
     Attributes
     ----------
-    contact : Contact
     point : array, shape (3,) [m]
         The point, the centre, or a point of the plane or the line.
     axis : array, shape (3,)
@@ -50,7 +49,6 @@ class Surface:
 
         Parameters
         ----------
-        contact : Contact
         p : array, shape (m, 3) [m]
             Tool points that touched it.
         value : array, shape (m,) [m], optional
@@ -180,7 +178,7 @@ def _ball(contact: Contact, p: Array, radius: Array | None) -> Surface:
     x = p - middle
     right = (x**2).sum(axis=1) - (0.0 if radius is None else radius**2)
     columns = np.column_stack([2.0 * x, np.ones(len(x))])
-    found = np.linalg.lstsq(columns, right, rcond=1e-9)[0]
-    size = float(np.sqrt(max(found[3] + found[:3] @ found[:3], LEAST)))
+    result = np.linalg.lstsq(columns, right, rcond=1e-9)[0]
+    size = float(np.sqrt(max(result[3] + result[:3] @ result[:3], LEAST)))
     size = size if radius is None else float(np.median(radius))
-    return Surface(contact, middle + found[:3], np.array([0.0, 0.0, 1.0]), size)
+    return Surface(contact, middle + result[:3], np.array([0.0, 0.0, 1.0]), size)

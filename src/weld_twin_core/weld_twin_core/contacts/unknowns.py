@@ -69,8 +69,8 @@ class Unknowns:
         basis, strength, _ = np.linalg.svd(both / size, full_matrices=False)
         basis = basis[:count, strength > RANK * strength.max(initial=0.0)]
         directions, taken, _ = np.linalg.svd(basis, full_matrices=False)
-        left = np.sqrt(np.clip(1.0 - taken**2, 0.0, 1.0))
-        return directions.T, np.where(left < 1e-7, 0.0, left)
+        remaining = np.sqrt(np.clip(1.0 - taken**2, 0.0, 1.0))
+        return directions.T, np.where(remaining < 1e-7, 0.0, remaining)
 
     @property
     def freedom(self) -> int:

@@ -49,6 +49,6 @@ def __getattr__(name: str) -> Any:
     """Return a public name, loading its module first."""
     if name not in __all__:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    found = getattr(import_module(f'.{_HOMES.get(name, "result")}', __name__), name)
-    globals()[name] = found
-    return found
+    result = getattr(import_module(f'.{_HOMES.get(name, "result")}', __name__), name)
+    globals()[name] = result
+    return result

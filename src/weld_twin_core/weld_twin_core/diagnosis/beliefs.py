@@ -42,8 +42,7 @@ class Beliefs:
     Each field says what it means, its unit, and where its value comes from. "Moved" tells what
     changes when the number is moved by 25 % down and up on 40 sealed development cases (`weld-twin
     blind make --cases 40 --seed 424202`), of which 35 are right as the numbers stand, before names
-    are held against curves. `weld-twin lab beliefs` makes the whole table, and
-    docs/beliefs.md keeps the last one. The numbers by which data are refused as
+    are held against curves. The numbers by which data are refused as
     unsound lie in `soundness.limits`.
 
     Examples

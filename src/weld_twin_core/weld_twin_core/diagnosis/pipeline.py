@@ -151,15 +151,15 @@ def _explained(
     """
     Return the diagnosis of recordings that were found sound.
 
-    Where a few effects leave the cause unknown, and all kinds together predict as well, kinds that
-    unseen data need are told in their place.
+    Where a few effects leave the cause unknown, and that is rather wrong than right, and all kinds
+    together predict as well, kinds that unseen data need are told in their place.
     """
-    found = _searched(examined, exclude, beliefs, progress)
-    out = _told(found, examined, exclude, holdout, beliefs, limits, progress)
-    if found.many is None or out.status != 'unknown' or _named(out):
+    result = _searched(examined, exclude, beliefs, progress)
+    out = _told(result, examined, exclude, holdout, beliefs, limits, progress)
+    if result.many is None or out.status != 'unknown' or _named(out) or _nameless(out):
         return out
     progress('a few effects leave the cause unknown: all kinds together')
-    many = _told(found.many, examined, exclude, holdout, beliefs, limits, progress)
+    many = _told(result.many, examined, exclude, holdout, beliefs, limits, progress)
     return many if _named(many) else out
 
 
@@ -168,8 +168,13 @@ def _named(out: Diagnosis) -> bool:
     return any(cause.effect is not None and cause.probability > LIKELIER for cause in out.causes)
 
 
+def _nameless(out: Diagnosis) -> bool:
+    """Return whether it is likelier than not that no name is right."""
+    return max(out.confidence, getattr(out.evidence, 'nameless', 0.0)) > LIKELIER
+
+
 def _told(
-    found: Search,
+    result: Search,
     examined: Examined,
     exclude: Sequence[str],
     holdout: Sequence[Recording],
@@ -178,43 +183,42 @@ def _told(
     progress: Progress,
 ) -> Diagnosis:
     """Return the diagnosis of what was found."""
-    examined = examined.torn(found.problem, found.final.model)
+    examined = examined.torn(result.problem, result.final.model)
     if examined.posed is None:
         return refusal(examined)
     holdout = examined.mended(holdout)
-    found, least = borne_out(found, holdout, exclude, beliefs)
-    unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    leftover = structure(unseen, found.final.model, beliefs)
+    result, least = borne_out(result, holdout, exclude, beliefs)
+    unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
+    leftover = structure(unseen, result.final.model, beliefs)
     progress('looked for what is left')
-    floor = noise_floor(found.problem, found.problem.residuals(found.final.model))
-    shrink = held_out_shrink(found, unseen, holdout, beliefs)
-    chance = reached_by_chance(found, unseen, holdout, beliefs)
-    evidence = gathered(found, unseen, leftover, shrink, floor, beliefs, least, chance)
-    rival = curved(found, beliefs)
-    left = missed(found, unseen, beliefs)
-    table = table_of(found.slots, beliefs)
-    statements = stated(found, unseen, evidence, table, rival)
-    believed = tuple(one.probability for one in statements.names)
-    evidence = replace(evidence, believed=believed, missed=left.in_words)
-    verdict = no_noise(decide(evidence, beliefs), rival, left, beliefs)
-    rival = standing(found, verdict, rival, beliefs)
+    floor = noise_floor(result.problem, result.problem.residuals(result.final.model))
+    shrink = held_out_shrink(result, unseen, holdout, beliefs)
+    chance = reached_by_chance(result, unseen, holdout, beliefs)
+    evidence = gathered(result, unseen, leftover, shrink, floor, beliefs, least, chance)
+    alternative = curved(result, beliefs)
+    remaining = missed(result, unseen, beliefs)
+    table = table_of(result.slots, beliefs)
+    statements = stated(result, unseen, evidence, table, alternative)
+    evidence = statements.put_to(replace(evidence, missed=remaining.in_words))
+    verdict = no_noise(decide(evidence, beliefs), alternative, remaining, beliefs)
+    alternative = standing(result, verdict, alternative, beliefs)
     unseen.forget_other_parts()
-    places = placed(found, verdict, rival, left, beliefs)
+    places = placed(result, verdict, alternative, remaining, beliefs)
     progress('held against curves without a formula')
-    which = verdict, rival, holdout, beliefs
-    found, unseen, shrink, verdict = carried(found, unseen, shrink, *which)
-    found = _by_itself(_held(found, examined.given.robot), shrink)
-    posterior = allowed(found.problem, found.final.model, found.scale, found.precision, floor)
+    which = verdict, alternative, holdout, beliefs
+    result, unseen, shrink, verdict = carried(result, unseen, shrink, *which)
+    result = _by_itself(_held(result, examined.given.robot), shrink)
+    posterior = allowed(result.problem, result.final.model, result.scale, result.precision, floor)
     progress('weighed what the data leave open')
-    told = (statements, rival, places, limits)
-    return answer(found, unseen, evidence, verdict, shrink, examined, posterior, *told)
+    reported = (statements, alternative, places, limits)
+    return answer(result, unseen, evidence, verdict, shrink, examined, posterior, *reported)
 
 
-def _by_itself(found: Search, shrink: Shrink) -> Search:
+def _by_itself(result: Search, shrink: Shrink) -> Search:
     """Return what was found with what a robot file of it does by itself."""
-    model = found.final.model
-    own = replace(model, alone=alone(found.problem, model, shrink, many=found.dense))
-    return replace(found, final=replace(found.final, model=own))
+    model = result.final.model
+    own = replace(model, alone=alone(result.problem, model, shrink, many=result.dense))
+    return replace(result, final=replace(result.final, model=own))
 
 
 def _searched(
@@ -222,14 +226,14 @@ def _searched(
 ) -> Search:
     """Return what was found, few effects or many, each with what could take its place."""
     assert examined.posed is not None
-    found = search(*examined.posed, exclude, beliefs, progress)
-    found = fitted_together(found, exclude, beliefs, progress)
-    found = settled_between(found, examined.given.may_change, beliefs)
-    return with_structural_aliases(found, exclude, beliefs)
+    result = search(*examined.posed, exclude, beliefs, progress)
+    result = fitted_together(result, exclude, beliefs, progress)
+    result = settled_between(result, examined.given.may_change, beliefs)
+    return with_structural_aliases(result, exclude, beliefs)
 
 
-def _held(found: Search, robot: Robot) -> Search:
+def _held(result: Search, robot: Robot) -> Search:
     """Return what was found with its frames as near to the given ones as machines and data bear."""
-    final = held(found.final, found.problem, found.scale, found.precision, robot)
-    pushed = implausible(final.model) and not implausible(found.final.model)
-    return found if pushed else replace(found, final=final)
+    final = held(result.final, result.problem, result.scale, result.precision, robot)
+    pushed = implausible(final.model) and not implausible(result.final.model)
+    return result if pushed else replace(result, final=final)

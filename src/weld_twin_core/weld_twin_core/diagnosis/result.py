@@ -231,8 +231,8 @@ class Family:
 
     def missed(self, worth: float) -> bool:
         """Return whether unseen data get worse without it: in the median part, and better in none."""
-        told = self.chosen and len(self.growths) > 1
-        return told and self.growth >= worth and min(self.growths) >= 0.0
+        reported = self.chosen and len(self.growths) > 1
+        return reported and self.growth >= worth and min(self.growths) >= 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``verdict.families``."""
@@ -343,6 +343,8 @@ class Shrink:
     """RMS [m] that would remain if only this one were mended."""
     orientation_rad: tuple[float, float] | None = None
     """RMS orientation gap before and after, on stretches taking their turn; poses only."""
+    elsewhere_ci95: tuple[float, float] | None = None
+    """Interval of the ratio on a motion where nothing was recorded."""
 
 
 @dataclass(frozen=True)
@@ -668,7 +670,7 @@ class Diagnosis:
         confidence = None if self.status == 'unsound' else self.confidence
         return {
             'status': self.status,
-            'effects': [found.as_dict() for found in self.effects],
+            'effects': [result.as_dict() for result in self.effects],
             'confidence': confidence,
             'learned': confidence,
             'sure': self.sure,
@@ -693,6 +695,9 @@ class Diagnosis:
             'rms_after_m': shrink.rms_after_m,
             'ratio': shrink.ratio,
             'ci95': list(shrink.ci95),
+            'elsewhere_ci95': None
+            if shrink.elsewhere_ci95 is None
+            else list(shrink.elsewhere_ci95),
             'held_out': shrink.held_out,
             'steps': [{'added': n, 'rms_m': v} for n, v in shrink.steps],
             'alone': [{'mended': n, 'rms_m': v} for n, v in shrink.alone],
@@ -700,11 +705,11 @@ class Diagnosis:
         }
 
     def _unexplained(self) -> dict[str, Any]:
-        left = self.unexplained
+        remaining = self.unexplained
         return {
-            'rms_m': left.rms_m,
-            'above_noise': left.above_noise,
-            'structure': list(left.structure),
+            'rms_m': remaining.rms_m,
+            'above_noise': remaining.above_noise,
+            'structure': list(remaining.structure),
             'share': self.shares.unexplained,
             'noise_share': self.shares.noise,
         }

@@ -128,13 +128,13 @@ def bristle_tangent(
     """
     bent = np.abs(step) / travel
     whole = bent + leak
-    left, moving = np.exp(-whole), whole > STILL
+    remaining, moving = np.exp(-whole), whole > STILL
     safe = np.where(moving, whole, 1.0)
-    drive = (leak / safe * -np.expm1(-whole) + bent * left) / safe
+    drive = (leak / safe * -np.expm1(-whole) + bent * remaining) / safe
     before = np.concatenate([np.zeros_like(z[..., :1]), z[..., :-1]], axis=-1)
     way = np.where(step < 0.0, -1.0, 1.0)
-    rise = way * np.where(moving, drive, 1.0) - left * before
-    slope: Array = linear(left, change * rise, np.zeros(np.shape(rise)[:-1]))
+    rise = way * np.where(moving, drive, 1.0) - remaining * before
+    slope: Array = linear(remaining, change * rise, np.zeros(np.shape(rise)[:-1]))
     return slope
 
 

@@ -20,7 +20,6 @@ def base_leans(robot: Robot, axes: Array) -> list[dict[Channel, float]]:
 
     Parameters
     ----------
-    robot : Robot
     axes : array, shape (K, 3)
         In the base frame of the arm's rows.
 

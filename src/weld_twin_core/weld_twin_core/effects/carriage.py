@@ -52,7 +52,6 @@ def carried(view: View, i: int, slide: Array | None, turn: Array | None) -> Shif
 
     Parameters
     ----------
-    view : View
     i : int
         The joint, counted from 0.
     slide, turn : array, shape (3, ...) [m, rad], optional

@@ -147,8 +147,6 @@ class Effect(Parametric, ABC):
 
         Parameters
         ----------
-        view : View
-        joint : str or None
         pull : array, shape (N,), optional
             How strongly the residual would move the joint at every sample; an effect too fine to
             search on a grid may look for itself in it.
@@ -221,7 +219,6 @@ class Effect(Parametric, ABC):
 
         Parameters
         ----------
-        parameter : Parameter
         robot : Robot, optional
             Left out, its joint turns.
 

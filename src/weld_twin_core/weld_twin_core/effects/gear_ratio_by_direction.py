@@ -111,8 +111,10 @@ class GearRatioByDirection(MemoryEffect):
         i = view.robot.index(self.joint)
         q = view.joint(i)
         way, touched, _ = self._way(q)
-        left = np.where(touched >= 0, np.take_along_axis(way, np.maximum(touched, 0), -1), 0.0)
-        slow = (np.sign(left) - way) / self.number('travel')
+        remaining = np.where(
+            touched >= 0, np.take_along_axis(way, np.maximum(touched, 0), -1), 0.0
+        )
+        slow = (np.sign(remaining) - way) / self.number('travel')
         slow = np.where(np.arange(q.shape[-1]) == touched, 0.0, slow)
         return [
             {('q', i): 0.5 * way * q},
@@ -148,8 +150,8 @@ class GearRatioByDirection(MemoryEffect):
             way = made._way(angle)[0]
             alike = np.stack([np.ones_like(angle), angle, way], axis=1)
             one = 0.5 * way * angle
-            left = one - alike @ np.linalg.lstsq(alike, one, rcond=None)[0]
-            if float(np.sqrt((left**2).mean())) > SHOWN * unit:
+            remaining = one - alike @ np.linalg.lstsq(alike, one, rcond=None)[0]
+            if float(np.sqrt((remaining**2).mean())) > SHOWN * unit:
                 yield made
 
     def remedy(self, robot: Robot) -> str:

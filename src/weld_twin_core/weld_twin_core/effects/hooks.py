@@ -197,8 +197,6 @@ class SearchHooks(Hooks):
 
         Parameters
         ----------
-        view : View
-        joint : str or None
         most : int
             Pairs of coordinates that the measurements allow every joint.
 
@@ -322,21 +320,16 @@ OF_GROUP = {k: at for at, g in GROUPS.items() for k in vars(g) if not k.startswi
 
 
 def gathered(kind: Any) -> None:
-    """
-    Put what a class has in the form of version 0.1, one attribute a hook, where it belongs now.
-
-    Parameters
-    ----------
-    kind : subclass of Effect
-
-    """
+    """Put what a class has in the form of version 0.1, one attribute a hook, where it belongs now."""
     own = {k: v for k, v in vars(kind).items() if k not in vars(kind).get('__annotations__', {})}
     traits = {k: own[k] for k in own if k in TRAITS}
     asked = {k: own[k] for k in own if k in OF_GROUP}
     if not traits and not asked:
         return
-    told = ', '.join(sorted([*traits, *asked]))
-    text = f'{kind.__name__}: {told} belong to traits, twin, search or fit; see docs/effects.md'
+    reported = ', '.join(sorted([*traits, *asked]))
+    text = (
+        f'{kind.__name__}: {reported} belong to traits, twin, search or fit; see docs/effects.md'
+    )
     warnings.warn(text, DeprecationWarning, stacklevel=4)
     kind.traits = replace(kind.traits, **traits)
     for at in {OF_GROUP[k] for k in asked}:

@@ -82,15 +82,17 @@ class HosePull(Effect):
     def displace(self, view: View) -> Shift:
         """Return the torque of the pull on the 'tau' channel of every joint."""
         values = [*(self.number('force', k) for k in range(3)), self.number('stiffness')]
-        parts = _torques(view)
-        return {
-            ('tau', i): sum(value * part[i] for value, part in zip(values, parts, strict=True))
-            for i in range(view.robot.n)
-        }
+        flange, pulls = _pulls(view)
+        pairs = zip(values, pulls, strict=True)
+        force = sum((value * pad(pull, np.ndim(value)) for value, pull in pairs), np.zeros(()))
+        torque = point_force_torque(view.robot, view.frames, flange, force)
+        return {('tau', i): torque[i] for i in range(view.robot.n)}
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return d torque by each component of the force, and by the stiffness."""
-        return [{('tau', i): part[i] for i in range(view.robot.n)} for part in _torques(view)]
+        flange, pulls = _pulls(view)
+        parts = [point_force_torque(view.robot, view.frames, flange, pull) for pull in pulls]
+        return [{('tau', i): part[i] for i in range(view.robot.n)} for part in parts]
 
     def remedy(self, robot: Robot) -> str:
         """Return what to mend, in words; see `Effect.remedy`."""
@@ -102,13 +104,12 @@ class HosePull(Effect):
         )
 
 
-def _torques(view: View) -> list[Array]:
-    """Return the joint torques of a force of one along each base axis, and of a stiffness of one."""
+def _pulls(view: View) -> tuple[Array, list[Array]]:
+    """Return the flange, and a force of one along each base axis and that of a stiffness of one."""
     chain = view.frames
     flange = components(chain.flange_point)
     width = flange.ndim - 1
     away = flange - pad(components(chain.root_point), width)
     base = wrench_rotation(view.robot, chain, 'base')
     axes = [pad(components(base[..., k]), width) for k in range(3)]
-    forces = [*(np.broadcast_to(axis, flange.shape) for axis in axes), -away]
-    return [point_force_torque(view.robot, chain, flange, force) for force in forces]
+    return flange, [*(np.broadcast_to(axis, flange.shape) for axis in axes), -away]

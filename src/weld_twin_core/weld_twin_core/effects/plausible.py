@@ -44,8 +44,6 @@ def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = Non
 
     Parameters
     ----------
-    robot : Robot
-    effect, parameter : str
     joint : str, optional
         Where the effect sits.
 
@@ -57,13 +55,13 @@ def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = Non
     """
     kind = REGISTRY.get(effect)
     each = next((p for p in kind.parameters if p.name == parameter), None) if kind else None
-    found = (each and each.range) or UNKNOWN
+    result = (each and each.range) or UNKNOWN
     if each and each.sliding and joint is not None and robot.prismatic[robot.index(joint)]:
-        found = each.sliding
-    if found.by_robot is not None:
-        low, high = found.by_robot(robot)
-        found = replace(found, low=low, high=high)
-    return _narrowed(found, robot.plausible.get(effect, {}).get(parameter))
+        result = each.sliding
+    if result.by_robot is not None:
+        low, high = result.by_robot(robot)
+        result = replace(result, low=low, high=high)
+    return _narrowed(result, robot.plausible.get(effect, {}).get(parameter))
 
 
 def spreads(robot: Robot, effect: Effect) -> Array:
@@ -81,20 +79,12 @@ def ranges(robot: Robot, effect: Effect) -> tuple[Array, Array]:
         most = plausible(robot, effect.name, 'amplitude', effect.site).high
         full = np.full(effect.fit.coordinates().size, most)
         return -full, full
-    found = _each(robot, effect)
-    return np.array([each.low for each in found]), np.array([each.high for each in found])
+    result = _each(robot, effect)
+    return np.array([each.low for each in result]), np.array([each.high for each in result])
 
 
 def beyond(robot: Robot, effect: Effect) -> list[tuple[str, float, float]]:
-    """
-    Return the parameters of an effect that no machine has, with value and nearest limit.
-
-    Parameters
-    ----------
-    robot : Robot
-    effect : Effect
-
-    """
+    """Return the parameters of an effect that no machine has, with value and nearest limit."""
     out = []
     for (parameter, _), value in zip(effect.components(), effect.vector(), strict=True):
         each = plausible(robot, effect.name, parameter.name, effect.site)
@@ -111,13 +101,13 @@ def _each(robot: Robot, effect: Effect) -> list[Plausible]:
     ]
 
 
-def _narrowed(found: Plausible, given: Mapping[str, float] | None) -> Plausible:
+def _narrowed(result: Plausible, given: Mapping[str, float] | None) -> Plausible:
     """Return what a robot file says instead, as far as it says anything."""
     if not given:
-        return found
+        return result
     return Plausible(
-        float(given.get('sd', found.sd)),
-        float(given.get('low', found.low)),
-        float(given.get('high', found.high)),
+        float(given.get('sd', result.sd)),
+        float(given.get('low', result.low)),
+        float(given.get('high', result.high)),
         'the robot file',
     )

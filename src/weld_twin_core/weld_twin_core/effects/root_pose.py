@@ -57,7 +57,6 @@ class RootPose(FrameError):
 
         Parameters
         ----------
-        robot : Robot
         base : array, shape (4, 4) [m]
             The base that it is told in, in the frame where the robot's own rows begin.
 

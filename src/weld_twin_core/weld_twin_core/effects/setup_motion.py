@@ -27,7 +27,6 @@ def seen_from(
 
     Parameters
     ----------
-    effects : sequence of Effect
     epoch_ns, span_ns : int, tuple of int
         What the stamps of the recording whose set-up moved count from; its first and last stamp.
     other : Recording

@@ -70,11 +70,11 @@ class SetupSettling(Effect):
 
     def displace(self, view: View) -> Shift:
         """Return what is left of the displacement on the base."""
-        left = self._left(view)
+        remaining = self._left(view)
         out: dict[Channel, Array] = {}
         for k in range(3):
-            out |= single(('base', k), self.number('xyz', k) * left, view)
-            out |= single(('base', k + 3), self.number('rotvec', k) * left, view)
+            out |= single(('base', k), self.number('xyz', k) * remaining, view)
+            out |= single(('base', k + 3), self.number('rotvec', k) * remaining, view)
         return out
 
     def gradient(self, view: View) -> list[Shift | None]:

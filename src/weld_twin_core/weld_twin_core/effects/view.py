@@ -145,7 +145,6 @@ class View:
 
     Attributes
     ----------
-    robot : Robot
     t : array, shape (N,), or (D, N) where the delay is drawn [s]
     elapsed : array, shape as t [s]
         Time since the recording's first stamp.
@@ -153,7 +152,6 @@ class View:
     static : bool
         Samples are stations at rest; their order is known, their timing means nothing.
     wrench : array, shape t.shape + (6,), optional [N, N m]
-    wrench_frame : str
     temperature : array, shape as t, optional [degC]
     effort : array, shape t.shape + (n,), optional [N m, or N of a slide]
         As the controller measured it; what springs take in the place of the statics.
@@ -225,7 +223,6 @@ def single(channel: Channel, value: Array | float, view: View) -> Shift:
     channel : tuple of str and int
         Such as ``('q', 2)`` for the third joint.
     value : float, or array broadcasting with the samples [rad or m]
-    view : View
 
     """
     if np.ndim(value) == 0:

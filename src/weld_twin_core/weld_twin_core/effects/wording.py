@@ -41,8 +41,8 @@ def size(value: float, digits: int = 3) -> str:
 
 def metres(value: float) -> str:
     """Return a signed length [m] in mm."""
-    told = f'{value * 1e3:+.3f}' if abs(value) < _FINE else number(value * 1e3)
-    return f'{told} mm'
+    reported = f'{value * 1e3:+.3f}' if abs(value) < _FINE else number(value * 1e3)
+    return f'{reported} mm'
 
 
 def radians(value: float) -> str:
@@ -73,8 +73,8 @@ def frame(step: Array, shifted: str, turned: str) -> str:
     """
     moved = _axes(np.asarray(step[:3]) * 1e3, LEAST_MM, 'mm along', 3)
     about = _axes(np.degrees(step[3:]), LEAST_DEG, 'deg about', 4)
-    told = [f'{moved} {shifted}' if moved else '', f'{about} {turned}' if about else '']
-    return ' and '.join(filter(None, told)) or 'less than 0.005 mm'
+    reported = [f'{moved} {shifted}' if moved else '', f'{about} {turned}' if about else '']
+    return ' and '.join(filter(None, reported)) or 'less than 0.005 mm'
 
 
 def _axes(values: Array, least: float, words: str, places: int) -> str:

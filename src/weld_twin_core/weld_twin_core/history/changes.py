@@ -119,7 +119,6 @@ def changes(
 
     Parameters
     ----------
-    observations : sequence of Observation
     named : collection of str
         Coordinates that a diagnosis has named as causes: of those that explain a change equally
         well, they come first.
@@ -156,7 +155,7 @@ def changes(
     look = _Look(series, shapes, simple[:, None] + 2.0 * LIKELY * rare, sooner)
     taken: list[tuple[Found, Change]] = []
     while len(taken) < MOST:
-        more = look.next([found for found, _ in taken])
+        more = look.next([result for result, _ in taken])
         if more is None:
             break
         taken.append(more)
@@ -169,8 +168,6 @@ class _Look(NamedTuple):
 
     Attributes
     ----------
-    series : Series
-    shapes : list of Shape
     bar : array, shape (shapes, P)
     sooner : array, shape (P,)
         Nats by which a coordinate goes before others that explain as much.
@@ -182,9 +179,9 @@ class _Look(NamedTuple):
     bar: Array
     sooner: Array
 
-    def next(self, found: Sequence[Found]) -> tuple[Found, Change] | None:
+    def next(self, result: Sequence[Found]) -> tuple[Found, Change] | None:
         """Return what explains most beside what was found, None if it is no more than chance."""
-        system = _System(self.series, found)
+        system = _System(self.series, result)
         gain = np.array([system.gains(shape) for shape in self.shapes]) / system.scatter
         row, column = np.unravel_index(int(np.argmax(gain - self.bar)), gain.shape)
         best = int(row), int(column)
@@ -201,28 +198,26 @@ class _Look(NamedTuple):
         if len(taken) < 2:
             return taken
         for k in range(len(taken)):
-            rest = [found for i, (found, _) in enumerate(taken) if i != k]
+            rest = [result for i, (result, _) in enumerate(taken) if i != k]
             taken[k] = self.next(rest) or taken[k]
         return taken
 
 
 def value_and_rise(
-    observations: Sequence[Observation], found: Sequence[Change], name: str
+    observations: Sequence[Observation], result: Sequence[Change], name: str
 ) -> tuple[Array, Array]:
     """
     Return value and rise in a day of a coordinate at the last diagnosis, (2,), and covariance, (2, 2).
 
     Parameters
     ----------
-    observations : sequence of Observation
-    found : sequence of Change
+    result : sequence of Change
         What `changes` returned for them.
-    name : str
 
     """
     series = series_of(observations)
     shapes = {(each.kind, float(series.days[each.begin])): each for each in _shapes(series.days)}
-    taken = [Found(shapes[each.kind, each.day], series.names.index(each.name)) for each in found]
+    taken = [Found(shapes[each.kind, each.day], series.names.index(each.name)) for each in result]
     return _System(series, taken).now(series.names.index(name))
 
 
@@ -242,26 +237,18 @@ def _shapes(days: Array) -> list[Shape]:
 
 
 class _System:
-    """
-    The arm as it was at first and the changes found so far, fitted together.
+    """The arm as it was at first and the changes found so far, fitted together."""
 
-    Parameters
-    ----------
-    series : Series
-    found : sequence of Found
-
-    """
-
-    def __init__(self, series: Series, found: Sequence[Found]) -> None:
-        self._series, self._found = series, tuple(found)
+    def __init__(self, series: Series, result: Sequence[Found]) -> None:
+        self._series, self._found = series, tuple(result)
         self._sizes: dict[tuple[str, int], tuple[Array, Array]] = {}
         first = series.precision.sum(axis=0)
         blocks = [[first + np.diag(series.prior)]]
         right = [series.told.sum(axis=0)]
-        for each in found:
-            cross, _, told = self._against(each.shape)
+        for each in result:
+            cross, _, reported = self._against(each.shape)
             blocks.append([cross[..., each.place], *self._among(each)])
-            right.append(told[:, each.place])
+            right.append(reported[:, each.place])
         self._matrix = _symmetric(blocks)
         self._right = np.concatenate([np.atleast_1d(r) for r in right])
         self._inverse = np.linalg.inv(self._matrix)
@@ -338,7 +325,7 @@ class _System:
         return self._sizes[key]
 
     def _fitted(self, shape: Shape) -> tuple[Array, Array]:
-        cross, own, told = self._against(shape)
+        cross, own, reported = self._against(shape)
         series = self._series
         rows = [np.moveaxis(cross, 0, -1)]  # (P first, P, m)
         for each in self._found:
@@ -347,7 +334,7 @@ class _System:
         stacked = np.concatenate(rows, axis=0)  # (P + found, P, m)
         solved = np.tensordot(self._inverse, stacked, axes=1)
         information = own - np.einsum('ajm,ajn->jmn', stacked, solved)
-        right = told.T - np.einsum('a,ajm->jm', self.solution, stacked)
+        right = reported.T - np.einsum('a,ajm->jm', self.solution, stacked)
         # A coordinate that nobody has seen carries no information; its size is zero.
         eye = np.eye(own.shape[1])
         floor = 1e-9 * np.maximum(np.trace(own, axis1=1, axis2=2), 1e-300)
@@ -426,6 +413,6 @@ def _odds(series: Series, system: _System, shape: Shape, place: int) -> float:
     known = information[place] / system.scatter
     # What was believed of a value holds for how far it moves over the recordings.
     prior = series.prior[place] * np.diag(np.ptp(shape.columns, axis=0) ** 2)
-    told = known @ mean[place]
-    fall = told @ np.linalg.solve(known + prior, told)
+    reported = known @ mean[place]
+    fall = reported @ np.linalg.solve(known + prior, reported)
     return 0.5 * float(fall + np.linalg.slogdet(prior)[1] - np.linalg.slogdet(known + prior)[1])

@@ -38,7 +38,7 @@ class Outlook(NamedTuple):
 
 
 def outlook(
-    observations: Sequence[Observation], found: Sequence[Change], name: str
+    observations: Sequence[Observation], result: Sequence[Change], name: str
 ) -> Outlook | None:
     """
     Return where a coordinate is and how fast it moves; None if it has no trend.
@@ -47,16 +47,15 @@ def outlook(
 
     Parameters
     ----------
-    observations : sequence of Observation
-    found : sequence of Change
+    result : sequence of Change
         What `changes` returned for them.
     name : str
         The coordinate.
 
     """
-    if not any(each.name == name and each.kind == 'trend' for each in found):
+    if not any(each.name == name and each.kind == 'trend' for each in result):
         return None
-    return Outlook(*value_and_rise(observations, found, name))
+    return Outlook(*value_and_rise(observations, result, name))
 
 
 def reaches(limit: float, now: Outlook) -> tuple[float, float, float]:
@@ -67,7 +66,6 @@ def reaches(limit: float, now: Outlook) -> tuple[float, float, float]:
     ----------
     limit : float
         Size of the value that must not be passed, on the side it moves to.
-    now : Outlook
 
     Returns
     -------

@@ -80,9 +80,9 @@ class Observation:
         shown = np.where(variance < 1.0 - SHOWN, 1.0 / variance - 1.0, 0.0)
         # value = variance * (precision of the data) * (what the data say), along each axis
         along = axes.T @ (self.value / width)
-        told = np.where(shown > 0.0, along / variance, 0.0)
+        reported = np.where(shown > 0.0, along / variance, 0.0)
         precision = (axes * shown) @ axes.T / np.outer(width, width)
-        return precision, (axes @ told) / width
+        return precision, (axes @ reported) / width
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,6 @@ class Series:
     Attributes
     ----------
     days : array, shape (W,)
-    names : tuple of str, length P
     precision : array, shape (W, P, P)
     told : array, shape (W, P)
         Precision times value.
@@ -116,10 +115,6 @@ def series_of(observations: Sequence[Observation]) -> Series:
     An effect that only some diagnoses name is taken to be zero in the others, as surely as three
     standard errors of those that name it.
 
-    Parameters
-    ----------
-    observations : sequence of Observation
-
     Raises
     ------
     DataError
@@ -137,10 +132,10 @@ def series_of(observations: Sequence[Observation]) -> Series:
     width = np.zeros(len(names))
     error: list[list[float]] = [[] for _ in names]
     precision = np.zeros((days.size, len(names), len(names)))
-    told = np.zeros((days.size, len(names)))
+    reported = np.zeros((days.size, len(names)))
     for w, each in enumerate(ordered):
         at = np.array([place[name] for name in each.names], int)
-        precision[w][np.ix_(at, at)], told[w, at] = each.information()
+        precision[w][np.ix_(at, at)], reported[w, at] = each.information()
         width[at] = np.maximum(width[at], each.prior_std)
         for k, std in zip(at, np.sqrt(np.diag(each.covariance)), strict=True):
             error[k].append(float(std))
@@ -148,4 +143,4 @@ def series_of(observations: Sequence[Observation]) -> Series:
         for w, each in enumerate(ordered):
             if name not in each.names:
                 precision[w, k, k] += 1.0 / (ABSENT * float(np.median(error[k]))) ** 2
-    return Series(days, names, precision, told, 1.0 / width**2)
+    return Series(days, names, precision, reported, 1.0 / width**2)

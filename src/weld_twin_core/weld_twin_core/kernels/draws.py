@@ -109,9 +109,9 @@ class SeamDraws:
         self._of_squares: _Determining | None = None
         if smooth:
             both = (features[0][:, None] * features[1][None]).reshape(-1, len(q))
-            found = _determining(both)
-            if found is not None:
-                self.samples, self.spread, self.remainder = found
+            result = _determining(both)
+            if result is not None:
+                self.samples, self.spread, self.remainder = result
                 self._of_squares = _determining(_products(both))
         self._near, self._far = (np.ascontiguousarray(f[:, self.samples]) for f in features)
         self._phases = np.exp(1j * q[self.samples].T)[..., None]
@@ -337,8 +337,8 @@ def _determining(features: Array) -> _Determining | None:
     spread = np.empty((rank, features.shape[1]))
     spread[:, order[:rank]] = np.eye(rank)
     spread[:, order[rank:]] = solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
-    left = np.abs(features[:, order[:rank]] @ spread - features).max()
-    remainder = float(left / np.abs(features).max())
+    remaining = np.abs(features[:, order[:rank]] @ spread - features).max()
+    remainder = float(remaining / np.abs(features).max())
     if remainder > _NEGLIGIBLE:
         return None
     return _Determining(order[:rank], np.ascontiguousarray(spread.T), remainder)
@@ -364,6 +364,6 @@ def _on_features(weights: Array, features: Array, memory: Array) -> Array:
     """Return weights (3, F, k, D) applied to features (F, S), shape (3, k, D, S)."""
     flat = weights.reshape(*weights.shape[:2], -1)
     shape = 3, flat.shape[2], features.shape[1]
-    found = memory[: prod(shape)].reshape(shape)
-    np.matmul(flat.swapaxes(1, 2), features, out=found)
-    return found.reshape(3, *weights.shape[2:], -1)
+    result = memory[: prod(shape)].reshape(shape)
+    np.matmul(flat.swapaxes(1, 2), features, out=result)
+    return result.reshape(3, *weights.shape[2:], -1)

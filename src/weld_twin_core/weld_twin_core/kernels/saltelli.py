@@ -34,7 +34,6 @@ def base_pair(inputs: int, base: int, seed: int) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    inputs : int
     base : int
         Samples of each set, a power of two.
     seed : int
@@ -59,7 +58,6 @@ def mixed(first: Array, second: Array, groups: Sequence[str] | None = None) -> A
     ----------
     first, second : array, shape (base, inputs)
         Two independent sets of probabilities; see `base_pair`.
-    groups : sequence of str, length inputs, optional
 
     """
     base, inputs = first.shape
@@ -94,7 +92,6 @@ def sobol_half_widths(
         Such as 0.95.
     rng : numpy Generator
         Chooses the resamples.
-    resamples : int
 
     """
     base = len(results)

@@ -43,14 +43,7 @@ _PACKED = Struct('16d').pack
 
 
 class SinglePose:
-    """
-    The chain of one robot, prepared for one joint position at a time.
-
-    Parameters
-    ----------
-    robot : Robot
-
-    """
+    """The chain of one robot, prepared for one joint position at a time."""
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot

@@ -71,9 +71,9 @@ def circle_of(points: Array) -> Circle | None:
     system = np.column_stack([2.0 * flat, np.ones(len(flat))])
     (x, y, rest), *_ = np.linalg.lstsq(system, (flat**2).sum(axis=1), rcond=None)
     radius = float(np.sqrt(max(rest + x * x + y * y, 0.0)))
-    found = Circle(middle + np.array([x, y]) @ plane, plane, radius)
-    off = np.linalg.norm(points - found.centre - radius * found.outwards(points), axis=1)
-    sectors = np.unique(((found.angles(points) + np.pi) / (2 * np.pi) * _SECTORS).astype(int))
+    result = Circle(middle + np.array([x, y]) @ plane, plane, radius)
+    off = np.linalg.norm(points - result.centre - radius * result.outwards(points), axis=1)
+    sectors = np.unique(((result.angles(points) + np.pi) / (2 * np.pi) * _SECTORS).astype(int))
     if radius <= 0.0 or float(off.max()) > _ROUND * radius or sectors.size < _SECTORS:
         return None
-    return found
+    return result

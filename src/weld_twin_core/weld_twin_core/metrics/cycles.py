@@ -127,9 +127,9 @@ def stops(recording: Recording) -> list[Stop]:
             for k, row in enumerate(rows)
         ]
     return [
-        found
+        result
         for start, end in rests(joints)
-        if (found := _mean_stop(joints, measured, start, end)) is not None
+        if (result := _mean_stop(joints, measured, start, end)) is not None
     ]
 
 
@@ -171,26 +171,25 @@ def _mean_stop(
     return Stop(late, joints.at(np.array(late))[0], measured.position[rows].mean(axis=0), rotation)
 
 
-def pose_cycles(found: list[Stop], robot: Robot) -> list[PoseCycles]:
+def pose_cycles(result: list[Stop], robot: Robot) -> list[PoseCycles]:
     """
     Return the stops by commanded pose, in the order in which the poses first came.
 
     Parameters
     ----------
-    found : list of Stop
     robot : Robot
         Tells where a commanded joint position should have brought the tool.
 
     """
-    if not found:
+    if not result:
         return []
-    q = np.stack([stop.q for stop in found])
+    q = np.stack([stop.q for stop in result])
     labels = _labels(q)
     commands = forward(robot, q)
     before = [-1, *labels[:-1]]
     ends = np.cumsum(np.bincount(labels))[:-1]
     return [
-        _cycles([found[k] for k in rows], commands[rows], tuple(int(before[k]) for k in rows))
+        _cycles([result[k] for k in rows], commands[rows], tuple(int(before[k]) for k in rows))
         for rows in np.split(np.argsort(labels, kind='stable'), ends)
     ]
 
@@ -213,18 +212,18 @@ def _labels(q: Array) -> np.ndarray:
     return labels
 
 
-def _cycles(found: list[Stop], commands: Array, came_from: tuple[int, ...]) -> PoseCycles:
+def _cycles(result: list[Stop], commands: Array, came_from: tuple[int, ...]) -> PoseCycles:
     first = commands[0]
-    position = np.stack([stop.position for stop in found])
-    turns = [stop.rotation for stop in found if stop.rotation is not None]
+    position = np.stack([stop.position for stop in result])
+    turns = [stop.rotation for stop in result if stop.rotation is not None]
     rotation = None
-    if len(turns) == len(found):
+    if len(turns) == len(result):
         off = np.stack(turns) @ np.swapaxes(commands[:, :3, :3], -1, -2)
         rotation = off @ first[:3, :3]
     return PoseCycles(
-        found[0].q,
+        result[0].q,
         first,
-        np.array([stop.t for stop in found]),
+        np.array([stop.t for stop in result]),
         position - (commands[:, :3, 3] - first[:3, 3]),
         rotation,
         came_from,

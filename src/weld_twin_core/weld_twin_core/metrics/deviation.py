@@ -31,7 +31,6 @@ class DeviationMetrics:
 
     Attributes
     ----------
-    samples : int
     rms_m, mean_m, p95_m, max_m : float [m]
         Of the length of the deviation, D(t).
     d_norm : float [-]

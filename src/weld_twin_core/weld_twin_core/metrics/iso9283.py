@@ -42,7 +42,6 @@ class PosePerformance:
 
     Attributes
     ----------
-    cycles : int
     ap_m : float [m]
         Distance of the barycentre of the attained positions from the command.
     rp_m : float [m]
@@ -76,7 +75,6 @@ class PathPerformance:
 
     Attributes
     ----------
-    cycles : int
     at_m : float [m]
         Largest distance of the barycentre path from the command path.
     rt_m : float [m]
@@ -307,8 +305,8 @@ def drift(groups: Sequence[ArrayLike], command: ArrayLike) -> DriftPerformance:
     """
     if len(groups) < 2:
         raise DataError(f'drift compares groups of cycles over time, got {len(groups)} group')
-    found = [pose_performance(group, command) for group in groups]
-    accuracy, spread = (np.array([getattr(f, key) for f in found]) for key in ('ap_m', 'rp_m'))
+    result = [pose_performance(group, command) for group in groups]
+    accuracy, spread = (np.array([getattr(f, key) for f in result]) for key in ('ap_m', 'rp_m'))
     return DriftPerformance(
         float(abs(accuracy - accuracy[0]).max()),
         float(abs(spread - spread[0]).max()),

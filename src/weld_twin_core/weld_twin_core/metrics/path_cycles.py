@@ -60,7 +60,6 @@ class PathCycles:
 
     Attributes
     ----------
-    spans : tuple of Span
     arc : array, shape (m,) [m]
         Length of the path to each point of evaluation.
     command : array, shape (m, 3) [m]
@@ -81,7 +80,6 @@ def path_cycles(recording: Recording, robot: Robot) -> PathCycles | None:
 
     Parameters
     ----------
-    recording : Recording
     robot : Robot
         Tells where a commanded joint position should have brought the tool.
 
@@ -107,7 +105,6 @@ def spans(joints: JointMotion, anchor: Array) -> list[Span]:
 
     Parameters
     ----------
-    joints : JointMotion
     anchor : array, shape (n,)
 
     """
@@ -125,14 +122,14 @@ def spans(joints: JointMotion, anchor: Array) -> list[Span]:
     ]
 
 
-def _of_one_path(joints: JointMotion, found: list[Span]) -> list[Span]:
+def _of_one_path(joints: JointMotion, result: list[Span]) -> list[Span]:
     """Return the largest group of spans that go the same way."""
-    if len(found) < 2:
-        return found
-    shapes = np.stack([_shape(joints, span) for span in found])
+    if len(result) < 2:
+        return result
+    shapes = np.stack([_shape(joints, span) for span in result])
     alike = [np.abs(shapes - one).max(axis=(1, 2)) < SAME_PATH for one in shapes[:REFERENCES]]
     chosen = max(alike, key=lambda same: int(same.sum()))
-    return [span for span, same in zip(found, chosen, strict=True) if same]
+    return [span for span, same in zip(result, chosen, strict=True) if same]
 
 
 def _shape(joints: JointMotion, span: Span) -> Array:
@@ -156,9 +153,9 @@ def _when(way: Array, t: Array, wanted: Array) -> Array:
 
 
 def _crossings(
-    measured: Measurements, joints: JointMotion, robot: Robot, found: Sequence[Span]
+    measured: Measurements, joints: JointMotion, robot: Robot, result: Sequence[Span]
 ) -> PathCycles | None:
-    times, arc = _even_times(joints, robot, found)
+    times, arc = _even_times(joints, robot, result)
     ways = _positions(joints, robot, times[0])
     ahead = np.diff(ways, axis=0, append=2.0 * ways[-1:] - ways[-2:-1])
     behind = np.diff(ways, axis=0, prepend=2.0 * ways[:1] - ways[1:2])
@@ -167,13 +164,13 @@ def _crossings(
     crossed = np.stack(
         [
             _passes(measured, ways, ahead + behind, when, span)
-            for when, span in zip(times, found, strict=True)
+            for when, span in zip(times, result, strict=True)
         ]
     )
     good = straight & np.isfinite(crossed).all(axis=(0, 2))
     if good.sum() < FEWEST:
         return None
-    return PathCycles(tuple(found), arc[good], ways[good], crossed[:, good])
+    return PathCycles(tuple(result), arc[good], ways[good], crossed[:, good])
 
 
 def _positions(joints: JointMotion, robot: Robot, t: Array) -> Array:
@@ -182,12 +179,12 @@ def _positions(joints: JointMotion, robot: Robot, t: Array) -> Array:
 
 
 def _even_times(
-    joints: JointMotion, robot: Robot, found: Sequence[Span]
+    joints: JointMotion, robot: Robot, result: Sequence[Span]
 ) -> tuple[list[Array], Array]:
     """Return when each cycle was commanded to be at even steps of the path, and their lengths."""
     shares = np.linspace(CUT, 1.0 - CUT, POINTS)
     times, arc = [], np.zeros(0)
-    for span in found:
+    for span in result:
         t, _ = _within(joints, span)
         steps = np.linalg.norm(np.diff(_positions(joints, robot, t), axis=0), axis=1)
         way = np.concatenate([[0.0], steps.cumsum()])

@@ -42,7 +42,6 @@ class PoseTest:
     ----------
     q : array, shape (n,)
     command : array, shape (3,) [m]
-    performance : PosePerformance
     variation_m : float [m], optional
         vAP: how far apart the pose is reached from different poses before it.
     approaches : int
@@ -82,7 +81,6 @@ class PathTest:
 
     Attributes
     ----------
-    performance : PathPerformance
     arc, at, rt : array, shape (m,) [m]
         Length of the path to each point, and accuracy and repeatability there.
     seconds : float
@@ -119,7 +117,6 @@ class Performance:
     ----------
     poses : tuple of PoseTest
         Those with two cycles or more.
-    path : PathTest, optional
     lacking : tuple of str
         What the standard asks for and the recording does not have, in sentences.
 
@@ -131,10 +128,10 @@ class Performance:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers; the worst pose counts for all, as in the standard."""
-        found = [pose.performance for pose in self.poses]
+        result = [pose.performance for pose in self.poses]
         return {
-            'ap_m': max((f.ap_m for f in found), default=None),
-            'rp_m': max((f.rp_m for f in found), default=None),
+            'ap_m': max((f.ap_m for f in result), default=None),
+            'rp_m': max((f.rp_m for f in result), default=None),
             'poses': [pose.as_dict() for pose in self.poses],
             'path': None if self.path is None else self.path.as_dict(),
             'lacking': list(self.lacking),
@@ -173,7 +170,7 @@ def performance_of(recording: Recording, robot: Robot) -> Performance:
 
 def _pose_test(cycles: PoseCycles) -> PoseTest:
     command = cycles.command
-    found = pose_performance(cycles.attained, command[:3, 3], cycles.rotation, command[:3, :3])
+    result = pose_performance(cycles.attained, command[:3, 3], cycles.rotation, command[:3, :3])
     before = np.array(cycles.came_from)
     ways = [cycles.attained[before == pose] for pose in np.unique(before)]
     ways = [way for way in ways if len(way) > 1]
@@ -182,7 +179,7 @@ def _pose_test(cycles: PoseCycles) -> PoseTest:
     return PoseTest(
         cycles.q,
         command[:3, 3],
-        found,
+        result,
         multidirectional_variation(ways) if len(ways) > 1 else None,
         len(ways),
         drift(groups, command[:3, 3]) if count > 1 else None,

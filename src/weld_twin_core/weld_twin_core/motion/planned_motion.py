@@ -115,7 +115,6 @@ def plan(
 
     Parameters
     ----------
-    robot : Robot
     path : Path
         A seam; see `paths`.
     profile : Profile or str
@@ -197,12 +196,12 @@ class _JointLine:
     """Joint positions as a function of arc length: the same place gives the same posture."""
 
     def __init__(
-        self, robot: Robot, path: Path, torch: Torch, seed: Array | None, told: Array | None
+        self, robot: Robot, path: Path, torch: Torch, seed: Array | None, reported: Array | None
     ) -> None:
-        told = rest(robot)[None] if told is None else np.atleast_2d(told)
-        self.carried = CarriedArm(robot, told.shape[1])
+        reported = rest(robot)[None] if reported is None else np.atleast_2d(reported)
+        self.carried = CarriedArm(robot, reported.shape[1])
         self.robot, self.path, self.torch = self.carried.arm, path, torch
-        self._told = _along(told, path.length)
+        self._told = _along(reported, path.length)
         self._first = path.sample(np.zeros(1))
         count = int(np.ceil(path.length / min(path.length / 256.0, path.detail / 24.0)))
         grid = np.linspace(0.0, path.length, count + 1)
@@ -242,13 +241,15 @@ class _JointLine:
         return change / (2.0 * _DIFFERENCE)
 
 
-def _along(told: Array, length: float) -> Callable[..., Array]:
+def _along(reported: Array, length: float) -> Callable[..., Array]:
     """Return positions and, of order 1, their slopes at arc lengths, without overshoot between."""
-    if len(told) == 1:
+    if len(reported) == 1:
         return lambda s, order=0: np.broadcast_to(
-            told[0] * (order == 0), (*s.shape, told.shape[1])
+            reported[0] * (order == 0), (*s.shape, reported.shape[1])
         )
-    course: Callable[..., Array] = PchipInterpolator(np.linspace(0.0, length, len(told)), told)
+    course: Callable[..., Array] = PchipInterpolator(
+        np.linspace(0.0, length, len(reported)), reported
+    )
     return course
 
 

@@ -20,7 +20,6 @@ def refuse_endless(duration: float, dt: float, most: int = MOST_SAMPLES) -> None
     Parameters
     ----------
     duration, dt : float [s]
-    most : int
 
     Raises
     ------

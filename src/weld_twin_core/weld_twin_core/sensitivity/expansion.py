@@ -71,8 +71,8 @@ class Expansion:
 
     def deviations(self, draws: Array) -> Array:
         """Return deviations along, across and normal, shape (3, D, N) [m], of draws (D, P)."""
-        left = self._left(draws)
-        return self._deviations(draws, left, slice(None))[:, :, np.argsort(left.order)]
+        remaining = self._left(draws)
+        return self._deviations(draws, remaining, slice(None))[:, :, np.argsort(remaining.order)]
 
     def outcomes(self, draws: Array) -> Outcomes:
         """Return what runs come to, in chunks of bounded memory."""
@@ -80,38 +80,38 @@ class Expansion:
         parts = []
         for start in range(0, len(draws), _BLOCK):
             block = draws[start : start + _BLOCK]
-            left = self._left(block)
+            remaining = self._left(block)
             for k in range(0, len(block), rows):
                 chunk = slice(k, k + rows)
-                off = self._deviations(block[chunk], left, chunk)
+                off = self._deviations(block[chunk], remaining, chunk)
                 parts.append(outcomes(off, self.study.length))
         return joined(parts)
 
     def _left(self, draws: Array) -> _Left:
         """Return what the slopes leave, the path points where any joint has something put last."""
-        found = [part.rest(draws) for part in self.memory]
+        result = [part.rest(draws) for part in self.memory]
         somewhere = np.zeros(self.study.samples, dtype=bool)
-        for _, where in found:
+        for _, where in result:
             somewhere[where] = True
         order = np.argsort(somewhere, kind='stable')
         place = np.argsort(order) - (self.study.samples - int(somewhere.sum()))
-        carried = np.zeros((3, sum(w.size for _, w in found), int(somewhere.sum())))
+        carried = np.zeros((3, sum(w.size for _, w in result), int(somewhere.sum())))
         start = 0
-        for (_, where), moved in zip(found, self.moved, strict=True):
+        for (_, where), moved in zip(result, self.moved, strict=True):
             rows = np.arange(start, start + where.size)
             carried[:, rows, place[where]] = moved[:, where]
             start += where.size
         shapes = np.ascontiguousarray(self.shapes[:, :, order])
-        return _Left(order, shapes, [rest for rest, _ in found], carried)
+        return _Left(order, shapes, [rest for rest, _ in result], carried)
 
-    def _deviations(self, draws: Array, left: _Left, chunk: slice) -> Array:
+    def _deviations(self, draws: Array, remaining: _Left, chunk: slice) -> Array:
         x = np.ascontiguousarray((draws / self.scale).T)
         first, second = self.products
         features = np.concatenate([x, x[first] * x[second]])
-        out: Array = (features.T @ self.weights) @ left.shapes
-        if left.carried.size:
-            rests = np.concatenate([rest.of(chunk) for rest in left.rests], axis=1)
-            out[:, :, out.shape[2] - left.carried.shape[2] :] += rests @ left.carried
+        out: Array = (features.T @ self.weights) @ remaining.shapes
+        if remaining.carried.size:
+            rests = np.concatenate([rest.of(chunk) for rest in remaining.rests], axis=1)
+            out[:, :, out.shape[2] - remaining.carried.shape[2] :] += rests @ remaining.carried
         return out
 
 
@@ -153,9 +153,9 @@ def expand(study: Study, tolerances: Sequence[Tolerance]) -> Expansion:
     products = np.triu_indices(len(tolerances))
     columns = _columns(_Runs(study, tolerances, scale, memory), products)
     flat = columns.reshape(len(columns), -1)
-    strength, left = np.linalg.eigh(flat @ flat.T)
-    left = left[:, strength > _RANK**2 * strength[-1]]
-    shapes = (left.T @ flat).reshape(-1, 3, study.samples).swapaxes(0, 1)
+    strength, remaining = np.linalg.eigh(flat @ flat.T)
+    remaining = remaining[:, strength > _RANK**2 * strength[-1]]
+    shapes = (remaining.T @ flat).reshape(-1, 3, study.samples).swapaxes(0, 1)
     chain = jacobian(
         study.robot,
         study.recording.joints.q if study.at is None else study.recording.joints.at(study.at)[0],
@@ -166,7 +166,7 @@ def expand(study: Study, tolerances: Sequence[Tolerance]) -> Expansion:
         tolerances,
         scale,
         products,
-        left,
+        remaining,
         np.ascontiguousarray(shapes),
         memory,
         np.array(moved),

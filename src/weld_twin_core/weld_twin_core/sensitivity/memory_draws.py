@@ -113,9 +113,9 @@ class Remembered:
                 where, table, rise = self._carried
                 return Rest(table, rise, row, part), where
         different, row = _different(own)
-        left = self.left(different)
-        where = _somewhere(left)
-        return Rest(left[:, where], None, row, None), where
+        remaining = self.left(different)
+        where = _somewhere(remaining)
+        return Rest(remaining[:, where], None, row, None), where
 
     @cached_property
     def _carried(self) -> tuple[NDArray[np.intp], Array, Array]:

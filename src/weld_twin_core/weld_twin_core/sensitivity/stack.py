@@ -134,14 +134,14 @@ def probabilities(runs: int, inputs: int, seed: int = 0) -> Array:
 
 
 def tolerance_stack(
-    found: Outcomes, tolerance: WeldTolerance | None = None, *, seed: int = 0
+    result: Outcomes, tolerance: WeldTolerance | None = None, *, seed: int = 0
 ) -> ToleranceStack:
     """
     Return what independent runs say about the weld.
 
     Parameters
     ----------
-    found : Outcomes
+    result : Outcomes
         Of runs at `probabilities`.
     tolerance : WeldTolerance, optional
         Left out, 0.5 mm across and 1 mm of stick-out.
@@ -154,14 +154,14 @@ def tolerance_stack(
         A result is not a number.
 
     """
-    refuse_unfinite(np.stack(found, axis=1), 'tolerance stack')
+    refuse_unfinite(np.stack(result, axis=1), 'tolerance stack')
     limits = tolerance or WeldTolerance()
-    across, stickout = found.across_m <= limits.across_m, found.stickout_m <= limits.stickout_m
+    across, stickout = result.across_m <= limits.across_m, result.stickout_m <= limits.stickout_m
     keys = ('d_norm', 'max_m', 'across_m', 'stickout_m')
     return ToleranceStack(
-        len(found.d_norm),
+        len(result.d_norm),
         seed,
-        {key: _percentiles(getattr(found, key)) for key in keys},
+        {key: _percentiles(getattr(result, key)) for key in keys},
         _frequency(across),
         _frequency(stickout),
         _frequency(across & stickout),
@@ -190,7 +190,7 @@ def _percentiles(values: Array) -> Array:
 def _ranks(chance: Array, runs: int, share: float) -> NDArray[np.intp]:
     """Return the least numbers of hits, of so many runs, that are exceeded with at most a chance."""
     # What scipy's distribution returns, without the half second that importing it takes.
-    found = np.ceil(bdtrik(chance, runs, share))
-    below = np.maximum(found - 1.0, 0.0)
+    result = np.ceil(bdtrik(chance, runs, share))
+    below = np.maximum(result - 1.0, 0.0)
     enough = bdtr(below, runs, share) >= chance
-    return np.asarray(np.where(enough, below, found), dtype=np.intp)
+    return np.asarray(np.where(enough, below, result), dtype=np.intp)

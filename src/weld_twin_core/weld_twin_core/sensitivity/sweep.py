@@ -154,6 +154,6 @@ def end_of_linearity(study: Study, tolerance: Tolerance, largest: float = 1.0) -
     float, or None where D stays in proportion up to ``largest``
 
     """
-    found = sweep(study, tolerance, np.geomspace(1e-3 * largest, largest, 121))
-    bent = np.abs(found.departure) > BENT
-    return float(found.values[np.argmax(bent)]) if bent.any() else None
+    result = sweep(study, tolerance, np.geomspace(1e-3 * largest, largest, 121))
+    bent = np.abs(result.departure) > BENT
+    return float(result.values[np.argmax(bent)]) if bent.any() else None

@@ -128,12 +128,12 @@ def tolerances_from_list(entries: Any, robot: Robot) -> tuple[Tolerance, ...]:
         if not isinstance(entry, Mapping) or 'effect' not in entry:
             raise ModelError(f"tolerance {k} must be a mapping with the key 'effect'")
         try:
-            found = _expanded(robot, entry, 1.0)
+            result = _expanded(robot, entry, 1.0)
         except ModelError as error:
             raise ModelError(f'tolerance {k}: {error}') from None
-        if not found:
+        if not result:
             raise ModelError(f'tolerance {k}: effect {entry["effect"]!r} has no such parameter')
-        out |= {item.name: item for item in found}
+        out |= {item.name: item for item in result}
     return tuple(out.values())
 
 

@@ -373,7 +373,7 @@ class _Search:
         simplex = first + np.vstack(
             [np.zeros(len(free)), np.diag(-0.1 * self.span[free]) * np.sign(first + 1e-12)]
         )
-        found = minimize(
+        result = minimize(
             bounded,
             first,
             method='Nelder-Mead',
@@ -384,7 +384,7 @@ class _Search:
                 'fatol': 1e-9,
             },
         )
-        return self.result(label, full(found.x if found.fun < min(costs) else first))
+        return self.result(label, full(result.x if result.fun < min(costs) else first))
 
 
 def _wrapped(angle: float) -> float:

@@ -20,27 +20,13 @@ from ..arm.chain import frames
 from ..arm.robot import Robot
 from ..arm.rotation import angle_between, rotation_matrix
 from ..arrays import Array
-from ..effects.effect import Effect, MemoryEffect, Stage
+from ..effects.effect import Effect, MemoryEffect
 from ..motion.inverse.newton import chain_jacobian, least_step
 from ..recording import JointMotion, Recording
+from .commandable import commandable
 from .poses import Poses
 from .twin import Twin
 
-BEYOND_COMMANDS = frozenset(
-    {
-        'measurement_scale',
-        'measurement_noise',
-        'refraction',
-        'time_delay',
-        'drift',
-        'setup_step',
-        'setup_settling',
-        'instrument_knock',
-        'quantization',
-    }
-)
-"""Effects of the measurement, new in every run, or a rounding of what is commanded, which is as near
-as it gets: no joint command mends them."""
 _CLOSED = 1e-12
 """Error [m, rad] that is rounding; nothing is left to correct."""
 _LEAST_SHARE = 1e-3
@@ -152,12 +138,12 @@ def _solved(real: Twin, recording: Recording, goal: Poses, rounds: int) -> Array
             break
         step = least_step(chain_jacobian(real.robot, frames(real.robot, q)), error, _SINGULAR)
         trial = replace(recording, joints=_commands(motion, q + share * step))
-        left = _missing(goal, real.poses(trial))
-        helps = np.linalg.norm(left, axis=1) < np.linalg.norm(error, axis=1)
+        remaining = _missing(goal, real.poses(trial))
+        helps = np.linalg.norm(remaining, axis=1) < np.linalg.norm(error, axis=1)
         if coupled:
-            helps[:] = _rms(left) < _rms(error)
+            helps[:] = _rms(remaining) < _rms(error)
         q = np.where(helps[:, None], trial.joints.q, q)
-        error = np.where(helps[:, None], left, error)
+        error = np.where(helps[:, None], remaining, error)
         share = np.where(helps[:, None], share, 0.5 * share)
     return np.asarray(q)
 
@@ -166,11 +152,6 @@ def _part_way(start: Poses, missing: Array, share: Array) -> Poses:
     """Return the poses a share of the way towards those that are wanted."""
     step = missing * share[:, None]
     return Poses(start.position + step[:, :3], rotation_matrix(step[:, 3:]) @ start.rotation)
-
-
-def commandable(effect: Effect) -> bool:
-    """Tell whether joint commands can mend an effect."""
-    return effect.name not in BEYOND_COMMANDS and effect.stage not in (Stage.CLOCK, Stage.NOISE)
 
 
 def _commands(nominal: JointMotion, q: Array) -> JointMotion:

@@ -46,7 +46,7 @@ def corrected(robot: Robot, effects: Sequence[Effect]) -> tuple[Robot, tuple[Eff
     0.001 m; backlash is left
 
     """
-    left = []
+    remaining = []
     for effect in effects:
         if isinstance(effect, ChannelError):
             robot = _with_row(robot, effect)
@@ -55,8 +55,8 @@ def corrected(robot: Robot, effects: Sequence[Effect]) -> tuple[Robot, tuple[Eff
         elif isinstance(effect, Payload) and robot.payload_mass + float(effect.mass) > 0.0:
             robot = _with_payload(robot, effect)
         else:
-            left.append(effect)
-    return robot, tuple(left)
+            remaining.append(effect)
+    return robot, tuple(remaining)
 
 
 def joint_offsets(robot: Robot, effects: Sequence[Effect]) -> np.ndarray:

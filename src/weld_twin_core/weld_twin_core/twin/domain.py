@@ -59,7 +59,6 @@ class Domain:
 
     Attributes
     ----------
-    joints : tuple of str
     ranges : tuple of tuple of (float, float)
         For every joint, where it was measured: separate intervals, in order [rad or m]; angles
         within half a turn of their median.

@@ -35,7 +35,6 @@ class Features:
     ----------
     twin : Twin
         Where the features are taken: its effects act, the ones asked about come on top.
-    recording : Recording
     at : array, shape (M,) [s]
     remembered : dict, optional
         Keeps what effects with memory make of the commanded motion, which no frame and no other
@@ -101,10 +100,10 @@ class Features:
             self._remembered[key] = self._picked(effect.atoms(self.joint_view))
         return self._remembered[key]
 
-    def _picked(self, found: Sequence[Shift]) -> list[Shift]:
+    def _picked(self, result: Sequence[Shift]) -> list[Shift]:
         """Return shifts on the joint clock at the stamps of the measurements."""
         pick = self._picker.pick
-        return [{key: pick(value) for key, value in shift.items()} for shift in found]
+        return [{key: pick(value) for key, value in shift.items()} for shift in result]
 
     @cached_property
     def _picker(self) -> Picker:
@@ -126,8 +125,8 @@ class Features:
             # One joint's hundred ripple orders share its column.
             sizes = [np.broadcast_to(s.get(channels[0], 0.0), self.at.shape) for s in shifts]
             return np.stack(sizes)[:, None] * self.column(channels[0])
-        found = [self.pose_change(shift) for shift in shifts]
-        return np.stack(found) if found else np.zeros((0, 6, self.at.size))
+        result = [self.pose_change(shift) for shift in shifts]
+        return np.stack(result) if result else np.zeros((0, 6, self.at.size))
 
     def seeds(
         self, kind: type[Effect], joint: str | None, residual: Array | None = None
@@ -139,7 +138,6 @@ class Features:
 
         Parameters
         ----------
-        kind : type of Effect
         joint : str or None
             The joint it would sit on; None for the robot as a whole.
         residual : array, shape (c, M) [m, rad], optional

@@ -20,10 +20,11 @@ import numpy as np
 from ..arm.chain import forward
 from ..arm.rotation import rotation_vector
 from ..arrays import Array
-from ..effects.effect import Effect, MemoryEffect, Stage
+from ..effects.effect import Effect, Stage
 from ..errors import DataError
 from ..recording import JointMotion, Recording
-from .compensation import commandable, compensate
+from .commandable import commandable
+from .compensation import compensate
 from .drawn import Drawn
 from .features import Features
 from .goal_motion import Course, Goal, course, fine_times
@@ -88,7 +89,6 @@ class Start(NamedTuple):
     ----------
     q : array, shape (n,), optional [rad or m]
         As commanded; None where it is not known.
-    moving : bool
     came : array, shape (n,), optional
         Sign of the last motion of every joint; 0 where it is not known.
 
@@ -105,7 +105,6 @@ class Refusal(NamedTuple):
 
     Attributes
     ----------
-    reason : str
     largest : (float, float), optional [m, rad]
         The correction that it would have taken.
 
@@ -122,7 +121,6 @@ class CorrectedGoal:
 
     Attributes
     ----------
-    goal : Goal
     added : array, shape (N, 6) [m, rad]
         What was added to the pose at every point, in the axes of the robot's base.
     before, after : float [m]
@@ -184,8 +182,8 @@ def corrected_goal(
 
 def not_corrected(model: ProgramModel) -> list[str]:
     """Return the names of the effects that no point of a goal mends, each once."""
-    left = [e for e in model.effects if e.stage != Stage.NOISE and not _mended(e)]
-    return list(dict.fromkeys(e.name for e in left))
+    remaining = [e for e in model.effects if e.stage != Stage.NOISE and not _mended(e)]
+    return list(dict.fromkeys(e.name for e in remaining))
 
 
 def too_large(length: float, turn: float, limits: GoalLimits) -> str:
@@ -209,9 +207,6 @@ class _Work:
         self.real = Twin(model.robot, mended)
         self.still = tuple(e for e in mended if not is_play(e))
         self.plays = tuple(e for e in mended if is_play(e))
-        self.lawless = [
-            e for e in mended if not isinstance(e, MemoryEffect) and e.on == 'direction'
-        ]
         self.bare = model.robot.with_frames(base=np.eye(4))
         self.largest: tuple[float, float] | None = None
         self.meant = course(goal, fine_times(goal))
@@ -229,9 +224,9 @@ class _Work:
             )
         sure = self._covariances()
         self._refuse_unsure(before, sure)
-        found, after, more = self._chosen(before)
-        added = self._added(found, self.goal.t)
-        waits = self._waits(found)
+        result, after, more = self._chosen(before)
+        added = self._added(result, self.goal.t)
+        waits = self._waits(result)
         if waits:
             more.append(
                 f'the correction sets in before the goal, which begins {waits:.3f} s later'
@@ -241,11 +236,11 @@ class _Work:
                 'where the arm stands is not known: the correction sets in at the first point'
             )
         return CorrectedGoal(
-            found.later(waits),
+            result.later(waits),
             added,
             _rms(before),
             _rms(after),
-            self._bound(after, course(found, self.meant.t)),
+            self._bound(after, course(result, self.meant.t)),
             waits,
             (*notes, *more),
         )
@@ -256,8 +251,8 @@ class _Work:
             f'{name} is not corrected: it hangs on how the controller follows, not on where it goes'
             for name in not_corrected(self.model)
         ]
-        if self.lawless:
-            names = ' and '.join(sorted({str(e.site) for e in self.lawless}))
+        if self.model.lawless:
+            names = ' and '.join(self.model.lawless)
             out.append(
                 f'no bound is told: what {names} loses by direction is known without its law, which '
                 'decides where it turns around'
@@ -268,17 +263,17 @@ class _Work:
         """Return the first way of correcting that keeps the limits and gains; raise why none does."""
         reasons: list[str] = []
         size = np.linalg.norm(before[:, :3], axis=1)
-        for found, play in self._ways():
-            added = self._added(found, self.goal.t)
+        for result, play in self._ways():
+            added = self._added(result, self.goal.t)
             self.largest = self.largest or _largest(added)
             try:
                 self._refuse_large(added)
-                self._refuse_beyond(course(found, self.meant.t), 'the corrected goal')
-                self._refuse_quick(found)
+                self._refuse_beyond(course(result, self.meant.t), 'the corrected goal')
+                self._refuse_quick(result)
             except _RefusedError as refused:
                 reasons.append(str(refused))
                 continue
-            after = self._missing(course(found, self.meant.t))
+            after = self._missing(course(result, self.meant.t))
             worst = float(np.linalg.norm(after[:, :3], axis=1).max())
             # How the arm comes to where a goal begins is one place; most of the way must gain.
             if _rms(after) > BETTER * _rms(before) + NOTHING or worst > size.max() + NOTHING:
@@ -287,9 +282,9 @@ class _Work:
                     f'would be left of {_rms(before) * 1e3:.3f} mm (at worst {size.max() * 1e3:.3f})'
                 )
                 continue
-            left = [f'play is not corrected: {reasons[0]}'] if self.plays and not play else []
+            remaining = [f'play is not corrected: {reasons[0]}'] if self.plays and not play else []
             self.largest = _largest(added)
-            return found, after, left
+            return result, after, remaining
         raise _RefusedError(reasons[0])
 
     def _ways(self) -> Iterator[tuple[Goal, bool]]:
@@ -375,7 +370,7 @@ class _Work:
     def _bound(self, after: Array, way: Course) -> float | None:
         """Return the largest distance on a way that is told not to be exceeded [m]."""
         posterior = self.model.posterior
-        if posterior is None or self.lawless:
+        if posterior is None or self.model.lawless:
             return None
         recording = self._approached(way)
         turned = just_turned(recording.joints, way.t)
@@ -387,24 +382,24 @@ class _Work:
         )
         # Where joints turn around more is left than beside, and few places would miss that.
         near = np.searchsorted(places, np.arange(len(after))).clip(max=places.size - 1)
-        found = accuracy([after], [Drawn(near, same, own)])
-        return None if found is None else found.likely_within(HOLDS)
+        result = accuracy([after], [Drawn(near, same, own)])
+        return None if result is None else result.likely_within(HOLDS)
 
-    def _added(self, found: Goal, at: Array) -> Array:
+    def _added(self, result: Goal, at: Array) -> Array:
         """Return what a corrected goal adds to the pose at stamps, shape (N, 6), seen from the base."""
-        old, new = (forward(self.bare, course(g, at).q) for g in (self.goal, found))
+        old, new = (forward(self.bare, course(g, at).q) for g in (self.goal, result))
         turn = rotation_vector(new[:, :3, :3] @ np.swapaxes(old[:, :3, :3], -1, -2))
         return np.concatenate([new[:, :3, 3] - old[:, :3, 3], turn], axis=1)
 
-    def _waits(self, found: Goal) -> float:
+    def _waits(self, result: Goal) -> float:
         """Return how much later the goal has to begin [s] for its correction to set in smoothly."""
         here = self.start.q
         if here is None or not self._rests:
             return 0.0
-        step = found.q[0] - here
+        step = result.q[0] - here
         if np.abs(step).max() < HERE:
             return 0.0
-        length, turn = np.abs(_largest(self._between(here, found.q[0])))
+        length, turn = np.abs(_largest(self._between(here, result.q[0])))
         most = np.minimum(self.model.robot.max_acceleration, self.limits.acceleration)
         needed = max(
             SMOOTH_SPEED * length / self.limits.rate,
@@ -438,15 +433,15 @@ class _Work:
             return
         count = self.meant.t.size
         pull, warm = self.model.wrench, self.model.temperature
-        found = self.model.posterior.domain.outside(
+        result = self.model.posterior.domain.outside(
             self.meant.q,
             None,
             None if pull is None else np.repeat(pull[None], count, axis=0),
             None if warm is None else np.full(count, warm),
         )
-        if found:
-            at = self.meant.t[found[0].first]
-            raise _RefusedError(f'outside what was recorded from {at:.2f} s on: {found[0].why}')
+        if result:
+            at = self.meant.t[result[0].first]
+            raise _RefusedError(f'outside what was recorded from {at:.2f} s on: {result[0].why}')
 
     def _refuse_unsure(self, before: Array, sure: Array | None) -> None:
         if sure is None:
@@ -465,10 +460,10 @@ class _Work:
         if length > self.limits.length or turn > self.limits.turn:
             raise _RefusedError(too_large(length, turn, self.limits))
 
-    def _refuse_quick(self, found: Goal) -> None:
+    def _refuse_quick(self, result: Goal) -> None:
         if self.meant.t.size < 2:
             return
-        rates = np.diff(self._added(found, self.meant.t), axis=0)
+        rates = np.diff(self._added(result, self.meant.t), axis=0)
         rates /= np.diff(self.meant.t)[:, None]
         length, turn = _largest(rates)
         if length > self.limits.rate or turn > self.limits.turn_rate:

@@ -91,7 +91,6 @@ def course(goal: Goal, at: Array) -> Course:
 
     Parameters
     ----------
-    goal : Goal
     at : array, shape (K,) [s]
         Within the goal.
 

@@ -24,14 +24,7 @@ motion."""
 
 
 class LivePosterior:
-    """
-    The covariance of the twin's pose while joint states come in.
-
-    Parameters
-    ----------
-    posterior : Posterior
-
-    """
+    """The covariance of the twin's pose while joint states come in."""
 
     def __init__(self, posterior: Posterior) -> None:
         self.posterior = posterior
@@ -61,12 +54,10 @@ class LivePosterior:
 
         Parameters
         ----------
-        twin : Twin
         t : float [s]
             Stamp of the joint state.
         q : array, shape (n,)
         wrench : array, shape (6,), optional [N, N m]
-        wrench_frame : str
         temperature : float, optional [degC]
         effort : array, shape (n,), optional [N m, or N of a slide]
 
@@ -105,10 +96,10 @@ class LivePosterior:
             effort=None if effort is None else JointSignal(now, effort[None]),
         )
         self._covariance = self.posterior.pose_covariance(Features(twin, recording, now))[0]
-        found = self.posterior.domain.outside(
+        result = self.posterior.domain.outside(
             q[None],
             speed[None],
             None if wrench is None else wrench[None],
             None if temperature is None else np.array([temperature]),
         )
-        self._outside = tuple(item.why for item in found)
+        self._outside = tuple(item.why for item in result)

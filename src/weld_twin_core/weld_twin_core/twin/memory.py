@@ -37,7 +37,6 @@ def run_all(
 
     Parameters
     ----------
-    effects : sequence of Effect
     view : View
         The commanded motion on the joint stamps.
     want : bool

@@ -142,8 +142,8 @@ class PoseCorrection:
             size = np.abs(error).max()
             step = least_step(rise, error, SINGULAR)
             q = q + step
-            left = np.abs(error - rise @ step).max()
-            if left < CLOSED and np.abs(step).max() < SETTLED:
+            remaining = np.abs(error - rise @ step).max()
+            if remaining < CLOSED and np.abs(step).max() < SETTLED:
                 break
         else:
             if not size < OPEN:
@@ -172,8 +172,8 @@ class PoseCorrection:
             self._begin()
             return
         way, size = _away(before, looked.pose)
-        told = _told(before, self._bend, way, size)
-        off = _size((told - looked.values)[:6])
+        reported = _told(before, self._bend, way, size)
+        off = _size((reported - looked.values)[:6])
         if size > REACH[0]:
             self._bend = (looked.slope - before.slope) / size
             self._way = way
@@ -222,13 +222,13 @@ class PoseCorrection:
         if posterior is None:
             return ''
         pull, warm = self.model.wrench, self.model.temperature
-        found = posterior.domain.outside(
+        result = posterior.domain.outside(
             looked.q[None],
             None,
             None if pull is None else pull[None],
             None if warm is None else np.array([warm]),
         )
-        return f'outside what was recorded: {found[0].why}' if found else ''
+        return f'outside what was recorded: {result[0].why}' if result else ''
 
     def doubt(self, looked: Looked) -> float:
         """Return how sure the model is of a pose: standard deviation of its distance [m], 0 unknown."""

@@ -13,7 +13,7 @@ was recorded.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -23,10 +23,11 @@ from numpy.typing import NDArray
 
 from ..arm.robot import Robot
 from ..arrays import Array, readonly
-from ..effects.effect import Effect, Stage
+from ..effects.effect import Effect
 from ..errors import DataError, ModelError
 from ..recording import JointMotion, Recording, Signal
 from ..sequences import halton
+from .commandable import commandable
 from .domain import Domain
 from .expected_effort import with_expected_effort
 from .features import Features
@@ -87,6 +88,12 @@ class Directions:
         return tuple(effect.fit.coordinates().size for effect in self.effects)
 
     @property
+    def own(self) -> list[slice]:
+        """Return where the coordinates of every effect are, behind those of the frames."""
+        ends = self.frame_count + np.cumsum(self.sizes, dtype=int)
+        return [slice(end - size, end) for end, size in zip(ends, self.sizes, strict=True)]
+
+    @property
     def count(self) -> int:
         """Return the number of coordinates."""
         return self.frame_count + sum(self.sizes) + sum(k.size for k in self.knots)
@@ -130,11 +137,10 @@ class Directions:
         if 'tool' in self.frames:
             for k in range(6 * framed):
                 out[at + k] = features.column(('tool', k))
-            at += 6
-        for effect, size in zip(self.effects, self.sizes, strict=True):
+        for effect, here in zip(self.effects, self.own, strict=True):
             if effect.applicable(features.view, effect.site) is None:
-                out[at : at + size] = features.columns(effect, atoms=False)
-            at += size
+                out[here] = features.columns(effect, atoms=False)
+        at = self.frame_count + sum(self.sizes)
         for joint, knots in enumerate(self.knots):
             if knots.size:
                 hats = _hats(features.run.view.joint(joint), knots)
@@ -234,11 +240,9 @@ class Posterior:
 
     Attributes
     ----------
-    directions : Directions
     mean : array, shape (P,)
         Where the middle of the allowed models lies, counted from the fitted one.
     covariance : array, shape (P, P)
-    discrepancy : Discrepancy
     domain : Domain
         What was recorded.
     left_open : tuple of str
@@ -251,6 +255,8 @@ class Posterior:
     single : (array, shape (P,), array, shape (P, P)), optional
         Mean and covariance under that one prior, of which it can be taken off again: what the data
         alone say. ``mean`` and ``covariance`` are weighed over many.
+    middle : float
+        How far to go from the fitted model to the middle to predict best, from 0 to 1.
     region : (str, float), optional
         A region that was asked for, as it was told, and the same standard deviation there [m].
 
@@ -267,6 +273,7 @@ class Posterior:
     prior_std: Array | None = None
     single: tuple[Array, Array] | None = None
     region: tuple[str, float] | None = None
+    middle: float = 0.0
 
     def __post_init__(self) -> None:
         count = self.directions.count
@@ -334,10 +341,30 @@ class Posterior:
         moved = np.tensordot(ways, self._columns(features, setup), axes=(0, 0))
         return moved, self.discrepancy.covariance(*self._levers(features))
 
-    def without_clocks(self) -> Posterior:
-        """Return how sure poses of a motion to come are, whose place nobody stamps."""
+    def doubt(self, effect: Effect) -> Array:
+        """
+        Return how far the coordinates of a fitted effect may be off, as standard deviations, (K,).
+
+        Zero where the models differ by other coordinates than its own, as waves of a joint do.
+        """
+        own = effect.fit.coordinates()
+        variance = np.diag(self.covariance) + self.mean**2
+        for mine, here in zip(self.directions.effects, self.directions.own, strict=True):
+            same = mine.key == effect.key and variance[here].shape == own.shape
+            if same and effect.traits.waves is None:
+                return np.sqrt(variance[here])
+        return np.zeros_like(own)
+
+    def of_the_arm(self) -> Posterior:
+        """
+        Return how sure the tool's own poses are on a motion to come, which nobody measures.
+
+        What was found of the instrument, its clock and the set-up stays with the recording. The
+        middle of the allowed models may hold less of it than the fit, and more of the arm in its
+        place: counted together, the two would cancel.
+        """
         what = self.directions
-        stays = [effect.stage is not Stage.CLOCK for effect in what.effects]
+        stays = [commandable(effect) for effect in what.effects]
         own = np.repeat(stays, what.sizes).astype(bool)
         curves = sum(k.size for k in what.knots)
         keep = np.concatenate([np.ones(what.frame_count, bool), own, np.ones(curves, bool)])
@@ -350,6 +377,42 @@ class Posterior:
             prior_std=None if self.prior_std is None else self.prior_std[keep],
             single=None,
         )
+
+    def centred(self, result: Sequence[Effect]) -> tuple[tuple[Effect, ...], Posterior]:
+        """
+        Return the effects that predict best, and the posterior about them.
+
+        What a diagnosis names is a few effects; most arms have a little of all others, and what the
+        recordings say of these is kept here. Frames go along. A parameter that bends the twin, and
+        the height of a curve, stay.
+
+        Parameters
+        ----------
+        result : sequence of Effect
+            Of the fitted model.
+
+        """
+        if self.middle == 0.0:
+            return tuple(result), self
+        step = self.middle * self.mean
+        effects = []
+        waves = [effect for effect in result if effect.traits.waves is not None]
+        ours = {effect.key for effect in self.directions.effects}
+        for effect, here in zip(self.directions.effects, self.directions.own, strict=True):
+            now = effect.fit.coordinates()
+            if effect.traits.waves is not None:
+                # Waves of a joint add up: those found stay as they are, beside what is missing.
+                effects.append(effect.fit.with_coordinates(step[here]))
+                continue
+            straight = [effect.components()[k][0].linear for k in effect.fit.fitted()]
+            moved = effect.fit.with_coordinates(now + np.where(straight, step[here], 0.0))
+            step[here] = moved.fit.coordinates() - now
+            effects.append(moved)
+        step[self.directions.frame_count + sum(self.directions.sizes) :] = 0.0
+        others = [effect for effect in result if effect.key not in ours and effect not in waves]
+        what = replace(self.directions, effects=tuple(effects))
+        centred = replace(self, directions=what, mean=self.mean - step, single=None, middle=0.0)
+        return (*effects, *waves, *others), centred
 
     def after(self, features: Features, noise: float) -> Posterior:
         """
@@ -373,8 +436,10 @@ class Posterior:
         moment = self.covariance + np.outer(self.mean, self.mean)
         gain = moment @ rows
         seen = rows.T @ gain + rest.reshape(3 * count, 3 * count)
-        left = moment - gain @ np.linalg.solve(seen, gain.T)
-        return replace(self, mean=np.zeros_like(self.mean), covariance=0.5 * (left + left.T))
+        remaining = moment - gain @ np.linalg.solve(seen, gain.T)
+        return replace(
+            self, mean=np.zeros_like(self.mean), covariance=0.5 * (remaining + remaining.T)
+        )
 
     def drawn(
         self, features: Features, setup: int = 0, *, framed: bool = True, count: int = DRAWS
@@ -437,10 +502,8 @@ def pose_covariances(
 
     Parameters
     ----------
-    posterior : Posterior
     twin : Twin
         The fitted model for this recording.
-    recording : Recording
     at : array, shape (M,) [s]
     setup : int
         Which base frame of the posterior.
@@ -463,8 +526,6 @@ def usual_sigma(posterior: Posterior, twin: Twin, like: Recording, q: Array) -> 
 
     Parameters
     ----------
-    posterior : Posterior
-    twin : Twin
     like : Recording
         Gives the temperature; the tool is not loaded.
     q : array, shape (M, n)
@@ -540,6 +601,7 @@ def as_dict(posterior: Posterior) -> dict[str, Any]:
             'reach': rest.reach,
             'turns': np.asarray(rest.turns).tolist(),
         },
+        'middle': posterior.middle,
         'recorded': posterior.domain.as_dict(),
         'left_open': list(posterior.left_open),
         'sigma_recorded_m': posterior.recorded_m,

@@ -32,8 +32,9 @@ class Accuracy(NamedTuple):
     worst : float
         By the model's own prediction.
     low, high : float or None
-        Nine of ten models that the recordings allow have their RMS between these, in the set-up
-        recorded and in the robot's own base; None where the model says nothing of how sure it is.
+        Nine of ten models that the recordings allow, and the one found, have their RMS between these,
+        in the set-up recorded and in the robot's own base; None where the model says nothing of how
+        sure it is.
     same : (float, float) or None
         The same in the set-up that was recorded.
     worsts : array, shape (2, D), optional [m]
@@ -77,7 +78,9 @@ def conforms(probability: float) -> str:
     return 'not kept' if probability <= 1.0 - SURE else 'open'
 
 
-def accuracy(gaps: Sequence[Array], drawn: Sequence[Drawn | None]) -> Accuracy | None:
+def accuracy(
+    gaps: Sequence[Array], drawn: Sequence[Drawn | None], ways: Sequence[Array] | None = None
+) -> Accuracy | None:
     """
     Return the accuracy over samples, or None without any.
 
@@ -87,30 +90,40 @@ def accuracy(gaps: Sequence[Array], drawn: Sequence[Drawn | None]) -> Accuracy |
         What is missing by the model.
     drawn : sequence of Drawn or None
         Of the same samples.
+    ways : sequence of array, each of shape (N,), optional [m]
+        How much of the way each sample stands for; all alike without.
 
     """
     gap = np.concatenate([np.zeros((0, 3)), *(g[:, :3] for g in gaps)])
     if not len(gap):
         return None
-    rms, worst = _rms(gap), float(np.linalg.norm(gap, axis=1).max())
+    share = np.ones(len(gap)) if ways is None else np.concatenate(ways)
+    share = share / share.sum()
+    square = (gap**2).sum(axis=1)
+    rms, worst = float(np.sqrt(share @ square)), float(np.sqrt(square.max()))
     known = [d for d in drawn if d is not None]
     if len(known) < len(drawn):
         return Accuracy(rms, worst)
     pairs = [(g[:, :3], d) for g, d in zip(gaps, known, strict=True)]
-    same = _drawn([(g, d.near, d.same) for g, d in pairs])
-    own = _drawn([(g, d.near, d.own) for g, d in pairs])
-    ends = np.percentile([same[0], own[0]], SPAN, axis=1)
+    same = _drawn([(g, d.near, d.same) for g, d in pairs], share)
+    own = _drawn([(g, d.near, d.own) for g, d in pairs], share)
+    # Drawn models are off by something everywhere. The one that was found, which may be off by
+    # nothing, is allowed as well.
+    low, high = np.percentile([same[0], own[0]], SPAN, axis=1)
+    low, high = np.minimum(low, rms), np.maximum(high, rms)
     return Accuracy(
         float(np.sqrt((same[0] ** 2).mean())),
         worst,
-        float(ends[0].min()),
-        float(ends[1].max()),
-        (float(ends[0, 0]), float(ends[1, 0])),
+        float(low.min()),
+        float(high.max()),
+        (float(low[0]), float(high[0])),
         np.stack([same[1], own[1]]),
     )
 
 
-def _drawn(parts: Sequence[tuple[Array, NDArray[np.int_], Array]]) -> tuple[Array, Array]:
+def _drawn(
+    parts: Sequence[tuple[Array, NDArray[np.int_], Array]], share: Array
+) -> tuple[Array, Array]:
     """Return RMS and largest distance under every model drawn, shape (D,) each [m]."""
     squares = np.concatenate(
         [
@@ -119,34 +132,37 @@ def _drawn(parts: Sequence[tuple[Array, NDArray[np.int_], Array]]) -> tuple[Arra
         ],
         axis=1,
     )
-    return np.sqrt(squares.mean(axis=1)), np.sqrt(squares.max(axis=1))
+    return np.sqrt(squares @ share), np.sqrt(squares.max(axis=1))
 
 
-def along_seams(found: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | None]:
+def along_seams(result: ProgramCorrection) -> tuple[Accuracy | None, Accuracy | None]:
     """Return the accuracy along corrected seams, before and after; of all moves without any."""
-    chosen = [
-        np.array(
-            [m.kind != 'joint' and m.seam not in found.left for m in piece.moves], dtype=bool
-        )[piece.move]
-        for piece in found.travel.pieces
-    ]
-    if not any(keep.any() for keep in chosen):
-        chosen = [_ends(piece.motion.t.size, piece.ends) for piece in found.travel.pieces]
+    pieces = result.travel.pieces
+    ways = [_along(result, k) for k in range(len(pieces))]
+    if not any(way.any() for way in ways):
+        ways = [_ends(piece.motion.t.size, piece.ends) for piece in pieces]
+    chosen = [way > 0.0 for way in ways]
     drawn = [
-        None if d is None else d.where(keep) for d, keep in zip(found.drawn, chosen, strict=True)
+        None if d is None else d.where(keep) for d, keep in zip(result.drawn, chosen, strict=True)
     ]
+    shares = [way[keep] for way, keep in zip(ways, chosen, strict=True)]
     before, after = (
-        accuracy([g[keep] for g, keep in zip(gaps, chosen, strict=True)], drawn)
-        for gaps in (found.before, found.after)
+        accuracy([g[keep] for g, keep in zip(gaps, chosen, strict=True)], drawn, shares)
+        for gaps in (result.before, result.after)
     )
     return before, after
 
 
-def _ends(count: int, ends: np.ndarray) -> np.ndarray:
-    out = np.zeros(count, dtype=bool)
-    out[ends] = True
+def _along(result: ProgramCorrection, k: int) -> Array:
+    """Return how much of the way along corrected seams the samples of a piece stand for, (N,) [m]."""
+    piece = result.travel.pieces[k]
+    seams = [move.kind != 'joint' and move.seam not in result.left for move in piece.moves]
+    steps = np.where(np.array(seams, dtype=bool)[piece.move], result.ways[k], 0.0)
+    # A seam begins where the move before it ends.
+    return np.asarray(0.5 * (steps + np.append(steps[1:], 0.0)))
+
+
+def _ends(count: int, ends: np.ndarray) -> Array:
+    out = np.zeros(count)
+    out[ends] = 1.0
     return out
-
-
-def _rms(gap: Array) -> float:
-    return float(np.sqrt((gap**2).sum(axis=1).mean()))

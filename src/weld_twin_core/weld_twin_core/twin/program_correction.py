@@ -104,10 +104,11 @@ class ProgramCorrection:
     held : frozenset of int
         Points that were not moved.
     before, after : tuple of array, each of shape (N, 6) [m, rad]
-        What is missing to the real tool at every sample of every piece.
+        What is missing to the real tool at every sample of every piece, with what no program mends.
+    ways : tuple of array, each of shape (N,) [m]
+        How far the tool goes to every sample.
     covariances : tuple of array or None, each of shape (N, 6, 6)
         In the set-up that was recorded.
-    drawn : tuple of Drawn or None
     results : tuple of MoveResult
         One for every move, in the order of the program.
 
@@ -120,6 +121,7 @@ class ProgramCorrection:
     held: frozenset[int]
     before: tuple[Array, ...]
     after: tuple[Array, ...]
+    ways: tuple[Array, ...]
     covariances: tuple[Array | None, ...]
     drawn: tuple[Drawn | None, ...]
     results: tuple[MoveResult, ...]
@@ -139,11 +141,8 @@ def correct_program(
 
     Parameters
     ----------
-    model : ProgramModel
-    program : MoveProgram
     held : dict of int to str, optional
         Points that must not be moved, with the reason; their seams are left as they were.
-    caps : Caps, optional
     start : array, shape (n,), optional
         Joint positions before the first move.
     written : callable, optional
@@ -152,21 +151,21 @@ def correct_program(
     """
     way = travel(model.robot, program, start, model.recorded if model.posterior else None)
     work = _Work(model, program, way, caps or Caps(), model.without_memory(), written)
-    left = dict(work.travel.lost)
+    remaining = dict(work.travel.lost)
     for seam, why in _held_seams(program, held or {}).items():
-        left.setdefault(seam, why)
+        remaining.setdefault(seam, why)
     calm: dict[int, str] = {}
-    moved = work.solved(_spread(program, left), calm)
+    moved = work.solved(_spread(program, remaining), calm)
     for _ in range(2 * len(work.seams) + 1):
-        found = work.refused(moved, left, calm)
-        found = found or work.unsettled(moved, left, calm)
-        if not found:
+        result = work.refused(moved, remaining, calm)
+        result = result or work.unsettled(moved, remaining, calm)
+        if not result:
             break
-        for seam, why in found.items():
-            (left if work.still is None or seam in calm else calm).setdefault(seam, why)
-        moved = work.solved(_spread(program, left), calm)
-    calm = {seam: why for seam, why in calm.items() if seam not in left}
-    return work.result(moved, left, calm)
+        for seam, why in result.items():
+            (remaining if work.still is None or seam in calm else calm).setdefault(seam, why)
+        moved = work.solved(_spread(program, remaining), calm)
+    calm = {seam: why for seam, why in calm.items() if seam not in remaining}
+    return work.result(moved, remaining, calm)
 
 
 class _Work(NamedTuple):
@@ -205,14 +204,14 @@ class _Work(NamedTuple):
                 gap = self.gap(piece, motion, calm)
                 _collect(self.model, moved, piece, motion, gap, steps)
             points = list(moved.points)
-            for point, found in steps.items():
+            for point, result in steps.items():
                 if point not in still:
-                    points[point] = _stepped(points[point], np.mean(found, axis=0))
+                    points[point] = _stepped(points[point], np.mean(result, axis=0))
             moved = moved.with_points(points)
         return moved if self.written is None else moved.with_points(self.written(moved.points))
 
     def refused(
-        self, moved: MoveProgram, left: dict[int, str], calm: Collection[int]
+        self, moved: MoveProgram, remaining: dict[int, str], calm: Collection[int]
     ) -> dict[int, str]:
         """Return the seams that must not be corrected this way, with the reason."""
         out: dict[int, str] = {}
@@ -229,7 +228,7 @@ class _Work(NamedTuple):
                 why = self._why_not(moved, piece, k, shares)
                 if why:
                     out.setdefault(move.seam, f'{move.where}: {why}')
-        return {seam: why for seam, why in out.items() if seam not in left}
+        return {seam: why for seam, why in out.items() if seam not in remaining}
 
     def _why_not(self, moved: MoveProgram, piece: Piece, k: int, shares: Array | None) -> str:
         move = piece.moves[k]
@@ -246,7 +245,7 @@ class _Work(NamedTuple):
         return ''
 
     def unsettled(
-        self, moved: MoveProgram, left: dict[int, str], calm: Collection[int]
+        self, moved: MoveProgram, remaining: dict[int, str], calm: Collection[int]
     ) -> dict[int, str]:
         """Return the seams that points cannot be moved for, with the reason."""
         out: dict[int, str] = {}
@@ -270,7 +269,7 @@ class _Work(NamedTuple):
         for seam, (before, after, where) in worst.items():
             if after > BETTER * before + NOTHING:
                 out.setdefault(seam, f'{where}: {_worse(before, after)}')
-        return {seam: why for seam, why in out.items() if seam not in left}
+        return {seam: why for seam, why in out.items() if seam not in remaining}
 
     def _sizes(self, piece: Piece, motion: JointMotion) -> Array:
         """Return how far off the tool is, shape (N,) [m], however the controller eases in and out."""
@@ -319,25 +318,28 @@ class _Work(NamedTuple):
         return posterior.domain.trust(piece.motion.q, gap[:, :3], covariance[:, :3, :3])
 
     def result(
-        self, moved: MoveProgram, left: dict[int, str], calm: dict[int, str]
+        self, moved: MoveProgram, remaining: dict[int, str], calm: dict[int, str]
     ) -> ProgramCorrection:
         """Return everything that is told of the correction."""
-        before, after, sure, drawn = [], [], [], []
+        before, after, ways, sure, drawn = [], [], [], [], []
         for piece in self.travel.pieces:
             aim = self.model.wanted(piece)
             motion = repeated(self.model.robot, moved, piece)
-            before.append(missing(aim, self.model.real(piece, piece.motion)))
-            after.append(missing(aim, self.model.real(piece, motion)))
+            before.append(missing(aim, self.model.real(piece, piece.motion, whole=True)))
+            after.append(missing(aim, self.model.real(piece, motion, whole=True)))
+            steps = np.diff(aim[:, :3, 3], axis=0, prepend=aim[:1, :3, 3])
+            ways.append(np.linalg.norm(steps, axis=1))
             sure.append(self.model.covariances(piece, piece.motion))
             drawn.append(self.model.drawn(piece, piece.motion))
         return ProgramCorrection(
             moved,
             self.travel,
-            left,
+            remaining,
             calm,
-            frozenset(_spread(self.program, left)),
+            frozenset(_spread(self.program, remaining)),
             tuple(before),
             tuple(after),
+            tuple(ways),
             tuple(sure),
             tuple(drawn),
             self._results(moved, before, after, sure),
@@ -427,18 +429,18 @@ def _held_seams(program: MoveProgram, held: dict[int, str]) -> dict[int, str]:
     return out
 
 
-def _spread(program: MoveProgram, left: dict[int, str]) -> set[int]:
+def _spread(program: MoveProgram, remaining: dict[int, str]) -> set[int]:
     """Return the points of seams that are left, and leave the seams that share one with them."""
     moves = [move for piece in program.pieces for move in piece]
     still: set[int] = set()
     while True:
-        more = {u.point for move in moves if move.seam in left for u in move.uses} - still
+        more = {u.point for move in moves if move.seam in remaining for u in move.uses} - still
         if not more:
             return still
         still |= more
         for move in moves:
-            if move.seam not in left and any(u.point in still for u in move.uses):
-                left[move.seam] = (
+            if move.seam not in remaining and any(u.point in still for u in move.uses):
+                remaining[move.seam] = (
                     f'{move.where}: a point of this seam belongs to one that is left as it was'
                 )
 

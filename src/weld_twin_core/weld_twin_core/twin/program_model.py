@@ -18,7 +18,7 @@ from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect
 from ..motion.programs import Move, Piece
 from ..recording import JointMotion, Recording, Signal
-from .compensation import commandable
+from .commandable import acts, commandable
 from .domain import Domain, Outside
 from .drawn import Drawn, places
 from .features import Features
@@ -40,8 +40,6 @@ class ProgramModel:
     ----------
     robot : Robot
         Nominal, with its own base and the tool that the effects were found with.
-    effects : tuple of Effect
-    posterior : Posterior, optional
     temperature : float, optional [degC]
         While the program runs.
     setup : int
@@ -60,12 +58,18 @@ class ProgramModel:
     setup: int = 0
     wrench: Array | None = None
     wrench_frame: str = 'tool'
-    _twins: dict[bytes, Twin] = field(default_factory=dict, repr=False)
+    _twins: dict[tuple[bytes, bool], Twin] = field(default_factory=dict, repr=False)
 
     @property
     def acting(self) -> tuple[Effect, ...]:
         """Return the effects that moves of the arm can mend."""
         return tuple(effect for effect in self.effects if commandable(effect))
+
+    @property
+    def lawless(self) -> list[str]:
+        """Return the joints of which is known what they lose by direction, and not by which law."""
+        lost = [e for e in self.acting if not isinstance(e, MemoryEffect) and e.on == 'direction']
+        return sorted({str(effect.site) for effect in lost})
 
     def without_memory(self) -> ProgramModel | None:
         """Return the model without play, friction and lag; None where it has none of them."""
@@ -76,12 +80,17 @@ class ProgramModel:
         """Return the nominal arm with a tool, in its own base."""
         return self.robot.with_frames(base=np.eye(4), tool=tool)
 
-    def twin(self, tool: Array) -> Twin:
-        """Return the real arm with a tool; what was found of another tool is left out."""
-        key = np.ascontiguousarray(tool).tobytes()
+    def twin(self, tool: Array, *, whole: bool = False) -> Twin:
+        """
+        Return the real arm with a tool; what was found of another tool is left out.
+
+        As far as moves of the arm can mend it, or the ``whole`` of what is off.
+        """
+        key = np.ascontiguousarray(tool).tobytes(), whole
         if key not in self._twins:
             same = self.same_tool(tool)
-            effects = [e for e in self.acting if same or e.name != TOOL_EFFECT]
+            acting = tuple(e for e in self.effects if acts(e)) if whole else self.acting
+            effects = [e for e in acting if same or e.name != TOOL_EFFECT]
             self._twins[key] = Twin(self.robot.with_frames(tool=tool), effects)
         return self._twins[key]
 
@@ -93,13 +102,13 @@ class ProgramModel:
         """Return ``T_base_tool`` as the program means it at every sample, shape (N, 4, 4)."""
         return self._by_tool(piece, lambda tool: forward(self.arm(tool), piece.motion.q))
 
-    def real(self, piece: Piece, motion: JointMotion) -> Array:
-        """Return ``T_base_tool`` of the real arm at every sample of a motion, (N, 4, 4)."""
+    def real(self, piece: Piece, motion: JointMotion, *, whole: bool = False) -> Array:
+        """Return ``T_base_tool`` of `twin` at every sample of a motion, (N, 4, 4)."""
         back = np.linalg.inv(self.robot.T_world_base)
         recording = self.recording(motion)
 
         def poses(tool: Array) -> Array:
-            position, rotation = self.twin(tool).poses(recording)
+            position, rotation = self.twin(tool, whole=whole).poses(recording)
             out = np.zeros((motion.t.size, 4, 4))
             out[:, :3, :3], out[:, :3, 3], out[:, 3, 3] = rotation, position, 1.0
             return np.asarray(back @ out)
@@ -114,8 +123,8 @@ class ProgramModel:
         turn = np.kron(np.eye(2), self.robot.T_world_base[:3, :3].T)
 
         def sureness(tool: Array) -> Array:
-            found = pose_covariances(posterior, self.twin(tool), recording, motion.t, self.setup)
-            return np.asarray(turn @ found @ turn.T)
+            result = pose_covariances(posterior, self.twin(tool), recording, motion.t, self.setup)
+            return np.asarray(turn @ result @ turn.T)
 
         return self._by_tool(piece, sureness)
 
@@ -128,8 +137,8 @@ class ProgramModel:
 
         def off(tool: Array, framed: bool) -> Array:
             seen = Features(self.twin(tool), recording, motion.t[at])
-            found = posterior.drawn(seen, self.setup, framed=framed)
-            return np.asarray(found @ self.robot.T_world_base[:3, :3])
+            result = posterior.drawn(seen, self.setup, framed=framed)
+            return np.asarray(result @ self.robot.T_world_base[:3, :3])
 
         same, own = (
             self._by_tool(piece, partial(off, framed=framed), at) for framed in (True, False)

@@ -16,7 +16,6 @@ class Picker:
 
     Parameters
     ----------
-    motion : JointMotion
     t : array, shape (M,) or (D, M) [s]
         Where to look; static stations give the nearest in time.
 

@@ -59,7 +59,6 @@ def approached(recording: Recording, came: Array | None, stands: Array | None = 
 
     Parameters
     ----------
-    recording : Recording
     came : array, shape (n,), optional
         Sign of the last motion of every joint; 0 where it is not known.
     stands : array, shape (n,), optional [rad or m]
@@ -90,8 +89,6 @@ def play_steps(
 
     Parameters
     ----------
-    robot : Robot
-    plays : tuple of Effect
     recording : Recording
         The motion that the joints are to make behind the gaps.
     came : array, shape (n,), optional
@@ -123,7 +120,6 @@ def spread(
     ----------
     steps : array, shape (K, n) [rad or m]
         From `play_steps`, at the samples of the course.
-    course : Course
     share : float
         How far a joint may be from where it turns around while its step is made, in units of
         what is added for play at most.

@@ -52,7 +52,6 @@ class Spots:
         ----------
         recordings : sequence of Recording
             One for every place.
-        robot : Robot
 
         """
         if any(recording.contacts is None for recording in recordings):

@@ -39,15 +39,7 @@ class Evaluation:
 
 @dataclass(frozen=True, eq=False)
 class EffectStages:
-    """
-    A robot with effects that act on it stage by stage.
-
-    Attributes
-    ----------
-    robot : Robot
-    effects : tuple of Effect
-
-    """
+    """A robot with effects that act on it stage by stage."""
 
     robot: Robot
     effects: Sequence[Effect] = ()

@@ -31,10 +31,6 @@ class LiveTwin:
     Changing `twin` while running keeps the memory of every effect that is still there. The
     poses belong to the joint stamps; a delay of the measurement clock is the caller's to add.
 
-    Parameters
-    ----------
-    twin : Twin
-
     Examples
     --------
     >>> import numpy as np

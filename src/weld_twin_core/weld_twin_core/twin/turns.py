@@ -23,7 +23,6 @@ def just_turned(motion: JointMotion, at: Array) -> NDArray[np.bool_]:
 
     Parameters
     ----------
-    motion : JointMotion
     at : array, shape (M,) [s]
         Stamps within it. Nothing has turned at rest at stations, or before a first turn.
 
@@ -50,7 +49,7 @@ def _turns(q: Array) -> NDArray[np.int_]:
     if not moved.size:
         return moved
     corners = [0, *(moved[1:][np.diff(steps[moved]) != 0.0]).tolist(), q.size - 1]
-    found: list[int] = []
+    result: list[int] = []
     way, far = 0.0, 0
     for k in corners[1:]:
         gone = float(q[k] - q[far])
@@ -60,6 +59,6 @@ def _turns(q: Array) -> NDArray[np.int_]:
         elif way * gone >= 0.0:
             far = k
         elif abs(gone) > BACK:
-            found.append(far)
+            result.append(far)
             way, far = -way, k
-    return np.array(found, dtype=int)
+    return np.array(result, dtype=int)

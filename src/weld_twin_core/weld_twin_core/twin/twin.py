@@ -42,7 +42,6 @@ class Twin(EffectStages):
 
     Attributes
     ----------
-    robot : Robot
     effects : sequence of Effect
         Stages decide the order; only effects with memory on one joint and of one stage run in
         the order given. Effects with parameter draws give every result a leading draw axis.
@@ -187,7 +186,6 @@ class Twin(EffectStages):
 
         Parameters
         ----------
-        shift : mapping of channel to array
         columns : callable
             Gives d pose / d channel, shape (6, ...), of a channel.
         shape : tuple of int

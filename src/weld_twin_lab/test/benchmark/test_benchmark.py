@@ -17,7 +17,7 @@ from weld_twin_lab.benchmark.arms import DH_KEYS, calibrated_arm, links, random_
 from weld_twin_lab.benchmark.kinematics import OWN, written_out
 from weld_twin_lab.benchmark.peers import find_peers
 from weld_twin_lab.benchmark.race import Contender, Outcome, Workload, race
-from weld_twin_lab.benchmark.race_table import LEFT_OUT, NOT_REACHED, short
+from weld_twin_lab.benchmark.race_table import LEFT_OUT, short
 from weld_twin_nodes.cli import main
 
 ROOT = Path(__file__).parents[4]
@@ -73,8 +73,7 @@ def test_peers_that_are_installed_have_the_same_arm() -> None:
     robot = calibrated_arm()
     q = random_positions(robot, 20)
     peers, missing = find_peers(robot)
-    assert 'pinocchio' in peers
-    assert all('not installed' in reason for reason in missing.values())
+    assert set(peers) == {'pinocchio', 'mujoco'} and not missing
     for peer in peers.values():
         assert np.abs(peer.poses(q) - chain.forward(robot, q)).max() < 1e-13
         if peer.screws:
@@ -97,11 +96,10 @@ def test_the_command_writes_what_it_found(tmp_path: Path, capsys: pytest.Capture
     assert main(['benchmark', '--quick', '--out', str(tmp_path / 'speed')]) == 0
     assert 'poses and Jacobians' in capsys.readouterr().out
     found = json.loads((tmp_path / 'speed' / 'benchmark.json').read_text())
-    assert len(found['workloads']) == 9
+    assert len(found['workloads']) == 5
     for load in found['workloads']:
         assert all(c['gap'] <= load['tolerance'] for c in load['contenders'].values())
-    assert (tmp_path / 'speed' / 'growth.png').stat().st_size > 10_000
-    assert (tmp_path / 'speed' / 'benchmark.md').read_text().count('\n') == 11
+    assert (tmp_path / 'speed' / 'benchmark.md').read_text().count('\n') == 7
     assert (tmp_path / 'speed' / 'brief.md').exists()
 
 
@@ -119,6 +117,6 @@ def test_the_kept_tables_are_those_of_the_kept_numbers() -> None:
     brief = (folder / 'brief.md').read_text()
     for load in found['workloads']:
         ratio = load['contenders'][OWN]['ratio']
-        if not (load['title'].endswith(LEFT_OUT) or load['title'].startswith(NOT_REACHED)):
+        if not load['title'].endswith(LEFT_OUT):
             reference = ' + '.join(load['reference'])
             assert f'| {load["title"]} | {short(np.median(ratio))} ({reference}) |' in brief

@@ -37,8 +37,3 @@ def diagnosis(status, *groups, confidence=0.9, effects=()):
             ],
         },
     }
-
-
-def found(family, joint, parameters, std):
-    """Return an effect of a diagnosis."""
-    return {'effect': family, 'joint': joint, 'parameters': parameters, 'std': std}

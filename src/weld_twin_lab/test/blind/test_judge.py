@@ -4,9 +4,8 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from blind_verdicts import diagnosis, found, offset, truth
+from blind_verdicts import diagnosis, offset, truth
 
 from weld_twin_lab.blind.judging import judge
 
@@ -87,42 +86,6 @@ def test_a_verdict_is_sure_and_wrong_only_when_it_claims_something(
 ):
     verdict = diagnosis(status, *groups, confidence=confidence)
     assert judge(ONE, verdict).confidently_wrong is wrong
-
-
-def test_parameter_errors_are_in_standard_errors():
-    effects = [found('joint_offset', 'a', {'offset': 1.3e-3}, {'offset': 1e-4})]
-    judged = judge(ONE, diagnosis('identified', [A], effects=effects))
-    np.testing.assert_allclose(judged.z, [3.0])
-
-
-def test_a_phase_has_no_error_of_a_whole_turn():
-    case = truth(
-        'single',
-        [
-            {
-                'effect': 'transmission_ripple',
-                'joint': 'a',
-                'amplitude': 2e-4,
-                'order': 3,
-                'phase': 3.1,
-            },
-        ],
-    )
-    effects = [
-        found(
-            'transmission_ripple',
-            'a',
-            {'amplitude': 1e-4, 'phase': -3.1},
-            {'amplitude': 1e-4, 'phase': 0.1},
-        )
-    ]
-    verdict = diagnosis('identified', [('transmission_ripple', 'a')], effects=effects)
-    np.testing.assert_allclose(judge(case, verdict).z, [-1.0, 10.0 * (2.0 * np.pi - 6.2)])
-
-
-def test_a_cause_within_a_set_has_no_parameter_errors():
-    effects = [found('joint_offset', 'a', {'offset': 1.3e-3}, {'offset': 1e-4})]
-    assert judge(ONE, diagnosis('ambiguous', [A, C], effects=effects)).z == ()
 
 
 def test_the_stratum_is_that_of_the_weakest_cause():

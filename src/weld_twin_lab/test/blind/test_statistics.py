@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from weld_twin_lab.blind.statistics import bootstrap, brier, calibration_error, reliability, share
+from weld_twin_lab.blind.statistics import bootstrap, brier, calibration_error, share
 
 
 @pytest.mark.parametrize(('hits', 'count'), [(0, 7), (1, 1), (3, 10), (399, 400), (40, 40)])
@@ -46,8 +46,3 @@ def test_a_calibrated_confidence_has_little_error():
     sure = rng.uniform(size=2000)
     assert calibration_error(sure, rng.uniform(size=2000) < sure).value < 0.04
     assert calibration_error(sure, rng.uniform(size=2000) < 0.5 * sure).value > 0.2
-
-
-def test_certainty_is_in_the_last_bin():
-    (last,) = reliability([1.0, 0.95], [True, True])
-    assert (last.low, last.high, last.right.cases) == (0.9, 1.0, 2)

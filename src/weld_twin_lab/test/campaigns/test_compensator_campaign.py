@@ -13,12 +13,16 @@ import pytest
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.goal_correction import corrected_goal
+from weld_twin_core.twin.goal_motion import course
+from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_core.twin.twin import Twin
 from weld_twin_lab.campaigns.compensating.drawn_cells import (
     HOMES,
     RECORDED,
     cell_of,
     drawn_goal,
+    learned,
     true_effects,
 )
 from weld_twin_lab.campaigns.compensator import (
@@ -29,6 +33,8 @@ from weld_twin_lab.campaigns.compensator import (
     unfinished,
     worse,
 )
+from weld_twin_msgs_py.files.diagnosis_model import read_model
+from weld_twin_nodes.offline.correcting import program_model
 
 KEPT = Path(__file__).parents[4] / 'docs/results/robustness/compensator.json'
 OTHER = 'exit code 2: weld_twin: diagnosis is of the robot ur10e'
@@ -141,6 +147,31 @@ def test_goals_are_seams_and_those_inside_lie_where_the_arm_was_recorded():
             assert inside == (away <= RECORDED)
             way = np.linalg.norm(np.diff(forward(robot, goal.q)[:, :3, 3], axis=0), axis=1).sum()
             assert 0.04 < way < 0.6
+
+
+def test_what_an_arm_has_a_little_of_is_corrected_beside_its_causes_and_the_bounds_hold(tmp_path):
+    robot, causes, rng = cell_of('fanuc_m10ia', 61000)
+    file = tmp_path / 'diagnosis.json'
+    file.write_text(learned(robot, causes, rng).text)
+    true = Twin(robot, true_effects(robot, causes))
+    whole, named = program_model(robot, file), ProgramModel(robot, read_model(robot, file).found)
+    off, bounds = [], []
+    for goal in [drawn_goal(robot, rng) for _ in range(6)]:
+        if goal.inside:
+            found = [corrected_goal(model, goal.goal) for model in (whole, named)]
+            off.append([_off(true, goal.goal, one.goal) for one in found])
+            bounds.append(found[0].bound)
+    after, alone = np.transpose(off)
+    assert len(after) > 3
+    assert after.mean() < 0.6 * alone.mean()
+    assert (after <= bounds).mean() > 0.8
+
+
+def _off(true, meant, run):
+    """Return how far the real tool is from where a goal means it, at most [m]."""
+    t = np.linspace(meant.t[0], meant.t[-1], 50)
+    real = true.poses(Recording('run', JointMotion(t, course(run, t).q))).position
+    return np.linalg.norm(real - forward(true.robot, course(meant, t).q)[:, :3, 3], axis=1).max()
 
 
 @pytest.mark.skipif(not KEPT.exists(), reason='the result is not kept yet')

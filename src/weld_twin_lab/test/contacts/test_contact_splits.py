@@ -7,8 +7,6 @@ import pytest
 
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_lab.contacts.data import places_of, robot_of, touches
-from weld_twin_lab.contacts.splits import judge
-from weld_twin_lab.contacts.table import summary, table
 from weld_twin_lab.contacts.touching import postures_at
 
 PLACES = {'front': [0.5, 0.0, 0.2], 'left': [0.0, 0.5, 0.4]}
@@ -34,29 +32,6 @@ def test_touches_of_an_exact_arm_do_not_scatter(data):
     recording = touches(data, 'kuka_14', ['left'])
     assert recording.contacts.labels == ('left/0',) * EACH + ('left/1',) * EACH
     _, model = aligned(recording, robot_of(data, 'kuka_14'), '', ())
-    found = judge('left', model, model, recording)
-    assert max(found.before_m, found.after_m, found.each_axis_m) < 1e-8
-    assert found.distance_m == pytest.approx(0.05, abs=1e-8)
-
-
-def test_the_table_counts_what_got_worse():
-    entries = [entry('front', 5e-4, 2e-4), entry('left', 3e-4, 4e-4)]
-    (row,) = summary(entries)
-    assert row['before_m'] == pytest.approx(4e-4)
-    assert row['after_m'] == pytest.approx(3e-4)
-    assert row['worse_than_nominal'] == ['left']
-    assert '| kuka_14 | left | 0.300 | 0.400 | 0.200 | 50.02 | 0.250 | unknown |' in table(entries)
-
-
-def entry(place, before, after):
-    """Return a split that left a place out."""
-    judged = {'place': place, 'before_m': before, 'after_m': after, 'each_axis_m': after / 2}
-    return {
-        'kind': 'without',
-        'arm': 'kuka_14',
-        'judged': [judged | {'distance_m': 0.05002}],
-        'flagged': [],
-        'told_held_out_m': 2.5e-4,
-        'status': 'unknown',
-        'seconds': 3.0,
-    }
+    points = model.twin(0).poses(recording, recording.joints.t).position.reshape(2, EACH, 3)
+    assert np.ptp(points, axis=1).max() < 1e-8
+    assert np.linalg.norm(points[0, 0] - points[1, 0]) == pytest.approx(0.05, abs=1e-8)

@@ -13,8 +13,8 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_lab.contest.course import Run, commands, run_all
-from weld_twin_lab.contest.entrants import geometry, never_knows, zero_offset
+from weld_twin_lab.contest.course import commands, run_all
+from weld_twin_lab.contest.entrants import bootstrap, geometry, never_knows, zero_offset
 from weld_twin_lab.contest.open_form import (
     ContestAnswer,
     read_answer,
@@ -22,9 +22,7 @@ from weld_twin_lab.contest.open_form import (
     write_answer,
     write_case,
 )
-from weld_twin_lab.contest.processes import Warm
-from weld_twin_lab.contest.scores import Sealed, page, point, summary
-from weld_twin_lab.contest.told import closer
+from weld_twin_lab.contest.scores import Sealed, page, point
 from weld_twin_lab.contest.told import page as told_page
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 
@@ -85,6 +83,19 @@ def test_geometry_finds_what_geometry_is(case, truth):
     assert worth.belief > 0.5
 
 
+def test_how_sure_an_answer_is_counts_by_cover_width_and_crps(case, truth, tmp_path):
+    write_answer(tmp_path / 'said', bootstrap.answer(read_case(case[0])))
+    said = read_answer(tmp_path / 'said', 80)
+    worth = point(said, truth)
+    assert 0.82 < worth.held < 0.97
+    assert worth.width_m == pytest.approx(2 * 1.645 * NOISE, rel=0.3)
+    # Of normal noise that is told as it is, the score is its size over the root of pi.
+    assert worth.crps_m == pytest.approx(NOISE / np.sqrt(np.pi), rel=0.2)
+    for factor in (0.3, 3.0):
+        assert point(replace(said, sigma=factor * said.sigma), truth).crps_m > 1.1 * worth.crps_m
+    assert point(never_knows.answer(read_case(case[0])), truth).crps_m is None
+
+
 def test_the_scales_are_what_they_are(case, truth):
     silent = point(never_knows.answer(read_case(case[0])), truth)
     assert silent.left == pytest.approx(1.0)
@@ -132,36 +143,18 @@ def test_anybody_can_enter_and_a_failure_is_told(case, truth, tmp_path):
     }
 
 
-def test_the_page_says_where_others_are_better_and_who_is_best_on_the_measured_arms(truth):
+def test_the_page_says_who_is_best_on_the_measured_arms(truth):
     floor = truth.positions + NOISE
-    half = {'weld_twin': 2.0, 'mine': 1.0, 'close': 1.95, 'never_knows': 0.5}
-    runs = {
-        name: {
-            'one': Run(
-                ContestAnswer(truth.positions + size * NOISE, unknown=1.0), 3.0 / size, 10**8
-            )
-        }
-        for name, size in half.items()
-    }
-    near = closer(runs, {'one': truth})
-    assert near == {'mine': ['one'], 'close': []}
-    found = {name: summary(said, {'one': truth}) for name, said in runs.items()}
     errors = {'weld_twin': {'arm_odd': 2e-4, 'arm_n30': 1e-4}, 'mine': {'arm_odd': 1e-4}}
-    told = told_page('TABLE', found, near, errors, {'arm_odd': floor, 'arm_n30': floor})
+    told = told_page('TABLE', errors, {'arm_odd': floor, 'arm_n30': floor})
     assert '| weld_twin | 0.200 | **0.100** |' in told and '| mine | **0.100** | - |' in told
-    better = told[told.index('## Where others are better') :]
-    assert '- arm_odd: `mine` 0.100 mm; `weld_twin` 0.200 mm.' in better
-    assert '- `mine` leaves less than 0.9 of the gap on 1 of 1 cases: one.' in better
-    assert 'gap left: `mine`' in better and '`never_knows`' not in better
-    alone = told_page('TABLE', {'weld_twin': found['weld_twin']}, {}, {}, {})
-    assert '- Nowhere.' in alone and 'measured arms' not in alone
+    assert 'measured arms' not in told_page('TABLE', {}, {})
 
 
-def test_a_method_that_cannot_start_is_one_sentence(case):
-    folder, _ = case
-    broken = Warm([sys.executable, '-c', '1/0', 'ghost'])
-    with pytest.raises(DataError, match=r"method 'ghost' ended with 1 .* leave it out"):
-        broken.run(folder, folder)
+def test_a_method_that_cannot_be_loaded_is_one_sentence(monkeypatch):
+    monkeypatch.setitem(sys.modules, 'weld_twin_lab.contest.entrants.boosted_trees', None)
+    with pytest.raises(DataError, match=r"'boosted_trees' cannot be loaded .* leave it out"):
+        commands(['never_knows', 'boosted_trees'], [])
 
 
 @pytest.mark.parametrize('text', ['mine', 'mine=run {case}', '=run {case} {out}'])

@@ -4,13 +4,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from scipy.stats import chi2
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_lab.blind.blind_cell import BlindCell, Take
+from weld_twin_lab.blind.deck import Lot
+from weld_twin_lab.blind.making import SealedCase
 from weld_twin_lab.coverage.held import inside_region
 from weld_twin_lab.coverage.oracle import oracle_sigma
-from weld_twin_lab.coverage.table import page, summaries
+from weld_twin_lab.coverage.sealed import of_case
+from weld_twin_lab.coverage.table import page, promise_table, summaries
+from weld_twin_lab.plant.plant_recording import Command
+from weld_twin_lab.plant.tracker import Tracker
+
+LOT = Lot('single', 'one', 'stations', ('joint_offset',), (1,))
+TAKE = Take(Command(np.zeros(1), np.zeros((1, 1)), True), 0)
 
 
 def test_nine_of_ten_draws_lie_in_their_region():
@@ -60,17 +72,59 @@ def test_one_who_knows_the_cause_is_as_sure_as_its_mean_is():
     rng = np.random.default_rng(3)
     count, noise, off = 25, 2e-5, 1e-3
     q = rng.uniform(-2.0, 2.0, (count, 1))
-    seen = 0.8 * np.column_stack([np.cos(q + off), np.sin(q + off), 0.0 * q])
-    seen += rng.normal(scale=noise, size=seen.shape)
+    true = 0.8 * np.column_stack([np.cos(q + off), np.sin(q + off), 0.0 * q])
+    seen = true + rng.normal(scale=noise, size=true.shape)
     t = np.arange(float(count))
-    train = Recording('train', JointMotion(t, q, static=True), Measurements(t, seen))
-    truth = {
-        'causes': [{'effect': 'joint_offset', 'joint': 'j', 'offset': off}],
-        'align': [],
-        'sigma_m': noise,
-    }
+    train, exact = (
+        Recording('train', JointMotion(t, q, static=True), Measurements(t, places))
+        for places in (seen, true)
+    )
+    every = np.ones(count, dtype=bool)
+    causes = [{'effect': 'joint_offset', 'joint': 'j', 'offset': off}]
+    cell = BlindCell(robot, Tracker(sigma=noise))
+    case = SealedCase(LOT, cell, causes, [], [], (), TAKE, TAKE, TAKE, False)
     # Every station shows the zero by the same lever that it moves the tool with.
-    sigma = oracle_sigma(robot, (), truth, (train, train), t)
-    assert abs(sigma / (noise / np.sqrt(count)) - 1.0) < 1e-6
-    truth['causes'] = [{'effect': 'no formula of ours', 'joint': 'j'}]
-    assert oracle_sigma(robot, (), truth, (train, train), t) is None
+    told = oracle_sigma(case, (train, exact), every)
+    assert abs(told['formal_sigma_m'] / (noise / np.sqrt(count)) - 1.0) < 1e-6
+    assert told['oracle_sigma_m'] >= told['formal_sigma_m']
+    # All of them off by 0.3 mm: so large a region holds them, and none that is smaller.
+    shifted = exact.with_measured(Measurements(t, true + [0.0, 0.0, 3e-4]))
+    missed = oracle_sigma(case, (train, shifted), every)['oracle_sigma_m']
+    assert abs(missed * np.sqrt(chi2.ppf(0.9, 3)) / 3e-4 - 1.0) < 0.01
+    unknown = replace(case, causes=[{'effect': 'no formula of ours', 'joint': 'j'}])
+    assert oracle_sigma(unknown, (train, exact), every) == {}
+
+
+def test_promises_of_a_sealed_cell_hold_where_the_tool_really_is_and_are_sharp():
+    told = of_case(97101, 12)
+    assert told is not None
+    inside = told['inside']
+    assert inside['held'] > 0.9
+    assert inside['formal_sigma_m'] <= inside['oracle_sigma_m']
+    assert inside['median_sigma_m'] < 4.0 * inside['oracle_sigma_m']
+    (shrink,) = told['promises']['shrink, inside']
+    (low, high), true = shrink['ci90'], shrink['true']
+    assert low <= true <= high
+    assert 'parameters' in promise_table([told])
+
+
+def test_a_parameter_is_told_as_well_as_small_errors_beside_it_let_it_be_known():
+    # Play of a joint, coupling and ratios hold beside small zeros, links and springs of all joints,
+    # which move the tool as the named cause does, too.
+    told = of_case(555002, 45)
+    assert told is not None
+    assert told['promises']['parameters']
+    for one in told['promises']['parameters']:
+        (low, high), true = one['ci90'], one['true']
+        assert low <= true <= high
+
+
+def test_the_shrink_holds_on_another_motion_where_it_was_recorded_and_where_it_was_not():
+    # As its stretches vary: by them the ratio of this recording is known to 4 %, and another motion
+    # of the same arm is off by more than that, on either side.
+    told = of_case(555002, 46)
+    assert told is not None
+    for where in ('inside', 'outside'):
+        (shrink,) = told['promises'][f'shrink, {where}']
+        (low, high), true = shrink['ci90'], shrink['true']
+        assert low <= true <= high < 1.4 * low

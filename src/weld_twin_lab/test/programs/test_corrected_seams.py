@@ -5,9 +5,12 @@
 import numpy as np
 import pytest
 
+from weld_twin_core.arm.catalog import load
 from weld_twin_lab.programs.cells import CELLS, robots_of
-from weld_twin_lab.programs.correction_table import counted, kept, page, totals
+from weld_twin_lab.programs.correction_table import counted, page, totals
 from weld_twin_lab.programs.path_accuracy import path_accuracy
+from weld_twin_lab.programs.plain_arm import tool_pose
+from weld_twin_lab.programs.plain_controller import driven
 
 
 def seam(after, outcome='corrected', language='krl', before=2e-4, true=1e-5):
@@ -22,6 +25,7 @@ def seam(after, outcome='corrected', language='krl', before=2e-4, true=1e-5):
         'why': '' if outcome == 'corrected' else 'seam.src line 9: the model is less sure',
         'at_m': {'before': before, 'after': after, 'true': true},
         'rms_m': {'before': before, 'after': after, 'true': true},
+        'off_m': {'before': (before, before), 'after': (after, after)},
     }
 
 
@@ -43,19 +47,21 @@ def test_the_table_tells_languages_apart_and_names_the_worsened_seam():
     assert '| the model is less sure | 1 |' in text
 
 
-def test_promises_that_hold_and_that_do_not_are_counted():
-    told = {'ci90_m': [1e-5, 3e-5], 'sure_within_m': 5e-5}
-    cases = [seam(2e-5), seam(4e-5), seam(6e-5), seam(2e-5, 'left')]
-    for case in cases[:3]:
-        case['promised'] = {'after': told}
-    assert kept(cases) == {
-        'after': {
-            'seams': 3.0,
-            'held': pytest.approx(1 / 3),
-            'within': pytest.approx(2 / 3),
-            'width_m': pytest.approx(2e-5),
-        }
-    }
+def test_a_plain_controller_tells_when_its_moves_end_and_where_it_believes_the_tool():
+    robot, start = load('ur5'), np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
+    first = tool_pose(robot, start, np.array(robot.T_flange_tool))
+    places = [first + _shift(0.0, 0.1, 0.0), first + _shift(0.05, 0.1, 0.0)]
+    moves = [('movej', [start]), *(('movel', [place]) for place in places)]
+    made = driven(robot, moves, start, 0.02)
+    np.testing.assert_allclose(made.ends, [0.0, 5.0, 7.5], atol=1e-6)
+    wanted = first[:3, 3] + np.array([[0.0, 0.05, 0.0], [0.025, 0.1, 0.0]])
+    np.testing.assert_allclose(made.believed(np.array([2.5, 6.25])), wanted, atol=1e-7)
+
+
+def _shift(*way):
+    out = np.zeros((4, 4))
+    out[:3, 3] = way
+    return out
 
 
 @pytest.mark.parametrize('language', CELLS)

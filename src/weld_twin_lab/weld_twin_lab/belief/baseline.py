@@ -88,7 +88,6 @@ class Scored(NamedTuple):
     ----------
     causes : int
         At work.
-    withheld : bool
     named, modelled : tuple of bool
         Of every visible cause that the library holds: is it in a set, is it in the model?
     told : tuple of (float, bool, bool)
@@ -99,8 +98,6 @@ class Scored(NamedTuple):
         No cause is told although the model explains much on sealed data.
     right, sure : bool
         The whole answer.
-    confidence, seconds : float
-    status : str
 
     """
 

@@ -114,7 +114,6 @@ def at(threshold: float, probability: Array, right: NDArray[np.bool_]) -> Bound:
 
     Parameters
     ----------
-    threshold : float
     probability : array, shape (N,)
     right : array of bool, shape (N,)
 
@@ -133,7 +132,6 @@ def upper_limit(wrong: int, cases: int, error: float) -> float:
 
     Parameters
     ----------
-    wrong, cases : int
     error : float
         Probability that the share is larger.
 

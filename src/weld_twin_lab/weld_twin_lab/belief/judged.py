@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from weld_twin_core.diagnosis.result import NAMING
 
-from ..blind.judging import Judged, answers_of, judge
+from ..blind.judging import NOT_IN_LIBRARY, Judged, answers_of, judge
 from .levels_of_truth import alike_by_structure, levels_of, numbers
 from .whole import FEW, whole
 
@@ -39,8 +39,6 @@ class Example(NamedTuple):
         Name of the case; statements on one case are kept together.
     kind : str
         As `weld_twin_core.diagnosis.calibration.features.KINDS` has it.
-    features : mapping from str to float
-    right : bool
     told : float
         What was told of it.
     sure : bool
@@ -202,11 +200,13 @@ def _examples(
     """Yield kind, features, whether it was right, what was told of it and whether as sure."""
     causes, at_work = row['verdict']['causes'], _at_work(row['truth'])
     truths = levels_of(row['truth'])
+    named_right = whole_right and row['verdict']['status'] in NAMING
+    nameless = row['truth']['kind'] in NOT_IN_LIBRARY and not named_right
     for said in row['statements']:
         kind, told = said['kind'], said['probability']
         if said['cause'] is None:
-            right = _complete(row) if kind == 'complete' else whole_right
-            sure = kind != 'complete' and bool(row['verdict']['sure'])
+            right = {'complete': _complete(row), 'nameless': nameless}.get(kind, whole_right)
+            sure = kind.startswith('answer') and bool(row['verdict']['sure'])
             yield kind, said['features'], right, told, sure
             continue
         cause, level = causes[said['cause']], kind.split()[0]

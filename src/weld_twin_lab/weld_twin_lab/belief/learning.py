@@ -56,7 +56,6 @@ def learned(
 
     Parameters
     ----------
-    examples : sequence of Example
     card : mapping
         Seeds, engines and mix, to be kept with the weights.
     risk : float
@@ -106,7 +105,6 @@ def unseen(examples: Sequence[Example], content: Mapping[str, Any]) -> list[Exam
 
     Parameters
     ----------
-    examples : sequence of Example
     content : mapping
         As `learned` returned it.
 

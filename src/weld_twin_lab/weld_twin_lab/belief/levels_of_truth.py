@@ -79,21 +79,13 @@ def alike_by_structure(robot: str, site: Site) -> frozenset[Site]:
     ----------
     robot : str
         Of the catalogue.
-    site : (str, str or None)
 
     """
     return frozenset(_alike(robot, site))
 
 
 def numbers(site: Site) -> int:
-    """
-    Return how many numbers a family of the library has.
-
-    Parameters
-    ----------
-    site : (str, str or None)
-
-    """
+    """Return how many numbers a family of the library has."""
     kind = REGISTRY.get(site[0])
     return sum(max(p.size, 1) for p in kind.parameters) if kind is not None else 0
 

@@ -37,10 +37,6 @@ def drawn(seed: int, number: int) -> Drawn:
     """
     Return case ``number`` of a seed; it depends on nothing else.
 
-    Parameters
-    ----------
-    seed, number : int
-
     Raises
     ------
     DataError

@@ -34,7 +34,6 @@ def write_rows(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
 
     Parameters
     ----------
-    path : Path
     rows : iterable of mappings
         As `judged.kept` gives them. A path that ends in .gz is packed.
 
@@ -50,10 +49,6 @@ def write_rows(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
 def read_rows(path: Path) -> list[dict[str, Any]]:
     """
     Return a table of cases.
-
-    Parameters
-    ----------
-    path : Path
 
     Raises
     ------
@@ -73,12 +68,5 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
 
 
 def seeds_of(rows: Sequence[Mapping[str, Any]]) -> list[int]:
-    """
-    Return the seeds that cases were drawn from.
-
-    Parameters
-    ----------
-    rows : sequence of mappings
-
-    """
+    """Return the seeds that cases were drawn from."""
     return sorted({int(row['name'].partition('/')[0]) for row in rows})

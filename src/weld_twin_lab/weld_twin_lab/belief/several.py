@@ -55,10 +55,6 @@ def several(seed: int, number: int) -> tuple[SealedCase, bool]:
     """
     Return case ``number`` of a seed, and whether its held-out recording is given.
 
-    Parameters
-    ----------
-    seed, number : int
-
     Raises
     ------
     DataError
@@ -80,7 +76,6 @@ def lot_of(seed: int, number: int, rng: np.random.Generator) -> Lot:
 
     Parameters
     ----------
-    seed, number : int
     rng : Generator
         Of the case.
 

@@ -25,13 +25,11 @@ from .bound import upper_limit
 from .goals import goal_measures
 from .judged import Example, examples_of, kept
 from .logistic import log_loss
-from .pictures import reliability_picture, risk_picture
 from .rows import seeds_of
 from .table import page
 from .trial import USUAL, tried
 
 RESULT, PAGE = 'results.json', 'belief.md'
-RELIABILITY, RISK = 'reliability.svg', 'risk.svg'
 COVERAGE = 0.7
 """Share of the statements, the surest first, at which the risk is quoted."""
 MIX = (
@@ -49,8 +47,6 @@ def rows_of(seed: int, count: int, runner: Runner, mix: str = USUAL) -> list[dic
 
     Parameters
     ----------
-    seed, count : int
-    runner : Runner
     mix : str
         As `tried` takes it.
 
@@ -129,14 +125,7 @@ def _answers(examples: Sequence[Example]) -> list[Example]:
 
 
 def worth(examples: Sequence[Example]) -> dict[str, Any]:
-    """
-    Return how far what is told of some statements can be trusted.
-
-    Parameters
-    ----------
-    examples : sequence of Example
-
-    """
+    """Return how far what is told of some statements can be trusted."""
     told, right = told_of(examples)
     sure = [e.sure for e in examples]
     wrong = sum(e.sure and not e.right for e in examples)
@@ -176,11 +165,10 @@ def write(
     taught: Sequence[Mapping[str, Any]] = (),
 ) -> str:
     """
-    Write the file of weights, what it is worth, the page and its pictures; return the page.
+    Write the file of weights, what it is worth, and the page; return the page.
 
     Parameters
     ----------
-    out : Path
     content : mapping
         Of the file of weights.
     rows : sequence of mappings
@@ -192,15 +180,11 @@ def write(
     """
     examples = examples_of(rows) if rows else learning.unseen(examples_of(taught), content)
     result = judged(content, rows, examples)
-    whole = told_of(_answers(examples))
-    causes = told_of([e for e in examples if e.kind in learning.CAUSES])
     text = page(result)
     for name, body in (
         (FILE, json.dumps(content, indent=1) + '\n'),
         (RESULT, json.dumps(result, indent=1) + '\n'),
         (PAGE, text),
-        (RELIABILITY, reliability_picture({'whole answers': whole, 'causes': causes})),
-        (RISK, risk_picture({'whole answers': whole, 'causes': causes})),
     ):
         write_owned(out / name, body)
     return text

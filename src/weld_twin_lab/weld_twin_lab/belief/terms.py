@@ -9,6 +9,8 @@ weights may have one sign only: 1 is good news, -1 bad news, 0 either.
 
 from __future__ import annotations
 
+from weld_twin_core.diagnosis.calibration.features import TOLD_AS
+
 RISK, CAUSE_RISK = 0.0025, 0.01
 """Probability that an answer is sure and wrong, and that a cause told as sure is wrong."""
 SITUATION = {
@@ -33,6 +35,15 @@ NAMES = {
     'widest set': 0,
 }
 """What the names told add up to."""
+NAMED = {
+    **SITUATION,
+    'form': -1,
+    'left': -1,
+    'left unexplained': -1,
+    'stations': 0,
+    **NAMES,
+}
+"""What speaks for an answer that names causes; against it speaks that one of them has no name."""
 REST = {'weight': 1, 'second': -1, 'share': 1, 'steady': 1, 'groups': 0}
 TERMS: dict[str, dict[str, int]] = {
     'name': {
@@ -85,16 +96,11 @@ TERMS: dict[str, dict[str, int]] = {
         'gap': 0,
         'form': 0,
         'refused': -1,
+        **{f'told as {one}': 0 for one in TOLD_AS},
         **NAMES,
     },
-    'answer, named': {
-        **SITUATION,
-        'form': -1,
-        'left': -1,
-        'left unexplained': -1,
-        'stations': 0,
-        **NAMES,
-    },
+    'nameless': {name: -way for name, way in NAMED.items()},
+    'answer, named': NAMED,
     'answer, unknown': {
         'gap': 0,
         'left unexplained': 0,
@@ -113,5 +119,5 @@ TERMS: dict[str, dict[str, int]] = {
     'answer, many': {'structure': -1, 'left': -1, 'gap': 0},
 }
 """By kind of statement, as `weld_twin_core.diagnosis.calibration.features.KINDS` lists them."""
-OF_FAMILIES = frozenset({'name'})
+OF_FAMILIES = frozenset({'name', 'nameless'})
 """Kinds of statements that each family named alone is a feature of: some imitate others often."""

@@ -68,8 +68,6 @@ def row_of(name: str, case: SealedCase, *, held_out: bool = True) -> dict[str, A
 
     Parameters
     ----------
-    name : str
-    case : SealedCase
     held_out : bool
         Whether its held-out recording is given to the diagnosis.
 
@@ -89,14 +87,7 @@ def row_of(name: str, case: SealedCase, *, held_out: bool = True) -> dict[str, A
 
 
 def said(told: Diagnosis) -> dict[str, Any]:
-    """
-    Return a verdict and its statements in plain values.
-
-    Parameters
-    ----------
-    told : Diagnosis
-
-    """
+    """Return a verdict and its statements in plain values."""
     whole = told.as_dict()
     return {
         'verdict': whole['verdict'],
@@ -112,7 +103,6 @@ def recordings_of(case: SealedCase, more: Sequence[Take] = ()) -> list[Recording
 
     Parameters
     ----------
-    case : SealedCase
     more : sequence of Take
         Further ones of the same truth.
 
@@ -132,8 +122,6 @@ def diagnosed(
 
     Parameters
     ----------
-    case : SealedCase
-    recordings : sequence of Recording
     held_out : bool
         Whether the held-out recording of the case is given.
 

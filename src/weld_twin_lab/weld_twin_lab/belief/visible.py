@@ -33,11 +33,6 @@ def shown(case: SealedCase) -> list[float]:
     Return for each cause by how much chi-square rises without it, the least of both kinds of motion.
 
     Causes are taken as linear in their parameters about the truth.
-
-    Parameters
-    ----------
-    case : SealedCase
-
     """
     cell = replace(case.cell, align=())
     takes = (case.train, *case.also, case.test)

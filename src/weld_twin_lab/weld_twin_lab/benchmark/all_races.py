@@ -15,14 +15,12 @@ from typing import Any
 
 from weld_twin_core import __version__
 
-from . import processes, race_table
+from . import race_table
 from .arms import calibrated_arm
-from .fits import fits
-from .growth import draw, growth
+from .inverse import inverse
 from .kinematics import batches, single
 from .peers import PACKAGES, Peer, find_peers
 from .race import Workload, race
-from .studies import studies
 
 
 @dataclass(frozen=True)
@@ -32,16 +30,11 @@ class Effort:
     rounds: int = 21
     least: float = 0.05
     counts: tuple[int, ...] = (1000, 100_000)
-    draws: int = 10_000
-    base: int = 1024
-    poses: int = 1000
-    million: int = 1_000_000
-    minutes: tuple[float, ...] = (5.0, 15.0, 30.0, 60.0)
-    quick: bool = False
+    points: int = 1000
 
 
 FULL = Effort()
-QUICK = Effort(3, 0.01, (1000,), 500, 16, 100, 100_000, (0.2, 0.5), True)
+QUICK = Effort(3, 0.01, (1000,), 100)
 """For a look, and for the tests: seconds instead of minutes."""
 
 
@@ -49,7 +42,7 @@ def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
     """
     Run everything; write the results.
 
-    They are ``benchmark.json``, two tables of it (``benchmark.md``, ``brief.md``) and ``growth.png``.
+    They are ``benchmark.json`` and two tables of it, ``benchmark.md`` and ``brief.md``.
 
     Raises
     ------
@@ -66,11 +59,6 @@ def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
         outcomes.append(race(workload, effort.rounds, effort.least))
         for line in race_table.lines(outcomes[-1]):
             say(line)
-    starts, memory = processes.starts(), processes.memory(effort.million)
-    curves = growth(effort.minutes, effort.quick)
-    for line in race_table.costs(starts, memory, curves['bag']['runs'][-1]):
-        say(line)
-    draw(curves, folder / 'growth.png')
     (folder / 'benchmark.md').write_text(race_table.page(outcomes), encoding='utf-8')
     (folder / 'brief.md').write_text(race_table.brief(outcomes), encoding='utf-8')
     found = {
@@ -78,9 +66,6 @@ def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
         'machine': _machine(),
         'left_out': missing,
         'workloads': [outcome.as_dict() for outcome in outcomes],
-        'starts_s': starts,
-        'memory': memory,
-        'growth': curves,
     }
     text = json.dumps(found, indent=1) + '\n'
     (folder / 'benchmark.json').write_text(text, encoding='utf-8')
@@ -91,9 +76,7 @@ def _workloads(effort: Effort, peers: dict[str, Peer]) -> Iterator[Workload]:
     for count in effort.counts:
         yield from batches(robot, peers, count)
     yield single(robot, peers)
-    yield from studies(robot, effort.draws, effort.base, 'pinocchio' in peers)
-    names = set(peers) - ({'pybotics'} if effort.quick else set())
-    yield from fits(effort.poses, effort.poses, names)
+    yield inverse(effort.points, 'pinocchio' in peers)
 
 
 def _machine() -> dict[str, Any]:

@@ -30,24 +30,6 @@ def calibrated_arm() -> Robot:
     return replace(arm, **rows, T_flange_tool=tool)
 
 
-def arm_of(joints: int) -> Robot:
-    """Return an arm of any number of revolute joints in general position."""
-    rng = np.random.default_rng(joints)
-    wide = np.full(joints, 7.0)
-    rows: dict[str, Any] = {key: rng.normal(size=joints) for key in DH_KEYS}
-    return Robot(
-        name=f'arm of {joints}',
-        joint_names=tuple(f'joint{i}' for i in range(joints)),
-        **rows,
-        beta=np.zeros(joints),
-        prismatic=np.zeros(joints, dtype=bool),
-        lower=-wide,
-        upper=wide,
-        max_velocity=wide,
-        max_acceleration=wide,
-    )
-
-
 def random_positions(arm: Robot, count: int, seed: int = 0) -> Array:
     """Return joint positions of which no two are the same, shape (count, n) [rad]."""
     return np.random.default_rng(seed).uniform(-np.pi, np.pi, (count, arm.n))

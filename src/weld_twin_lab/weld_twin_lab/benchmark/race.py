@@ -24,8 +24,6 @@ class Contender:
 
     Attributes
     ----------
-    name : str
-    run : callable
     items : int
         How many poses, draws or runs one call does; a slow contender may do fewer of them.
     gap : float
@@ -103,8 +101,6 @@ def race(workload: Workload, rounds: int, least: float) -> Outcome:
 
     Parameters
     ----------
-    workload : Workload
-    rounds : int
     least : float [s]
         How long each contender works in a round, in as many calls as that takes.
 

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -16,12 +15,8 @@ from .race import Outcome
 
 UNITS = ((1.0, 's'), (1e-3, 'ms'), (1e-6, 'us'), (1e-9, 'ns'))
 """Units of time, the largest that a figure reaches is used."""
-MEGABYTE = 1e6
-"""Bytes."""
-LEFT_OUT = ('N = 1,000', 'arbitrary points')
-"""Ends of the titles that the brief table goes without ..."""
-NOT_REACHED = ('largest deviation', 'Sobol', 'calibration')
-"""... and beginnings: no command comes to these kernels in just this way."""
+LEFT_OUT = 'N = 1,000'
+"""End of the titles that the brief table goes without."""
 
 
 def lines(outcome: Outcome) -> Iterator[str]:
@@ -59,31 +54,14 @@ def page(outcomes: list[Outcome]) -> str:
 
 
 def brief(outcomes: list[Outcome]) -> str:
-    """Return a shorter table, without ranges, small batches and draws on arbitrary points."""
+    """Return a shorter table, without ranges and small batches."""
     rows = [('one thread, in one run', 'times as fast')]
     for outcome in outcomes:
         load, ratio = outcome.workload, outcome.ratio(OWN)
-        told = not (load.title.endswith(LEFT_OUT) or load.title.startswith(NOT_REACHED))
-        if ratio is not None and told:
+        if ratio is not None and not load.title.endswith(LEFT_OUT):
             reference = ' + '.join(load.reference)
             rows.append((load.title, f'{short(float(np.median(ratio)))} ({reference})'))
     return markdown.table(*rows)
-
-
-def costs(starts: dict[str, float], memory: dict[str, Any], bag: dict[str, Any]) -> Iterator[str]:
-    """Yield lines on what processes cost."""
-    yield 'starting, processor time: ' + ', '.join(
-        f'{name} {duration(value)}' for name, value in starts.items()
-    )
-    yield (
-        f'{memory["poses"]:,} poses: peak {memory["bytes"] / MEGABYTE:.1f} MB above what goes in '
-        'and comes out'
-    )
-    yield (
-        f'{bag["minutes"]:g} min of bag ({bag["joint_states"]:,} joint states, {bag["poses"]:,} '
-        f'poses): read {bag["read_s"]:.1f} s, align and compare {bag["compare_s"]:.2f} s, peak '
-        f'{bag["peak_bytes"] / MEGABYTE:.0f} MB'
-    )
 
 
 def times(outcome: Outcome, name: str) -> str:

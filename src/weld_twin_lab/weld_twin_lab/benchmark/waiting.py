@@ -35,7 +35,6 @@ class WaitingJob:
 
     Attributes
     ----------
-    name : str
     words : tuple of str
         What the interpreter is started with; '{out}' is a place that does not exist yet.
     needs : str
@@ -95,6 +94,12 @@ JOBS = (
         'import a table of 100,000 rows',
         (*_CLI, 'import', '{data}', '--robot', 'ur5', '--out', '{out}'),
         'table',
+    ),
+    WaitingJob(
+        'pages of 200 cells with 50 diagnoses each',
+        (*_CLI, 'history', 'page', '--db', '{data}/plant.db', '--out', '{out}'),
+        'plant',
+        once=True,
     ),
     WaitingJob(
         'sensitivity study with page',

@@ -23,6 +23,8 @@ JOINT_RATE, POSE_RATE = 125.0, 60.0
 """Hz: those of a UR controller and of a camera system."""
 NOISE, TURN_NOISE = 2e-5, 5e-5
 """Of a laser tracker with a probe [m, rad]."""
+PLANT = 200, 50
+"""Cells of a plant, and diagnoses of each."""
 STATIONS, ROWS = 2772, 100_000
 """Stations of a long calibration, and rows of a long table."""
 
@@ -35,7 +37,6 @@ def made(name: str, folder: Path) -> Path:
     ----------
     name : str
         One of `MAKERS`.
-    folder : Path
 
     """
     place = folder / ('table.csv' if name == 'table' else name)
@@ -62,9 +63,6 @@ def seen(commanded: Recording, robot: Robot, effects: list[Effect], at: Array) -
 
     Parameters
     ----------
-    commanded : Recording
-    robot : Robot
-    effects : list of Effect
     at : array, shape (M,) [s]
 
     """
@@ -122,7 +120,19 @@ def _table(place: Path) -> None:
     np.savetxt(place, rows, delimiter=',', header=head, comments='', fmt='%.6f')
 
 
+def _plant(place: Path) -> None:
+    from weld_twin_report.history import Database
+
+    from .made_history import fill
+
+    place.mkdir()
+    database = Database(str(place / 'plant.db'))
+    fill(database, *PLANT)
+    database.close()
+
+
 MAKERS = {
+    'plant': _plant,
     'motion': _motion,
     'minutes': _minutes,
     'hour': _hour,

@@ -44,8 +44,6 @@ class BlindCell:
 
     Attributes
     ----------
-    robot : Robot
-    tracker : Tracker
     known : tuple of effects
         At work and told to the diagnosis.
     align : tuple of str
@@ -110,8 +108,6 @@ def fitted_out(cell: BlindCell, align: tuple[str, ...] | None, noise_m: float | 
 
     Parameters
     ----------
-    cell : BlindCell
-    align : tuple of str, optional
     noise_m : float, optional
         RMS length [m].
 

@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects import REGISTRY
+from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.plausible import plausible as plausible_of
 
 from ..plant.textbook_effects import LIBRARY
@@ -18,75 +19,8 @@ from ..plant.textbook_effects import LIBRARY
 Cause = dict[str, Any]
 """An entry of an effects file."""
 
-SIZES: dict[str, tuple[str, ...]] = {
-    'joint_offset': ('offset',),
-    'link_length': ('da',),
-    'link_offset': ('dd',),
-    'link_twist': ('dalpha',),
-    'axis_parallelism': ('dbeta',),
-    'base_pose': ('xyz', 'rotvec'),
-    'tool_pose': ('xyz', 'rotvec'),
-    'gear_ratio': ('scale',),
-    'transmission_ripple': ('amplitude',),
-    'joint_coupling': ('ratio',),
-    'backlash': ('width',),
-    'joint_compliance': ('compliance',),
-    'cartesian_compliance': ('compliance',),
-    'payload': ('mass',),
-    'servo_lag': ('time_constant',),
-    'time_delay': ('delay',),
-    'thermal_growth': ('coefficient',),
-    'drift': ('xyz_rate',),
-    'vibration': ('gain',),
-    'quantization': ('step',),
-    'measurement_scale': ('scale',),
-    'station_step': ('xyz', 'rotvec'),
-    'tool_slip': ('xyz', 'rotvec'),
-    'quadratic_scale': ('coefficient',),
-    'column_bend': ('rotvec',),
-    'stick_slip': ('amplitude',),
-    'friction_wander': ('amplitude',),
-    'dress_pack': ('amplitude',),
-    'friction': ('windup',),
-    'hysteresis': ('amplitude',),
-    'bearing_tilt': ('tilt',),
-    'loaded_play': ('width',),
-    'wear': ('rate',),
-    'pedestal_tilt': ('compliance',),
-    'hose_pull': ('tension',),
-    'refraction': ('warming',),
-    'gear_ratio_by_direction': ('difference',),
-    'clock_rate': ('rate',),
-    'link_warm_up': ('strain',),
-}
-"""The parameters of every cause that grow with it."""
-NEW = sorted((LIBRARY & set(REGISTRY)) - set(SIZES) - {'measurement_noise'})
-"""Effects that plant and library have, and that nothing is said of here: as they say themselves."""
-SIZES |= {name: (REGISTRY[name].parameters[0].name,) for name in NEW}
-OUTSIDE = (
-    'station_step',
-    'tool_slip',
-    'quadratic_scale',
-    'column_bend',
-    'stick_slip',
-    'friction_wander',
-    'dress_pack',
-)
-FAMILIES = tuple(name for name in SIZES if name not in OUTSIDE)
-MOVING = frozenset(
-    {
-        'servo_lag',
-        'time_delay',
-        'clock_rate',
-        'link_warm_up',
-        'vibration',
-        'friction_wander',
-        'stick_slip',
-        'friction',
-        'hysteresis',
-    }
-)
-"""Causes that stations at rest cannot show."""
+POSE = ('xyz', 'rotvec')
+"""Parameters of a frame."""
 SPREAD = (0.02, 20.0)
 """How many times its typical size a cause may be and still be plausible."""
 MOST = {
@@ -118,17 +52,15 @@ def draw(family: str, robot: Robot, span: float, rng: np.random.Generator) -> Ca
 
     Parameters
     ----------
-    family : str
-    robot : Robot
     span : float [s]
         Duration of the recording, for what happens at a time.
-    rng : Generator
 
     """
-    drawn = _DRAWN[family](robot, span, rng)
-    if set(SIZES[family]) & {'xyz', 'rotvec', 'xyz_rate'} or family in _POSITIVE:
+    typical = CAUSES[family]
+    drawn = typical.draw(robot, span, rng)
+    if not typical.signed:
         return {'effect': family, **drawn}
-    size = SIZES[family][0]
+    size = typical.sizes[0]
     return {'effect': family, **drawn, size: drawn[size] * float(rng.choice([-1.0, 1.0]))}
 
 
@@ -138,10 +70,8 @@ def plausible(robot: Robot, cause: Mapping[str, Any], factor: float) -> bool:
 
     Parameters
     ----------
-    robot : Robot
     cause : mapping
         Of its typical size.
-    factor : float
 
     """
     family = cause['effect']
@@ -160,8 +90,6 @@ def machines(robot: Robot, cause: Mapping[str, Any], key: str) -> float:
 
     Parameters
     ----------
-    robot : Robot
-    cause : mapping
     key : str
         Of the parameter that is its size.
 
@@ -184,29 +112,30 @@ def site(cause: Mapping[str, Any]) -> tuple[str, str | None]:
     return cause['effect'], cause.get('joint')
 
 
-_POSITIVE = frozenset(
-    {
-        'transmission_ripple',
-        'backlash',
-        'joint_compliance',
-        'cartesian_compliance',
-        'servo_lag',
-        'thermal_growth',
-        'link_warm_up',
-        'vibration',
-        'quantization',
-        'payload',
-        'stick_slip',
-        'friction_wander',
-        'loaded_play',
-        'friction',
-        'hysteresis',
-        'pedestal_tilt',
-        'hose_pull',
-        'refraction',
-        *(name for name in NEW if REGISTRY[name].parameters[0].lower >= 0.0),
-    }
-)
+class Typical(NamedTuple):
+    """
+    A cause of its typical size.
+
+    Attributes
+    ----------
+    draw : callable
+        Takes robot, duration [s] and generator; returns the cause without its name.
+    sizes : tuple of str
+        The parameters that grow with it.
+    signed : bool
+        Whether it may be negative; what has a direction is drawn with it.
+    moving : bool
+        Whether stations at rest cannot show it.
+    outside : bool
+        Whether the library of effects has none of its kind.
+
+    """
+
+    draw: Callable[..., Cause]
+    sizes: tuple[str, ...]
+    signed: bool = False
+    moving: bool = False
+    outside: bool = False
 
 
 def _joint(robot: Robot, rng: np.random.Generator) -> str:
@@ -218,17 +147,27 @@ def _vector(size: float, rng: np.random.Generator) -> list[float]:
     return [float(size * part) for part in way / np.linalg.norm(way)]
 
 
-def _one(key: str, size: float) -> Callable[..., Cause]:
-    """Return how to draw a cause with a joint and one number."""
-    return lambda robot, span, rng: {'joint': _joint(robot, rng), key: size}
+def _one(key: str, size: float, **more: bool) -> Typical:
+    """Return a cause with a joint and one number."""
+    return Typical(
+        lambda robot, span, rng: {'joint': _joint(robot, rng), key: size}, (key,), **more
+    )
 
 
-def _whole(key: str, size: float) -> Callable[..., Cause]:
-    return lambda robot, span, rng: {key: size}
+def _whole(key: str, size: float, **more: bool) -> Typical:
+    """Return a cause with one number."""
+    return Typical(lambda robot, span, rng: {key: size}, (key,), **more)
 
 
-def _frame(xyz: float, turn: float) -> Callable[..., Cause]:
-    return lambda robot, span, rng: {'xyz': _vector(xyz, rng), 'rotvec': _vector(turn, rng)}
+def _turned(key: str, size: float, **more: bool) -> Typical:
+    """Return a cause with one vector that points anywhere."""
+    return Typical(lambda robot, span, rng: {key: _vector(size, rng)}, (key,), **more)
+
+
+def _frame(xyz: float, turn: float) -> Typical:
+    return Typical(
+        lambda robot, span, rng: {'xyz': _vector(xyz, rng), 'rotvec': _vector(turn, rng)}, POSE
+    )
 
 
 def _ripple(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
@@ -313,60 +252,74 @@ def _hose(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
     return {'hook': [reach * float(x) for x in hook], 'tension': 15.0, 'length': reach}
 
 
-_DRAWN: dict[str, Callable[..., Cause]] = {
-    'joint_offset': _one('offset', 5e-4),
-    'link_length': _one('da', 3e-4),
-    'link_offset': _one('dd', 3e-4),
-    'link_twist': _one('dalpha', 5e-4),
-    'axis_parallelism': _one('dbeta', 5e-4),
+def _quadratic(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
+    return {'coefficient': 3e-4, 'origin': _vector(float(rng.uniform(0.0, 1.0)), rng)}
+
+
+def _wear(robot: Robot, span: float, rng: np.random.Generator) -> Cause:
+    return {'rate': 1e-5, 'slower': float(span * rng.uniform(1.5, 4.0))}
+
+
+def _usual(kind: type[Effect]) -> Typical:
+    """Return an effect of the sizes that its parameters say are typical."""
+    first, sizes = kind.parameters[0], {}
+    for p in kind.parameters:
+        sizes[p.name] = p.typical if p.size < 2 else [p.typical] * p.size
+    on_joint = kind.of in ('joint', 'link')
+    return Typical(
+        lambda robot, span, rng: {**({'joint': _joint(robot, rng)} if on_joint else {}), **sizes},
+        (first.name,),
+        signed=first.lower < 0.0,
+    )
+
+
+CAUSES: dict[str, Typical] = {
+    'joint_offset': _one('offset', 5e-4, signed=True),
+    'link_length': _one('da', 3e-4, signed=True),
+    'link_offset': _one('dd', 3e-4, signed=True),
+    'link_twist': _one('dalpha', 5e-4, signed=True),
+    'axis_parallelism': _one('dbeta', 5e-4, signed=True),
     'base_pose': _frame(3e-4, 5e-4),
     'tool_pose': _frame(3e-4, 1e-3),
-    'gear_ratio': _one('scale', 5e-4),
-    'transmission_ripple': _ripple,
-    'joint_coupling': _coupling,
+    'gear_ratio': _one('scale', 5e-4, signed=True),
+    'transmission_ripple': Typical(_ripple, ('amplitude',)),
+    'joint_coupling': Typical(_coupling, ('ratio',), signed=True),
     'backlash': _one('width', 6e-4),
-    'joint_compliance': _compliance,
-    'cartesian_compliance': _give,
-    'payload': _payload,
-    'servo_lag': _one('time_constant', 0.008),
-    'time_delay': _whole('delay', 0.006),
+    'joint_compliance': Typical(_compliance, ('compliance',)),
+    'cartesian_compliance': Typical(_give, ('compliance',)),
+    'payload': Typical(_payload, ('mass',)),
+    'servo_lag': _one('time_constant', 0.008, moving=True),
+    'time_delay': _whole('delay', 0.006, signed=True, moving=True),
     'thermal_growth': _whole('coefficient', 3e-5),
-    'drift': lambda robot, span, rng: {'xyz_rate': _vector(1e-5, rng)},
-    'vibration': _vibration,
+    'drift': _turned('xyz_rate', 1e-5),
+    'vibration': Typical(_vibration, ('gain',), moving=True),
     'quantization': _one('step', 6e-4),
-    'measurement_scale': _whole('scale', 1e-4),
-    'bearing_tilt': _tilt,
-    'station_step': _knock,
-    'tool_slip': _knock,
-    'quadratic_scale': lambda robot, span, rng: {
-        'coefficient': 3e-4,
-        'origin': _vector(float(rng.uniform(0.0, 1.0)), rng),
-    },
-    'column_bend': _bend,
-    'stick_slip': _one('amplitude', 6e-4),
-    'friction_wander': _wander,
+    'measurement_scale': _whole('scale', 1e-4, signed=True),
+    'station_step': Typical(_knock, POSE, outside=True),
+    'tool_slip': Typical(_knock, POSE, outside=True),
+    'quadratic_scale': Typical(_quadratic, ('coefficient',), signed=True, outside=True),
+    'column_bend': Typical(_bend, ('rotvec',), outside=True),
+    'stick_slip': _one('amplitude', 6e-4, moving=True, outside=True),
+    'friction_wander': Typical(_wander, ('amplitude',), moving=True, outside=True),
+    'dress_pack': _one('amplitude', 5e-4, signed=True, outside=True),
+    'friction': Typical(_friction, ('windup',), moving=True),
+    'hysteresis': Typical(_hysteresis, ('amplitude',), moving=True),
+    'bearing_tilt': Typical(_tilt, ('tilt',), signed=True),
     'loaded_play': _one('width', 6e-4),
-    'dress_pack': _one('amplitude', 5e-4),
-    'friction': _friction,
-    'hysteresis': _hysteresis,
-    'pedestal_tilt': _pedestal,
-    'hose_pull': _hose,
-    'refraction': lambda robot, span, rng: {'warming': _vector(2.0, rng)},
-    'wear': lambda robot, span, rng: {'rate': 1e-5, 'slower': float(span * rng.uniform(1.5, 4.0))},
-    'gear_ratio_by_direction': _one('difference', 1e-3),
-    'clock_rate': _whole('rate', 2e-5),
-    'link_warm_up': _warm_up,
+    'wear': Typical(_wear, ('rate',), signed=True),
+    'pedestal_tilt': Typical(_pedestal, ('compliance',)),
+    'hose_pull': Typical(_hose, ('tension',)),
+    'refraction': _turned('warming', 2.0),
+    'gear_ratio_by_direction': _one('difference', 1e-3, signed=True),
+    'clock_rate': _whole('rate', 2e-5, signed=True, moving=True),
+    'link_warm_up': Typical(_warm_up, ('strain',), moving=True),
 }
-
-
-def _usual(family: str) -> Callable[..., Cause]:
-    """Return how to draw an effect of the sizes that its parameters say are typical."""
-    kind = REGISTRY[family]
-    sizes = {p.name: p.typical if p.size < 2 else [p.typical] * p.size for p in kind.parameters}
-    return lambda robot, span, rng: {
-        **({'joint': _joint(robot, rng)} if kind.of in ('joint', 'link') else {}),
-        **sizes,
-    }
-
-
-_DRAWN |= {name: _usual(name) for name in NEW}
+NEW = sorted((LIBRARY & set(REGISTRY)) - set(CAUSES) - {'measurement_noise'})
+"""Effects that plant and library have, and that nothing is said of here: as they say themselves."""
+CAUSES |= {name: _usual(REGISTRY[name]) for name in NEW}
+SIZES = {name: typical.sizes for name, typical in CAUSES.items()}
+"""The parameters of every cause that grow with it."""
+FAMILIES = tuple(name for name, typical in CAUSES.items() if not typical.outside)
+OUTSIDE = tuple(name for name, typical in CAUSES.items() if typical.outside)
+MOVING = frozenset(name for name, typical in CAUSES.items() if typical.moving)
+"""Causes that stations at rest cannot show."""

@@ -66,7 +66,6 @@ class Lot:
 
     Attributes
     ----------
-    kind, robot, motion : str
     families : tuple of str
         Of the causes; the construction where the kind is 'ambiguous'.
     strata : tuple of int
@@ -99,8 +98,6 @@ def lots(
 
     Parameters
     ----------
-    seed : int
-    count : int
     kinds : sequence of str
         Only these; empty for all.
     constructions : sequence of str

@@ -15,7 +15,6 @@ from typing import Any
 import weld_twin_core
 from weld_twin_core import __version__
 from weld_twin_core.diagnosis import Diagnosis, diagnose
-from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.files.whole_files import write_text
@@ -49,7 +48,6 @@ def diagnose_cases(
 
     Parameters
     ----------
-    cases : Path
     out : Path
         Gets a diagnosis.json for every case, and the list of them.
     runner : Runner
@@ -146,22 +144,8 @@ def diagnose_case(place: str, digest: str, engine: str, with_holdout: bool) -> d
     }
 
 
-def diagnosis_of(
-    directory: Path, with_holdout: bool = True, beliefs: Beliefs | None = None
-) -> Diagnosis:
-    """
-    Return the diagnosis of one case.
-
-    Parameters
-    ----------
-    directory : Path
-        Of the case.
-    with_holdout : bool
-        Give the diagnosis the held-out recording to judge its shrink on.
-    beliefs : Beliefs, optional
-        The usual ones when left out.
-
-    """
+def diagnosis_of(directory: Path, with_holdout: bool = True) -> Diagnosis:
+    """Return the diagnosis of the case of a directory; its held-out recording judges the shrink."""
     case = layout.read(directory / layout.CASE)
     known = directory / layout.KNOWN if case['known'] else ''
     twin = build_twin(load_robot(str(directory / layout.ROBOT)), known)
@@ -176,5 +160,4 @@ def diagnosis_of(
         known=twin.effects,
         exclude=case['exclude'],
         holdout=held,
-        beliefs=beliefs,
     )

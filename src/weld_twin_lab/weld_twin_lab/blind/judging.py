@@ -12,19 +12,14 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from .ambiguous import Site
-from .cause_sizes import SIZES, site
 
 CONFIDENT = 0.8
 """Probability above which what says no more of itself counts as sure: older answers, other methods."""
 IN_LIBRARY = frozenset({'single', 'double', 'triple', 'ambiguous'})
 NOT_IN_LIBRARY = frozenset({'outside', 'withheld'})
-SEMI_REAL, AS_IT_IS = 'semi-real', 'as it is'
 NAMED = {'station_step': 'instrument_knock'}
 """What the twin calls a cause that the plant calls otherwise."""
 NAMING = ('identified', 'ambiguous')
-_ANGLES = frozenset({'phase'})
-_ALSO = {'transmission_ripple': ('phase',), 'vibration': ('frequency', 'damping')}
-"""Parameters besides the size whose estimates are compared."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +35,6 @@ class Judged:
         Both in words.
     status : str
         Of the verdict, or 'error'.
-    confidence : float
-    sure : bool
     stratum : float
         Effect RMS over noise, of the weakest cause.
     set : str
@@ -53,10 +46,6 @@ class Judged:
     right : bool
         What the confidence is about: the set is exact, or nothing was to be found and nothing
         was said, or the library lacks the cause and the verdict is 'unknown'.
-    breadth : float
-        Mean number of sites in a set that cannot be told apart.
-    z : tuple of float
-        Errors of the parameters in their standard errors.
 
     """
 
@@ -75,8 +64,6 @@ class Judged:
     family: bool | None
     joint: bool | None
     right: bool
-    breadth: float
-    z: tuple[float, ...]
 
     @property
     def confidently_wrong(self) -> bool:
@@ -122,9 +109,7 @@ def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judg
         whole and bool(answer) and status != 'error',
         _all(_family, answers, groups),
         _all(_joint, answers, groups),
-        _right(kind, status, exact, whole),
-        _breadth(groups),
-        _errors(truth, diagnosis, groups) if exact and diagnosis else (),
+        _right(kind, status, exact),
     )
 
 
@@ -167,15 +152,13 @@ def _set(exact: bool, matched: int, groups: Sequence[set[Site]]) -> str:
     return 'partial' if matched else 'wrong'
 
 
-def _right(kind: str, status: str, exact: bool, whole: bool) -> bool:
+def _right(kind: str, status: str, exact: bool) -> bool:
     if kind == 'none':
         return status == 'none'
     if kind in NOT_IN_LIBRARY:
         # What gave way at an instant may be dated, and is then named; so may be what no motion
         # tells from the cause, in a set with it.
         return status == 'unknown' or (exact and status in NAMING)
-    if kind == SEMI_REAL:
-        return whole
     return exact and status in NAMING
 
 
@@ -214,10 +197,6 @@ def _joint(at: Site, groups: Sequence[set[Site]]) -> bool | None:
     return any(at[1] == joint for group in groups for _, joint in group)
 
 
-def _breadth(groups: Sequence[set[Site]]) -> float:
-    return float(np.mean([len(group) for group in groups])) if groups else 0.0
-
-
 def _in_words(sites: Iterable[Sequence[Any]]) -> str:
     return ' + '.join(' of '.join(filter(None, at)) for at in sites) or 'nothing'
 
@@ -225,36 +204,3 @@ def _in_words(sites: Iterable[Sequence[Any]]) -> str:
 def _said(groups: Sequence[set[Site]]) -> str:
     listed = (sorted(group, key=str) for group in groups)
     return ' + '.join(' or '.join(_in_words([at]) for at in group) for group in listed)
-
-
-def _errors(
-    truth: Mapping[str, Any], diagnosis: Mapping[str, Any], groups: Sequence[set[Site]]
-) -> tuple[float, ...]:
-    """Return the errors of the estimates of causes that are beyond confusion."""
-    alone = [next(iter(group)) for group in groups if len(group) == 1]
-    found = {(item['effect'], item['joint']): item for item in diagnosis['verdict']['effects']}
-    out: list[float] = []
-    for cause in truth['causes']:
-        at = site(cause)
-        if at not in alone or at not in found:
-            continue
-        for key in (*SIZES[at[0]], *_ALSO.get(at[0], ())):
-            out += _error(cause.get(key), found[at]['parameters'], found[at]['std'], key)
-    return tuple(out)
-
-
-def _error(
-    true: Any, parameters: Mapping[str, Any], std: Mapping[str, Any], key: str
-) -> list[float]:
-    if true is None or parameters.get(key) is None or std.get(key) is None:
-        return []
-    given, found, spread = (
-        np.atleast_1d(np.asarray(value, dtype=float))
-        for value in (true, parameters[key], std[key])
-    )
-    if not given.shape == found.shape == spread.shape:
-        return []
-    off = found - given
-    if key in _ANGLES:
-        off = (off + np.pi) % (2.0 * np.pi) - np.pi
-    return [float(value) for value in (off / np.maximum(spread, 1e-300))[spread > 0.0]]

@@ -22,7 +22,6 @@ VERDICTS = 'verdicts.json'
 DIAGNOSIS = 'diagnosis.json'
 DONE = 'done'
 SCORE = 'score.json'
-PAGE = 'score.html'
 
 SCHEMAS = {
     CASES: 'weld_twin/blind/cases/1',

@@ -59,16 +59,12 @@ class SealedCase:
 
     Attributes
     ----------
-    lot : Lot
-    cell : BlindCell
-    causes : list of effects
     alike : list of lists of (family, joint)
         Answers as right as the truth.
     ratios : list of float
         Deviation of every cause over the noise, each alone.
     excluded : tuple of str
         Families taken out of the library.
-    train, holdout, test : Take
     fresh : bool
         Whether hold-out and test are other motions than the training's.
     also : tuple of Take
@@ -105,8 +101,6 @@ def make(
     ----------
     cases, truths : Path
         Directories; the truths hold the seed, which is a truth as well.
-    seed, count : int
-    runner : Runner
     kinds : sequence of str
         Only these kinds of cases; empty for all.
     spans : tuple of float [s]
@@ -180,8 +174,6 @@ def draw_case(
 
     Parameters
     ----------
-    lot : Lot
-    rng : Generator
     spans : tuple of float [s]
         Shortest and longest recording.
     poor : str
@@ -286,15 +278,7 @@ def write_truth(place: Path, name: str, case: SealedCase) -> None:
 
 
 def truth_of(name: str, case: SealedCase) -> dict[str, Any]:
-    """
-    Return the truth of a case in plain values.
-
-    Parameters
-    ----------
-    name : str
-    case : SealedCase
-
-    """
+    """Return the truth of a case in plain values."""
     cell, lot = case.cell, case.lot
     reachable, outliers = floor(cell, case.causes, case.test)
     every = rms(deviation(cell, case.causes, case.train)) / cell.noise if case.causes else 0.0

@@ -8,18 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from .achieved import Achieved
 from .judging import NOT_IN_LIBRARY, Judged
-from .statistics import Estimate, bootstrap, brier, calibration_error, share
+from .statistics import Estimate, brier, calibration_error, share
 
 AS_GOOD = 1.05
 """RMS left over what the true causes leave, up to which an answer predicts as the truth does."""
 CLEAR = 3.0
 """Effect RMS over noise from which a cause is plain to see."""
-BINS = ((0.0, 1.0, '< 1'), (1.0, 3.0, '1-3'), (3.0, 10.0, '3-10'), (10.0, np.inf, '> 10'))
-"""Effect RMS over noise: from, below, and what it is called."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +24,6 @@ class Measure:
 
     Attributes
     ----------
-    key, title : str
-    estimate : Estimate
-    goal : float or None
     at_least : bool
         Whether the goal is a least or a most.
 
@@ -62,12 +54,10 @@ class Question(NamedTuple):
 
     Attributes
     ----------
-    key, title : str
     asked : callable
         Tells which cases are asked.
     told : callable
         Tells whether the answer to a case is right; None where it cannot be said.
-    goal : float, optional
     at_least : bool
         Whether the goal is a least or a most.
 
@@ -97,12 +87,11 @@ def _status(*statuses: str) -> Callable[[Judged], bool]:
     return lambda case: case.status in statuses
 
 
-def alias_measure(cases: Sequence[Judged], shrinks: Mapping[str, Achieved]) -> Measure:
+def alias_measure(cases: Sequence[Judged], left: Mapping[str, float]) -> Measure:
     """Return how often a cause no library knows is unknown, or what is named does as well."""
 
     def told(case: Judged) -> bool:
-        shrink = shrinks.get(case.name)
-        return case.status == 'unknown' or (shrink is not None and shrink.over_floor < AS_GOOD)
+        return case.status == 'unknown' or left.get(case.name, AS_GOOD) < AS_GOOD
 
     foreign = [case for case in cases if case.kind in NOT_IN_LIBRARY]
     return Measure(
@@ -123,117 +112,6 @@ def calibration_measures(cases: Sequence[Judged]) -> list[Measure]:
             'brier', 'Brier score', brier([c.confidence for c in told], [c.right for c in told])
         ),
     ]
-
-
-def shrink_measures(shrinks: Sequence[Achieved]) -> list[Measure]:
-    """Return how the shrink claimed compares with the shrink achieved on sealed recordings."""
-    same = [s for s in shrinks if s.test == 'same motion']
-    other = [s for s in shrinks if s.test != 'same motion']
-    return [
-        Measure(
-            'shrink_off',
-            'median distance of claimed and achieved shrink',
-            _off(shrinks),
-            0.03,
-            False,
-        ),
-        Measure('shrink_off_same', 'the same, motion repeated', _off(same)),
-        Measure('shrink_off_new', 'the same, another motion', _off(other)),
-        Measure(
-            'shrink_cover',
-            '90 % interval of the shrink holds the achieved (85-95 %)',
-            share([s.covered_90 for s in shrinks]),
-            0.85,
-        ),
-        Measure(
-            'shrink_cover_same', 'the same, motion repeated', share([s.covered_90 for s in same])
-        ),
-        Measure(
-            'shrink_cover_new', 'the same, another motion', share([s.covered_90 for s in other])
-        ),
-        Measure(
-            'over_floor',
-            'RMS left over what the true causes leave, median',
-            bootstrap([s.over_floor for s in shrinks]),
-            1.05,
-            False,
-        ),
-    ]
-
-
-def parameter_measures(cases: Sequence[Judged]) -> list[Measure]:
-    """Return whether parameters are within their standard errors."""
-    z = [value for case in cases for value in case.z]
-    return [
-        Measure(
-            'z_spread',
-            'errors of parameters over their standard errors: RMS, outer 2 % cut',
-            bootstrap(_trimmed(z), lambda v, axis: np.sqrt((v**2).mean(axis=axis))),
-        ),
-        Measure('z_inside', 'the same: share within 1.96', share([abs(v) < 1.96 for v in z])),
-    ]
-
-
-def semi_real_measures(cases: Sequence[Judged], own: Mapping[str, str]) -> list[Measure]:
-    """
-    Return how often a cause put into a real bag is named.
-
-    Parameters
-    ----------
-    cases : sequence of Judged
-    own : mapping
-        What is said of every bag as it is, by its name.
-
-    """
-    new = [c for c in cases if c.truth not in own.get(c.motion, '')]
-    return [
-        Measure(
-            f'semi_real_{k}',
-            f'cause put into a real bag, {label} of its noise: named',
-            _of([c for c in new if low <= c.stratum < high], _named),
-        )
-        for k, (low, high, label) in enumerate(BINS)
-    ]
-
-
-def by_stratum(cases: Sequence[Judged]) -> list[dict[str, Any]]:
-    """Return the causes in the library by how large the weakest is against the noise."""
-    out = []
-    for low, high, label in BINS:
-        for kind in ('single', 'double', 'triple'):
-            inside = [c for c in cases if c.kind == kind and low <= c.stratum < high]
-            if inside:
-                out.append({'stratum': label, **row(kind, inside)})
-    return out
-
-
-def by(cases: Sequence[Judged], key: Callable[[Judged], str]) -> list[dict[str, Any]]:
-    """Return the cases grouped, each group a row."""
-    groups: dict[str, list[Judged]] = {}
-    for case in cases:
-        groups.setdefault(key(case), []).append(case)
-    return [row(name, groups[name]) for name in sorted(groups)]
-
-
-def row(name: str, cases: Sequence[Judged]) -> dict[str, Any]:
-    """Return the measures that every group of cases has."""
-    sets = [c.set for c in cases]
-    return {
-        'group': name,
-        'count': len(cases),
-        'right': share([c.right for c in cases])._asdict(),
-        'family': _of(cases, _family)._asdict(),
-        'joint': _of(cases, _joint)._asdict(),
-        'sets': {key: sets.count(key) for key in ('exact', 'partial', 'wrong', 'silent')},
-        'statuses': _counts(c.status for c in cases),
-        'confidently_wrong': sum(c.confidently_wrong for c in cases),
-        'breadth': float(np.mean([c.breadth for c in cases])),
-    }
-
-
-def _counts(values: Any) -> dict[str, int]:
-    listed = list(values)
-    return {key: listed.count(key) for key in sorted(set(listed))}
 
 
 def _of(cases: Sequence[Judged], test: Callable[[Judged], bool | None]) -> Estimate:
@@ -263,15 +141,6 @@ def _unknown(case: Judged) -> bool:
 
 def _calibrated(cases: Sequence[Judged]) -> Estimate:
     return calibration_error([c.confidence for c in cases], [c.right for c in cases])
-
-
-def _off(shrinks: Sequence[Achieved]) -> Estimate:
-    return bootstrap([abs(s.claimed - s.ratio) for s in shrinks])
-
-
-def _trimmed(values: Sequence[float]) -> list[float]:
-    ordered = sorted(values, key=abs)
-    return ordered[: int(np.ceil(0.98 * len(ordered)))]
 
 
 QUESTIONS = (

@@ -20,11 +20,9 @@ def poorer(taken: Take, poor: str, rng: np.random.Generator) -> Take:
 
     Parameters
     ----------
-    taken : Take
     poor : str
         One of `WAYS`, or empty for the run as it is: 'small' moves all joints little, 'still'
         holds some of them, 'one' moves one alone, 'few' keeps few of the stations.
-    rng : Generator
 
     """
     q, command = taken.command.q.copy(), taken.command

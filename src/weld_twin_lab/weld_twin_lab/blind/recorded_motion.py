@@ -39,10 +39,8 @@ def motion(kind: str, robot: Robot, span: float, rng: np.random.Generator) -> Mo
     ----------
     kind : str
         'seams', 'free' or 'stations'.
-    robot : Robot
     span : float [s]
         About how long; two seconds for every station.
-    rng : Generator
 
     """
     return {'seams': _seams, 'free': _free, 'stations': _stations}[kind](robot, span, rng)

@@ -71,7 +71,6 @@ def opened(cases: Path, truths: Path, seal: str = '') -> list[dict[str, Any]]:
 
     Parameters
     ----------
-    cases, truths : Path
     seal : str, optional
         As printed when the cases were made; left out, the one stored with the cases holds.
 

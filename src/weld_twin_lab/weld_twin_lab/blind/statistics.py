@@ -65,25 +65,6 @@ def brier(confidence: Sequence[float], right: Sequence[bool]) -> Estimate:
     return bootstrap(squares, np.mean)
 
 
-class Bin(NamedTuple):
-    """Cases of like confidence: its mean, and the share that was right."""
-
-    low: float
-    high: float
-    confidence: float
-    right: Estimate
-
-
-def reliability(confidence: Sequence[float], right: Sequence[bool]) -> list[Bin]:
-    """Return the bins of equal width that hold cases."""
-    sure, true = np.asarray(confidence, dtype=float), np.asarray(right, dtype=bool)
-    place = np.minimum((sure * BINS).astype(int), BINS - 1)
-    return [
-        Bin(k / BINS, (k + 1) / BINS, float(sure[inside].mean()), share(list(true[inside])))
-        for k, inside in ((k, place == k) for k in np.unique(place))
-    ]
-
-
 def calibration_error(confidence: Sequence[float], right: Sequence[bool]) -> Estimate:
     """Return the expected calibration error over ten bins of equal width."""
     pairs = np.array([confidence, right], dtype=float).T

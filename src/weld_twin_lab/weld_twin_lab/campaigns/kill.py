@@ -1,22 +1,17 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Kill the recorder and the commands at random moments and look at what is left.
+"""Kill the recorder at random moments and look at what is left.
 
-Recorder: joint states at 500 Hz and poses at 100 Hz are recorded with both storages, in files small
-enough that splits are hit too. SIGKILL comes while recording, or while the bag is being completed. What
+Joint states at 500 Hz and poses at 100 Hz are recorded with both storages, in files small enough that
+splits are hit too. SIGKILL comes while recording, or while the bag is being completed. What
 `weld-twin bag recover` finds must be the messages sent, in order and without a gap from the first on,
 and may lack one second at most.
-
-Commands: each replaces an older result in a folder in which a person's files lie, or adds to a
-database. SIGKILL comes at a random moment, or at a change to files. Every file must be the older one or
-the newer one, whole, a person's files the same; and the next run must end with the newer result.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from weld_twin_msgs_py.files import markdown
@@ -25,18 +20,10 @@ from ..study import option, options
 
 ALLOWED = 1.0
 """Seconds of messages that a kill may cost."""
-RECORDER = 'recorder'
 
 
 add_arguments = options(
     option('--times', 200, 'N', 'kills of the recorder (default: 200)'),
-    option('--each', 40, 'N', 'kills of each command (default: 40)'),
-    option(
-        '--cases',
-        '',
-        'NAMES',
-        'what is killed, such as "recorder,diagnose,history add" (default: all)',
-    ),
     option('--seed', 1, 'S', 'decides the moments'),
     option('--longest', 3.0, 'SECONDS', 'latest moment of a kill of the recorder (default: 3)'),
     out='',
@@ -45,63 +32,6 @@ add_arguments = options(
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return one row for each kill, and what they come to."""
-    from weld_twin_core.errors import DataError
-
-    from .killing.cases import CASES
-
-    names = [RECORDER, *(case.name for case in CASES)]
-    chosen = args.cases.split(',') if args.cases else names
-    for name in chosen:
-        if name not in names:
-            raise DataError(f'--cases: there is no {name!r}; there are {", ".join(names)}')
-    result: dict[str, Any] = {'passed': True}
-    if RECORDER in chosen:
-        result = _recorder(args, tell)
-    rows = _commands(args, [case for case in CASES if case.name in chosen], tell)
-    if rows:
-        result['commands'] = _by_case(rows)
-        result['kills_of_commands'] = rows
-        faults = any(row['lost'] or row['half'] for row in rows)
-        result['passed'] = result['passed'] and not faults
-    return result
-
-
-def _commands(
-    args: argparse.Namespace, cases: list[Any], tell: Callable[[str], None]
-) -> list[dict[str, Any]]:
-    import tempfile
-
-    import numpy as np
-
-    rows: list[dict[str, Any]] = []
-    for number, case in enumerate(cases):
-        rng = np.random.default_rng([args.seed, number])
-        with tempfile.TemporaryDirectory(prefix='weld_twin_kill_') as place:
-            once = case.begin(Path(place))
-            mine = [dict(once(rng)) for _ in range(args.each)]
-        rows += mine
-        for row in mine:
-            if row['lost'] or row['half']:
-                tell(f'{row["case"]} {row["how"]}: {row["lost"]} {row["half"]}')
-        tell(f'{case.name}: {len(mine)} kills')
-    return rows
-
-
-def _by_case(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [
-        {
-            'case': name,
-            'kills': len(mine),
-            'lost': sum(bool(row['lost']) for row in mine),
-            'halves': sum(bool(row['half']) for row in mine),
-            'mixed': sum(row['mixed'] for row in mine),
-        }
-        for name in dict.fromkeys(row['case'] for row in rows)
-        for mine in [[row for row in rows if row['case'] == name]]
-    ]
-
-
-def _recorder(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
     import numpy as np
 
     from .killing.trial import Trial, try_once
@@ -150,18 +80,7 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def table(result: dict[str, Any]) -> str:
-    """Return a row for each storage of the recorder, and one for each command."""
-    parts = []
-    if 'mcap' in result:
-        parts.append(_recorder_table(result))
-    if 'commands' in result:
-        head = ('command', 'kills', 'lost', 'halves', 'old and new files until the next run')
-        rows = [tuple(row.values()) for row in result['commands']]
-        parts.append(markdown.table(head, *rows))
-    return '\n\n'.join(parts)
-
-
-def _recorder_table(result: dict[str, Any]) -> str:
+    """Return a row for each storage."""
     head = ('storage', 'kills', 'gaps, repeats, broken bags', 'missing, median', 'missing, worst')
     rows = []
     for name in ('mcap', 'sqlite3'):

@@ -18,6 +18,8 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
+from ..study import option, options
+
 RATES = (125.0, 500.0, 1000.0)
 """Rates [Hz] of joint states: common controllers, and twice the fastest of them."""
 LIMIT = 1.25
@@ -48,10 +50,11 @@ processor time that the relay has no like of, so that only the latency counts th
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument('--turns', type=int, default=20, help='turns of each, at each rate')
-    parser.add_argument('--seconds', type=float, default=1.0, help='length of a turn')
+add_arguments = options(
+    option('--turns', 20, 'N', 'turns of each, at each rate (default: 20)'),
+    option('--seconds', 1.0, 'S', 'length of a turn'),
+    out='',
+)
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
@@ -165,32 +168,21 @@ def table(result: dict[str, Any]) -> str:
     def ratio(row: dict[str, float]) -> str:
         return f'{row["p50_us"]:.2f} / {row["p99_us"]:.2f}'
 
-    poses = result.get('poses')
-    more = '' if poses is None else '\n\n' + pose_table(poses)
-    on_tf, bare = (all(key in row for row in result['rates']) for key in ('ratio_tf', 'bare'))
-    head: tuple[str, ...] = 'Hz', 'relay p50 / p99', 'raw relay'
-    head += ('rclpy alone', 'twin', 'twin / relay') if bare else ('twin', 'twin / relay')
-    head += ('twin on /tf / relay',) if on_tf else ()
-    return (
-        markdown.table(
-            (*head, 'CPU relay / twin', 'ratio'),
-            *(
-                (
-                    f'{row["rate_hz"]:g}',
-                    ms(row['relay']),
-                    ms(row['raw_relay']),
-                    *([ms(row['bare'])] if bare else []),
-                    ms(row['twin']),
-                    ratio(row['ratio']),
-                    *([ratio(row['ratio_tf'])] if on_tf else []),
-                    f'{row["relay"]["cpu_us"]:.0f} / {row["twin"]["cpu_us"]:.0f}',
-                    f'{row["ratio"]["cpu_us"]:.2f}',
-                )
-                for row in result['rates']
-            ),
-        )
-        + more
+    head = (
+        *('Hz', 'relay p50 / p99', 'raw relay', 'rclpy alone', 'twin', 'twin / relay'),
+        *('twin on /tf / relay', 'CPU relay / twin', 'ratio'),
     )
+    rows = (
+        (
+            f'{row["rate_hz"]:g}',
+            *(ms(row[name]) for name in ('relay', 'raw_relay', 'bare', 'twin')),
+            *(ratio(row[name]) for name in ('ratio', 'ratio_tf')),
+            f'{row["relay"]["cpu_us"]:.0f} / {row["twin"]["cpu_us"]:.0f}',
+            f'{row["ratio"]["cpu_us"]:.2f}',
+        )
+        for row in result['rates']
+    )
+    return markdown.table(head, *rows) + '\n\n' + pose_table(result['poses'])
 
 
 def pose_table(poses: dict[str, Any]) -> str:

@@ -3,7 +3,7 @@
 """All nodes together for a long time: memory, lost samples, CPU time.
 
 The generator goes along a seam there and back in real time; injector, twin, analyzer, markers,
-recorder and live diagnosis work on what it sends. Writes a picture (.png) beside the result.
+recorder and live diagnosis work on what it sends.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     import tempfile
     from pathlib import Path
 
-    from .live.soaking import Soak, losses, picture, verdict
+    from .live.soaking import Soak, losses, verdict
 
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[: args.cores])
     with tempfile.TemporaryDirectory() as folder:
@@ -63,7 +63,6 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
         'recorded': lost,
         'cpu_share_total': round(sum(node['cpu_share'] for node in nodes.values()), 3),
     }
-    picture(Path(args.out).with_suffix('.png'), soak.samples)
     return {'passed': verdict(result, FLAT), **result}
 
 

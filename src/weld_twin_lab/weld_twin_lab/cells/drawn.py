@@ -115,7 +115,6 @@ def really(
     causes : sequence of mapping
         What is wrong, each with the joint that it is of.
     q : array, shape (M, n) [rad or m]
-    rng : Generator
 
     """
     arm = {key: value for key, value in data.items() if key != 'workpiece'}

@@ -23,8 +23,8 @@ from weld_twin_core.recording import Measurements, Recording
 from weld_twin_msgs_py.tables import read_camera, read_pixels, read_target
 
 from ..real_arms.sources import motoman
-from ..real_robots.unseen_stations import ALIGN, residual
 from ..transfer.plain import PLAIN, plain_fit
+from ..transfer.unseen_stations import ALIGN, residual
 
 PARTS = 5
 """Stretches of time, each left out in turn."""

@@ -61,10 +61,8 @@ def touches(data: Path, arm: str, places: Sequence[str]) -> Recording:
 
     Parameters
     ----------
-    data : Path
     arm : str
         One of `ARMS`.
-    places : sequence of str
 
     """
     postures, labels = [], []

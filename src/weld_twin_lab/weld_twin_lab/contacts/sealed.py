@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,12 +13,9 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.contacts import Tie, spreads
-from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.recording import Recording
 
-from ..blind.cause_sizes import draw, scaled, site
-from ..blind.simulator import require_simulator
-from ..study import Parts
+from ..blind.cause_sizes import Cause, draw, scaled
 from .touching import postures_at, touching
 
 ARMS = ('ur5', 'ur10', 'kuka_iiwa14', 'franka_panda')
@@ -47,19 +43,24 @@ SLACK = (5e-6, 5e-5)
 """Of the ball in its socket [m], standard deviation of each coordinate."""
 SIZE = (3.0, 15.0)
 """What a cause moves, in slacks."""
-SHOWN = 0.3
-"""A cause that moves less than this many slacks at its largest believable size is not seen."""
 LARGEST = 10.0
 """Factor on a drawn cause beyond which it is larger than machines have it."""
-SURE = 0.9
-"""Confidence from which a wrong answer counts as sure."""
 TIES = tuple(Tie((f'{k}/0', f'{k}/1'), 0.05, 2e-5) for k in range(len(SOCKETS)))
 """The sockets of a place are 50 mm apart."""
 
 
-def case(seed: int) -> dict[str, Any]:
+class Sealed(NamedTuple):
+    """An arm with one flaw, its touches, and how far the flaw moves in slacks."""
+
+    robot: Robot
+    cause: Cause
+    recording: Recording
+    slacks: float
+
+
+def made(seed: int) -> Sealed:
     """
-    Return one sealed case, diagnosed and opened.
+    Return one sealed case.
 
     Parameters
     ----------
@@ -80,28 +81,7 @@ def case(seed: int) -> dict[str, Any]:
     cause = scaled(cause, factor)
     loose = places + rng.normal(0.0, slack, places.shape)
     recording = touching(robot, [cause], start, labels, loose, TIES, rng)
-    return {'seed': seed, 'robot': robot.name} | _opened(
-        diagnose(recording, robot), site(cause), shown * factor / slack
-    )
-
-
-def _opened(found: Diagnosis, truth: tuple[str, str | None], slacks: float) -> dict[str, Any]:
-    """Return what a diagnosis says of a cause that moves so many slacks, and whether it is right."""
-    named = [(item.effect.name, item.effect.site) for item in found.effects]
-    alike = {(s.effect, s.joint) for group in found.indistinguishable for s in group}
-    seen = slacks >= SHOWN
-    right = truth in named or truth in alike
-    return {
-        'truth': list(truth),
-        'slacks': slacks,
-        'seen': seen,
-        'status': found.status,
-        'confidence': found.confidence,
-        'named': [list(item) for item in named],
-        'right': right if seen else truth not in named,
-        'sure_and_wrong': found.status == 'identified' and found.sure and not right,
-        'spread_m': None if found.contacts is None else found.contacts.held_out_spread_m,
-    }
+    return Sealed(robot, cause, recording, shown * factor / slack)
 
 
 def _starts(robot: Robot, rng: np.random.Generator) -> tuple[Array, list[str], Array]:
@@ -123,28 +103,3 @@ def _shown(robot: Robot, recording: Recording) -> float:
     points = forward(robot, recording.joints.q)[:, :3, 3]
     away = np.concatenate(list(spreads(recording.contacts, points).values()))
     return float(np.sqrt((away**2).mean() / 3.0))
-
-
-def sealed(count: int, part: Parts) -> dict[str, Any]:
-    """
-    Return how many of some sealed cases were named.
-
-    Parameters
-    ----------
-    count : int
-    part : Parts
-        Keeps every case.
-
-    """
-    require_simulator()
-    cases = [part(f'case_{seed:04d}', partial(case, seed)) for seed in range(count)]
-    seen = [c for c in cases if c['seen'] and c['slacks'] >= SIZE[0]]
-    hidden = [c for c in cases if not c['seen']]
-    return {
-        'cases': len(cases),
-        'seen': len(seen),
-        'named': sum(c['right'] for c in seen),
-        'hidden': len(hidden),
-        'hidden_named': sum(not c['right'] for c in hidden),
-        'sure_and_wrong': sum(c['sure_and_wrong'] for c in cases),
-    }

@@ -29,11 +29,9 @@ def postures_at(robot: Robot, place: Array, count: int, rng: np.random.Generator
 
     Parameters
     ----------
-    robot : Robot
     place : array, shape (3,) [m]
     count : int
         How many at the most.
-    rng : Generator
 
     """
     low, high = np.maximum(robot.lower, -TURN), np.minimum(robot.upper, TURN)
@@ -63,12 +61,10 @@ def touching(
         What is wrong with the plant, as in an effects file.
     q : array, shape (M, n) [rad or m]
         Postures to start from.
-    labels : sequence of str
     places : array, shape (M, 3) [m]
         Where each touch takes place.
     ties : sequence of Tie
         Of the artefact.
-    rng : Generator
 
     """
     from ..plant.plant import run

@@ -44,7 +44,7 @@ def arm_cases(ur5: Path, ur10: Path, out: Path) -> dict[str, Array]:
     Parameters
     ----------
     ur5, ur10 : Path
-        Directories of the published tables; see docs/real_robots.md.
+        Directories of the published tables; see docs/real_arms.md.
     out : Path
         Cases that are there already are left as they are.
 

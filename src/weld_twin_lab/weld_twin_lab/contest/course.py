@@ -8,8 +8,9 @@ import json
 import shlex
 import shutil
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from weld_twin_core.errors import DataError
@@ -19,7 +20,7 @@ from weld_twin_msgs_py.robots import load_robot
 
 from ..blind import layout
 from .open_form import ContestAnswer, read_answer, write_case
-from .processes import Cold, Ended, Starter, Warm
+from .processes import Ended, ended
 
 ENTRANTS = (
     'weld_twin',
@@ -27,6 +28,8 @@ ENTRANTS = (
     'zero_offset',
     'sparse_regression',
     'gaussian_process',
+    'bayesian_linear',
+    'bootstrap',
     'boosted_trees',
     'never_knows',
 )
@@ -46,7 +49,6 @@ class Run:
         None where it gave none.
     seconds : float [s]
         Of processor time, start of the interpreter included.
-    memory_bytes : int
     trouble : str
         Why there is no answer.
 
@@ -90,40 +92,48 @@ def opened(cases: Path, truths: Path, out: Path) -> list[str]:
     return names
 
 
-def commands(names: list[str], entered: list[str]) -> dict[str, Starter]:
+def commands(names: list[str], entered: list[str]) -> dict[str, list[str]]:
     """
-    Return what starts every method on a case.
+    Return the command of every method, with {case} and {out} in it.
 
     Parameters
     ----------
     names : list of str
-        Of `ENTRANTS`; what they import is loaded once for all cases.
+        Of `ENTRANTS`.
     entered : list of str
-        Others, as NAME=COMMAND with {case} and {out} in it; started anew for every case.
+        Others, as NAME=COMMAND.
 
     Raises
     ------
     DataError
-        There is no such entrant, or a command does not say where case and answer go.
+        There is no such entrant, or it cannot be loaded, or a command does not say where case and
+        answer go.
 
     """
-    out: dict[str, Starter] = {}
+    out: dict[str, list[str]] = {}
     for name in names:
         if name not in ENTRANTS:
             raise DataError(f'no entrant is called {name!r}; there are {", ".join(ENTRANTS)}')
-        out[name] = Warm([sys.executable, '-m', str(__package__), name])
+        try:
+            import_module(f'{__package__}.entrants.{name}')
+        except ImportError as error:
+            raise DataError(
+                f'the method {name!r} cannot be loaded ({error}); run '
+                "pip install 'weld-twin[bench,contest]', or leave it out of --entrants"
+            ) from None
+        out[name] = [sys.executable, '-m', str(__package__), name, '{case}', '{out}']
     for text in entered:
         name, _, command = text.partition('=')
         if not name or '{case}' not in command or '{out}' not in command:
             raise DataError(f'--enter takes NAME=COMMAND with {{case}} and {{out}}, got {text!r}')
-        out[name] = Cold(shlex.split(command))
+        out[name] = shlex.split(command)
     return out
 
 
 def run_all(
     cases: Path,
     names: list[str],
-    methods: Mapping[str, Starter],
+    methods: Mapping[str, Sequence[str]],
     out: Path,
     counts: Mapping[str, int],
     tell: Callable[[str], None],
@@ -134,34 +144,29 @@ def run_all(
     A method that has been run on a case is not run again: ``out`` keeps what came of it.
     """
     runs: dict[str, dict[str, Run]] = {method: {} for method in methods}
-    try:
-        for name in names:
-            for method, starter in methods.items():
-                place = out / method / name
-                if not (place / RUN).exists():
-                    _start(starter, cases / name, place)
-                runs[method][name] = _kept(place, counts[name])
-            tell(name)
-    finally:
-        for starter in methods.values():
-            starter.close()
+    for name in names:
+        for method, words in methods.items():
+            place = out / method / name
+            if not (place / RUN).exists():
+                _start(words, cases / name, place)
+            runs[method][name] = _kept(place, counts[name])
+        tell(name)
     return runs
 
 
-def _start(starter: Starter, case: Path, place: Path) -> None:
+def _start(words: Sequence[str], case: Path, place: Path) -> None:
     """Have a case answered, and keep what that took."""
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
-    ended = starter.run(case, place)
-    write_text(place / RUN, json.dumps(ended._asdict(), indent=1) + '\n')
+    write_text(place / RUN, json.dumps(ended(words, case, place)._asdict(), indent=1) + '\n')
 
 
 def _kept(place: Path, count: int) -> Run:
     """Return what came of a run; an answer out of form is none."""
-    ended = Ended(**json.loads((place / RUN).read_text(encoding='utf-8')))
-    used = ended.seconds, ended.memory_bytes
-    if ended.trouble:
-        return Run(None, *used, ended.trouble)
+    found = Ended(**json.loads((place / RUN).read_text(encoding='utf-8')))
+    used = found.seconds, found.memory_bytes
+    if found.trouble:
+        return Run(None, *used, found.trouble)
     try:
         return Run(read_answer(place, count), *used)
     except DataError as error:

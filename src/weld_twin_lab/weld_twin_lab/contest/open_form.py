@@ -94,6 +94,8 @@ class ContestAnswer:
     sure : tuple of bool, optional
         Whether each cause is told as sure, then whether the whole is; left out, what is likelier
         than `blind.judging.CONFIDENT` counts as sure.
+    sigma : array, shape (M, 3) [m], optional
+        Standard deviation of what will be measured of each coordinate, noise included.
 
     """
 
@@ -102,6 +104,7 @@ class ContestAnswer:
     unknown: float = 0.0
     none: float = 0.0
     sure: tuple[bool, ...] | None = None
+    sigma: Array | None = None
 
 
 def write_case(
@@ -237,7 +240,8 @@ def write_answer(folder: Path, answer: ContestAnswer) -> None:
         'none': answer.none,
     }
     (folder / ANSWER).write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
-    _write(folder / PREDICTED, ['x', 'y', 'z'], [answer.predicted])
+    told = [answer.predicted, *([] if answer.sigma is None else [answer.sigma])]
+    _write(folder / PREDICTED, ['x', 'y', 'z', 'sx', 'sy', 'sz'][: 3 * len(told)], told)
 
 
 def read_answer(folder: Path, count: int) -> ContestAnswer:
@@ -246,7 +250,6 @@ def read_answer(folder: Path, count: int) -> ContestAnswer:
 
     Parameters
     ----------
-    folder : Path
     count : int
         Positions that were asked for.
 
@@ -269,9 +272,12 @@ def read_answer(folder: Path, count: int) -> ContestAnswer:
     likely = [unknown, none, *(p for cause in causes for *_, p in cause)]
     if not all(0.0 <= value <= 1.0 + _SLACK for value in likely):
         raise DataError(f"'{folder / ANSWER}' has a probability that is not between 0 and 1")
-    if predicted.shape != (count, 3) or not np.isfinite(predicted).all():
+    if predicted.shape not in ((count, 3), (count, 6)) or not np.isfinite(predicted).all():
         raise DataError(
-            f"'{folder / PREDICTED}' must have {count} rows of three finite numbers, it has "
+            f"'{folder / PREDICTED}' must have {count} rows of three or six finite numbers, it has "
             f'{predicted.shape[0]} of {predicted.shape[1]}'
         )
-    return ContestAnswer(predicted, causes, unknown, none)
+    sigma = predicted[:, 3:] if predicted.size > 3 * count else None
+    if sigma is not None and (sigma <= 0.0).any():
+        raise DataError(f"'{folder / PREDICTED}' has a standard deviation that is not positive")
+    return ContestAnswer(predicted[:, :3], causes, unknown, none, sigma=sigma)

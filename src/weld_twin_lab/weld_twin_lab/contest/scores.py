@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtr
 
 from weld_twin_core.arrays import Array
 from weld_twin_msgs_py.bags import read_recording
@@ -17,13 +18,16 @@ from weld_twin_msgs_py.files.markdown import table
 from weld_twin_msgs_py.robots import load_robot
 
 from ..blind import layout
-from ..blind.achieved import counted
+from ..blind.achieved import NORMAL_90, counted
 from ..blind.ambiguous import Site
 from ..blind.displacement import rms
 from ..blind.judging import CONFIDENT, IN_LIBRARY, answers_of
 from .course import Run
 from .open_form import Cause, ContestAnswer, Name
 
+DENSITY, APART = 1.0 / np.sqrt(2.0 * np.pi), 1.0 / np.sqrt(np.pi)
+"""Of a normal distribution of unit width: its density in the middle, and half the mean distance of two
+draws."""
 LIKELY = 0.5
 """Probability from which something is said to be there."""
 NAMES = 3
@@ -64,13 +68,21 @@ class Point:
 
     Attributes
     ----------
-    detected, false_alarm, family, joint, sure_wrong : bool or None
     belief : float or None
         In the true families, of cases detected.
     left : float
         Gap with the prediction over the gap of the nominal arm.
     over_floor : float
         Gap with the prediction over what the true causes would leave.
+    held, width_m, crps_m : float or None
+        Share of the measured coordinates within their 90 % interval; the median of its width; and the
+        mean continuous ranked probability score, which is less the sharper and the truer an answer is
+        [1]_. None where a method does not say how sure it is.
+
+    References
+    ----------
+    .. [1] T. Gneiting, A. E. Raftery, "Strictly proper scoring rules, prediction, and estimation",
+       Journal of the American Statistical Association 102, 2007, equation 21.
 
     """
 
@@ -82,6 +94,25 @@ class Point:
     sure_wrong: bool
     left: float
     over_floor: float
+    held: float | None = None
+    width_m: float | None = None
+    crps_m: float | None = None
+
+
+def promised(off: Array, sigma: Array) -> tuple[float, float, float]:
+    """
+    Return the share held by 90 % intervals, their median width and the mean CRPS of normal answers.
+
+    Parameters
+    ----------
+    off, sigma : array, shape (M, 3) [m]
+        Measured minus predicted, and how sure that was said to be.
+
+    """
+    z = off / sigma
+    score = sigma * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * DENSITY * np.exp(-0.5 * z**2) - APART)
+    held = float((np.abs(z) <= NORMAL_90).mean())
+    return held, 2.0 * NORMAL_90 * float(np.median(sigma)), float(score.mean())
 
 
 def point(answer: ContestAnswer, case: Sealed) -> Point:
@@ -103,7 +134,14 @@ def point(answer: ContestAnswer, case: Sealed) -> Point:
         _sure_wrong(answer, case),
         gap / case.nominal_m,
         gap / float(truth['floor_m']),
+        *_promises(answer, case),
     )
+
+
+def _promises(answer: ContestAnswer, case: Sealed) -> tuple[float | None, ...]:
+    if answer.sigma is None:
+        return None, None, None
+    return promised((case.positions - answer.predicted)[case.good], answer.sigma[case.good])
 
 
 def _first(answer: ContestAnswer, count: int) -> list[Name]:
@@ -148,8 +186,6 @@ def page(runs: Mapping[str, Mapping[str, Run]], cases: Mapping[str, Sealed], nom
 
     Parameters
     ----------
-    runs : mapping of method to mapping of case to Run
-    cases : mapping of case to Sealed
     nominal : str
         What is said of a method that gave no answer: it is taken for the nominal arm, silent.
 
@@ -157,7 +193,7 @@ def page(runs: Mapping[str, Mapping[str, Run]], cases: Mapping[str, Sealed], nom
     head = (
         *('method', 'answers', 'detected', 'false alarms', 'family', 'joint', 'belief (FIA)'),
         *('sure and wrong', 'gap left, median', 'over the floor, median', 'worse than nominal'),
-        *('processor [s]', 'memory [MB]'),
+        *('90 % hold', 'their width [mm]', 'CRPS [mm]', 'processor [s]', 'memory [MB]'),
     )
     rows: list[Sequence[object]] = [head]
     for method, said in runs.items():
@@ -175,6 +211,9 @@ def summary(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> dict[str, A
     left = np.array([each.left for each in points])
     out['left'] = float(np.median(left)) if points else None
     out['over_floor'] = float(np.median([p.over_floor for p in points])) if points else None
+    for key in ('held', 'width_m', 'crps_m'):
+        told = [getattr(each, key) for each in points if getattr(each, key) is not None]
+        out[key] = None if not told else float((np.mean if key == 'held' else np.median)(told))
     out['worse_than_nominal'] = int((left > 1.0).sum())
     out['seconds'] = float(np.median([run.seconds for run in runs.values()]))
     out['memory_bytes'] = float(np.median([run.memory_bytes for run in runs.values()]))
@@ -192,6 +231,8 @@ def _row(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> tuple[object, 
         '-' if found['left'] is None else f'{found["left"]:.2f}',
         '-' if found['over_floor'] is None else f'{found["over_floor"]:.2f}',
         found['worse_than_nominal'],
+        _share(found['held']),
+        *('-' if found[k] is None else f'{found[k] * 1e3:.3f}' for k in ('width_m', 'crps_m')),
         f'{found["seconds"]:.1f}',
         f'{found["memory_bytes"] / 1e6:.0f}',
     )

@@ -58,7 +58,6 @@ def held(
     ----------
     diagnosis : Diagnosis
         Of ``train``.
-    train, other : Recording
     sigma : array, shape (M,) [m]
         The instrument's noise at the other's measurements.
     good : array of bool, shape (M,), optional
@@ -68,8 +67,8 @@ def held(
     posterior, measured = diagnosis.posterior, other.measured
     assert posterior is not None
     assert measured is not None
-    twin = _twin(diagnosis.model, train, other)
-    use = _within(other, measured) if good is None else good & _within(other, measured)
+    twin = twin_for(diagnosis.model, train, other)
+    use = within(other, measured) if good is None else good & within(other, measured)
     t = measured.t[use]
     errors = measured.position[use] - twin.poses(other, t).position
     covariances = pose_covariances(posterior, twin, other, t)
@@ -88,13 +87,13 @@ def held(
     }
 
 
-def _twin(model: Model, train: Recording, other: Recording) -> Twin:
+def twin_for(model: Model, train: Recording, other: Recording) -> Twin:
     """Return the model of a recording for another."""
     found = seen_from(model.found, train.epoch_ns, train.span_ns, other)
     return Model(model.robot, model.bases[:1], model.known, found).twin(0)
 
 
-def _within(other: Recording, measured: Measurements) -> Mask:
+def within(other: Recording, measured: Measurements) -> Mask:
     """Return which measurements lie inside the joint stream, shape (M,)."""
     if other.joints.static:
         return np.ones(measured.t.size, dtype=bool)

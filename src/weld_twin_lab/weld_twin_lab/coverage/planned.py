@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,11 +18,10 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.posterior import largest_sigma
 from weld_twin_core.twin.twin import Twin
 
-from ..blind.simulator import require_simulator
+from ..blind.cause_sizes import Cause
 from ..plant.plant import run
 from ..plant.plant_recording import Command
 from ..plant.tracker import Tracker
-from ..study import Parts, Tell
 
 ARMS = ('ur5', 'ur10', 'kuka_kr6_r900', 'abb_irb1600')
 COUNTS = (16, 24, 40)
@@ -56,7 +53,7 @@ def carried_out(seed: int) -> dict[str, Any]:
     robot = catalog.load(ARMS[seed % len(ARMS)])
     count = COUNTS[seed // len(ARMS) % len(COUNTS)]
     plan = plan_stations(robot, count, TOLERANCE, NOISE)
-    flaws = [*FRAMES, *_arm(robot, rng)]
+    flaws = [*FRAMES, *small_errors(robot, rng)]
     measured = _measured(robot, flaws, plan.q, NOISE, rng)
     found = diagnose(measured, robot, align='base,tool')
     others = clear_postures(robot, SPREAD)[-UNSEEN:]
@@ -87,8 +84,8 @@ def _still(name: str, q: Array) -> Recording:
     return Recording(name, JointMotion(np.arange(float(len(q))), q, static=True))
 
 
-def _arm(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Return every small error that arms of this kind have, each drawn from its usual spread."""
+def small_errors(robot: Robot, rng: np.random.Generator, part: float = 1.0) -> list[Cause]:
+    """Return every small error that arms of this kind have, each drawn from a part of its spread."""
     out = []
     for effect in plausible_arm.directions(robot, ()):
         if effect.of not in ('joint', 'link') or effect.traits.waves is not None:
@@ -98,7 +95,7 @@ def _arm(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]:
             if robot.mass is None:
                 continue
             size = np.abs(size)
-        out.append(effect.with_vector(size).to_mapping())
+        out.append(effect.with_vector(part * size).to_mapping())
     return out
 
 
@@ -110,36 +107,3 @@ def _measured(
     tracker = Tracker(sigma=noise, orientation=False)
     seen = run(robot.to_mapping(), flaws, Command(t, q, static=True), tracker, rng)
     return Recording('plan', JointMotion(t, q, static=True), Measurements(t, seen.position))
-
-
-def planned(count: int, part: Parts, tell: Tell) -> list[dict[str, Any]]:
-    """
-    Return what so many plans promised, and what came of them.
-
-    Parameters
-    ----------
-    count : int
-    part : Parts
-        Keeps every plan.
-    tell : callable
-        Told what came of every plan.
-
-    """
-    require_simulator()
-    entries = []
-    for seed in range(count):
-        entries.append(part(f'plan_{seed:03d}', partial(carried_out, seed)))
-        tell(' '.join(f'{key} {value}' for key, value in entries[-1].items()))
-    return entries
-
-
-def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """Return how plans compare with what came of them."""
-    ratio = [e['kept_sigma_m'] / e['promised_sigma_m'] for e in entries]
-    return {
-        'plans': len(entries),
-        'kept_over_promised_median': float(np.median(ratio)),
-        'kept_over_promised_worst': float(max(ratio)),
-        'promised_within': float(np.mean([e['promised_within'] for e in entries])),
-        'kept_within': float(np.mean([e['kept_within'] for e in entries])),
-    }

@@ -1,13 +1,13 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Every poor recording and every sealed case diagnosed, and its regions tried on other poses."""
+"""All that is promised of recordings, cases, programs, touches, years and plans, and what it came to."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,51 +16,95 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
-from weld_twin_msgs_py.bags import read_recording
-from weld_twin_msgs_py.robots import load_robot
-from weld_twin_nodes.offline.told_twin import build_twin
 
-from ..blind import layout
-from ..blind.diagnosing import diagnosis_of
-from ..real_robots.unseen_stations import ALIGN
+from ..blind.simulator import require_simulator
+from ..programs.cells import CELLS
 from ..study import Parts
-from ..transfer.flags import flagged
+from ..transfer.plain import plain_fit
 from ..transfer.splits import TUNED_ON, Split, all_splits
+from ..transfer.unseen_stations import ALIGN, residual
 from .held import held
-from .oracle import oracle_sigma
+from .others import of_seam, of_touches, of_years
+from .planned import carried_out
+from .sealed import of_case, told_shrink
 
 NAME, PARTS = 'coverage', 'parts'
-FEWEST = 15
-"""Poses of a sealed case below which their share says nothing."""
+APART = 10_000
+"""How far apart the seeds of what is drawn by one number are."""
 UR5_NOISE = 2e-5
 """A GTS3800 is good to 15 um + 6 um/m, a metre or two away [m]."""
 
 
-def entries_of(ur5: Path, ur10: Path, cases: Path | None, part: Parts) -> list[dict[str, Any]]:
+class Wanted(NamedTuple):
     """
-    Return what the regions of all splits hold, and of sealed cases where there are any.
+    What is asked for.
+
+    Attributes
+    ----------
+    arms : (Path, Path) or None
+        Directories with the published tables of the UR5 and the UR10.
+    seed : int
+        Of all that is drawn.
+    cases, seams, touches, cells, plans : int
+        Sealed cases; seams of each language of programs; arms that touch things; cells that live
+        through years; plans that are carried out.
+
+    """
+
+    arms: tuple[Path, Path] | None
+    seed: int
+    cases: int
+    seams: int
+    touches: int
+    cells: int
+    plans: int
+
+
+def entries_of(wanted: Wanted, part: Parts) -> list[dict[str, Any]]:
+    """
+    Return what every promise came to.
 
     Parameters
     ----------
-    ur5, ur10 : Path
-        Directories with the published tables.
-    cases : Path or None
-        Directory with ``cases`` and ``truths`` as ``weld-twin lab blind make`` writes them.
     part : Parts
         Keeps every recording's result.
 
     Raises
     ------
     DataError
-        Data are missing or cannot be read.
+        Data are missing or cannot be read, or the simulator is not there.
 
     """
-    entries = [part(split.name, partial(_of_split, split)) for split in all_splits(ur5, ur10)]
-    if cases is not None:
-        for name in _names(cases / 'cases'):
-            pair = (cases / 'cases' / name, cases / 'truths' / name)
-            entries.append(part(name, partial(of_case, *pair)))
-    return entries
+    if any(wanted[2:]):
+        require_simulator()
+    entries = [part(name, partial(_simulated, make)) for name, make in _asked(wanted)]
+    return [entry for entry in entries if entry is not None]
+
+
+def _simulated(make: Callable[[], Any]) -> Any:
+    """Return what is made; None where the plant's springs are too stiff to be simulated."""
+    try:
+        return make()
+    except FloatingPointError:
+        return None
+
+
+def _asked(wanted: Wanted) -> Iterator[tuple[str, Callable[[], Any]]]:
+    """Yield the name of every part, and what makes it."""
+    seed = wanted.seed
+    for split in all_splits(*wanted.arms) if wanted.arms else ():
+        yield split.name, partial(_of_split, split)
+    for k in range(wanted.cases):
+        yield f'{seed}_{k:04d}', partial(of_case, seed, k)
+    for k in range(wanted.seams):
+        for language in CELLS:
+            yield f'{seed}_{language}_{k:03d}', partial(of_seam, language, seed, k)
+    for k in range(wanted.touches):
+        yield f'{seed}_touches_{k:04d}', partial(of_touches, APART * seed + k)
+    for k in range(wanted.cells):
+        yield f'{seed}_years_{k:03d}', partial(of_years, seed, k)
+    for k in range(wanted.plans):
+        yield f'{seed}_plan_{k:03d}', partial(carried_out, APART * seed + k)
 
 
 def _of_split(split: Split) -> dict[str, Any]:
@@ -73,37 +117,21 @@ def _of_split(split: Split) -> dict[str, Any]:
     for region, other in (('inside', split.inside), ('outside', split.outside)):
         if other is not None and other.measured is not None and other.measured.t.size:
             entry[region] = held(found, split.train, other, _noise(other))
+            told = _of_shrink(split, other, found, region)
+            entry.setdefault('promises', {})[f'shrink on the real arms, {region} (95 %)'] = [told]
     return entry
 
 
-def of_case(case: Path, truth: Path) -> dict[str, Any]:
-    """Return what the regions of one sealed case hold on its test recording."""
-    told = layout.read(truth / layout.TRUTH)
-    entry: dict[str, Any] = {'name': case.name, 'source': 'plant', 'group': 'unseen'}
-    entry |= {'kind': told['kind'], 'motion': told['motion']}
-    found = _tried(lambda: diagnosis_of(case, with_holdout=False), entry)
-    if found is None:
-        return entry
-    robot = load_robot(str(case / layout.ROBOT))
-    train, test = (read_recording(p, robot) for p in (case / layout.TRAIN, truth / layout.TEST))
-    assert test.measured is not None
-    good = np.ones(test.measured.t.size, dtype=bool)
-    good[np.asarray(told['outliers'], dtype=int)] = False
-    noise = np.full(test.measured.t.size, float(told['sigma_m']))
-    assert found.posterior is not None
-    beyond = flagged(found.posterior, test, test.measured.t)
-    effects = build_twin(robot, case / layout.KNOWN if _knows(case) else '').effects
-    for region, mask in (('inside', good & ~beyond), ('outside', good & beyond)):
-        if mask.sum() >= FEWEST:
-            entry[region] = held(found, train, test, noise, mask)
-            at = test.measured.t[mask]
-            entry[region]['oracle_sigma_m'] = oracle_sigma(robot, effects, told, (train, test), at)
-    return entry
-
-
-def _knows(case: Path) -> bool:
-    """Tell whether a case tells effects beforehand."""
-    return bool(layout.read(case / layout.CASE)['known'])
+def _of_shrink(split: Split, other: Recording, found: Diagnosis, region: str) -> dict[str, Any]:
+    """Return the shrink that is told of a split, and that on stations that were not fitted."""
+    assert found.shrink is not None
+    bare = plain_fit(split.train, catalog.load(split.robot), (), frozenset(ALIGN))
+    before, after = (
+        float(np.sqrt((residual(model, split.train, other)[:3] ** 2).sum(axis=0).mean()))
+        for model in (bare, found.model)
+    )
+    told = told_shrink(found.shrink, after / before, region)
+    return {**told, 'ci90': told['ci95']}
 
 
 def _tried(work: Callable[[], Diagnosis], entry: dict[str, Any]) -> Diagnosis | None:
@@ -122,8 +150,3 @@ def _noise(other: Recording) -> Array:
     if other.measured.sigma is not None:
         return other.measured.sigma
     return np.full(other.measured.t.size, UR5_NOISE)
-
-
-def _names(cases: Path) -> Iterator[str]:
-    listed = layout.read(cases / layout.CASES)
-    return (str(entry['name']) for entry in listed['cases'])

@@ -13,11 +13,65 @@ from weld_twin_msgs_py.files.markdown import table
 
 Entry = dict[str, Any]
 REGIONS = ('inside', 'outside')
+HEAD = """# What 90 % regions of predictions hold
+
+Poor recordings of two measured arms, and cells of the plant, whose poses are judged where
+the tool really is; [how it was done](../../predictions.md#does-it-hold).
+"""
 
 
 def page(entries: Sequence[Entry]) -> str:
-    """Return the summary and the table of every recording."""
-    return '\n'.join([summary_table(entries), entry_table(entries)])
+    """Return the summary, what became of other promises, and the table of every recording."""
+    plans = [entry for entry in entries if 'promised_within' in entry]
+    rest = [entry for entry in entries if 'source' in entry]
+    tables = [summary_table(rest), promise_table(rest), entry_table(rest)]
+    if plans:
+        told = ', '.join(f'{key} {value:.3g}' for key, value in of_plans(plans).items())
+        tables.insert(2, f'Plans carried out: {told}.\n')
+    return '\n'.join([HEAD, *tables])
+
+
+def of_plans(plans: Sequence[Entry]) -> dict[str, float]:
+    """Return how plans of a first measurement compare with what came of them."""
+    ratio = [e['kept_sigma_m'] / e['promised_sigma_m'] for e in plans]
+    return {
+        'plans': len(plans),
+        'kept over promised': float(np.median(ratio)),
+        'worst': max(ratio),
+        'promised within tolerance': float(np.mean([e['promised_within'] for e in plans])),
+        'kept': float(np.mean([e['kept_within'] for e in plans])),
+    }
+
+
+def promises(entries: Sequence[Entry]) -> dict[str, list[dict[str, Any]]]:
+    """Return all intervals with what is true, by their kind."""
+    out: dict[str, list[dict[str, Any]]] = {}
+    for entry in entries:
+        for kind, told in entry.get('promises', {}).items():
+            out.setdefault(kind, []).extend(told)
+    return {kind: told for kind, told in out.items() if told}
+
+
+def promise_table(entries: Sequence[Entry]) -> str:
+    """Return how often the intervals of `promises` hold, and how wide they are."""
+    rows = []
+    for kind, told in promises(entries).items():
+        ends = np.array([one['ci90'] for one in told])
+        true = np.array([one['true'] for one in told])
+        above, below = true > ends[:, 1], true < ends[:, 0]
+        width = np.median((ends[:, 1] - ends[:, 0]) / np.maximum(np.abs(true), 1e-12))
+        rows.append(
+            [
+                kind,
+                str(true.size),
+                f'{1.0 - (above | below).mean():.1%}',
+                f'{below.mean():.1%}',
+                f'{above.mean():.1%}',
+                f'{width:.3f}',
+            ]
+        )
+    heads = ('interval of', 'number', 'held', 'truth below', 'above', 'width over the truth')
+    return table(heads, *rows)
 
 
 def summaries(entries: Sequence[Entry]) -> list[dict[str, Any]]:
@@ -38,8 +92,11 @@ def summaries(entries: Sequence[Entry]) -> list[dict[str, Any]]:
 
 def _summary(source: str, group: str, region: str, mine: Sequence[Entry]) -> dict[str, Any]:
     held = np.array([e['held'] for e in mine])
-    known = [e for e in mine if e.get('oracle_sigma_m')]
-    wider = [e['median_sigma_m'] / e['oracle_sigma_m'] for e in known]
+    known = [e for e in mine if e.get('oracle_sigma_m') and e['formal_sigma_m']]
+    wider, formal = (
+        [e['median_sigma_m'] / e[key] for e in known]
+        for key in ('oracle_sigma_m', 'formal_sigma_m')
+    )
     poses = np.array([e['poses'] for e in mine])
     return {
         'source': source,
@@ -51,6 +108,7 @@ def _summary(source: str, group: str, region: str, mine: Sequence[Entry]) -> dic
         'worst': float(held.min()),
         'flagged': float(np.mean([e['flagged'] for e in mine])),
         'over_oracle': float(np.median(wider)) if wider else None,
+        'over_formal': float(np.median(formal)) if formal else None,
     }
 
 
@@ -66,7 +124,7 @@ def summary_table(entries: Sequence[Entry]) -> str:
             f'{s["held_of_all_poses"]:.1%}',
             f'{s["worst"]:.0%}',
             f'{s["flagged"]:.1%}',
-            '' if s['over_oracle'] is None else f'{s["over_oracle"]:.2f}',
+            *('' if s[k] is None else f'{s[k]:.2f}' for k in ('over_oracle', 'over_formal')),
         ]
         for s in summaries(entries)
     ]
@@ -79,7 +137,8 @@ def summary_table(entries: Sequence[Entry]) -> str:
         'of all poses',
         'worst',
         'flagged',
-        'over oracle',
+        'width over the oracle',
+        'over its formal one',
     )
     return table(heads, *rows)
 

@@ -72,28 +72,14 @@ def heard(cases: Sequence[Mapping[str, Any]]) -> Heard:
 
 
 def weights(taught: Heard) -> Weights:
-    """
-    Return what each sign counts, and what is added.
-
-    Parameters
-    ----------
-    taught : Heard
-
-    """
+    """Return what each sign counts, and what is added."""
     ones = np.ones(len(taught.right))
     prior = np.array([1.0, 0.0, 0.0])
     return fitted(taught.signs, taught.right, WAYS, RIDGE, ones, prior)
 
 
 def unseen(all_: Heard) -> Array:
-    """
-    Return the belief in each answer by weights learned from other cells, shape (N,).
-
-    Parameters
-    ----------
-    all_ : Heard
-
-    """
+    """Return the belief in each answer by weights learned from other cells, shape (N,)."""
     out = np.zeros(len(all_.right))
     for fold in range(FOLDS):
         here = all_.cell % FOLDS == fold
@@ -108,7 +94,6 @@ def reached(all_: Heard, probability: Array, least: float) -> tuple[int, int]:
 
     Parameters
     ----------
-    all_ : Heard
     probability : array, shape (N,)
     least : float
         Belief that it has to have.
@@ -124,14 +109,7 @@ def reached(all_: Heard, probability: Array, least: float) -> tuple[int, int]:
 
 
 def page(all_: Heard) -> str:
-    """
-    Return what was learned, and what it is worth on cells it was not learned from, in Markdown.
-
-    Parameters
-    ----------
-    all_ : Heard
-
-    """
+    """Return what was learned, and what it is worth on cells that it was not learned from."""
     from weld_twin_msgs_py.files import markdown
 
     found, probability = weights(all_), unseen(all_)

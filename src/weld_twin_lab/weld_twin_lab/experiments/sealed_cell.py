@@ -58,7 +58,6 @@ class SealedCell:
 
     Attributes
     ----------
-    name : str
     robot : Robot
         As whoever diagnoses knows it.
     still : bool
@@ -101,8 +100,6 @@ class SealedCell:
 
         Parameters
         ----------
-        name : str
-        motion : Motion
         seed : int
             Decides noise and surroundings.
         changed : str
@@ -190,7 +187,6 @@ def as_motion(asked: Mapping[str, Any], robot: Robot) -> Motion:
     ----------
     asked : mapping
         'static', 'joint_names', 't' [s], 'q' [rad or m].
-    robot : Robot
 
     Raises
     ------

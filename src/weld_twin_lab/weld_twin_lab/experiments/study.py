@@ -26,7 +26,7 @@ BATCH = 8
 
 
 def investigated(
-    seed: int, wanted: int, runner: Runner, tell: Tell, *, alone: bool, minutes: float
+    seed: int, wanted: int, runner: Runner, tell: Tell, *, minutes: float
 ) -> dict[str, Any]:
     """
     Investigate sealed cells that poor motions leave open.
@@ -41,8 +41,6 @@ def investigated(
         Keeps what came of every cell drawn.
     tell : callable
         Told how many were drawn.
-    alone : bool
-        Leave out what is usual practice.
     minutes : float
         No further cells are begun after so long.
 
@@ -50,7 +48,7 @@ def investigated(
     end, engine = time.monotonic() + 60.0 * minutes, engine_digest()
     drawn: list[dict[str, Any]] = []
     cases: list[dict[str, Any]] = []
-    for tasks in _batches(seed, wanted, engine, alone):
+    for tasks in _batches(seed, wanted, engine):
         drawn += runner.run(tasks)
         cases = [entry for entry in drawn if entry['open']][:wanted]
         tell(f'{len(drawn)} drawn, {len(cases)} left open at first')
@@ -66,14 +64,14 @@ def investigated(
     )
 
 
-def _batches(seed: int, wanted: int, engine: str, alone: bool) -> Iterator[list[Task]]:
+def _batches(seed: int, wanted: int, engine: str) -> Iterator[list[Task]]:
     most = MOST_DRAWN * wanted
     for begin in range(0, most, BATCH):
         numbers = range(begin, min(begin + BATCH, most))
-        yield [Task(investigated_cell, (seed, k, engine, alone), f'cell {k}') for k in numbers]
+        yield [Task(investigated_cell, (seed, k, engine), f'cell {k}') for k in numbers]
 
 
-def investigated_cell(seed: int, number: int, engine: str, alone: bool) -> dict[str, Any]:
+def investigated_cell(seed: int, number: int, engine: str) -> dict[str, Any]:
     """
     Return what came of one cell, in plain values; the simulator is loaded where it is needed.
 
@@ -83,15 +81,13 @@ def investigated_cell(seed: int, number: int, engine: str, alone: bool) -> dict[
         Decide the cell.
     engine : str
         Only tells the results of one version of the core from those of another.
-    alone : bool
-        Leave out what is usual practice.
 
     """
     from ..blind.simulator import require_simulator
 
     require_simulator()
     from .sealed_cell import SealedCell
-    from .trial import beside, looped, poor_at_first
+    from .trial import looped, poor_at_first
 
     begun = time.process_time()
     try:
@@ -105,7 +101,4 @@ def investigated_cell(seed: int, number: int, engine: str, alone: bool) -> dict[
         return {'open': False, 'why': 'right from the first', 'spent': spent}
     entry = looped(cell, *first)
     spent['loop'] = time.process_time() - begun - sum(spent.values())
-    if not alone:
-        entry |= beside(cell, entry)
-        spent['beside'] = time.process_time() - begun - sum(spent.values())
     return {'open': True, **entry, 'spent': spent}

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One sealed cell, investigated; and the same minutes spent as is usual."""
+"""One sealed cell, investigated."""
 
 from __future__ import annotations
 
@@ -16,9 +16,7 @@ from weld_twin_core.recording import Recording
 from weld_twin_nodes.offline.closing import STATED, signs, weighed
 from weld_twin_nodes.offline.investigation import decided, question, short
 
-from ..blind.recorded_motion import Motion
-from .sealed_cell import STAY, SealedCell, as_motion
-from .usual_practice import at_random, d_optimal, rich
+from .sealed_cell import SealedCell, as_motion
 
 ROUNDS = 3
 """Experiments at most."""
@@ -34,8 +32,6 @@ ASKED = (
     *('expected_sigma', 'between', 'promise', 'changes'),
 )
 """What is kept of every experiment."""
-STEPS = (8, 20)
-"""Stations after which D-optimal ones are diagnosed, up to as many as the minutes hold."""
 
 
 def said(cell: SealedCell, found: Mapping[str, Any], why: str) -> dict[str, Any]:
@@ -58,9 +54,6 @@ def answered(
 
     Parameters
     ----------
-    cell : SealedCell
-    first : Recording
-    later : sequence of Recording
     limits : Limits
         What the next experiment may take.
 
@@ -116,7 +109,6 @@ def looped(cell: SealedCell, found: Mapping[str, Any], first: Mapping[str, Any])
 
     Parameters
     ----------
-    cell : SealedCell
     found : mapping
         The first diagnosis.
     first : mapping
@@ -135,33 +127,6 @@ def looped(cell: SealedCell, found: Mapping[str, Any], first: Mapping[str, Any])
         'end': end,
         'minutes': sum(step['robot_minutes'] for step in rounds),
         'loop': answer,
-    }
-
-
-def beside(cell: SealedCell, entry: Mapping[str, Any]) -> dict[str, Any]:
-    """
-    Return what the minutes of an investigation lead to where nobody asks what is in doubt.
-
-    Parameters
-    ----------
-    cell : SealedCell
-    entry : mapping
-        As `looped` returned it.
-
-    """
-    start = cell.first
-    spent = max(float(entry['minutes']), 1.0)
-    count = max(int(60.0 * spent / STAY), 1)
-    others = {
-        'random': at_random(cell.robot, cell.still, spent, 1),
-        'rich': rich(cell.robot, cell.still, spent),
-        'd_optimal': d_optimal(cell.robot, count, _points(start)),
-    }
-    told = {name: _with(cell, start, name, motion) for name, motion in others.items()}
-    good = entry['loop']['right'] and entry['loop']['sure']
-    return {
-        **told,
-        'd_optimal_stations': _to_certainty(cell, start, count, told) if good else None,
     }
 
 
@@ -199,29 +164,3 @@ def investigated(
                 'heard': heard,
             }
         )
-
-
-def _with(cell: SealedCell, start: Recording, name: str, motion: Motion) -> dict[str, Any]:
-    """Return what a further recording of a motion leads to."""
-    made = cell.made(name, motion, 200)
-    try:
-        return said(cell, *answered(cell, start, [made], _left(MINUTES))[:2])
-    except TwinError as error:
-        return {'status': 'refused', 'said': str(error), 'right': False, 'sure': False}
-
-
-def _to_certainty(
-    cell: SealedCell, start: Recording, tried: int, told: Mapping[str, Any]
-) -> int | None:
-    """Return after how many D-optimal stations the answer is right and sure; None: never."""
-    for count in sorted({*STEPS, tried}):
-        motion = d_optimal(cell.robot, count, _points(start))
-        again = count == tried
-        answer = told['d_optimal'] if again else _with(cell, start, f'd {count}', motion)
-        if answer['right'] and answer['sure']:
-            return count
-    return None
-
-
-def _points(recording: Recording) -> bool:
-    return recording.measured is None or recording.measured.rotation is None

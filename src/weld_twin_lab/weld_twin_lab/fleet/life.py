@@ -88,7 +88,6 @@ class Year:
 
     Attributes
     ----------
-    events : tuple of Event
     weeks : tuple of int
         Those with a check.
     set_ups : tuple of int

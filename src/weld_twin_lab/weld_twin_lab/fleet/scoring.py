@@ -12,6 +12,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.history import Change, Observation, changes, outlook, reaches
 
+from ..blind.achieved import NORMAL_90
 from .life import Event, Year
 
 WEEK = 7.0
@@ -186,8 +187,19 @@ def _entry(
         'what': any(_site(change.name, joints) == _site(event.name, joints) for change in mine),
         'in_set': bool(mine),
         'when': any(_dated(event, change, weeks) for change in mine),
+        'size': _size(event, mine),
         'told': [(change.name, change.kind, change.day, len(change.alike)) for change in mine],
     }
+
+
+def _size(event: Event, mine: Sequence[Change]) -> dict[str, Any] | None:
+    """Return the 90 % interval of the size of a change told as it is, and the true one."""
+    for told in mine:
+        if (told.name, told.kind) == (event.name, event.kind):
+            half, unit = NORMAL_90 * told.std, WEEK if event.kind == 'trend' else 1.0
+            size = abs(event.size) if event.kind == 'season' else event.size
+            return {'ci90': [unit * (told.size - half), unit * (told.size + half)], 'true': size}
+    return None
 
 
 def _forecast(

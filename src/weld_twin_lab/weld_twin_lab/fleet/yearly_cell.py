@@ -41,7 +41,6 @@ class YearlyCell:
 
     Attributes
     ----------
-    cell : BlindCell
     as_built : tuple of mappings
         Its flaws on the first day.
     checks : tuple of Take

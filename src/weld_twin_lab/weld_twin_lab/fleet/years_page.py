@@ -35,12 +35,15 @@ and joint are judged at the end of the year, by the coordinate told first; the l
 tool are one place. The date of a step is right within one recording, that of a trend if the interval
 told reaches the week it began in; a step may be told as *at once or slowly since* a date, which counts
 for wear. Limits of forecasts lie half as far ahead again as the wear has
-gone. The changes drawn are those that use makes: a link that was bent would come second in a set.
+gone. A change of three standard errors would be told in one of seven looks: so many instants and
+coordinates are tried that chance reaches four. The changes drawn are those that use makes: a link that
+was bent would come second in a set.
 """
 MORE = {
     'found_at_last': 'found at all',
     'what': 'of those found: effect and joint right',
     'when': 'of those found: date right',
+    'sizes': 'of those told as they are: size in its 90 % interval',
 }
 
 
@@ -61,7 +64,7 @@ def page(result: Mapping[str, Any], seed: int) -> str:
         f'{full["forecasts"]}; looks: {drawn["checks"]} and {full["checks"]}. In time by kind:'
     )
     parts = (
-        f'# Simulated years\n\n`weld-twin lab years --seed {seed}`\n',
+        f'# Simulated years\n\n`weld-twin lab years --seed {seed} --years {drawn["years"]}`\n',
         LEAD,
         markdown.table(heads, *rows),
         '',

@@ -38,8 +38,6 @@ class Sound:
     ----------
     robot : Robot
         The nominal arm with its tool as it is told to the diagnosis.
-    recording : Recording
-    align : tuple of str
     real : Robot
         The same arm with its tool as it is; the base as it was told.
     told : dict
@@ -60,7 +58,6 @@ def draw(rng: np.random.Generator, *, rich: bool = False) -> Sound:
 
     Parameters
     ----------
-    rng : Generator
     rich : bool
         Only motions that show every joint.
 

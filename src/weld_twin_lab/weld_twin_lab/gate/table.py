@@ -29,7 +29,6 @@ def result(trials: Sequence[Mapping[str, Any]], seed: int) -> dict[str, Any]:
     ----------
     trials : sequence of mapping
         Those without a ``kind`` are of sound recordings.
-    seed : int
 
     """
     mistakes = [t for t in trials if 'kind' in t]
@@ -86,17 +85,7 @@ def page(content: Mapping[str, Any]) -> str:
         'have causes of all families, big ones among them, on rich and poor motions.',
         table(content),
     ]
-    parts = [content]
-    if 'real' in content:
-        parts.append(content['real'])
-        out += [
-            '## Stations of real arms',
-            'The same mistakes put into stations of a measured UR5 and UR10. Sound ones are poor '
-            'parts of both, and a servo axis in motion.',
-            table(content['real']),
-        ]
-    missed = [m for part in parts for m in part['missed']]
-    if missed:
+    if missed := content['missed']:
         rows = [
             [m['kind'], m['way'], m['what'], ', '.join((*m['kinds'], *m['dated'])) or 'nothing']
             for m in missed

@@ -49,14 +49,12 @@ def seen(
 
     Parameters
     ----------
-    eye : Eye
     board : Motion, of (M,)
         In the measuring frame.
     points : array, shape (P, 3) [m]
         In the board's own frame.
     noise : float [px]
         Standard deviation of each coordinate.
-    rng : Generator
 
     """
     there = compose(inverse(eye.stands), board)

@@ -31,9 +31,6 @@ class Compliant:
     ----------
     robot : mapping
         The robot file.
-    arm : Arm
-    causes : Causes
-    richness : float
 
     """
 

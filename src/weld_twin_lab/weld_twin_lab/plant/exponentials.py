@@ -125,7 +125,6 @@ def home(arm: Arm, rows: Rows | None = None) -> Home:
 
     Parameters
     ----------
-    arm : Arm
     rows : Rows, each (..., n), optional
         The rows as built, where they differ from the file's.
 
@@ -168,8 +167,6 @@ def flange(arm: Arm, at: Home, q: np.ndarray, wobble: np.ndarray | None = None) 
 
     Parameters
     ----------
-    arm : Arm
-    at : Home
     q : array, shape (..., n) [rad or m]
     wobble : array, shape (..., n) [rad], optional
         Lean of each axis about its `across` vector: a bearing that tilts as it turns.

@@ -28,7 +28,6 @@ def pull(causes: Causes, arm: Arm, q: np.ndarray) -> np.ndarray | None:
     ----------
     causes : Causes
         Entries of hose_pull: hook [m] in the base frame, tension [N], length [m].
-    arm : Arm
     q : array, shape (N, n)
 
     """

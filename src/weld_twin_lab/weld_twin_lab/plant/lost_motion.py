@@ -43,11 +43,9 @@ def on_joints(causes: Causes, t: np.ndarray, q: np.ndarray, richness: float) -> 
 
     Parameters
     ----------
-    causes : Causes
     t : array, shape (N,) [s]
     q : array, shape (N, n)
         Motor side; a sequence in time.
-    richness : float
 
     """
     out = np.zeros_like(q)

@@ -58,13 +58,11 @@ def on_joints(
 
     Parameters
     ----------
-    causes : Causes
     t : array, shape (N,) [s]
     q : array, shape (N, n)
         Motor side; a sequence in time.
     torque : callable
         Gives the load torque, shape (N, n); asked only where needed.
-    rng : Generator
 
     """
     out = np.zeros_like(q)

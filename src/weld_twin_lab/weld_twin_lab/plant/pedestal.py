@@ -33,7 +33,6 @@ class Pedestal:
     ----------
     parts : Compliant
         The arm with its load.
-    causes : Causes
 
     """
 

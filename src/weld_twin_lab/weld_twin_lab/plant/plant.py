@@ -157,8 +157,6 @@ def run(
         A robot file (interface section 2).
     effects : sequence of mappings
         The flaws, as in an effects file; also those of `outside_causes`.
-    command : Command
-    tracker : Tracker
     rng : Generator
         Source of everything random; the same seed gives the same recording.
     richness : float

@@ -74,7 +74,6 @@ class PlantRecording:
     quaternion : array, shape (M, 4) x y z w, or None
     wrench_t, wrench : arrays, shapes (W,) [s] and (W, 6) [N, N m], or None
     temperature_t, temperature : arrays, shapes (K,) [s] and (K,) [degC], or None
-    static : bool
 
     """
 

@@ -68,7 +68,6 @@ def run(
 
     Parameters
     ----------
-    model : MjModel
     start, velocity : array, shape (nv,)
     force : array, shape (N, nv)
         Generalised force held over the step that begins at each sample.

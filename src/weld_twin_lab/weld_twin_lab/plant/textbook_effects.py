@@ -69,7 +69,6 @@ class Causes:
     ----------
     items : tuple of mappings
         As in an effects file.
-    joints : tuple of str
 
     """
 
@@ -173,7 +172,6 @@ def gearing(causes: Causes, q: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    causes : Causes
     q : array, shape (..., n)
         Motor side, in units of the joint.
 

@@ -48,7 +48,6 @@ class Tracker:
         Of the tracker's clock, added to its stamps: a time_delay by another name.
     joint_rate : float [Hz], optional
     joint_jitter : float [s]
-    joint_drop : float
     velocity : bool
         Whether joint velocity is published.
     wrench_sigma : float [N]
@@ -110,10 +109,8 @@ def gained(causes: Causes, since: np.ndarray, richness: float) -> np.ndarray:
 
     Parameters
     ----------
-    causes : Causes
     since : array, shape (M,) [s]
         True time since both were set.
-    richness : float
 
     """
     rate = float(causes.total('clock_rate', 'rate'))
@@ -129,11 +126,9 @@ def observe(
 
     Parameters
     ----------
-    tracker : Tracker
     pose : Motion, shape (M,)
     sigma : float [m]
         White noise of each coordinate, the tracker's and any other.
-    rng : Generator
 
     Returns
     -------

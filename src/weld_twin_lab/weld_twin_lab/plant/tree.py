@@ -54,7 +54,6 @@ def moving(
 
     Parameters
     ----------
-    parts : Compliant
     t : array, shape (N,) [s]
         Evenly spaced by `STEP`.
     motor : CubicSpline
@@ -79,8 +78,6 @@ class Tree:
 
     Parameters
     ----------
-    parts : Compliant
-    course : Course
     wrench : array, shape (N, 6), optional
 
     """

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from weld_twin_core.arm.catalog import load, names
+from weld_twin_core.arm.catalog import names
 from weld_twin_core.arm.robot import Robot
 from weld_twin_msgs_py.programs import Context, controller_of
 
@@ -21,22 +21,21 @@ PULSES = (1000.0, -1200.0, 1100.0, 900.0, -800.0, 700.0)
 
 
 class ProgramCell(NamedTuple):
-    """A robot, the suffix of its programs, an independent reader, and rounding [rad or m]."""
+    """A robot, the suffix of its programs, and an independent reader."""
 
     robot: str
     suffix: str
     reader: Callable[..., readers.Moves]
-    rounding: float
 
 
 CELLS: dict[str, ProgramCell] = {
-    'urscript': ProgramCell('ur5', '.script', readers.urscript, 1e-6),
-    'krl': ProgramCell('kuka_kr16_2', '.src', readers.krl, 1e-6),
-    'rapid': ProgramCell('abb_irb1600', '.mod', readers.rapid, 1e-6),
-    'inform': ProgramCell('yaskawa_ma1440', '.jbi', readers.inform, 2e-5),
-    'fanuc-ls': ProgramCell('fanuc_m10ia', '.ls', readers.fanuc, 2e-5),
-    'joint-trajectory': ProgramCell('ur5', '.yaml', readers.trajectory, 1e-8),
-    'csv': ProgramCell('ur5', '.csv', readers.table, 1e-8),
+    'urscript': ProgramCell('ur5', '.script', readers.urscript),
+    'krl': ProgramCell('kuka_kr16_2', '.src', readers.krl),
+    'rapid': ProgramCell('abb_irb1600', '.mod', readers.rapid),
+    'inform': ProgramCell('yaskawa_ma1440', '.jbi', readers.inform),
+    'fanuc-ls': ProgramCell('fanuc_m10ia', '.ls', readers.fanuc),
+    'joint-trajectory': ProgramCell('ur5', '.yaml', readers.trajectory),
+    'csv': ProgramCell('ur5', '.csv', readers.table),
 }
 """By language."""
 
@@ -70,17 +69,4 @@ def context_on(language: str, robot: Robot) -> Context:
     flange = controller_of(robot, language).flange
     tool = np.linalg.inv(flange) @ robot.T_flange_tool
     controller = controller_of(robot, language, {'0': tool, '1': tool})
-    return Context(robot, controller, np.array(PULSES))
-
-
-def robot_of(language: str) -> Robot:
-    """Return the robot that speaks a language."""
-    return load(CELLS[language].robot)
-
-
-def context_of(language: str, tool: np.ndarray | None = None) -> Context:
-    """Return what a program is read with; ``tool`` is what tool 0 and 1 stand for."""
-    robot = robot_of(language)
-    tools = {} if tool is None else {'0': tool, '1': tool}
-    controller = controller_of(robot, language, tools)
     return Context(robot, controller, np.array(PULSES))

@@ -32,14 +32,6 @@ HEADS = (
     'worse than before',
 )
 """Heads of the table a language."""
-PROMISED_HEADS = (
-    'of',
-    'seams',
-    'RMS in its 90 % interval',
-    'within what was 95 % sure',
-    'width, mm',
-)
-"""Heads of the table of promises."""
 SEAM_HEADS = (
     'language',
     'robot',
@@ -97,39 +89,6 @@ def counted(cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return out
 
 
-def kept(cases: Sequence[dict[str, Any]]) -> dict[str, dict[str, float]]:
-    """
-    Return how often promises of before and after hold, and how wide they are.
-
-    Parameters
-    ----------
-    cases : sequence of dict
-        As `corrected_seam` returns them; those without a promise do not count.
-
-    Returns
-    -------
-    dict
-        For 'before' and 'after': ``seams``; ``held``, the share whose RMS lies in its 90 % interval;
-        ``within``, the share that stays within what was 95 % sure; ``width_m``, median of the interval.
-
-    """
-    out = {}
-    for name in ('before', 'after'):
-        mine = [(c, c['promised'][name]) for c in cases if name in (c.get('promised') or {})]
-        if mine:
-            ends = np.array([p['ci90_m'] for _, p in mine])
-            rms = np.array([c['rms_m'][name] for c, _ in mine])
-            at = np.array([c['at_m'][name] for c, _ in mine])
-            sure = np.array([p['sure_within_m'] for _, p in mine])
-            out[name] = {
-                'seams': float(len(mine)),
-                'held': float(((ends[:, 0] <= rms) & (rms <= ends[:, 1])).mean()),
-                'within': float((at <= sure).mean()),
-                'width_m': float(np.median(ends[:, 1] - ends[:, 0])),
-            }
-    return out
-
-
 def _spread(values: Sequence[float]) -> dict[str, float]:
     return {
         'median': float(np.median(values)),
@@ -159,10 +118,6 @@ def page(result: dict[str, Any]) -> str:
             '',
             markdown.table(HEADS, *rows),
             '',
-            '## Promises',
-            '',
-            markdown.table(PROMISED_HEADS, *map(_promised_row, kept(drawn).items())),
-            '',
             '## Why seams were left as they were',
             '',
             markdown.table(('why', 'seams'), *((text, str(n)) for text, n in why.most_common())),
@@ -172,17 +127,6 @@ def page(result: dict[str, Any]) -> str:
             markdown.table(SEAM_HEADS, *(_seam_row(case) for case in drawn)),
             '',
         ]
-    )
-
-
-def _promised_row(named: tuple[str, dict[str, float]]) -> tuple[str, ...]:
-    name, told = named
-    return (
-        name,
-        f'{told["seams"]:.0f}',
-        f'{told["held"]:.0%}',
-        f'{told["within"]:.0%}',
-        f'{1e3 * told["width_m"]:.3f}',
     )
 
 

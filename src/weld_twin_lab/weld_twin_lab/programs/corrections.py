@@ -38,7 +38,8 @@ from weld_twin_report.report.diagnosis_files import RESULT, diagnosis_text
 from ..blind.recorded_motion import RATE
 from .cells import CELLS, reader_of
 from .path_accuracy import path_accuracy
-from .plain_controller import Driven, driven, evenly
+from .plain_arm import tool_pose
+from .plain_controller import REST, Driven, driven, evenly
 from .sealed_seams import MEASURING, SealedSeam, drawn_as, sealed_seam
 
 MEMORY = frozenset(
@@ -67,12 +68,13 @@ class AskedModel(ProgramModel):
         """Return the same plant without play, friction and lag."""
         return replace(self, without=self.without | MEMORY)
 
-    def real(self, piece: Piece, motion: JointMotion) -> Array:
+    def real(self, piece: Piece, motion: JointMotion, *, whole: bool = True) -> Array:
         """
-        Return ``T_base_tool`` of the plant at every sample of a motion, (N, 4, 4).
+        Return ``T_base_tool`` of the plant, always whole, at every sample of a motion, (N, 4, 4).
 
         What is off is looked up between the plant's samples; it changes slowly, the tool does not.
         """
+        del whole
         assert self.seam is not None
         even = np.arange(motion.t[0], motion.t[-1] + 4.0 / RATE, 1.0 / RATE)
         q = np.stack([np.interp(even, motion.t, column) for column in motion.q.T], axis=1)
@@ -89,24 +91,26 @@ class AskedModel(ProgramModel):
         return np.asarray(np.linalg.inv(self.robot.T_world_base) @ out)
 
 
-def corrected_seam(language: str, seed: int, number: int) -> dict[str, Any]:
+def corrected_seam(language: str, seed: int, number: int, engine: str = '') -> dict[str, Any]:
     """
     Return what a correction does to one seam; a case that cannot be drawn says why.
 
     Parameters
     ----------
-    language : str
     seed, number : int
         Decide everything random in it.
+    engine : str
+        Only tells the results of one version of the core from those of another.
 
     """
     try:
         seam = sealed_seam(language, seed, number)
     except TwinError as error:
         return {'language': language, 'undrawn': str(error)}
-    along = _along(seam, seam.text)
+    along = seam_driven(seam, seam.text)
     found = _diagnosed(seam, along, seed)
-    after, outcome, why, promised = _by_diagnosis(seam, found)
+    told = promised_and_true(seam, along, found)
+    after = told.pop('text')
     asked = AskedModel(seam.robot, (), temperature=seam.temperature, seam=seam)
     _, best, limit = _or_as_it_was(seam, asked)
     texts = {'before': seam.text, 'after': after, 'true': best}
@@ -114,16 +118,21 @@ def corrected_seam(language: str, seed: int, number: int) -> dict[str, Any]:
     return {
         **drawn_as(seam),
         'status': found.status,
-        'outcome': outcome,
-        'why': why,
+        **told,
         'limit': limit,
         'at_m': {name: one.at for name, one in accuracy.items()},
         'rms_m': {name: one.rms for name, one in accuracy.items()},
-        'promised': promised,
     }
 
 
-def _along(seam: SealedSeam, text: str) -> Driven:
+def promised_and_true(seam: SealedSeam, along: Driven, found: Diagnosis) -> dict[str, Any]:
+    """Return what a diagnosis makes of a seam, what it promises before and after, and what is true."""
+    text, outcome, why, promised = _by_diagnosis(seam, found)
+    off = {'before': _off(seam, seam.text, along), 'after': _off(seam, text, along)}
+    return {'text': text, 'outcome': outcome, 'why': why, 'off_m': off, 'promised': promised}
+
+
+def seam_driven(seam: SealedSeam, text: str) -> Driven:
     """Return what the plain controller makes of a program, read by the independent reader."""
     moves = reader_of(seam.language, seam.robot)([text])
     return driven(seam.robot, moves, seam.start, seam.speed)
@@ -132,8 +141,29 @@ def _along(seam: SealedSeam, text: str) -> Driven:
 def _accuracy(seam: SealedSeam, text: str, wanted: Driven) -> Any:
     """Return how far the plant's tool is from the seam as the program means it."""
     base = np.array(seam.robot.T_world_base)
-    real = seam.ran(*evenly(_along(seam, text), RATE)).position
+    real = seam.ran(*evenly(seam_driven(seam, text), RATE)).position
     return path_accuracy(real, wanted.tool @ base[:3, :3].T + base[:3, 3])
+
+
+def _off(seam: SealedSeam, text: str, meant: Driven) -> tuple[float, float]:
+    """
+    Return RMS and largest distance of the plant's tool from where the program means it then [m].
+
+    That is where the controller believes it, less what the points around were moved by: what a
+    promise is of, and what `verify` measures.
+    """
+    along, base = seam_driven(seam, text), np.array(seam.robot.T_world_base)
+    t, q = evenly(along, RATE)
+    keep = (t >= REST) & (t <= REST + along.clock[-1])
+    at = t[keep] - REST
+    moved = (along.believed(along.ends) - meant.believed(meant.ends)).T
+    # Between the places it works out, a controller turns its joints evenly: the tool goes in a bow.
+    tool = np.array(seam.robot.T_flange_tool)
+    believed = np.array([tool_pose(seam.robot, row, tool)[:3, 3] for row in q[keep]])
+    wanted = believed - np.stack([np.interp(at, along.ends, m) for m in moved], axis=1)
+    real = (seam.ran(t, q).position[keep] - base[:3, 3]) @ base[:3, :3]
+    off = np.linalg.norm(real - wanted, axis=1)
+    return float(np.sqrt((off**2).mean())), float(off.max())
 
 
 def _diagnosed(seam: SealedSeam, along: Driven, seed: int) -> Diagnosis:

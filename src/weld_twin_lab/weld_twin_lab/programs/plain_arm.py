@@ -43,7 +43,6 @@ class ScrewArm:
 
     Attributes
     ----------
-    name : str
     axes, points : array, shape (n, 3) [1, m]
         Direction of every axis, which its joint turns about by the right hand, and a point on it.
     flange, T_flange_tool : array, shape (4, 4) [m]

@@ -16,8 +16,9 @@ STEP = 0.005
 """Way between two places that joints are worked out for [m]."""
 FINE = 0.001
 """The same where they are straight in the joints, and the tool goes in a bow [m]."""
-REST = 2.0
-"""Stay at either end [s], as exported programs say; what grows with time has grown by then."""
+REST = 2.3
+"""Stay at either end [s], as exported programs say: 0.3 until the arm stands, and 2 that are recorded;
+what grows with time has grown by then."""
 TURNING = 0.2
 """A turn of the tool takes as long as its end takes to go so far [m/rad]."""
 BY_JOINTS = ('movej', 'PTP', 'MoveAbsJ', 'MOVJ', 'J', 'joint', 'point')
@@ -25,11 +26,20 @@ BY_JOINTS = ('movej', 'PTP', 'MoveAbsJ', 'MOVJ', 'J', 'joint', 'point')
 
 
 class Driven(NamedTuple):
-    """Times (N,) [s], joints (N, n) [rad], and where the controller believes the tool, (N, 3)."""
+    """
+    Times (N,) [s], joints (N, n) [rad], and where the controller believes the tool, (N, 3).
+
+    ``ends`` (K,) [s] are the times at which the moves end.
+    """
 
     clock: np.ndarray
     joints: np.ndarray
     tool: np.ndarray
+    ends: np.ndarray
+
+    def believed(self, t: np.ndarray) -> np.ndarray:
+        """Return where the controller believes the tool at times (M,), shape (M, 3)."""
+        return np.stack([np.interp(t, self.clock, column) for column in self.tool.T], axis=1)
 
 
 def driven(robot: Arm, moves: Moves, start: np.ndarray, speed: float) -> Driven:
@@ -38,7 +48,6 @@ def driven(robot: Arm, moves: Moves, start: np.ndarray, speed: float) -> Driven:
 
     Parameters
     ----------
-    robot : Robot
     moves : moves
         As a reader returns them, their places in the robot's base.
     start : array, shape (n,)
@@ -50,6 +59,7 @@ def driven(robot: Arm, moves: Moves, start: np.ndarray, speed: float) -> Driven:
     tool = np.array(robot.T_flange_tool)
     q, at = np.array(start), 0.0
     clock: list[float] = []
+    ends: list[float] = []
     joints: list[np.ndarray] = []
     for k, (word, places) in enumerate(moves):
         place = places[-1]
@@ -66,10 +76,10 @@ def driven(robot: Arm, moves: Moves, start: np.ndarray, speed: float) -> Driven:
             if not clock or at > clock[-1] + 1e-6:
                 clock.append(at)
                 joints.append(q)
+        ends.append(at)
     rows = np.array(joints)
-    return Driven(
-        np.array(clock), rows, np.array([tool_pose(robot, row, tool)[:3, 3] for row in rows])
-    )
+    believed = np.array([tool_pose(robot, row, tool)[:3, 3] for row in rows])
+    return Driven(np.array(clock), rows, believed, np.array(ends))
 
 
 def _by_joints(robot: Arm, q: np.ndarray, place: np.ndarray, tool: np.ndarray) -> list[np.ndarray]:

@@ -58,7 +58,6 @@ class SealedSeam:
 
     Attributes
     ----------
-    language : str
     case : SealedCase
         BlindCell, causes, and the free motion.
     context : Context
@@ -131,7 +130,6 @@ def sealed_seam(language: str, seed: int, number: int) -> SealedSeam:
 
     Parameters
     ----------
-    language : str
     seed, number : int
         Decide everything random in it.
 

@@ -81,7 +81,6 @@ class Borne:
     ----------
     median, least : float
         Growth of the unseen RMS error without it, over the parts.
-    parts : int
 
     """
 
@@ -103,7 +102,6 @@ def borne_out(
 
     Parameters
     ----------
-    row : ArmRow
     told : sequence of Effect
         What a diagnosis tells, as it found it: shapes that are not straight are taken from it.
     claims : sequence of sequence of str

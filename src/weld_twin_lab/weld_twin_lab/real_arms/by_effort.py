@@ -17,8 +17,8 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, JointSignal, Recording
 from weld_twin_msgs_py.files import markdown
 
-from ..real_robots.unseen_stations import ALIGN, residual
 from ..transfer.plain import PLAIN, plain_fit
+from ..transfer.unseen_stations import ALIGN, residual
 
 WAYS = ('frames', 'geometry', 'statics', 'efforts')
 """Plain fits of the frames and of the geometry; diagnoses with springs by statics and by efforts."""
@@ -52,7 +52,6 @@ def folds(
     ----------
     recording : Recording
         Stations with measured poses and efforts.
-    robot : Robot
     count : int
         Stretches, of equal numbers of stations in the order of time.
     tell : callable

@@ -35,10 +35,6 @@ class ArmRow:
 
     Attributes
     ----------
-    name : str
-    robot : Robot
-    align : tuple of str
-    fitted : Recording
     other : Recording or None
         None where everything is fitted.
 

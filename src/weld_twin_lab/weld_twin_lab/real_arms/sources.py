@@ -24,7 +24,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 from ..contacts.data import places_of, robot_of, touches
-from ..real_robots.data import tables
+from ..transfer.arm_tables import stations
 from ..transfer.servo_axis import axis_recording, axis_robot
 from ..transfer.splits import HOME, alone
 
@@ -64,7 +64,7 @@ class Source:
 def tracked(data: Path, name: str) -> Source:
     """Return one of the two arms under a laser tracker."""
     robot = name.partition('_')[0]
-    recording = tables(robot, data / name)[0].recording
+    recording = stations(robot, data / name)
     assert recording.measured is not None
     rows = np.arange(HOME[robot], recording.measured.t.size)
     return Source(catalog.load(robot), replace(alone(recording, rows), name=name))

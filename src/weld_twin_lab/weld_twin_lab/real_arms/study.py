@@ -18,9 +18,9 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.recording import Recording
 
-from ..real_robots.unseen_stations import residual
 from ..transfer.crash import traceback_told
 from ..transfer.plain import PLAIN, plain_fit
+from ..transfer.unseen_stations import residual
 from .borne_out import Borne, borne_out
 from .rows import ArmRow, halves, plans, row, size
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,8 @@ import numpy as np
 Entry = dict[str, Any]
 MANY = 120
 """Stations from which on more is asked of the diagnosis."""
+WORSE = 1.05
+"""Mean error over another from which on it counts as worse."""
 
 
 class Measure(NamedTuple):
@@ -31,33 +33,66 @@ def measures(entries: Sequence[Entry]) -> list[Measure]:
         _never_much_worse(found),
         _median(found, MANY, 0.85),
         _median(found, 0, 1.0),
-        _unflagged(found),
+        _none(
+            'splits whose stations that are not flagged are worse than frames only by 5 % or more',
+            found,
+            lambda e: any(
+                _of(e, region, 'unflagged_over_frames', {'ratio': 0.0})['ratio'] >= WORSE
+                for region in ('inside', 'outside')
+            ),
+        ),
         *_outside(found),
         _flagged(found),
-        _unsound(found),
+        _none('sound splits called unsound', found, lambda e: e.get('status') == 'unsound'),
         _interval(found),
         _stable(found),
-        _implausible(found),
-        _nothing_named(found),
-        _tracebacks(entries),
+        _none(
+            'named parameters outside their plausible range',
+            found,
+            lambda e: len(e.get('beyond') or ()),
+        ),
+        _none(
+            'identified with nothing named',
+            found,
+            lambda e: e.get('status') == 'identified' and not e.get('families'),
+        ),
+        _none(
+            'tracebacks on the splits',
+            entries,
+            lambda e: bool(
+                e.get('traceback') or any(h.get('traceback') for h in e.get('halves', ()))
+            ),
+        ),
     ]
 
 
+def _of(entry: Entry, region: str, key: str, otherwise: Any = None) -> Any:
+    value = (entry.get(region) or {}).get(key)
+    return otherwise if value is None else value
+
+
+def _none(what: str, entries: Sequence[Entry], count: Callable[[Entry], int]) -> Measure:
+    """Return how much there is of what must not be."""
+    counts = {e['name']: int(count(e)) for e in entries}
+    bad = tuple(name for name, number in counts.items() if number)
+    return Measure(what, '0', str(sum(counts.values())), not bad, bad)
+
+
 def _regions(entries: Sequence[Entry], region: str, key: str) -> list[tuple[Entry, Any]]:
-    rows = [(e, (e.get(region) or {}).get(key)) for e in entries]
+    rows = [(e, _of(e, region, key)) for e in entries]
     return [(e, value) for e, value in rows if value is not None]
 
 
 def _never_much_worse(entries: Sequence[Entry]) -> Measure:
     pairs = _regions(entries, 'inside', 'over_best')
-    bad = [e['name'] for e, r in pairs if r['ratio'] > 1.05 and r['low'] > 1.0]
+    bad = tuple(e['name'] for e, r in pairs if r['ratio'] > WORSE and r['low'] > 1.0)
     worst = max((r['ratio'] for _, r in pairs), default=float('nan'))
     return Measure(
         'product over the best of the three plain fits, mean error, inside',
         '<= 1.05 on every split, or its 95 % interval reaches 1',
         f'{len(pairs) - len(bad)} of {len(pairs)}; worst {worst:.2f}',
         not bad,
-        tuple(bad),
+        bad,
     )
 
 
@@ -65,37 +100,19 @@ def _median(entries: Sequence[Entry], least: int, goal: float) -> Measure:
     pairs = [
         r['ratio'] for e, r in _regions(entries, 'inside', 'over_best') if e['stations'] >= least
     ]
-    middle = float(np.median(pairs)) if pairs else float('nan')
     which = f'splits of {least} stations or more' if least else 'all splits'
-    return Measure(
-        f'the same, median over {which}', f'<= {goal}', f'{middle:.2f}', _below(middle, goal)
-    )
-
-
-def _unflagged(entries: Sequence[Entry]) -> Measure:
-    bad = []
-    for region in ('inside', 'outside'):
-        for e, r in _regions(entries, region, 'unflagged_over_frames'):
-            if r['ratio'] >= 1.05 and e['name'] not in bad:
-                bad.append(e['name'])
-    return Measure(
-        'splits whose stations that are not flagged are worse than frames only by 5 % or more',
-        '0',
-        str(len(bad)),
-        not bad,
-        tuple(bad),
-    )
+    middle = float(np.median(pairs)) if pairs else float('nan')
+    return _below(f'the same, median over {which}', middle, goal)
 
 
 def _outside(entries: Sequence[Entry]) -> list[Measure]:
     pairs = [(e, r['ratio']) for e, r in _regions(entries, 'outside', 'over_frames')]
     ratios = [ratio for _, ratio in pairs] or [float('nan')]
-    bad = tuple(e['name'] for e, ratio in pairs if ratio > 1.05)
-    worst, middle = max(ratios), float(np.median(ratios))
+    bad = tuple(e['name'] for e, ratio in pairs if ratio > WORSE)
     what = 'mean error outside over frames only'
     return [
-        Measure(f'{what}, worst', '<= 1.05', f'{worst:.2f}', _below(worst, 1.05), bad),
-        Measure(f'{what}, median', '<= 0.8', f'{middle:.2f}', _below(middle, 0.8)),
+        _below(f'{what}, worst', max(ratios), WORSE, bad),
+        _below(f'{what}, median', float(np.median(ratios)), 0.8),
     ]
 
 
@@ -108,29 +125,14 @@ def _flagged(entries: Sequence[Entry]) -> Measure:
     )
 
 
-def _unsound(entries: Sequence[Entry]) -> Measure:
-    bad = tuple(e['name'] for e in entries if e.get('status') == 'unsound')
-    return Measure('sound splits called unsound', '0', str(len(bad)), not bad, bad)
-
-
 def _interval(entries: Sequence[Entry]) -> Measure:
-    hits, bad = 0, []
     pairs = [e for e, _ in _regions(entries, 'inside', 'over_frames') if e.get('claimed')]
+    bad = []
     for e in pairs:
-        rms = e['inside']['rms_m']
-        low, high = e['claimed']['ci95']
-        if low <= rms['product'] / rms['frames'] <= high:
-            hits += 1
-        else:
+        rms, (low, high) = e['inside']['rms_m'], e['claimed']['ci95']
+        if not low <= rms['product'] / rms['frames'] <= high:
             bad.append(e['name'])
-    share = hits / max(len(pairs), 1)
-    return Measure(
-        '95 % interval of the shrink holds',
-        '>= 90 % of splits',
-        f'{hits} of {len(pairs)}',
-        share >= 0.9,
-        tuple(bad),
-    )
+    return _most('95 % interval of the shrink holds', '>= 90 % of splits', len(pairs), bad, 0.0)
 
 
 def _stable(entries: Sequence[Entry]) -> Measure:
@@ -140,43 +142,23 @@ def _stable(entries: Sequence[Entry]) -> Measure:
     for e in entries:
         if e['kind'] == 'odd' and f'{e["robot"]}_even' in by_name:
             pairs.append((f'{e["robot"]} odd/even', e, by_name[f'{e["robot"]}_even']))
-    bad = tuple(name for name, one, other in pairs if not _alike(one, other))
-    share = 1.0 - len(bad) / max(len(pairs), 1)
-    return Measure(
-        'same status and families on odd and even halves',
-        '>= 90 %',
-        f'{len(pairs) - len(bad)} of {len(pairs)}',
-        share >= 0.9,
-        bad,
-    )
+    bad = [
+        name
+        for name, one, other in pairs
+        if any(one.get(key) != other.get(key) for key in ('status', 'families'))
+    ]
+    what = 'same status and families on odd and even halves'
+    return _most(what, '>= 90 %', len(pairs), bad, 1.0)
 
 
-def _alike(one: Entry, other: Entry) -> bool:
-    return all(one.get(key) == other.get(key) for key in ('status', 'families'))
+def _most(what: str, goal: str, count: int, bad: Sequence[str], of_none: float) -> Measure:
+    """Return whether nine of ten are good; ``of_none`` is their share where there are none."""
+    good = count - len(bad)
+    share = good / count if count else of_none
+    return Measure(what, goal, f'{good} of {count}', share >= 0.9, tuple(bad))
 
 
-def _implausible(entries: Sequence[Entry]) -> Measure:
-    bad = tuple(e['name'] for e in entries if e.get('beyond'))
-    count = sum(len(e.get('beyond') or ()) for e in entries)
-    return Measure('named parameters outside their plausible range', '0', str(count), not bad, bad)
-
-
-def _nothing_named(entries: Sequence[Entry]) -> Measure:
-    bad = tuple(
-        e['name'] for e in entries if e.get('status') == 'identified' and not e.get('families')
-    )
-    return Measure('identified with nothing named', '0', str(len(bad)), not bad, bad)
-
-
-def _tracebacks(entries: Sequence[Entry]) -> Measure:
-    bad = tuple(
-        e['name']
-        for e in entries
-        if e.get('traceback') or any(h.get('traceback') for h in e.get('halves', ()))
-    )
-    return Measure('tracebacks on the splits', '0', str(len(bad)), not bad, bad)
-
-
-def _below(value: float, goal: float) -> bool | None:
-    """Return whether a goal is reached, None where nothing was measured."""
-    return None if np.isnan(value) else value <= goal
+def _below(what: str, value: float, goal: float, blame: tuple[str, ...] = ()) -> Measure:
+    """Return whether a value is low enough, None where nothing was measured."""
+    reached = None if np.isnan(value) else value <= goal
+    return Measure(what, f'<= {goal}', f'{value:.2f}', reached, blame)

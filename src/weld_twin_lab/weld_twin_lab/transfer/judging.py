@@ -16,11 +16,11 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.recording import Recording
 
-from ..real_robots.unseen_stations import ALIGN, residual
 from .crash import traceback_told
 from .flags import flagged
 from .plain import PLAIN, plain_fit
 from .splits import Split, halves
+from .unseen_stations import ALIGN, residual
 
 PRODUCT, FRAMES = 'product', 'frames'
 HALVES = 60

@@ -37,8 +37,6 @@ def plain_fit(
 
     Parameters
     ----------
-    train : Recording
-    robot : Robot
     families : tuple of str
         One number per joint each; none for the frames alone.
     align : frozenset of str

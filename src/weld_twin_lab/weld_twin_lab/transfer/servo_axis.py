@@ -17,10 +17,10 @@ from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
-from ..real_robots.unseen_stations import residual
 from .crash import traceback_told
 from .judging import said
 from .splits import Rows
+from .unseen_stations import residual
 
 FILE = 'DATA_EMPS.mat'
 JOINT = 'axis'

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion, Recording
 
-from ..real_robots.data import tables
+from .arm_tables import stations
 
 Rows = NDArray[Any]
 """Row numbers."""
@@ -52,8 +52,6 @@ class Split:
 
     Attributes
     ----------
-    name, kind, robot : str
-    train : Recording
     inside : Recording or None
         Stations like those fitted on; None where there are none.
     outside : Recording or None
@@ -85,7 +83,7 @@ def all_splits(ur5: Path, ur10: Path) -> Iterator[Split]:
 
     """
     for robot, directory in (('ur5', ur5), ('ur10', ur10)):
-        yield from splits(robot, tables(robot, directory)[0].recording, HOME[robot])
+        yield from splits(robot, stations(robot, directory), HOME[robot])
 
 
 def splits(robot: str, table: Recording, first: int = 0) -> Iterator[Split]:
@@ -94,7 +92,6 @@ def splits(robot: str, table: Recording, first: int = 0) -> Iterator[Split]:
 
     Parameters
     ----------
-    robot : str
     table : Recording
         Stations at rest, in the order they were measured.
     first : int

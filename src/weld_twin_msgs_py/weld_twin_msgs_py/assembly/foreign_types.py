@@ -116,17 +116,17 @@ def _joints_of_dynamic_state(message: Any, _: str) -> Iterator[Any]:
         len(each.interface_names) != len(each.values) for each in message.interface_values
     ):
         raise DataError('it has not one value for every interface of every joint it names')
-    told = [
+    reported = [
         (name, dict(zip(values.interface_names, values.values, strict=True)))
         for name, values in zip(message.joint_names, message.interface_values, strict=True)
     ]
-    told = [(name, values) for name, values in told if 'position' in values]
+    reported = [(name, values) for name, values in reported if 'position' in values]
     unknown = float('nan')
     yield SimpleNamespace(
         header=message.header,
-        name=[name for name, _ in told],
-        position=[values['position'] for _, values in told],
-        velocity=[values.get('velocity', unknown) for _, values in told],
+        name=[name for name, _ in reported],
+        position=[values['position'] for _, values in reported],
+        velocity=[values.get('velocity', unknown) for _, values in reported],
     )
 
 
@@ -172,7 +172,6 @@ class FedBack:
 
     Parameters
     ----------
-    robot : Robot
     part : str
         Of the message; empty for what is fed back.
     joint_names : sequence of str, optional
@@ -210,7 +209,6 @@ def plain_messages(kind: str, message: Any, part: str = '') -> tuple[Any, ...]:
     ----------
     kind : str
         Its type.
-    message : message
     part : str
         The child frame of a transform, or the part of a controller's state, that is meant.
 

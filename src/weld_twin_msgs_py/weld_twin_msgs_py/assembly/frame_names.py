@@ -104,10 +104,6 @@ class WrenchFrame:
     but is none of these is refused, for it may be either; every other name is taken for the
     tool's, and that is told.
 
-    Parameters
-    ----------
-    robot : Robot
-
     Attributes
     ----------
     meaning : str

@@ -78,12 +78,6 @@ class Intake:
     joint_names, mend, efforts
         See `JointStates`.
 
-    Attributes
-    ----------
-    joints : JointStates
-    wrench_frame : WrenchFrame
-    measuring_frame : MeasuringFrame
-
     """
 
     def __init__(
@@ -127,9 +121,13 @@ class Intake:
     @property
     def remarks(self) -> list[str]:
         """Return what is to be told of names and frames that were taken for granted."""
-        told = (self.joints, self.measuring_frame, self.wrench_frame)
+        reported = (self.joints, self.measuring_frame, self.wrench_frame)
         joints = self.joints
-        remarks = [*(each.remark for each in told), joints.velocity_remark, joints.beside.remark]
+        remarks = [
+            *(each.remark for each in reported),
+            joints.velocity_remark,
+            joints.beside.remark,
+        ]
         return [remark for remark in remarks if remark]
 
     def last(self, role: Role) -> int | None:

@@ -35,8 +35,6 @@ def names_called(
 
     Parameters
     ----------
-    robot : Robot
-    prefix : str
     called : mapping of str to str, optional
         Joints of the robot, and what they are called behind the prefix.
 
@@ -101,7 +99,6 @@ class JointStates:
 
     Parameters
     ----------
-    robot : Robot
     limits : bool
         Whether positions beyond the joints' limits are refused. A running node does; a recording
         is read with them, for they tell of swapped joints and of degrees taken for radians.
@@ -331,7 +328,7 @@ class JointStates:
             )
         q = from_messages.joint_positions(message, present)
         qd = from_messages.joint_velocities(message, present)
-        left, before = self._missing(self._parts), self._stamp
+        remaining, before = self._missing(self._parts), self._stamp
         if stamp != before:
             self._parts, self._stamp = {}, stamp
         unknown = np.full(len(present), np.nan)
@@ -345,9 +342,9 @@ class JointStates:
             listed = ', '.join(message.name)
             raise Missing(f'the joint state has no joint {missing!r}; it has {listed}')
         self._take_beside(message, [k for k, x in enumerate(message.name) if x not in present])
-        if stamp != before and 0 < len(left) < len(self._names):
+        if stamp != before and 0 < len(remaining) < len(self._names):
             raise Incomplete(
-                f'joint {left[0]!r} never came with the stamp {before * 1e-9:.6f} s; publish all '
+                f'joint {remaining[0]!r} never came with the stamp {before * 1e-9:.6f} s; publish all '
                 'joints in one message, or with equal stamps'
             )
         if self._missing(self._parts):

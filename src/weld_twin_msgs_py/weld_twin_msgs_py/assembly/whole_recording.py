@@ -57,8 +57,6 @@ def assembled(
 
     Parameters
     ----------
-    name : str
-    robot : Robot
     streams : mapping
         Rows as `Intake` gives them, the joints among them. Poses are used before points.
     wrench_frame : str
@@ -78,8 +76,8 @@ def assembled(
     """
     epoch = int(streams[Role.JOINTS].ns[0])
     motion, effort = _motion(robot, streams[Role.JOINTS])
-    measured, told = _measurements(streams, epoch)
-    notes += told
+    measured, reported = _measurements(streams, epoch)
+    notes += reported
     if static is None:
         static = looks_static(robot, motion, measured)
     if static:
@@ -125,11 +123,11 @@ def _motion(robot: Robot, joints: Samples) -> tuple[JointMotion, JointSignal | N
     """
     t, n = seconds(joints.ns, int(joints.ns[0])), robot.n
     q, qd, effort = joints.rows[:, :n], joints.rows[:, n : 2 * n], joints.rows[:, 2 * n :]
-    told = JointSignal(t, effort) if effort.size else None
+    reported = JointSignal(t, effort) if effort.size else None
     untold = np.isnan(qd).any(axis=1, keepdims=True)
     if untold.all():
-        return JointMotion(t, q), told
-    return JointMotion(t, q, np.where(untold, backward_rates(t, q), qd)), told
+        return JointMotion(t, q), reported
+    return JointMotion(t, q, np.where(untold, backward_rates(t, q), qd)), reported
 
 
 def _measurements(
@@ -199,9 +197,9 @@ def _unloaded_before(
         return whole, measured, (said,)
     if measured is None:
         return whole, None, ()
-    told = np.flatnonzero(measured.t >= late)
-    count = measured.t.size - told.size
-    if not count or not told.size:
+    reported = np.flatnonzero(measured.t >= late)
+    count = measured.t.size - reported.size
+    if not count or not reported.size:
         return whole, measured, ()
     said = f'{count} measurements from before the first wrench are left out'
-    return whole, measured.take(told), (said,)
+    return whole, measured.take(reported), (said,)

@@ -166,10 +166,10 @@ class BackgroundBag:
         """Return what waits, as soon as there is something to do; messages stay in the queue."""
         with self._changed:
             while not (self._queue or self._notes or self._closing):
-                left = due - time.monotonic()
-                if left <= 0.0:
+                remaining = due - time.monotonic()
+                if remaining <= 0.0:
                     break
-                self._changed.wait(left)
+                self._changed.wait(remaining)
             notes, self._notes = self._notes, {}
             return list(islice(self._queue, BATCH)), notes, self._closing
 

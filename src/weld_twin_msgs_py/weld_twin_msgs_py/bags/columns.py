@@ -70,8 +70,8 @@ class Stream:
             self._repeated += error.behind == 0
             self._late += error.behind > 0
         else:
-            told = f"message {self.messages - 1} of '{self.topic}': {error}"
-            count, first = self._other.get(type(error), (0, told))
+            reported = f"message {self.messages - 1} of '{self.topic}': {error}"
+            count, first = self._other.get(type(error), (0, reported))
             self._other[type(error)] = count + 1, first
 
     def jumped(self, back: int) -> DataError:

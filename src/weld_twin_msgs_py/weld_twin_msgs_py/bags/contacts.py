@@ -74,7 +74,6 @@ def touching(recording: Recording, each: list[Mark], made: Mapping[str, Any]) ->
     ----------
     recording : Recording
         With the joint states, as they came.
-    each : list of Mark
     made : mapping
         How the bag was made; may hold the artefact. Without one every label is a point, or a
         length where the messages hold one.

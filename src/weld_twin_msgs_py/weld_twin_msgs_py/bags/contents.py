@@ -89,7 +89,6 @@ class BagInfo:
         What a diagnosis will do without or work around.
     incomplete : tuple of str
         What of the messages sent is not in it, and which streams begin late or end early.
-    provenance : dict
 
     """
 
@@ -119,16 +118,16 @@ def bag_info(path: Path | str, topics: TopicNames | None = None) -> BagInfo:
 
     """
     names = TopicNames() if topics is None else topics
-    found, made = _found(path, names)
-    used = [t for t in found if t.use and t.start_ns is not None]
-    timed = used or [t for t in found if t.start_ns is not None]
+    result, made = _found(path, names)
+    used = [t for t in result if t.use and t.start_ns is not None]
+    timed = used or [t for t in result if t.start_ns is not None]
     start = min((t.start_ns for t in timed if t.start_ns is not None), default=0)
     end = max((t.end_ns for t in timed if t.end_ns is not None), default=0)
-    missing, notes = _judge(names, {t.use: t for t in used}, found)
-    lacking = (*never_recorded(made), *(uneven_ends(_ends(found)) if not missing else ()))
+    missing, notes = _judge(names, {t.use: t for t in used}, result)
+    lacking = (*never_recorded(made), *(uneven_ends(_ends(result)) if not missing else ()))
     return BagInfo(
         Path(path),
-        tuple(found),
+        tuple(result),
         start,
         (end - start) * 1e-9,
         missing,
@@ -151,7 +150,7 @@ def _found(path: Path | str, names: TopicNames) -> tuple[list[TopicInfo], dict[s
                 unstamped[topic] = unstamped.get(topic, 0) + 1
             else:
                 stamps.setdefault(topic, array('q')).append(ns)
-        found = [
+        result = [
             replace(
                 _describe(name, kind, stamps.get(name, array('q')), unstamped.get(name, 0), names),
                 header=name in headers,
@@ -159,15 +158,15 @@ def _found(path: Path | str, names: TopicNames) -> tuple[list[TopicInfo], dict[s
             for name, (kind, _) in sorted(bag.topics.items())
         ]
         made = bag.provenance
-    return found, made
+    return result, made
 
 
-def _ends(found: list[TopicInfo]) -> dict[str, Ends]:
+def _ends(result: list[TopicInfo]) -> dict[str, Ends]:
     """Return the ends of the streams that beat, on the clock of the headers."""
     rare = {row.name for row in BY_NAME.values() if not row.steady}
     return {
         t.name: Ends(t.start_ns, t.end_ns, round(1e9 / t.rate_hz))
-        for t in found
+        for t in result
         if t.name not in rare
         and t.header
         and t.rate_hz
@@ -222,11 +221,11 @@ def _describe(
 
 
 def _judge(
-    names: TopicNames, used: dict[str, TopicInfo], found: list[TopicInfo]
+    names: TopicNames, used: dict[str, TopicInfo], result: list[TopicInfo]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return what is missing for a diagnosis and what it will do without."""
     missing, notes = [], []
-    present = {t.name: (t.type, t.count) for t in found}
+    present = {t.name: (t.type, t.count) for t in result}
     if 'joints' not in used:
         missing.append(no_joints(names, present))
     measured = used.get('contact') or used.get('pose') or used.get('point')
@@ -236,7 +235,7 @@ def _judge(
     if joints and measured:
         sentence = apart(_span(joints), _span(measured))
         missing += [] if sentence is None else [f'{sentence}. {ONE_CLOCK}']
-    notes += [f"'{t.name}' is {t.sent.words}" for t in found if t.sent is not None]
+    notes += [f"'{t.name}' is {t.sent.words}" for t in result if t.sent is not None]
     if measured is not None and measured.use == 'point':
         notes.append('positions only: errors that turn the tool in place stay invisible')
     for use, effects in (('wrench', 'tool loads'), ('temperature', 'thermal growth')):

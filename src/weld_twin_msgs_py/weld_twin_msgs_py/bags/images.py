@@ -66,7 +66,6 @@ def looking(
     ----------
     recording : Recording
         With the joint states.
-    each : sequence of Image
     names : TopicNames
         May describe cameras and targets.
     made : mapping
@@ -118,26 +117,26 @@ def _rows(
     """Return rows of image, camera, target, point, u and v, an array for every image."""
     number = {ns: float(k) for k, ns in enumerate(stamps)}
     out = []
-    for ns, camera, found in each:
+    for ns, camera, result in each:
         if camera not in cameras:
             raise DataError(
                 f"the bag has images of camera '{camera}', which is not described; give it with "
                 f'--camera {camera}=FILE'
             )
-        rows = _labelled(found, targets) if isinstance(found, list) else found
+        rows = _labelled(result, targets) if isinstance(result, list) else result
         before = np.array([number[ns], float(list(cameras).index(camera))])
         out.append(np.column_stack([np.tile(before, (len(rows), 1)), rows]))
     return out
 
 
-def _labelled(found: Marks, targets: Mapping[str, Target]) -> np.ndarray:
+def _labelled(result: Marks, targets: Mapping[str, Target]) -> np.ndarray:
     """Return rows of `FIELDS` of corners by their labels; those of tags elsewhere are left out."""
     known = {
         text: (float(k), float(call))
         for k, one in enumerate(targets.values())
         for text, call in zip(one.labels, numbered(one), strict=True)
     }
-    rows = [(*known[text], u, v) for text, u, v in found if text in known]
+    rows = [(*known[text], u, v) for text, u, v in result if text in known]
     return np.array(rows, dtype=float).reshape(-1, len(FIELDS))
 
 

@@ -49,7 +49,6 @@ class BagReader:
 
     Attributes
     ----------
-    path : Path
     topics : dict
         Message type and count of each topic.
     provenance : dict

@@ -156,8 +156,8 @@ def _copy(source: Path, folder: Path, name: str, damage: Damage) -> Counter[str]
         for k, file in enumerate(files):
             if k:
                 segments.split()
-            for found in _STORAGE[file.suffix][1](file, damage):
-                _write(segments, found, file, counts, damage)
+            for result in _STORAGE[file.suffix][1](file, damage):
+                _write(segments, result, file, counts, damage)
         segments.finish(_provenance(source, damage))
     finally:
         segments.abort()
@@ -165,9 +165,9 @@ def _copy(source: Path, folder: Path, name: str, damage: Damage) -> Counter[str]
 
 
 def _write(
-    segments: Segments, found: Found, file: Path, counts: Counter[str], damage: Damage
+    segments: Segments, result: Found, file: Path, counts: Counter[str], damage: Damage
 ) -> None:
-    channel, log_ns, data = found
+    channel, log_ns, data = result
     try:
         if channel.type in TYPES.types:
             decode(data, channel.type)

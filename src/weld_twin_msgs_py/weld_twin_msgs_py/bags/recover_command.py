@@ -31,8 +31,8 @@ def recover_command(path: Path, growing: Path | None = None) -> str:
     needed = _size(path if growing is None else growing) + SPARE
     if not _has_room(path.parent, needed):
         places = (Path.cwd(), Path.home(), Path(tempfile.gettempdir()))
-        found = next((place for place in places if _has_room(place, needed)), None)
-        command += ['--out', str((found or Path('ANOTHER_DISK')) / path.name)]
+        result = next((place for place in places if _has_room(place, needed)), None)
+        command += ['--out', str((result or Path('ANOTHER_DISK')) / path.name)]
     return shlex.join(command)
 
 

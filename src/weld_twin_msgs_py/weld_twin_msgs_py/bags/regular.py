@@ -94,10 +94,8 @@ def fill_regular(
     ----------
     bag : BagReader
         Open.
-    roles : mapping of str to Role
     streams : mapping of Role to Stream
         Empty; to be thrown away, with the intake, where this fails.
-    intake : Intake
 
     Returns
     -------

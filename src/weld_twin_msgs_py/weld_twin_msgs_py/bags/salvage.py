@@ -19,14 +19,7 @@ Found = tuple[Channel, int, bytes]
 
 
 class Damage:
-    """
-    What was wrong with the files.
-
-    Attributes
-    ----------
-    sentences : list of str
-
-    """
+    """What was wrong with the files."""
 
     def __init__(self) -> None:
         self.sentences: list[str] = []

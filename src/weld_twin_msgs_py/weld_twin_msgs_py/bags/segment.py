@@ -130,10 +130,8 @@ class Channel(NamedTuple):
 
     Attributes
     ----------
-    topic, type : str
     definition : str
         Text of a message definition that Jazzy does not know, with its hash; else empty.
-    digest : str
     qos : tuple
         As offered; empty for what the table of topics says.
 
@@ -286,7 +284,7 @@ def sync(path: Path) -> None:
 
 
 @contextmanager
-def clear_write_errors(path: Path, left: Callable[[], str] = str) -> Iterator[None]:
+def clear_write_errors(path: Path, remaining: Callable[[], str] = str) -> Iterator[None]:
     """
     Turn what a full or missing disk makes the storages raise into one sentence.
 
@@ -294,7 +292,7 @@ def clear_write_errors(path: Path, left: Callable[[], str] = str) -> Iterator[No
     ----------
     path : Path
         The bag that is written.
-    left : callable
+    remaining : callable
         Returns what is to be said behind it, by the time that it happens.
 
     """
@@ -302,7 +300,7 @@ def clear_write_errors(path: Path, left: Callable[[], str] = str) -> Iterator[No
         yield
     except (OSError, sqlite3.Error) as error:
         reason = getattr(error, 'strerror', None) or str(error)
-        raise DataError(f"bag '{path}' cannot be written: {reason}{left()}") from None
+        raise DataError(f"bag '{path}' cannot be written: {reason}{remaining()}") from None
 
 
 def check_storage(storage: str) -> str:

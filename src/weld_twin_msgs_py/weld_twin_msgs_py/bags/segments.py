@@ -29,11 +29,6 @@ class Segments:
         Directory of the bag; exists.
     name : str
         What the files are called.
-    storage : str
-
-    Attributes
-    ----------
-    growing : Segment
 
     """
 

@@ -44,7 +44,6 @@ def unzstd(data: bytes, size: int | None = None) -> bytes:
 
     Parameters
     ----------
-    data : bytes
     size : int, optional
         What is declared beside it.
 
@@ -77,11 +76,11 @@ def unpack_file(packed: Path, out: Path) -> None:
     most = max(SMALL, RATIO * packed.stat().st_size)
     free = shutil.disk_usage(out.parent).free
     with packed.open('rb') as raw:
-        told = zstd.get_frame_info(raw.read(_HEAD)).decompressed_size or 0
-    if told > most:
+        reported = zstd.get_frame_info(raw.read(_HEAD)).decompressed_size or 0
+    if reported > most:
         raise _bomb()
-    if told > free:
-        raise _no_room(packed, out, f'unpacks to {told / 1e9:.1f} GB')
+    if reported > free:
+        raise _no_room(packed, out, f'unpacks to {reported / 1e9:.1f} GB')
     done = 0
     try:
         with packed.open('rb') as raw, zstd.open(raw, 'rb') as source, out.open('wb') as sink:

@@ -81,7 +81,6 @@ class BagWriter:
 
         Parameters
         ----------
-        topic : str
         message : rosbags message
         log_ns : int, optional [ns]
             When it was recorded; left out, its header stamp.

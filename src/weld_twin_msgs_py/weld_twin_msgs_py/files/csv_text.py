@@ -21,7 +21,6 @@ def csv_text(header: Sequence[Any], rows: Iterable[Sequence[Any]]) -> str:
 
     Parameters
     ----------
-    header : sequence
     rows : iterable of sequence
         Of texts and numbers.
 

@@ -78,7 +78,7 @@ def read_model(robot: Robot, path: Path | str) -> Model:
     try:
         tool = _frame(model['tool'], 'model.tool')
         bases = tuple(_frame(base, 'model.bases') for base in model['bases'])
-        known, found = (
+        known, result = (
             effects_from_list(_at_rest(model, key), robot) for key in ('known', 'found')
         )
         alone = _alone(model.get('alone'), robot)
@@ -89,7 +89,7 @@ def read_model(robot: Robot, path: Path | str) -> Model:
     if not bases:
         raise ModelError(f"the model of diagnosis '{path}' has no base frame")
     placed = robot.with_frames(tool=tool)
-    return Model(placed, bases, known, found, _mended(content), mends=mends, alone=alone)
+    return Model(placed, bases, known, result, _mended(content), mends=mends, alone=alone)
 
 
 def _alone(entry: Any, robot: Robot) -> Alone | None:
@@ -116,8 +116,8 @@ def _at_rest(model: dict[str, Any], key: str) -> list[dict[str, Any]]:
 def _without_model(path: Path | str, content: dict[str, Any]) -> str:
     wrong = content.get('unsound')
     if isinstance(wrong, list) and wrong and isinstance(wrong[0], dict):
-        told = str(wrong[0].get('sentence', '')).rstrip('.')
-        return f"diagnosis '{path}' holds no model, for its data were unsound: {told}"
+        reported = str(wrong[0].get('sentence', '')).rstrip('.')
+        return f"diagnosis '{path}' holds no model, for its data were unsound: {reported}"
     return f"diagnosis '{path}' holds no model; make it anew with diagnose"
 
 
@@ -170,7 +170,6 @@ def mended_source(
         As `read_model` returns it.
     nominal : Robot
         The robot that was given.
-    recording : Recording
     setup : int
         Which recording of the diagnosis it is, counted from 0.
 

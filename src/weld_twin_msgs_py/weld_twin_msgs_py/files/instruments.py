@@ -30,7 +30,6 @@ class Instrument(NamedTuple):
     least : float [m]
     per_metre : float [m/m]
         What comes on top for every metre between instrument and point.
-    source : str
     away : float [m], optional
         How far away the points are; left out, from the origin of the measuring frame.
 
@@ -53,13 +52,13 @@ INSTRUMENTS = {
 """By the name that people type. Certificates of one's own are better: give their numbers."""
 
 
-def instrument(told: str) -> Instrument:
+def instrument(given: str) -> Instrument:
     """
     Return an instrument by name, or by what its certificate says.
 
     Parameters
     ----------
-    told : str
+    given : str
         A name of `INSTRUMENTS`, or the largest permissible error such as ``0.015+0.006/m`` [mm];
         ``@3`` behind either says that the points are 3 m away.
 
@@ -69,16 +68,16 @@ def instrument(told: str) -> Instrument:
         It is neither.
 
     """
-    name, _, away = told.partition('@')
+    name, _, away = given.partition('@')
     known = INSTRUMENTS.get(name.lower())
-    found = _TOLD.fullmatch(f'0@{away}' if known and away else told if known is None else '0')
+    result = _TOLD.fullmatch(f'0@{away}' if known and away else given if known is None else '0')
     try:
-        numbers = {k: float(v) for k, v in found.groupdict().items() if v} if found else {}
+        numbers = {k: float(v) for k, v in result.groupdict().items() if v} if result else {}
     except ValueError:
         numbers = {}
     if not numbers or (known is None and not 0.0 < numbers['least'] < 10.0):
         raise DataError(
-            f"--instrument '{told}' is none that is known ({', '.join(INSTRUMENTS)}); else write its "
+            f"--instrument '{given}' is none that is known ({', '.join(INSTRUMENTS)}); else write its "
             'largest permissible error in mm, such as 0.015+0.006/m'
         )
     if known is None:
@@ -92,8 +91,6 @@ def measured_by(recording: Recording, what: Instrument, *, own_frame: bool) -> R
 
     Parameters
     ----------
-    recording : Recording
-    what : Instrument
     own_frame : bool
         Whether the measuring frame is the instrument's own.
 

@@ -35,7 +35,6 @@ def write_joint_motion(path: Path, motion: Mapping[str, Any], comment: str) -> N
 
     Parameters
     ----------
-    path : Path
     motion : mapping
         'static', 'joint_names', 't' [s] and 'q' [rad, m]; static is stations, each measured at
         rest, ``t`` when.
@@ -94,7 +93,6 @@ def through_stations(robot: Robot, t: Array, q: Array, rate: float) -> JointMoti
 
     Parameters
     ----------
-    robot : Robot
     t : array, shape (K,) [s]
         When each is to be measured; the arm is late where the way or the stay takes longer.
     q : array, shape (K, n)

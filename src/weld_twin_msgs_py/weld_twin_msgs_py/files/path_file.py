@@ -53,7 +53,6 @@ def read_external(path: FilePath | str, robot: Robot) -> Array | None:
     Parameters
     ----------
     path : Path or str
-    robot : Robot
 
     Raises
     ------
@@ -76,15 +75,15 @@ def read_external(path: FilePath | str, robot: Robot) -> Array | None:
             f'{where} needs one number for each joint, or lists of one length'
         ) from None
     last = max(robot.index(name) for name in knots)
-    told = np.zeros((columns[0].size, max(last + 1, robot.behind)))
-    told[:, : robot.behind] = rest(robot)
+    reported = np.zeros((columns[0].size, max(last + 1, robot.behind)))
+    reported[:, : robot.behind] = rest(robot)
     for name, column in zip(knots, columns, strict=True):
-        told[:, robot.index(name)] = column
-    if columns[0].ndim != 1 or not np.isfinite(told).all() or told.shape[1] >= robot.n:
+        reported[:, robot.index(name)] = column
+    if columns[0].ndim != 1 or not np.isfinite(reported).all() or reported.shape[1] >= robot.n:
         raise PathError(f'{where} needs finite numbers, and a joint that is left to the arm')
-    still = np.clip(np.zeros((len(told), robot.n)), robot.lower, robot.upper)
-    robot.check_positions(np.concatenate([told, still[:, told.shape[1] :]], axis=1))
-    return told
+    still = np.clip(np.zeros((len(reported), robot.n)), robot.lower, robot.upper)
+    robot.check_positions(np.concatenate([reported, still[:, reported.shape[1] :]], axis=1))
+    return reported
 
 
 def _points(path: FilePath | str) -> list[list[float]]:

@@ -67,6 +67,7 @@ def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:
         tuple(str(item) for item in entry['left_open']),
         _size(entry['sigma_recorded_m'], 'sigma_recorded_m'),
         _size(entry['sigma_anywhere_m'], 'sigma_anywhere_m'),
+        middle=min(_size(entry.get('middle', 0.0), 'middle'), 1.0),
     )
 
 

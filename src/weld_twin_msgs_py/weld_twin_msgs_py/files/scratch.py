@@ -89,18 +89,16 @@ def sweep(parent: Path, prefix: str, rescue: Callable[[Path], object] | None = N
 
     Parameters
     ----------
-    parent : Path
-    prefix : str
     rescue : callable, optional
         Told every directory before it goes; no other process sweeps it meanwhile.
 
     """
     own = re.compile(re.escape(prefix) + _DRAWN)
     try:
-        found = [entry for entry in os.scandir(parent) if own.fullmatch(entry.name)]
+        result = [entry for entry in os.scandir(parent) if own.fullmatch(entry.name)]
     except OSError:
         return
-    for entry in found:
+    for entry in result:
         if not entry.is_dir(follow_symlinks=False) or not _mine(entry):
             continue
         folder = Path(entry.path)

@@ -177,7 +177,6 @@ def numbers_text(key: str, values: Array) -> str:
 
     Parameters
     ----------
-    key : str
     values : array, shape (N,) or (N, n), not empty
 
     """

@@ -18,14 +18,7 @@ from .to_messages import quaternion
 
 
 class PoseEncoder:
-    """
-    Serialises PoseStamped messages of one frame.
-
-    Parameters
-    ----------
-    frame_id : str
-
-    """
+    """Serialises PoseStamped messages of one frame."""
 
     def __init__(self, frame_id: str) -> None:
         self._head, self._body = _stamped(frame_id, '7d')
@@ -42,14 +35,7 @@ class PoseEncoder:
 
 
 class PoseCovarianceEncoder:
-    """
-    Serialises PoseWithCovarianceStamped messages of one frame.
-
-    Parameters
-    ----------
-    frame_id : str
-
-    """
+    """Serialises PoseWithCovarianceStamped messages of one frame."""
 
     def __init__(self, frame_id: str) -> None:
         self._head, self._body = _stamped(frame_id, '43d')
@@ -67,14 +53,7 @@ class PoseCovarianceEncoder:
 
 
 class Vector3Encoder:
-    """
-    Serialises Vector3Stamped messages of one frame.
-
-    Parameters
-    ----------
-    frame_id : str
-
-    """
+    """Serialises Vector3Stamped messages of one frame."""
 
     def __init__(self, frame_id: str) -> None:
         self._head, self._body = _stamped(frame_id, '3d')
@@ -85,14 +64,7 @@ class Vector3Encoder:
 
 
 class TwistEncoder:
-    """
-    Serialises TwistStamped messages of one frame.
-
-    Parameters
-    ----------
-    frame_id : str
-
-    """
+    """Serialises TwistStamped messages of one frame."""
 
     def __init__(self, frame_id: str) -> None:
         self._head, self._body = _stamped(frame_id, '6d')
@@ -103,14 +75,7 @@ class TwistEncoder:
 
 
 class JointStateEncoder:
-    """
-    Serialises joint states of one set of joints, without frame or effort.
-
-    Parameters
-    ----------
-    joint_names : sequence of str
-
-    """
+    """Serialises joint states of one set of joints, without frame or effort."""
 
     def __init__(self, joint_names: Sequence[str]) -> None:
         head = pack('<I4sI', 1, b'', len(joint_names))

@@ -25,7 +25,6 @@ class GoalPoints(NamedTuple):
 
     Attributes
     ----------
-    goal : Goal
     columns : tuple of int
         Where the joints of the robot stand in every point.
 
@@ -90,7 +89,6 @@ def corrected_trajectory(trajectory: Any, columns: Sequence[int], goal: Goal, wa
 
     Parameters
     ----------
-    trajectory : JointTrajectory
     columns : sequence of int
         As `read_goal` returns them.
     goal : Goal

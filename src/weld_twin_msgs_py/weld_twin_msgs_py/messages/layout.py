@@ -153,7 +153,6 @@ def layout_of(kind: str, data: bytes) -> Layout | None:
 
     Parameters
     ----------
-    kind : str
     data : bytes
         The message; one run of doubles follows its header, or, of a joint state, positions,
         velocities and efforts.

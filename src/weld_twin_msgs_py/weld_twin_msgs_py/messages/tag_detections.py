@@ -44,11 +44,11 @@ def corners(message: Any) -> Marks:
 
     """
     out: Marks = []
-    for found in message.detections:
-        if len(found.corners) != len(OURS):
-            raise DataError(f'tag {found.id} has {len(found.corners)} corners; a tag has four')
-        for place, at in zip(OURS, found.corners, strict=True):
+    for result in message.detections:
+        if len(result.corners) != len(OURS):
+            raise DataError(f'tag {result.id} has {len(result.corners)} corners; a tag has four')
+        for place, at in zip(OURS, result.corners, strict=True):
             if not (isfinite(at.x) and isfinite(at.y)):
-                raise DataError(f'a corner of tag {found.id} is no finite number')
-            out.append((label(int(found.id), place), float(at.x), float(at.y)))
+                raise DataError(f'a corner of tag {result.id} is no finite number')
+            out.append((label(int(result.id), place), float(at.x), float(at.y)))
     return out

@@ -97,12 +97,10 @@ class Messages:
 
         Parameters
         ----------
-        ns : int
         position : array, shape (3,) [m]
         rotation : array, shape (3, 3)
         covariance : array, shape (6, 6)
             Position first [m^2], then turns about the fixed axes of the frame [rad^2].
-        frame_id : str
 
         """
         inner = self._make(
@@ -307,7 +305,6 @@ class Lines(NamedTuple):
 
     Attributes
     ----------
-    name : str
     points : array, shape (N, 3) [m]
     colors : array, shape (N, 3)
         Red, green, blue of each point, 0 to 1.

@@ -32,8 +32,10 @@ def types_with(kind: str, definition: str, idl: bool) -> Typestore:
             f'the bag does not say what a {kind} is; record it as mcap, which holds the definition'
         )
     store = get_typestore(Stores.ROS2_JAZZY)
-    found = get_types_from_idl(definition) if idl else get_types_from_msg(definition, kind)
-    store.register({name: fields for name, fields in found.items() if name not in store.fielddefs})
+    result = get_types_from_idl(definition) if idl else get_types_from_msg(definition, kind)
+    store.register(
+        {name: fields for name, fields in result.items() if name not in store.fielddefs}
+    )
     return store
 
 

@@ -36,8 +36,6 @@ class Point(NamedTuple):
         As the program calls it; 'line 12' for one that stands in the move.
     where : str
         File and line.
-    numbers : tuple of Number
-    notation : Notation
     value : array
         A pose (4, 4) in its own base frame, or joint positions of the model (n,).
     told : array, shape (m,), optional
@@ -96,10 +94,8 @@ class Program:
 
     Attributes
     ----------
-    language : str
     sources : list of Source
         The first is the program, the others belong to it.
-    points : list of Point
     pieces : list of list of Step
         Routines; where one begins, nobody knows where the arm is.
     held : dict of int to str
@@ -132,9 +128,6 @@ class Program:
 
         Parameters
         ----------
-        name : str
-        numbers : sequence of Number
-        notation : Notation
         file : int
             Which of the sources they stand in.
         told : array, shape (m,), optional
@@ -193,7 +186,6 @@ def hold_if_used_elsewhere(
 
     Parameters
     ----------
-    program : Program
     names : dict of str to int
         Points by name, in lower case where the language does not care.
     texts : sequence of str
@@ -203,11 +195,11 @@ def hold_if_used_elsewhere(
 
     """
     for file, text in enumerate(texts):
-        for found in re.finditer(r'[A-Za-z_$][\w$]*', text):
-            point = names.get(found[0], names.get(found[0].lower()))
-            if point is not None and found.start() not in used[file]:
-                where = program.sources[file].where(found.start())
-                program.hold(point, f'{found[0]} is used at {where} in a way not understood')
+        for result in re.finditer(r'[A-Za-z_$][\w$]*', text):
+            point = names.get(result[0], names.get(result[0].lower()))
+            if point is not None and result.start() not in used[file]:
+                where = program.sources[file].where(result.start())
+                program.hold(point, f'{result[0]} is used at {where} in a way not understood')
 
 
 def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProgram:
@@ -218,8 +210,6 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
 
     Parameters
     ----------
-    program : Program
-    robot : Robot
     controller : Controller
         Where the controller's frames are on this robot, and the frames that were given.
 
@@ -238,9 +228,9 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
         if moves:
             pieces.append(tuple(moves))
     still = np.zeros(count)
-    told = tuple(still if point.told is None else point.told for point in points)
+    reported = tuple(still if point.told is None else point.told for point in points)
     values = tuple(point.value for point in points)
-    return MoveProgram(values, tuple(pieces), told if count else ())
+    return MoveProgram(values, tuple(pieces), reported if count else ())
 
 
 def _with_external(point: Point, count: int) -> Point:

@@ -23,8 +23,6 @@ class Context(NamedTuple):
 
     Attributes
     ----------
-    robot : Robot
-    controller : Controller
     pulses_per_degree : array, shape (n,), optional
         Of a Yaskawa arm whose points are in pulses.
 

@@ -57,7 +57,6 @@ class Frame(NamedTuple):
 
     Attributes
     ----------
-    name : str
     value : array, shape (4, 4) [m], optional
         None where the program has no numbers.
     moving : bool or None
@@ -210,7 +209,6 @@ def controller_of(
 
     Parameters
     ----------
-    robot : Robot
     language : str
         Each maker's controller runs its own, on its own robots; on others nothing is assumed.
     tools, bases : mapping of str to array, optional
@@ -219,13 +217,13 @@ def controller_of(
         What was told of external axes.
 
     """
-    told = cell or Cell()
-    axes = external_axes(told.external, robot, language)
+    reported = cell or Cell()
+    axes = external_axes(reported.external, robot, language)
     arm = CarriedArm(robot, len(axes)).arm
     frames = robot.controller or controller_frames(arm)
     origin, notes = np.array(frames.base), _linked(frames)
-    if told.world is not None:
-        origin = np.array(np.linalg.inv(told.world))
+    if reported.world is not None:
+        origin = np.array(np.linalg.inv(reported.world))
     mix = _counting(arm, robot, language, origin, notes)
     if axes and language in LABELS:
         mix = shown_order(robot, axes) @ mix
@@ -239,8 +237,8 @@ def controller_of(
         _lower(bases),
         notes,
         axes,
-        told.along,
-        told.world is not None or len(axes) == robot.behind,
+        reported.along,
+        reported.world is not None or len(axes) == robot.behind,
         robot.behind > 0,
     )
 
@@ -248,11 +246,6 @@ def controller_of(
 def world_of(robot: Robot, language: str) -> tuple[Array, str]:
     """
     Return the world of a controller as delivered: the arm's own base, or where its track begins.
-
-    Parameters
-    ----------
-    robot : Robot
-    language : str
 
     Returns
     -------

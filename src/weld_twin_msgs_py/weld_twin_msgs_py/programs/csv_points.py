@@ -78,7 +78,7 @@ def _columns(
     joints = context.robot.joint_names
     if len(set(head)) != len(head):
         raise DataError(f'{source.where(place)}: a column is named twice')
-    found = [
+    result = [
         next(((joint + end, unit) for end, unit in ends.items() if joint + end in head), None)
         for joint, ends in zip(
             joints,
@@ -86,7 +86,7 @@ def _columns(
             strict=True,
         )
     ]
-    named = [item for item in found if item is not None]
+    named = [item for item in result if item is not None]
     if len(named) == len(joints):
         units = np.array([unit for _, unit in named])
         notation = joint_notation(units, np.eye(context.robot.n), 9, 'joints')

@@ -67,8 +67,6 @@ def external_axes(given: str, robot: Robot, language: str) -> tuple[ExternalAxis
     ----------
     given : str
         Which is which, as ``E1=rail,E2=-tilt``; empty where it is not told.
-    robot : Robot
-    language : str
 
     Raises
     ------
@@ -96,8 +94,10 @@ def external_axes(given: str, robot: Robot, language: str) -> tuple[ExternalAxis
             )
         return ()
     axes = [_axis(text.strip(), pattern, robot) for text in given.split(',')]
-    told = sorted(axis.joint for axis in axes)
-    if told != list(range(max(len(names), len(axes)))) or len({a.label for a in axes}) < len(axes):
+    reported = sorted(axis.joint for axis in axes)
+    if reported != list(range(max(len(names), len(axes)))) or len({a.label for a in axes}) < len(
+        axes
+    ):
         raise DataError(
             f'--external must tell each of the joints {listed or "before the arm"} once, each under a '
             f'name of its own, and no joint of the arm; got {given!r}'
@@ -107,8 +107,8 @@ def external_axes(given: str, robot: Robot, language: str) -> tuple[ExternalAxis
 
 def _axis(text: str, pattern: str, robot: Robot) -> ExternalAxis:
     label, sign, joint = (part.strip() for part in text.partition('='))
-    found = re.fullmatch(pattern, label, re.I)
-    if not sign or found is None:
+    result = re.fullmatch(pattern, label, re.I)
+    if not sign or result is None:
         raise DataError(f'--external needs NAME=joint with NAME like {pattern}, got {text!r}')
     name = label.lower() if label.lower().startswith('eax') else label.upper()
     back = joint.startswith('-')
@@ -116,15 +116,7 @@ def _axis(text: str, pattern: str, robot: Robot) -> ExternalAxis:
 
 
 def shown_order(robot: Robot, axes: tuple[ExternalAxis, ...]) -> Array:
-    """
-    Return the joints of a robot from those a controller shows: the arm's, then external ones, (n, n).
-
-    Parameters
-    ----------
-    robot : Robot
-    axes : tuple of ExternalAxis
-
-    """
+    """Return the joints of a robot from those a controller shows, (n, n): the arm's, then others."""
     out, own = np.zeros((robot.n, robot.n)), robot.n - len(axes)
     out[np.arange(len(axes), robot.n), np.arange(own)] = 1.0
     for k, axis in enumerate(axes):

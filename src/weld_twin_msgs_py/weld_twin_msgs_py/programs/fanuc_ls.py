@@ -70,18 +70,18 @@ class _Reader:
         self.untaught: dict[int, str] = {}
 
     def read(self) -> Program:
-        parts = {found[1]: found.start() for found in _PART.finditer(self.text)}
+        parts = {result[1]: result.start() for result in _PART.finditer(self.text)}
         moves, points = parts.get('MN', 0), parts.get('POS', len(self.text))
-        for found in _POINT.finditer(self.text, points):
-            self._point(found)
-        for found in _STATEMENT.finditer(self.text, moves, points):
-            self._statement(found)
+        for result in _POINT.finditer(self.text, points):
+            self._point(result)
+        for result in _STATEMENT.finditer(self.text, moves, points):
+            self._statement(result)
         self._refuse_open(moves, points)
         return self.program
 
     def _refuse_open(self, start: int, end: int) -> None:
         """Refuse a move that no semicolon ends: what it says would be lost."""
-        rest = _STATEMENT.sub(lambda found: ' ' * len(found[0]), self.text[start:end])
+        rest = _STATEMENT.sub(lambda result: ' ' * len(result[0]), self.text[start:end])
         lost = re.search(r'^[ \t]*\d+[ \t]*:[ \t]*[JLCAS][ \t]+PR?\[', rest, re.M)
         if lost is not None:
             where = self.source.where(start + lost.start())
@@ -89,14 +89,14 @@ class _Reader:
 
     # Points ----------------------------------------------------------------------------------
 
-    def _point(self, found: re.Match[str]) -> None:
-        index, where = int(found[1]), self.source.where(found.start())
+    def _point(self, result: re.Match[str]) -> None:
+        index, where = int(result[1]), self.source.where(result.start())
         if index in self.points or index in self.untaught:
             raise DataError(f'{where}: P[{index}] is defined twice')
-        end = closing(self.source, self.text, found.start(2))
-        groups = [m.start() for m in re.finditer(r'\bGP\d+\s*:', self.text[found.end() : end])]
-        first = found.end() + groups[0] if groups else found.end()
-        last = found.end() + groups[1] if len(groups) > 1 else end
+        end = closing(self.source, self.text, result.start(2))
+        groups = [m.start() for m in re.finditer(r'\bGP\d+\s*:', self.text[result.end() : end])]
+        first = result.end() + groups[0] if groups else result.end()
+        last = result.end() + groups[1] if len(groups) > 1 else end
         fields = self._fields(first, last, index)
         if fields is None:
             self.untaught[index] = f'P[{index}] is not taught'
@@ -132,9 +132,9 @@ class _Reader:
 
     def _fields(self, start: int, end: int, index: int) -> dict[str, Number] | None:
         fields: dict[str, Number] = {}
-        for found in re.finditer(r'\b(J\d|E\d|[XYZWPR])\s*=\s*([^\s,]+)', self.text[start:end]):
-            key, place = found[1], (start + found.start(2), start + found.end(2))
-            if found[2].startswith('*'):
+        for result in re.finditer(r'\b(J\d|E\d|[XYZWPR])\s*=\s*([^\s,]+)', self.text[start:end]):
+            key, place = result[1], (start + result.start(2), start + result.end(2))
+            if result[2].startswith('*'):
                 return None
             if key in fields:
                 where = self.source.where(place[0])
@@ -153,17 +153,17 @@ class _Reader:
         raise DataError(f'{where}: P[{index}] needs X Y Z W P R, or {", ".join(axes)}')
 
     def _frames(self, start: int, end: int, where: str) -> tuple[Frame, Frame]:
-        found = re.search(r'\bUF\s*:\s*(\w+)\s*,\s*UT\s*:\s*(\w+)', self.text[start:end])
-        if found is None:
+        result = re.search(r'\bUF\s*:\s*(\w+)\s*,\s*UT\s*:\s*(\w+)', self.text[start:end])
+        if result is None:
             raise DataError(f'{where}: a point needs UF and UT')
-        user, tool = found[1], found[2]
+        user, tool = result[1], result[2]
         base = Frame('', np.eye(4)) if user == '0' else Frame(user)
         return Frame(tool), base
 
     # Moves -----------------------------------------------------------------------------------
 
-    def _statement(self, found: re.Match[str]) -> None:
-        text, where = found[2].strip(), self.source.where(found.start(2))
+    def _statement(self, result: re.Match[str]) -> None:
+        text, where = result[2].strip(), self.source.where(result.start(2))
         wait = re.match(rf'WAIT\s+({NUMBER})\s*\(sec\)', text)
         if wait is not None:
             self.program.dwell(max(float(wait[1]), 0.0))
@@ -194,10 +194,10 @@ class _Reader:
             for point in self.points.values():
                 self.program.hold(point, f'a register chooses the point at {where}')
         elif not moves and not text.startswith(('!', '//')):
-            for found in re.finditer(r'(?<![A-Z])P\[\s*(\d+)', text):
-                point = self.points.get(int(found[1]), -1)
+            for result in re.finditer(r'(?<![A-Z])P\[\s*(\d+)', text):
+                point = self.points.get(int(result[1]), -1)
                 if point >= 0:
-                    self.program.hold(point, f'P[{found[1]}] is used at {where} by no move')
+                    self.program.hold(point, f'P[{result[1]}] is used at {where} by no move')
 
     def _add(self, kind: Kind, where: str, via: int | None, point: int | None, tail: str) -> None:
         assert point is not None
@@ -216,26 +216,26 @@ class _Reader:
         self.program.add(step)
 
     def _index(self, name: str, text: str) -> int | None:
-        found = _INDEX.match(text)
-        return self.points.get(int(found[1])) if name == 'P' and found is not None else None
+        result = _INDEX.match(text)
+        return self.points.get(int(result[1])) if name == 'P' and result is not None else None
 
     def _why(self, name: str, index: str, shift: re.Match[str] | None) -> str:
-        found = _INDEX.match(index)
+        result = _INDEX.match(index)
         if shift is not None:
             return f'{shift[0]} shifts it'
-        if name == 'P' and found is not None and int(found[1]) in self.untaught:
-            return self.untaught[int(found[1])]
+        if name == 'P' and result is not None and int(result[1]) in self.untaught:
+            return self.untaught[int(result[1])]
         return f'{name}[{index}] is not given here'
 
 
 def _speed(kind: Kind, tail: str) -> float:
-    found = _SPEED.search(tail)
-    if found is None:
+    result = _SPEED.search(tail)
+    if result is None:
         return SPEED
     try:
-        value = float(found[1])
+        value = float(result[1])
     except ValueError:
         return SPEED
     if kind == 'joint':
-        return max(value / 100.0, 1e-4) if found[2] == '%' else SPEED
-    return max(value * _UNITS[found[2]], 1e-4) if found[2] in _UNITS else SPEED
+        return max(value / 100.0, 1e-4) if result[2] == '%' else SPEED
+    return max(value * _UNITS[result[2]], 1e-4) if result[2] in _UNITS else SPEED

@@ -72,8 +72,8 @@ class _Reader:
         self.arc: list[Step] = []
 
     def read(self) -> Program:
-        found = re.search(r'^//INST\b', self.text, re.M)
-        cut = len(self.text) if found is None else found.start()
+        result = re.search(r'^//INST\b', self.text, re.M)
+        cut = len(self.text) if result is None else result.start()
         head = [(m.start(), self._head, m) for m in _HEAD.finditer(self.text, 0, cut)]
         head += [(m.start(), self._point, m) for m in _POINT.finditer(self.text, 0, cut)]
         body = [
@@ -92,8 +92,8 @@ class _Reader:
         self._close_arc()
         return self.program
 
-    def _head(self, found: re.Match[str]) -> None:
-        word, value = found[1].upper(), (found[2] or '').strip()
+    def _head(self, result: re.Match[str]) -> None:
+        word, value = result[1].upper(), (result[2] or '').strip()
         if word == 'TOOL':
             self.tool = Frame(value)
         elif word == 'USER':
@@ -102,14 +102,14 @@ class _Reader:
             self.form = value.upper()
         self.base = Frame(self.user or 'USER') if self.form == 'USER' else Frame('', np.eye(4))
 
-    def _point(self, found: re.Match[str]) -> None:
-        if found[1] != 'C':
+    def _point(self, result: re.Match[str]) -> None:
+        if result[1] != 'C':
             return  # Variables and other axes: a move that uses them is not understood.
-        name = f'C{int(found[2]):05d}'
-        where = self.source.where(found.start())
+        name = f'C{int(result[2]):05d}'
+        where = self.source.where(result.start())
         if name in self.points:
             raise DataError(f'{where}: {name} is defined twice')
-        parts = split_outside(self.text, *found.span(3))
+        parts = split_outside(self.text, *result.span(3))
         notation = self._notation(where)
         numbers = [number_at(self.source, *part, f'a coordinate of {name}') for part in parts]
         count = self.context.robot.n if notation.joints else 6
@@ -138,24 +138,24 @@ class _Reader:
         unit = np.radians(1.0 / pulses)
         return joint_notation(unit, self.context.controller.mix, 0, 'pulses')
 
-    def _timer(self, found: re.Match[str]) -> None:
+    def _timer(self, result: re.Match[str]) -> None:
         self._close_arc()
         try:
-            self.program.dwell(max(number_at(self.source, *found.span(1), 'a time').value, 0.0))
+            self.program.dwell(max(number_at(self.source, *result.span(1), 'a time').value, 0.0))
         except DataError:
             return  # A time in a variable; how long it is does not matter here.
 
-    def _shift(self, found: re.Match[str]) -> None:
+    def _shift(self, result: re.Match[str]) -> None:
         self._close_arc()
-        where = self.source.where(found.start())
-        if found[1] == 'SFTON':
+        where = self.source.where(result.start())
+        if result[1] == 'SFTON':
             self.shifted = f'SFTON at {where} shifts it'
-        elif found[1] == 'SFTOF':
+        elif result[1] == 'SFTOF':
             self.shifted = ''
 
-    def _move(self, found: re.Match[str]) -> None:
-        word, rest = found[1], found[2]
-        where, kind = self.source.where(found.start()), _KINDS.get(found[1], 'linear')
+    def _move(self, result: re.Match[str]) -> None:
+        word, rest = result[1], result[2]
+        where, kind = self.source.where(result.start()), _KINDS.get(result[1], 'linear')
         if kind != 'circular':
             self._close_arc()
         named = re.match(r'C(\d+)\b', rest)

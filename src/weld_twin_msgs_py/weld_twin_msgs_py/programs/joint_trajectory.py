@@ -50,7 +50,7 @@ def read(sources: Sequence[Source], context: Context) -> Program:
     order = _order(source, text, robot.joint_names)
     mix = np.eye(robot.n)[:, order]
     notation = joint_notation(np.ones(robot.n), mix, DIGITS, 'positions')
-    places = [found.end() for found in _POSITIONS.finditer(text)]
+    places = [result.end() for result in _POSITIONS.finditer(text)]
     times = _times(text, places)
     for k, place in enumerate(places):
         numbers = _numbers(source, text, place)
@@ -66,13 +66,13 @@ def read(sources: Sequence[Source], context: Context) -> Program:
 
 def _order(source: Source, text: str, joints: Sequence[str]) -> list[int]:
     """Return which joint of the robot each position is."""
-    found = _NAMES.search(text)
-    if found is None:
+    result = _NAMES.search(text)
+    if result is None:
         raise DataError(f'{source.where(0)}: a trajectory needs joint_names')
-    names = [text[a:b].strip(' "\'') for a, b in _items(source, text, found.end())]
+    names = [text[a:b].strip(' "\'') for a, b in _items(source, text, result.end())]
     if sorted(names) != sorted(joints):
         raise DataError(
-            f'{source.where(found.start())}: it moves {", ".join(names)}; the robot has '
+            f'{source.where(result.start())}: it moves {", ".join(names)}; the robot has '
             + ', '.join(joints)
         )
     return [list(joints).index(name) for name in names]
@@ -85,11 +85,11 @@ def _items(source: Source, text: str, place: int) -> list[tuple[int, int]]:
         parts = [stripped(text, *part) for part in split_outside(text, place + 1, end)]
         return [part for part in parts if part[0] < part[1]]
     out = []
-    found = _ITEM.match(text, place)
-    while found is not None:
-        out.append(stripped(text, *found.span(1)))
-        found = _ITEM.match(text, found.end())
-        if found is not None and ':' in found[1]:
+    result = _ITEM.match(text, place)
+    while result is not None:
+        out.append(stripped(text, *result.span(1)))
+        result = _ITEM.match(text, result.end())
+        if result is not None and ':' in result[1]:
             break  # The next point begins, "- positions:".
     return out
 

@@ -91,7 +91,6 @@ def read(sources: Sequence[Source], context: Context) -> Program:
     ----------
     sources : sequence of Source
         The .src, then the .dat where there is one.
-    context : Context
 
     Raises
     ------
@@ -119,11 +118,11 @@ class _Reader:
 
     def read(self) -> Program:
         for file in range(len(self.sources)):
-            for found in _DECLARED.finditer(self.texts[file]):
-                self._declaration(file, found)
+            for result in _DECLARED.finditer(self.texts[file]):
+                self._declaration(file, result)
         self._frame_tables()
         events = [
-            (found.start(), handle, found)
+            (result.start(), handle, result)
             for pattern, handle in (
                 (_MOVE, self._move),
                 (_OTHER, self._other),
@@ -132,27 +131,27 @@ class _Reader:
                 (_WAIT, self._wait),
                 (_ROUTINE, self._routine),
             )
-            for found in pattern.finditer(self.texts[0])
+            for result in pattern.finditer(self.texts[0])
         ]
-        for _, handle, found in sorted(events, key=lambda event: event[0]):
-            handle(found)
+        for _, handle, result in sorted(events, key=lambda event: event[0]):
+            handle(result)
         hold_if_used_elsewhere(self.program, self.names, self.texts, self.used)
         return self.program
 
     # Declarations ----------------------------------------------------------------------------
 
-    def _declaration(self, file: int, found: re.Match[str]) -> None:
-        kind, name = found[1].upper(), found[2].lower()
-        where = self.sources[file].where(found.start(2))
-        self.used[file].add(found.start(2))
+    def _declaration(self, file: int, result: re.Match[str]) -> None:
+        kind, name = result[1].upper(), result[2].lower()
+        where = self.sources[file].where(result.start(2))
+        self.used[file].add(result.start(2))
         if name in self.names or name in self.data:
-            raise DataError(f'{where}: {found[2]} is declared twice')
-        end = closing(self.sources[file], self.texts[file], found.start(3)) + 1
-        content = self._aggregate(file, found.start(3), end)
+            raise DataError(f'{where}: {result[2]} is declared twice')
+        end = closing(self.sources[file], self.texts[file], result.start(3)) + 1
+        content = self._aggregate(file, result.start(3), end)
         if kind in ('FDAT', 'LDAT', 'PDAT'):
             self.data[name] = content
         else:
-            point = self._point_of(file, content, found.start(3), found[2])
+            point = self._point_of(file, content, result.start(3), result[2])
             if point is None:
                 self.data[name] = content
             else:
@@ -161,11 +160,11 @@ class _Reader:
     def _frame_tables(self) -> None:
         """Take in TOOL_DATA and BASE_DATA where they stand in one of the files."""
         for file, text in enumerate(self.texts):
-            for found in _SET.finditer(text):
-                if found[1].upper().endswith(']') and '_DATA' in found[1].upper():
-                    value = self._frame_at(file, *found.span(2))
+            for result in _SET.finditer(text):
+                if result[1].upper().endswith(']') and '_DATA' in result[1].upper():
+                    value = self._frame_at(file, *result.span(2))
                     if value is not None:
-                        self.frames[found[1].upper()] = value
+                        self.frames[result[1].upper()] = value
 
     def _aggregate(self, file: int, start: int, end: int) -> Aggregate:
         """Return the components of ``{...}``; nested ones are left as text."""
@@ -201,9 +200,9 @@ class _Reader:
         for keys, notation in ((POSE_KEYS, KUKA_POSE), (axes, self.context.degrees())):
             if all(key in content.numbers for key in keys):
                 numbers = [content.numbers[key] for key in keys]
-                told = [content.numbers.get(label) for label in known]
+                reported = [content.numbers.get(label) for label in known]
                 point = self.program.add_point(
-                    name, numbers, notation, file, self.context.told(told)
+                    name, numbers, notation, file, self.context.told(reported)
                 )
                 outer = [k for k in EXTERNAL if k in content.numbers and k not in known]
                 if any(content.numbers[key].value != 0.0 for key in outer):
@@ -217,25 +216,25 @@ class _Reader:
 
     # Statements ------------------------------------------------------------------------------
 
-    def _routine(self, found: re.Match[str]) -> None:
-        del found
+    def _routine(self, result: re.Match[str]) -> None:
+        del result
         self.program.new_piece()
 
-    def _wait(self, found: re.Match[str]) -> None:
+    def _wait(self, result: re.Match[str]) -> None:
         try:
             self.program.dwell(
-                max(number_at(self.sources[0], *found.span(1), 'a time').value, 0.0)
+                max(number_at(self.sources[0], *result.span(1), 'a time').value, 0.0)
             )
         except DataError:
             return  # A computed time; how long it is does not matter here.
 
-    def _other(self, found: re.Match[str]) -> None:
-        where = self.sources[0].where(found.start())
-        self.program.unknown('linear', where, f'{found[1].upper()} is not understood')
+    def _other(self, result: re.Match[str]) -> None:
+        where = self.sources[0].where(result.start())
+        self.program.unknown('linear', where, f'{result[1].upper()} is not understood')
 
-    def _set(self, found: re.Match[str]) -> None:
-        what = found[1].upper()
-        start, end = stripped(self.texts[0], *found.span(2))
+    def _set(self, result: re.Match[str]) -> None:
+        what = result[1].upper()
+        start, end = stripped(self.texts[0], *result.span(2))
         value = self.texts[0][start:end]
         if what in ('$BASE', '$TOOL'):
             along = _ALONG.match(value) if what == '$BASE' else None
@@ -259,9 +258,9 @@ class _Reader:
             speed = self.data[value.lower()].numbers.get('VEL')
             self.state.speed = self.state.speed if speed is None else max(speed.value, 1e-4)
 
-    def _bas(self, found: re.Match[str]) -> None:
-        what = found[1].upper()
-        start, end = stripped(self.texts[0], *found.span(2))
+    def _bas(self, result: re.Match[str]) -> None:
+        what = result[1].upper()
+        start, end = stripped(self.texts[0], *result.span(2))
         if what == 'EX_BASE':
             self.state.base = Frame(self.texts[0][start:end], None, None)
         elif what in ('TOOL', 'BASE'):
@@ -329,18 +328,18 @@ class _Reader:
 
     # Moves -----------------------------------------------------------------------------------
 
-    def _move(self, found: re.Match[str]) -> None:
-        word, kind = found[1].upper(), KINDS[found[1].upper()]
+    def _move(self, result: re.Match[str]) -> None:
+        word, kind = result[1].upper(), KINDS[result[1].upper()]
         source, text = self.sources[0], self.texts[0]
-        where = source.where(found.start())
-        end = _line_end(text, found.end())
-        if found[2]:
+        where = source.where(result.start())
+        end = _line_end(text, result.end())
+        if result[2]:
             self.program.unknown(kind, where, f'{word}_REL counts from where the arm stands')
             return
         wanted = 2 if kind == 'circular' else 1
-        with_ = _WITH.search(text, found.end(), end)
+        with_ = _WITH.search(text, result.end(), end)
         cut = end if with_ is None else with_.start()
-        parts = self._parts(found.end(), cut)
+        parts = self._parts(result.end(), cut)
         if len(parts) > wanted:
             self.program.unknown(
                 kind, where, f'{word} with {len(parts)} arguments is not understood'
@@ -353,7 +352,7 @@ class _Reader:
         tail = text[parts[-1][1] : end].upper() if parts else ''
         refs = [self._ref(*part) for part in parts]
         if len(refs) < wanted or any(ref is None for ref in refs):
-            what = source.text[found.end() : end].strip() or 'nothing'
+            what = source.text[result.end() : end].strip() or 'nothing'
             self.program.unknown(kind, where, f'{word} goes to {what!r}, which is not given here')
             return
         ends = [ref for ref in refs if ref is not None]
@@ -421,11 +420,11 @@ class _Reader:
 
 def _bare(text: str) -> str:
     """Return the number of ``TOOL_DATA[1]``, as a user would name it."""
-    found = re.fullmatch(r'(?:TOOL|BASE)_DATA\s*\[\s*(\w+)\s*\]', text.strip(), re.I)
-    return found[1] if found else ''
+    result = re.fullmatch(r'(?:TOOL|BASE)_DATA\s*\[\s*(\w+)\s*\]', text.strip(), re.I)
+    return result[1] if result else ''
 
 
 def _line_end(text: str, start: int) -> int:
     """Return where the statement that goes on at a place ends."""
-    found = re.compile(r'[\r\n]').search(text, start)
-    return len(text) if found is None else found.start()
+    result = re.compile(r'[\r\n]').search(text, start)
+    return len(text) if result is None else result.start()

@@ -31,12 +31,10 @@ class Language(NamedTuple):
 
     Attributes
     ----------
-    maker : str
     extensions : tuple of str
         In lower case, with the point.
     signs : str
         A regular expression that only programs of this language hold.
-    read : callable
     pose : Notation
         How it writes a pose.
     beside : tuple of str
@@ -82,7 +80,6 @@ def language_of(source: Source, path: Path | str, controller: str = '') -> str:
 
     Parameters
     ----------
-    source : Source
     path : Path or str
         Where it was read.
     controller : str
@@ -119,7 +116,6 @@ def read_program(path: Path | str, context: Context, controller: str = '') -> Pr
     Parameters
     ----------
     path : Path or str
-    context : Context
     controller : str
         Its language; empty to let the file tell.
 
@@ -133,12 +129,12 @@ def read_program(path: Path | str, context: Context, controller: str = '') -> Pr
     name = language_of(source, path, controller)
     place, beside = Path(path), []
     for extension in LANGUAGES[name].beside:
-        found = [
+        result = [
             other
             for other in sorted(place.parent.glob('*'))
             if other.stem.lower() == place.stem.lower() and other.suffix.lower() == extension
         ]
-        beside += [read_source(other) for other in found[:1]]
+        beside += [read_source(other) for other in result[:1]]
     return read_sources([source, *beside], context, name)
 
 

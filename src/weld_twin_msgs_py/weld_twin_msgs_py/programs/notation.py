@@ -44,7 +44,6 @@ class Notation(NamedTuple):
 
     Attributes
     ----------
-    name : str
     joints : bool
         The numbers are joint positions.
     value : callable
@@ -77,7 +76,6 @@ def angles_fixed(rotation: Array, near: Sequence[float]) -> list[float]:
     Parameters
     ----------
     rotation : array, shape (3, 3)
-    near : sequence of float
 
     """
     cosine = float(np.hypot(rotation[0, 0], rotation[1, 0]))
@@ -167,8 +165,6 @@ def joint_notation(per_unit: Array, mix: Array, decimals: int, name: str) -> Not
         Model units [rad or m] of one unit as written.
     mix : array, shape (n, n)
         Makes the joints of the model from those of the controller, where they are coupled.
-    decimals : int
-    name : str
 
     """
     back = np.linalg.inv(mix)

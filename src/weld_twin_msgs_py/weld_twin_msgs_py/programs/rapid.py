@@ -105,10 +105,10 @@ class _Reader:
         self.unit = ''
 
     def read(self) -> Program:
-        for found in _DECLARED.finditer(self.text):
-            self._declaration(found)
+        for result in _DECLARED.finditer(self.text):
+            self._declaration(result)
         events = [
-            (found.start(), handle, found)
+            (result.start(), handle, result)
             for pattern, handle in (
                 (_MOVE, self._move),
                 (_OTHER, self._other),
@@ -116,35 +116,35 @@ class _Reader:
                 (_CONF, self._conf),
                 (_ROUTINE, self._routine),
             )
-            for found in pattern.finditer(self.text)
+            for result in pattern.finditer(self.text)
         ]
-        for _, handle, found in sorted(events, key=lambda event: event[0]):
-            handle(found)
+        for _, handle, result in sorted(events, key=lambda event: event[0]):
+            handle(result)
         hold_if_used_elsewhere(self.program, self.names, [self.text], [self.used])
         return self.program
 
     # Declarations ----------------------------------------------------------------------------
 
-    def _declaration(self, found: re.Match[str]) -> None:
-        kind, name = found[1].lower(), found[2].lower()
-        where = self.source.where(found.start(2))
-        self.used.add(found.start(2))
-        if found[3] or not self.text.startswith('[', found.end()):
+    def _declaration(self, result: re.Match[str]) -> None:
+        kind, name = result[1].lower(), result[2].lower()
+        where = self.source.where(result.start(2))
+        self.used.add(result.start(2))
+        if result[3] or not self.text.startswith('[', result.end()):
             return  # An array, or a value that is worked out: moves to it are not understood.
         known: list[dict[str, Any]] = [self.names, self.tools, self.bases, self.speeds]
         if any(name in table for table in known):
-            raise DataError(f'{where}: {found[2]} is declared twice')
-        tree = self._tree(found.end(), closing(self.source, self.text, found.end()) + 1)
+            raise DataError(f'{where}: {result[2]} is declared twice')
+        tree = self._tree(result.end(), closing(self.source, self.text, result.end()) + 1)
         if kind in ('robtarget', 'jointtarget'):
-            point = self._target(tree, found.end(), found[2], kind == 'jointtarget')
+            point = self._target(tree, result.end(), result[2], kind == 'jointtarget')
             if point is not None:
                 self.names[name] = point
         elif kind == 'tooldata':
-            self.tools[name] = self._tool(tree, found[2], found.end())
+            self.tools[name] = self._tool(tree, result[2], result.end())
         elif kind == 'wobjdata':
-            self.bases[name] = self._wobj(tree, found[2], found.end())
+            self.bases[name] = self._wobj(tree, result[2], result.end())
         elif isinstance(tree, list) and tree and isinstance(tree[0], Leaf):
-            speed = number_at(self.source, *tree[0], f'the speed of {found[2]}').value
+            speed = number_at(self.source, *tree[0], f'the speed of {result[2]}').value
             self.speeds[name] = max(speed, 0.1) * 1e-3
 
     def _tool(self, tree: Tree, name: str, at: int) -> Frame:
@@ -204,8 +204,8 @@ class _Reader:
             point = self.program.add_point(name, numbers, self.context.degrees())
         else:
             numbers = self._numbers(parts[:2], (3, 4), name, start)
-            told = self.context.told(given)
-            point = self.program.add_point(name, numbers, ABB_POSE, told=told)
+            reported = self.context.told(given)
+            point = self.program.add_point(name, numbers, ABB_POSE, told=reported)
             if len(parts) > 2:
                 conf = self._numbers(parts[2:3], (4,), name, start)
                 self.suits[point] = quadrants([round(number.value) for number in conf])
@@ -240,44 +240,44 @@ class _Reader:
 
     # Statements ------------------------------------------------------------------------------
 
-    def _routine(self, found: re.Match[str]) -> None:
-        del found
+    def _routine(self, result: re.Match[str]) -> None:
+        del result
         self.program.new_piece()
 
-    def _conf(self, found: re.Match[str]) -> None:
-        self.config[found[1].lower()] = found[2].lower() == 'on'
+    def _conf(self, result: re.Match[str]) -> None:
+        self.config[result[1].lower()] = result[2].lower() == 'on'
 
-    def _wait(self, found: re.Match[str]) -> None:
+    def _wait(self, result: re.Match[str]) -> None:
         try:
-            self.program.dwell(max(number_at(self.source, *found.span(2), 'a time').value, 0.0))
+            self.program.dwell(max(number_at(self.source, *result.span(2), 'a time').value, 0.0))
         except DataError:
             return  # A computed time; how long it is does not matter here.
 
-    def _other(self, found: re.Match[str]) -> None:
-        where = self.source.where(found.start())
-        if found[1].lower().endswith('offsoff') or found[1].lower() == 'pdispoff':
+    def _other(self, result: re.Match[str]) -> None:
+        where = self.source.where(result.start())
+        if result[1].lower().endswith('offsoff') or result[1].lower() == 'pdispoff':
             self.displaced = ''
-        elif found[1].lower() in _DISPLACED:
-            self.displaced = f'{found[1]} at {where} displaces it'
+        elif result[1].lower() in _DISPLACED:
+            self.displaced = f'{result[1]} at {where} displaces it'
         else:
-            self.program.unknown('linear', where, f'{found[1]} is not understood')
+            self.program.unknown('linear', where, f'{result[1]} is not understood')
 
     # Moves -----------------------------------------------------------------------------------
 
-    def _move(self, found: re.Match[str]) -> None:
-        word = (found[1] or found[2] or found[3]).lower()
-        kind, where = _KINDS[word], self.source.where(found.start())
-        end = self.text.find(';', found.end())
+    def _move(self, result: re.Match[str]) -> None:
+        word = (result[1] or result[2] or result[3]).lower()
+        kind, where = _KINDS[word], self.source.where(result.start())
+        end = self.text.find(';', result.end())
         if end < 0:
-            raise DataError(f'{where}: the statement {found[0]} is not closed by ;')
-        parts = self._arguments(found.end(), end)
+            raise DataError(f'{where}: the statement {result[0]} is not closed by ;')
+        parts = self._arguments(result.end(), end)
         wanted = 2 if kind == 'circular' else 1
         if len(parts) < wanted + 3:
-            raise DataError(f'{where}: {found[0]} needs a point, a speed, a zone and a tool')
+            raise DataError(f'{where}: {result[0]} needs a point, a speed, a zone and a tool')
         refs = [self._ref(*part, word == 'absj') for part in parts[:wanted]]
         if self.displaced or any(ref is None for ref in refs):
             text = self.source.text[slice(*parts[wanted - 1])].strip()
-            why = self.displaced or f'{found[0]} goes to {text!r}, which is not given here'
+            why = self.displaced or f'{result[0]} goes to {text!r}, which is not given here'
             self.program.unknown(kind, where, why)
             return
         places = [ref for ref in refs if ref is not None]
@@ -307,8 +307,8 @@ class _Reader:
         text = self.text[start:cut]
         if text.startswith('['):
             tree = self._tree(start, cut)
-            found = self._target(tree, start, f'line {self.source.line(start)}', joints)
-            return None if found is None else Ref(found)
+            result = self._target(tree, start, f'line {self.source.line(start)}', joints)
+            return None if result is None else Ref(result)
         call = re.match(r'(Offs|RelTool)\s*(\()', text, re.I)
         if call is not None:
             return self._shifted(call[1].lower(), start + call.start(2), cut)
@@ -351,10 +351,10 @@ class _Reader:
         r"""Return the numbers of ``\Rx:=5`` and the like; None where one is worked out."""
         out = {}
         text = self.text[start:end]
-        for found in re.finditer(r'\\(\w+)\s*:=\s*([^\\]*)', text):
-            place = start + found.start(2), start + found.end(2)
+        for result in re.finditer(r'\\(\w+)\s*:=\s*([^\\]*)', text):
+            place = start + result.start(2), start + result.end(2)
             try:
-                out[found[1].lower()] = number_at(self.source, *place, 'an angle').value
+                out[result[1].lower()] = number_at(self.source, *place, 'an angle').value
             except DataError:
                 return None
         return out
@@ -384,9 +384,10 @@ class _Reader:
         start, end = parts[at]
         speed = self.text[start : self._before_switch(start, end)].lower()
         value = self.speeds.get(speed)
-        usual = re.fullmatch(r'v(\d+)', speed)
+        # v200 is 200 mm/s; a move may also have the numbers of its speed itself.
+        usual = re.match(r'v(\d+)$|\[\s*(\d+\.?\d*(?:e[+-]?\d+)?)\s*,', speed)
         if value is None:
-            value = float(usual[1]) * 1e-3 if usual else SPEED
+            value = float(usual[1] or usual[2]) * 1e-3 if usual else SPEED
         start, end = parts[-2]
         zone = self.text[start : self._before_switch(start, end)].lower()
         if kind == 'joint':

@@ -28,7 +28,6 @@ def rewritten(program: Program, points: Sequence[Array], moved: Collection[int])
 
     Parameters
     ----------
-    program : Program
     points : sequence of array
         Values of all points.
     moved : collection of int
@@ -62,7 +61,6 @@ def numeral(value: float, old: str, least: int) -> str:
 
     Parameters
     ----------
-    value : float
     old : str
         The number that it replaces; a sign before a positive one is kept.
     least : int
@@ -76,8 +74,8 @@ def numeral(value: float, old: str, least: int) -> str:
 
 
 def _decimals(text: str) -> int:
-    found = re.search(r'\.(\d+)', text)
-    return min(len(found[1]), 12) if found and 'e' not in text.lower() else 0
+    result = re.search(r'\.(\d+)', text)
+    return min(len(result[1]), 12) if result and 'e' not in text.lower() else 0
 
 
 def check_written(before: Program, after: Program, points: Sequence[Array]) -> None:

@@ -93,7 +93,6 @@ def number_at(source: Source, start: int, end: int, what: str, file: int = 0) ->
 
     Parameters
     ----------
-    source : Source
     start, end : int
         The piece.
     what : str
@@ -166,7 +165,7 @@ def stripped(text: str, start: int, end: int) -> tuple[int, int]:
 def masked(text: str, patterns: Sequence[str]) -> str:
     """Return a text of the same length with comments and strings blanked out, line ends kept."""
     either = re.compile('|'.join(f'(?:{pattern})' for pattern in patterns))
-    return either.sub(lambda found: re.sub(r'[^\r\n]', ' ', found[0]), text)
+    return either.sub(lambda result: re.sub(r'[^\r\n]', ' ', result[0]), text)
 
 
 def _short(text: str) -> str:

@@ -86,9 +86,9 @@ class _Reader:
 
     def read(self) -> Program:
         self._declare()
-        for found in _WORD.finditer(self.text):
-            if found[5]:
-                self._statement(found)
+        for result in _WORD.finditer(self.text):
+            if result[5]:
+                self._statement(result)
             else:
                 self.program.new_piece()
         names = {name: point for name, point in self.names.items() if point >= 0}
@@ -99,34 +99,34 @@ class _Reader:
     def _declare(self) -> None:
         """Take in the variables that are set to a pose or to joint positions."""
         self.counts: dict[str, int] = {}
-        for found in _ASSIGNED.finditer(self.text):
-            name = found[2]
+        for result in _ASSIGNED.finditer(self.text):
+            name = result[2]
             self.counts[name] = self.counts.get(name, 0) + 1
-            if re.match(r'(?:p\s*)?\[', self.text[found.end() :]) is None:
+            if re.match(r'(?:p\s*)?\[', self.text[result.end() :]) is None:
                 continue
-            opening = self.text.index('[', found.end())
+            opening = self.text.index('[', result.end())
             try:
-                point = self._target(found.end(), closing(self.source, self.text, opening) + 1)
+                point = self._target(result.end(), closing(self.source, self.text, opening) + 1)
             except DataError:
                 continue  # A list of something else; a move to it is refused where it stands.
             if point is not None and name not in self.names:
                 self.names[name] = point
-                self.used.add(found.start(2))
+                self.used.add(result.start(2))
 
     def _hold_reassigned(self) -> None:
         for name, point in self.names.items():
             if self.counts.get(name, 0) > 1:
                 self.program.hold(point, f'{name} is set more than once')
 
-    def _statement(self, found: re.Match[str]) -> None:
-        opening = found.start(5)
+    def _statement(self, result: re.Match[str]) -> None:
+        opening = result.start(5)
         end = closing(self.source, self.text, opening)
-        where = self.source.where(found.start())
-        if found[1]:
-            self._move(found[1], where, opening + 1, end)
-        elif found[2]:
-            self.program.unknown('linear', where, f'{found[2]} moves the arm in its own way')
-        elif found[3]:
+        where = self.source.where(result.start())
+        if result[1]:
+            self._move(result[1], where, opening + 1, end)
+        elif result[2]:
+            self.program.unknown('linear', where, f'{result[2]} moves the arm in its own way')
+        elif result[3]:
             self.tool = self._tool(opening + 1, end)
         else:
             self._sleep(opening + 1, end)
@@ -266,10 +266,10 @@ class _Reader:
 
     def _numbers(self, start: int, end: int, count: int) -> list[Number] | None:
         """Return the numbers of a list; None where it is no list, or one that is worked out."""
-        found = re.match(r'(?:p\s*)?(\[)', self.text[start:end])
-        if found is None:
+        result = re.match(r'(?:p\s*)?(\[)', self.text[start:end])
+        if result is None:
             return None
-        opening = start + found.start(1)
+        opening = start + result.start(1)
         last = closing(self.source, self.text, opening)
         if last != end - 1:
             return None

@@ -62,7 +62,6 @@ def foot_of(
 
     Parameters
     ----------
-    tree : Tree
     base : str
         The first link of the chain.
     chain : sequence of Joint
@@ -93,10 +92,8 @@ def flange_link_of(
 
     Parameters
     ----------
-    tree : Tree
     chain : sequence of Joint
         From base to tip.
-    tip : str
     wanted : str or None
         The link that was asked for.
 
@@ -144,7 +141,6 @@ def _rank(link: str, fixed: bool, carries: bool) -> int:
 
     Parameters
     ----------
-    link : str
     fixed : bool
         It hangs on the last link that moves, and is not that.
     carries : bool

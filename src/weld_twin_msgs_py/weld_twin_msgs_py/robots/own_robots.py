@@ -19,9 +19,9 @@ SUFFIXES = ('.yaml', '.yml', '.urdf')
 
 def folders() -> tuple[Path, ...]:
     """Return where robots of one's own lie: what the environment says, else the user's settings."""
-    told = os.environ.get(FOLDERS, '')
-    if told:
-        return tuple(Path(part).expanduser() for part in told.split(os.pathsep) if part)
+    reported = os.environ.get(FOLDERS, '')
+    if reported:
+        return tuple(Path(part).expanduser() for part in reported.split(os.pathsep) if part)
     home = os.environ.get('XDG_CONFIG_HOME') or os.path.join(os.path.expanduser('~'), '.config')
     return (Path(home, 'weld_twin', 'robots'),)
 
@@ -58,14 +58,14 @@ def own_robot(spec: str) -> Path | None:
         Several robots have the name; none of them is taken for the other.
 
     """
-    found = [str(file) for file in own_files() if file.stem.lower() == spec.lower()]
-    if found and spec.lower() in catalog.names():
-        found.insert(0, 'the bundled one')
-    if len(found) > 1:
+    result = [str(file) for file in own_files() if file.stem.lower() == spec.lower()]
+    if result and spec.lower() in catalog.names():
+        result.insert(0, 'the bundled one')
+    if len(result) > 1:
         raise ModelError(
-            f'{spec!r} is the name of several robots: {", ".join(found)}; rename all files but one'
+            f'{spec!r} is the name of several robots: {", ".join(result)}; rename all files but one'
         )
-    return Path(found[0]) if found else None
+    return Path(result[0]) if result else None
 
 
 def as_file(spec: str) -> str:

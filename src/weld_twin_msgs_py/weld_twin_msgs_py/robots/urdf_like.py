@@ -68,11 +68,9 @@ def write_urdf_like(
     Parameters
     ----------
     path : Path or str
-    given : GivenUrdf
     robot : Robot
         The corrected one, with the joints of the given file; where its base stands in the world
         is not written.
-    overwrite : bool
     notes : sequence of str
         Comments at the top.
 

@@ -41,8 +41,6 @@ def write_urdf(
     Parameters
     ----------
     path : Path or str
-    robot : Robot
-    overwrite : bool
     notes : sequence of str
         Comments at the top.
 
@@ -125,14 +123,7 @@ def add_fixed(root: Element, parent: str, name: str, T: Array) -> None:
 
 
 def joint_frames(robot: Robot) -> list[Array]:
-    """
-    Return the frame of every joint at zero, axis z, and of the tool last, (4, 4) each.
-
-    Parameters
-    ----------
-    robot : Robot
-
-    """
+    """Return the frame of every joint at zero, axis z, and of the tool last, (4, 4) each."""
     out, ahead = [], robot.T_world_base
     for k in range(robot.n):
         before, after = _split_row(robot, k)

@@ -36,7 +36,6 @@ def misfit(robot: Robot, q: Array, position: Array) -> Array:
 
     Parameters
     ----------
-    robot : Robot
     q : array, shape (M, n)
     position : array, shape (M, 3) [m]
 
@@ -61,13 +60,13 @@ def misfit(robot: Robot, q: Array, position: Array) -> Array:
         rest = seen - (flange + turn @ solution[:3]) @ last.T - solution[3:]
         return np.asarray(np.linalg.norm(rest, axis=1)), R
 
-    found, _ = fitted(_best_turn(seen_flange), _ROUNDS)
-    if np.median(found) > _FAR * np.linalg.norm(seen, axis=1).max(initial=0.0):
+    result, _ = fitted(_best_turn(seen_flange), _ROUNDS)
+    if np.median(result) > _FAR * np.linalg.norm(seen, axis=1).max(initial=0.0):
         # Few axes bring the flange along an arc: then the turns have ends that are not the best.
         begun = [fitted(turn, _FIRST) for turn in _CORNERS]
         _, R = min(begun, key=lambda one: float(np.median(one[0])))
-        found = min(found, fitted(R, _ROUNDS)[0], key=np.median)
-    return found
+        result = min(result, fitted(R, _ROUNDS)[0], key=np.median)
+    return result
 
 
 def _best_turn(products: Array) -> Array:

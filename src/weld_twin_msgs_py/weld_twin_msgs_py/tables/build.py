@@ -253,9 +253,9 @@ def _position(
     named = columns.position or columns.target
     off = () if columns.position else columns.difference
     sign = 1.0 if options.difference == 'add' else -1.0
-    told = next((u for u in (options.length_unit, *map(columns.unit, named + off)) if u), None)
+    reported = next((u for u in (options.length_unit, *map(columns.unit, named + off)) if u), None)
     raw = cells.stack(named) + (sign * cells.stack(off) if off else 0.0)
-    unit, sentence = length_unit(raw, robot, q, told)
+    unit, sentence = length_unit(raw, robot, q, reported)
     what = 'a measured position' if columns.position else 'a position'
     position = _metres(cells, named, columns, options, unit, what)
     if columns.position:
@@ -312,8 +312,8 @@ def _rotation(
             )
         return rotation
     own = [options.rotation_unit or columns.unit(name) for name in columns.rotation]
-    told = next((unit for unit in own if unit), None)
-    unit, sentence = angle_unit(values, told, 'measured angles')
+    reported = next((unit for unit in own if unit), None)
+    unit, sentence = angle_unit(values, reported, 'measured angles')
     if sentence:
         said.append(sentence)
     angles = values * [

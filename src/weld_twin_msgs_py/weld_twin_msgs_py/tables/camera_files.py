@@ -76,7 +76,6 @@ def read_target(name: str, path: Path | str, mount: str | None = None) -> Target
 
     Parameters
     ----------
-    name : str
     path : Path or str
         YAML with ``points`` (label to x, y, z, or a list of them) or the numbers of a board
         (`board_points`), and where they apply ``mount`` and ``sigma``; or a table whose first

@@ -34,12 +34,8 @@ class Cells:
 
     Attributes
     ----------
-    path : Path
-    header : list of str
-    rows : list of list of str
     lines : list of int
         Line number of each row in the file.
-    decimal : str
     said : list of str
         What was found out, one sentence each.
 
@@ -137,12 +133,12 @@ def read_cells(
     if is_positions(decoded):
         return _as_read(path, read_positions(path, decoded))
     if delimiter is None:
-        found = _known(path, decoded, marker)
-        if found is not None:
-            return found
+        result = _known(path, decoded, marker)
+        if result is not None:
+            return result
     table = split_lines(path, decoded, delimiter, said)
-    told = {name: parted(name)[1] for name in table.header}
-    header, rows = without_units(path, table.header, table.rows, told)
+    reported = {name: parted(name)[1] for name in table.header}
+    header, rows = without_units(path, table.header, table.rows, reported)
     if decimal is None:
         commas = said[:1] == ["columns are separated by ','"] or delimiter == ','
         decimal = decimal_sign(path, rows, ',' if commas else None)
@@ -166,8 +162,8 @@ def _known(path: Path, text: str, marker: str | None) -> Cells | None:
     return None
 
 
-def _as_read(path: Path, found: Read) -> Cells:
-    header, rows, lines, said = found
+def _as_read(path: Path, result: Read) -> Cells:
+    header, rows, lines, said = result
     if not rows:
         raise DataError(f"table '{path}': there is a header and no row under it")
     comma = any(COMMA.match(cell) for row in rows[:LOOK] for cell in row)

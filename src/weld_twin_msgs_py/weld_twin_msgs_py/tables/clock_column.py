@@ -103,5 +103,5 @@ def _reader(texts: list[str]) -> Callable[[str], datetime] | None:
 
 def _by_format(text: str, form: str) -> datetime:
     # A comma before the fraction of a second, as German spreadsheets have it.
-    found = datetime.strptime(text.replace(',', '.').strip(), form)
-    return found if '%Y' in form else found.replace(year=2000)
+    result = datetime.strptime(text.replace(',', '.').strip(), form)
+    return result if '%Y' in form else result.replace(year=2000)

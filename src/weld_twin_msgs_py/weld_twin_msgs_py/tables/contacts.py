@@ -58,7 +58,6 @@ def write_touches(path: Path, motion: Mapping[str, Any]) -> None:
 
     Parameters
     ----------
-    path : Path
     motion : mapping
         'joint_names', 'q' [rad, m] and 'contact', one label per posture.
 

@@ -41,13 +41,13 @@ def read_positions(path: Path, text: str) -> Read:
 
     """
     rows, lines = list[list[str]](), list[int]()
-    starts = [found.start() for found in _MARK.finditer(text)]
+    starts = [result.start() for result in _MARK.finditer(text)]
     for start, end in zip(starts, [*starts[1:], len(text)], strict=True):
         groups = _GROUP.findall(text[:start])
         if groups and groups[-1] != _ARM:
             continue
-        found = dict(_JOINT.findall(text[start:end]))
-        rows.append([found[number] for number in sorted(found, key=int)])
+        result = dict(_JOINT.findall(text[start:end]))
+        rows.append([result[number] for number in sorted(result, key=int)])
         lines.append(text.count('\n', 0, start) + 1)
     if len({len(row) for row in rows}) != 1:
         raise DataError(

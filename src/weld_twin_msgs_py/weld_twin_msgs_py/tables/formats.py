@@ -142,8 +142,6 @@ def read(known: Format, text: str, marker: str | None) -> Read:
 
     Parameters
     ----------
-    known : Format
-    text : str
     marker : str, optional
         Marker or body that is meant, where the file has several.
 
@@ -164,14 +162,14 @@ def read(known: Format, text: str, marker: str | None) -> Read:
     first = at + 1 + known.below
     if known.named_by and first < len(split) and split[first] and not is_number(split[first][0]):
         header, first = split[first], first + 1  # QTM writes names over the columns if asked to
-    found, said = _meant(known, header, text, marker)
+    result, said = _meant(known, header, text, marker)
     rows, numbers = [], []
     for k in range(first, len(lines)):
         cells = split[k]
         if len(cells) >= len(header) and any(cells):
-            rows.append(_seen([cells[i] for i, _ in found], known))
+            rows.append(_seen([cells[i] for i, _ in result], known))
             numbers.append(k + 1)
-    names = [name for _, name in found]
+    names = [name for _, name in result]
     if known.rate and not any(name.startswith('time') for name in names):
         match = re.search(known.rate, text, re.M)
         rate = float(match[1]) if match else 1.0
@@ -227,11 +225,11 @@ def _meant(
     owned = dict[str, list[tuple[int, str]]]()
     for k, name in enumerate(header):
         for pattern, called in known.names:
-            found = re.search(pattern, name)
-            if found is None:
+            result = re.search(pattern, name)
+            if result is None:
                 continue
-            new = found.expand(called.replace('{unit}', unit))
-            what = found.groupdict().get('what')
+            new = result.expand(called.replace('{unit}', unit))
+            what = result.groupdict().get('what')
             (plain if what is None else owned.setdefault(what, [])).append((k, new))
             break
     said = [f'read as the {known.name} writes it']

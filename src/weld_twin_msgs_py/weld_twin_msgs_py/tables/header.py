@@ -95,17 +95,19 @@ def find_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> 
             f'robot {robot.name!r} has {robot.n} joints, but {len(out.joints)} joint columns are '
             'named in --joint-columns'
         )
-    left = [part for part in parts if part.name not in out.joints]
-    out.effort = _efforts(left, robot)
-    left = [part for part in left if part.name not in out.effort]
-    names = [part.name for part in left]
+    remaining = [part for part in parts if part.name not in out.joints]
+    out.effort = _efforts(remaining, robot)
+    remaining = [part for part in remaining if part.name not in out.effort]
+    names = [part.name for part in remaining]
     out.temperature = options.temperature_column or _first(names, TEMPERATURE)
     given = options.time_column
     out.date, out.time = (None, given) if given else time_columns(names)
-    _positions(left, options, out)
+    _positions(remaining, options, out)
     if not options.positions_only:
-        out.rotation = options.rotation_columns or _rotation(left)
-    out.sigma = options.sigma_columns or _one_group(left, 'length', SIGMA, 'sigma_columns', False)
+        out.rotation = options.rotation_columns or _rotation(remaining)
+    out.sigma = options.sigma_columns or _one_group(
+        remaining, 'length', SIGMA, 'sigma_columns', False
+    )
     return out
 
 
@@ -164,15 +166,15 @@ def _joints(parts: Sequence[Named], robot: Robot) -> tuple[str, ...]:
     """
     own = _by_own_names(parts, robot)
     missing = [joint for joint in robot.joint_names if joint not in own]
-    left = [part for part in parts if part.name not in own.values()]
+    remaining = [part for part in parts if part.name not in own.values()]
     slides = [joint for joint in missing if robot.prismatic[robot.index(joint)]]
-    beside = _beside_the_arm(left)
+    beside = _beside_the_arm(remaining)
     if slides and len(beside) == len(slides):
         own |= dict(zip(slides, beside, strict=True))
         missing = [joint for joint in missing if joint not in own]
-        left = [part for part in left if part.name not in beside]
+        remaining = [part for part in remaining if part.name not in beside]
     if missing:
-        own |= dict(zip(missing, _in_order(left, len(missing), parts, robot), strict=True))
+        own |= dict(zip(missing, _in_order(remaining, len(missing), parts, robot), strict=True))
     return tuple(own[joint] for joint in robot.joint_names)
 
 
@@ -181,43 +183,43 @@ def _by_own_names(parts: Sequence[Named], robot: Robot) -> dict[str, str]:
     called = {'_'.join(parted(part.name)[0]): part.name for part in reversed(parts)}
     called |= {'_'.join(tokens(part.name)): part.name for part in reversed(parts)}
     names = {joint: called.get('_'.join(tokens(joint))) for joint in robot.joint_names}
-    found = {joint: name for joint, name in names.items() if name is not None}
+    result = {joint: name for joint, name in names.items() if name is not None}
     # The x that was measured is no joint because a slide of a gantry is called so, too.
-    others = [part for part in parts if part.name not in found.values()]
+    others = [part for part in parts if part.name not in result.values()]
     axes = {part.axis for part in others if part.kind == 'length'}
     return {
-        joint: name for joint, name in found.items() if tokens(joint)[-1] not in {*'xyz'} - axes
+        joint: name for joint, name in result.items() if tokens(joint)[-1] not in {*'xyz'} - axes
     }
 
 
 def _beside_the_arm(parts: Sequence[Named]) -> list[str]:
     """Return the columns of axes beside the arm in their order, such as E1 and eax_b."""
-    found = {}
+    result = {}
     for part in parts:
         words = [word for word in part.stem or (part.axis,) if word]
         pieces = [piece for word in words for piece in re.findall(r'[^0-9]+|[0-9]+', word)]
         if len(pieces) == 2 and pieces[0] in EXTERNAL and re.fullmatch('[a-f1-6]', pieces[1]):
-            found[pieces[1]] = part.name
-    return [found[key] for key in sorted(found)]
+            result[pieces[1]] = part.name
+    return [result[key] for key in sorted(result)]
 
 
 def _in_order(
-    left: Sequence[Named], count: int, parts: Sequence[Named], robot: Robot
+    remaining: Sequence[Named], count: int, parts: Sequence[Named], robot: Robot
 ) -> tuple[str, ...]:
     """Return so many columns that are numbered, or lettered as Yaskawa does it."""
-    letters = {tokens(p.name)[0]: p.name for p in left if tokens(p.name)[:1]}
+    letters = {tokens(p.name)[0]: p.name for p in remaining if tokens(p.name)[:1]}
     if count == len(LETTERS) and set(LETTERS) <= set(letters):
         return tuple(letters[letter] for letter in LETTERS)
-    numbered = _numbered(left)
+    numbered = _numbered(remaining)
     whole = [list(range(count)), list(range(1, count + 1))]
     fitting = {words: group for words, group in numbered.items() if sorted(group) in whole}
     # What the encoders read comes before what the controller wanted.
     best = max((_rank(words) for words in fitting), default=0)
     chosen = [group for words, group in fitting.items() if _rank(words) == best]
     if len(chosen) != 1:
-        found = 'more than one set of' if chosen else 'no'
+        result = 'more than one set of' if chosen else 'no'
         raise DataError(
-            f'the table has {found} columns for the {robot.n} joints of robot {robot.name!r} '
+            f'the table has {result} columns for the {robot.n} joints of robot {robot.name!r} '
             f'({", ".join(robot.joint_names)}){_found(parts, _numbered(parts))}; '
             '--joint-columns decides'
         )
@@ -269,8 +271,8 @@ def _found(parts: Sequence[Named], numbered: Mapping[tuple[str, ...], Mapping[in
     """Return what the header has: the joints that were understood, then the other names."""
     joints = [name for group in numbered.values() for _, name in sorted(group.items())]
     others = [part.name for part in parts if part.name not in joints]
-    told = [('joints', joints), ('besides', others)] if joints else [('columns', others)]
-    said = ', '.join(f'{word} {shortened(names)}' for word, names in told if names)
+    reported = [('joints', joints), ('besides', others)] if joints else [('columns', others)]
+    said = ', '.join(f'{word} {shortened(names)}' for word, names in reported if names)
     return f'; found {said}' if said else ''
 
 
@@ -314,9 +316,9 @@ def _lacking(parts: Sequence[Named]) -> str:
 def _rotation(parts: Sequence[Named]) -> tuple[str, ...]:
     """Return the measured quaternion or angles, nothing when the table has none."""
     for kind, axes in (('quaternion', 'xyzw'), *_ANGLES):
-        found = _one_group(parts, kind, MEASURED, 'rotation_columns', True, axes)
-        if found:
-            return found
+        result = _one_group(parts, kind, MEASURED, 'rotation_columns', True, axes)
+        if result:
+            return result
     return ()
 
 

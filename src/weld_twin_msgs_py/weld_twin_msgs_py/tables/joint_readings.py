@@ -56,11 +56,8 @@ def joint_angles(
 
     Parameters
     ----------
-    cells : Cells
-    robot : Robot
     names : tuple of str
         The columns, in the robot's order.
-    options : TableOptions
     said : list of str
         Sentences are added to it.
     units : Units, optional
@@ -97,12 +94,14 @@ def joint_units(
 
     """
     turning, sliding = ~robot.prismatic, robot.prismatic
-    told = [_told(names, kind, given) for kind, given in _kinds(robot, options)]
-    usual = Units(told[0] or _usual_angle(q[:, turning]), told[1] or _usual_slide(q, robot))
+    reported = [_told(names, kind, given) for kind, given in _kinds(robot, options)]
+    usual = Units(
+        reported[0] or _usual_angle(q[:, turning]), reported[1] or _usual_slide(q, robot)
+    )
     chosen = usual
     if judge is not None and len(q) >= ENOUGH:
-        open_angle = told[0] is None and bool(turning.any())
-        open_slide = told[1] is None and bool(sliding.any())
+        open_angle = reported[0] is None and bool(turning.any())
+        open_slide = reported[1] is None and bool(sliding.any())
         others = [
             Units(angle, slide)
             for angle in (('rad', 'deg') if open_angle else (usual.angle,))
@@ -110,11 +109,11 @@ def joint_units(
         ]
         chosen = _fitting(q, usual, others, robot, names, options, judge)
     fitted = ' (the measured positions fit no other unit)' if chosen != usual else ''
-    if told[0] is None and turning.any():
+    if reported[0] is None and turning.any():
         word = {'deg': 'degrees', 'rad': 'radians'}[chosen.angle]
         size = largest(q[:, turning])
         said.append(f'joint angles are in {word} (up to {size:.4g}){fitted}')
-    if told[1] is None and sliding.any():
+    if reported[1] is None and sliding.any():
         size = largest(q[:, sliding])
         said.append(
             f'sliding joints are in {chosen.slide} (up to {size:.4g}){fitted}; --slide-unit decides'
@@ -153,8 +152,8 @@ def _kinds(robot: Robot, options: TableOptions) -> tuple[tuple[Sequence[bool], s
 
 def _told(names: Sequence[str], kind: Sequence[bool], given: str | None) -> str | None:
     """Return the unit that an option or the header gives one of some columns."""
-    told = (unit_of(name) for name, meant in zip(names, kind, strict=True) if meant)
-    return given or next((unit for unit in told if unit), None)
+    reported = (unit_of(name) for name, meant in zip(names, kind, strict=True) if meant)
+    return given or next((unit for unit in reported if unit), None)
 
 
 def _usual_angle(values: Array) -> str:

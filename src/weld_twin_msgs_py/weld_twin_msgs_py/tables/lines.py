@@ -44,7 +44,6 @@ def split_lines(path: Path, text: str, delimiter: str | None, said: list[str]) -
     ----------
     path : Path
         For messages.
-    text : str
     delimiter : str, optional
         Left out, it is found.
     said : list of str

@@ -33,7 +33,6 @@ def number(text: str, decimal: str) -> float:
 
     Parameters
     ----------
-    text : str
     decimal : str
         '.' or ','.
 
@@ -61,7 +60,6 @@ def decimal_sign(path: Path, rows: Iterable[list[str]], delimiter: str | None) -
     ----------
     path : Path
         For the message.
-    rows : iterable of list of str
     delimiter : str, optional
         Between the cells; a comma there is no decimal sign.
 
@@ -102,8 +100,6 @@ def without_units(
     ----------
     path : Path
         For the message.
-    header : list of str
-    rows : list of list of str
     unit_of_name : mapping
         Units that the header gives already.
 

@@ -52,10 +52,8 @@ def read_pixels(
     path : Path or str
         Columns ``u``, ``v`` [px], ``point``, those of the joints; ``camera`` and ``target`` where
         there are several; a stamp or a number of the image. Rows of one image share the joints.
-    robot : Robot
     cameras, targets : sequence of Camera, Target
         Called as the table calls them; one alone may have any name.
-    options : TableOptions, optional
 
     Raises
     ------

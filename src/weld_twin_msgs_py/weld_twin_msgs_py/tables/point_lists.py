@@ -50,7 +50,6 @@ def read_point_list(text: str, marker: str | None) -> Read:
 
     Parameters
     ----------
-    text : str
     marker : str, optional
         The group of points that is meant.
 
@@ -104,9 +103,9 @@ def _layout(rows: list[tuple[int, list[str]]]) -> tuple[int, int, list[str]] | N
         if names + count != width or not all(is_number(c) for row in cells for c in row[names:]):
             continue
         values = np.array([[float(c) for c in row[names:]] for row in cells])
-        found = _measured(values)
-        if found is not None:
-            return names, *found
+        result = _measured(values)
+        if result is not None:
+            return names, *result
     return None
 
 
@@ -130,20 +129,20 @@ def _measured(values: Array) -> tuple[int, list[str]] | None:
 def is_joint_targets(text: str) -> bool:
     """Return whether a text holds targets of joints in RAPID, and is no program of moves."""
     lines = [line for line in text.splitlines() if line.strip()]
-    found = sum(1 for line in lines if _joints(line))
-    return found > 0 and ('jointtarget' in text.lower() or 2 * found >= len(lines))
+    result = sum(1 for line in lines if _joints(line))
+    return result > 0 and ('jointtarget' in text.lower() or 2 * result >= len(lines))
 
 
 def read_joint_targets(text: str) -> Read:
     """Return the targets of joints in the order in which they stand."""
-    found = [
+    result = [
         (k, *axes) for k, line in enumerate(text.splitlines(), start=1) for axes in _joints(line)
     ]
-    here = [k for k in range(_AXES) if all(abs(float(ext[k])) < _NO_AXIS for _, _, ext in found)]
+    here = [k for k in range(_AXES) if all(abs(float(ext[k])) < _NO_AXIS for _, _, ext in result)]
     header = [f'rax_{k + 1} [deg]' for k in range(_AXES)] + [f'eax_{"abcdef"[k]}' for k in here]
-    rows = [[*arm, *(ext[k] for k in here)] for _, arm, ext in found]
+    rows = [[*arm, *(ext[k] for k in here)] for _, arm, ext in result]
     said = ['read as targets of joints in RAPID, in the order of the file']
-    return Read(header, rows, [k for k, _, _ in found], said)
+    return Read(header, rows, [k for k, _, _ in result], said)
 
 
 def _joints(line: str) -> list[tuple[list[str], list[str]]]:

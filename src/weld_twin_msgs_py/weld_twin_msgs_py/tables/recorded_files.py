@@ -81,16 +81,16 @@ def read_trace(path: Path, text: str) -> Read:
         A file of values is missing or holds another number of them, or is of another type.
 
     """
-    found = [
+    result = [
         dict(re.findall(r'^\s*(\d{3}),\s*(.*?)\s*$', block, re.M))
         for block in re.findall(r'#BEGINCHANNELHEADER(.*?)#ENDCHANNELHEADER', text, re.S)
     ]
     names, columns = [], []
-    for channel in found:
+    for channel in result:
         unit = channel.get(UNIT, '')
         names.append(f'{channel.get(NAME, "?")} [{unit}]' if unit else channel.get(NAME, '?'))
         try:
-            columns.append(_values(path, channel, found))
+            columns.append(_values(path, channel, result))
         except (ValueError, OverflowError):
             raise DataError(
                 f"trace '{path}': channel {names[-1]!r} has an entry that is no number"

@@ -71,19 +71,19 @@ def find_convention(angles: Array, robot: Robot, q: Array) -> tuple[str, str]:
         None agrees with the arm, or several do.
 
     """
-    found = {
+    result = {
         name: disagreement(rotations(angles, name), robot, q)
         for name in (*EULER_ORDERS, ROTATION_VECTOR)
     }
-    ranked = sorted(found, key=lambda name: found[name])
+    ranked = sorted(result, key=lambda name: result[name])
     best, second = ranked[0], ranked[1]
-    if found[best] > AGREES:
+    if result[best] > AGREES:
         raise DataError(
             f'no reading of the three angles agrees with the arm (the best, {best}, is '
-            f'{np.degrees(found[best]):.3g} deg off); check the joint columns, or '
+            f'{np.degrees(result[best]):.3g} deg off); check the joint columns, or '
             '--positions-only leaves orientation out'
         )
-    if found[second] < CLEARLY * found[best] + ROUNDING:
+    if result[second] < CLEARLY * result[best] + ROUNDING:
         raise DataError(
             f'the angles could be {best} or {second}, the poses do not tell which; '
             '--rotation decides'
@@ -91,6 +91,6 @@ def find_convention(angles: Array, robot: Robot, q: Array) -> tuple[str, str]:
     meaning = 'a rotation vector' if best == ROTATION_VECTOR else f'Euler {best} (intrinsic)'
     return best, (
         f'measured angles are {meaning}: relative rotations agree with the arm to '
-        f'{np.degrees(found[best]):.2g} deg, the next reading is {np.degrees(found[second]):.2g} '
+        f'{np.degrees(result[best]):.2g} deg, the next reading is {np.degrees(result[second]):.2g} '
         'deg off'
     )

@@ -37,7 +37,6 @@ class TableOptions:
 
     Attributes
     ----------
-    delimiter, decimal : str, optional
     joint_columns : tuple of str, optional
         In chain order.
     position_columns : tuple of 3 str, optional
@@ -54,7 +53,6 @@ class TableOptions:
         Of positions, joint angles, joints that slide, and measured angles.
     sigma_columns : tuple of 1 or 3 str, optional
         Standard deviation of the position, in its unit.
-    temperature_column, time_column : str, optional
     joint_signs : tuple of n float, optional
         1 or -1 for every joint, where the controller counts it the other way than the model.
     joint_offsets : tuple of n float, optional [deg, mm for a slide]

@@ -42,8 +42,6 @@ def read_two_tables(
     ----------
     joints, measured : Path or str
         A log of the controller, and an export of the instrument.
-    robot : Robot
-    options : TableOptions, optional
     offset : float [s]
         Added to the stamps of the instrument.
 
@@ -58,13 +56,13 @@ def read_two_tables(
     seen = read_cells(measured, options.delimiter, options.decimal, options.marker)
     said = [f'{c.path.name}: {text}' for c in (log, seen) for text in c.said]
     names = joint_columns(log.header, robot, options)
-    found = list[str]()
-    stream = _later(_whole(log, names, found), options, found)
-    points = _later(seen, options, found)
-    times, own = _stamps(stream, options, found), _stamps(points, options, found)
+    result = list[str]()
+    stream = _later(_whole(log, names, result), options, result)
+    points = _later(seen, options, result)
+    times, own = _stamps(stream, options, result), _stamps(points, options, result)
     if times is None or own is None or not _stream(times):
         return _paired(log, seen, names, robot, options, said)
-    said += found
+    said += result
     dated = bool(min(times[0], own[0]) > SINCE_1970)
     if dated and max(times[-1], own[-1]) >= LAST_STAMP:
         times, own, dated = times - times[0], own - times[0], False
@@ -136,15 +134,15 @@ def _moving(
 
 def _joined(log: Cells, seen: Cells, names: tuple[str, ...], q: Array, t: Array | None) -> Cells:
     """Return one table of the joints of one file and all but times of the other."""
-    left = [
+    remaining = [
         k for k, name in enumerate(seen.header) if name not in (*time_columns(seen.header), *names)
     ]
     rows = []
     for k, (joints, row) in enumerate(zip(q, seen.rows, strict=True)):
         stamp = [] if t is None else [repr(float(t[k]))]
-        others = [row[i].replace(',', '.') if seen.decimal == ',' else row[i] for i in left]
+        others = [row[i].replace(',', '.') if seen.decimal == ',' else row[i] for i in remaining]
         rows.append([*stamp, *(repr(float(v)) for v in joints), *others])
-    header = [*([] if t is None else ['time [s]']), *names, *(seen.header[i] for i in left)]
+    header = [*([] if t is None else ['time [s]']), *names, *(seen.header[i] for i in remaining)]
     return Cells(log.path, header, rows, seen.lines, '.', [])
 
 
@@ -156,10 +154,10 @@ def _whole(log: Cells, names: tuple[str, ...], said: list[str]) -> Cells:
 
 def _later(cells: Cells, options: TableOptions, said: list[str]) -> Cells:
     """Return a table without rows whose stamp is not later than those before."""
-    found = later_rows(cells, *_clock(cells, options))
-    if found is None:
+    result = later_rows(cells, *_clock(cells, options))
+    if result is None:
         return cells
-    return _kept(cells, found, said, 'whose stamp repeats one before')
+    return _kept(cells, result, said, 'whose stamp repeats one before')
 
 
 def _kept(cells: Cells, keep: NDArray[np.intp], said: list[str], why: str) -> Cells:

@@ -98,9 +98,9 @@ def tokens(name: str) -> list[str]:
 
 def parted(name: str) -> tuple[list[str], str | None]:
     """Return the words of a header cell without its unit, and the unit as this project has it."""
-    found = bracketed(name)
-    if found is not None:
-        return tokens(found[0]), IN_BRACKETS[unit_word(found[1])]
+    result = bracketed(name)
+    if result is not None:
+        return tokens(result[0]), IN_BRACKETS[unit_word(result[1])]
     words = tokens(name)
     if len(words) > 1 and words[-1] in UNITS:
         return words[:-1], UNITS[words[-1]]
@@ -109,10 +109,10 @@ def parted(name: str) -> tuple[list[str], str | None]:
 
 def bracketed(name: str) -> tuple[str, str] | None:
     """Return a header cell before its unit in brackets, and that unit; None where it has none."""
-    found = _BRACKETS.search(name)
-    if found is None or unit_word(found[1]) not in IN_BRACKETS:
+    result = _BRACKETS.search(name)
+    if result is None or unit_word(result[1]) not in IN_BRACKETS:
         return None
-    return name[: found.start()].strip(), found[1].strip()
+    return name[: result.start()].strip(), result[1].strip()
 
 
 def shortened(names: Sequence[str]) -> str:

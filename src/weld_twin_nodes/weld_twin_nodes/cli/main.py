@@ -46,9 +46,9 @@ OLD = {
     'plan-measurement': 'investigate',
     'fleet': 'history',
     'blind': 'lab blind',
+    'real-robots': 'lab transfer',
     'benchmark': 'lab benchmark',
     'campaign': 'lab campaign',
-    'real-robots': 'lab real-robots',
 }
 """Old spellings of commands, and what they are called now; they work for one release more."""
 HELP = ('-h', '--help', '--help-all')

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from .parsing import Adder, Parser, short_help
@@ -219,7 +219,6 @@ def refuse(args: argparse.Namespace, names: Sequence[str], why: str) -> None:
 
     Parameters
     ----------
-    args : argparse.Namespace
     names : sequence of str
         Attributes of options that are None, empty or False unless given.
     why : str
@@ -239,7 +238,9 @@ def refuse(args: argparse.Namespace, names: Sequence[str], why: str) -> None:
             raise DataError(f'--{name.replace("_", "-")} {why}')
 
 
-def add_command(subparsers: Any, name: str, module: ModuleType) -> argparse.ArgumentParser:
+def add_command(
+    subparsers: Any, name: str, module: ModuleType | SimpleNamespace
+) -> argparse.ArgumentParser:
     """
     Add a subcommand whose help is the module's docstring, with the module's own options.
 

@@ -22,7 +22,6 @@ class Adder:
 
     Parameters
     ----------
-    parser : Parser
     title : str, optional
         Heading of the group in the help; left out, the options are those of the command itself.
     rare : bool

@@ -66,8 +66,6 @@ def context_of(args: argparse.Namespace, robot: Robot, language: str) -> Context
 
     Parameters
     ----------
-    args : argparse.Namespace
-    robot : Robot
     language : str
         Says how --tool and --base are written.
 
@@ -133,7 +131,6 @@ def quantity(text: str, units: Sequence[str], option: str) -> float:
 
     Parameters
     ----------
-    text : str
     units : sequence of str
         Those that make sense here; the first is meant where none is written.
     option : str
@@ -147,10 +144,10 @@ def quantity(text: str, units: Sequence[str], option: str) -> float:
     """
     from weld_twin_core.errors import DataError
 
-    found = re.fullmatch(r'\s*([\d.]+(?:[eE][-+]?\d+)?)\s*([a-z]*)\s*', text)
-    unit = found[2] or units[0] if found else ''
+    result = re.fullmatch(r'\s*([\d.]+(?:[eE][-+]?\d+)?)\s*([a-z]*)\s*', text)
+    unit = result[2] or units[0] if result else ''
     try:
-        value = float(found[1]) if found else -1.0
+        value = float(result[1]) if result else -1.0
     except ValueError:
         value = -1.0
     if unit not in units or not 0.0 <= value < 1e9:

@@ -77,8 +77,6 @@ def table_of(args: argparse.Namespace, robot: Robot, file: str) -> Table:
     ----------
     args : argparse.Namespace
         With the options of tables, of cameras, and `contacts`.
-    robot : Robot
-    file : str
 
     Raises
     ------

@@ -198,7 +198,6 @@ class Cell:
 
         Parameters
         ----------
-        topic : str
         kind : message class, optional
             Not needed for topics of this project's table.
 
@@ -241,8 +240,6 @@ class Cell:
 
         Parameters
         ----------
-        motion : JointMotion
-        joint_names : sequence of str
         start_ns : int [ns]
         listeners : int
             How many subscribers to wait for.
@@ -325,7 +322,6 @@ class Cell:
 
         Parameters
         ----------
-        condition : callable
         what : str or callable
             What is waited for, in words.
         limit : float [s]
@@ -341,13 +337,13 @@ class Cell:
         """
         end, so_far = time.monotonic() + limit, None
         while not condition():
-            told = what if isinstance(what, str) else what()
+            reported = what if isinstance(what, str) else what()
             if any(process.code for process in self.processes):
-                raise CellTimeout(f'a node died before {told}' + ''.join(self._logs()))
+                raise CellTimeout(f'a node died before {reported}' + ''.join(self._logs()))
             if progress is not None and (now := progress()) != so_far:
                 end, so_far = time.monotonic() + limit, now
             if time.monotonic() > end:
-                raise CellTimeout(f'waited {limit:g} s for {told}' + ''.join(self._logs()))
+                raise CellTimeout(f'waited {limit:g} s for {reported}' + ''.join(self._logs()))
             self._executor.spin_once(timeout_sec=0.02)
 
     def meet(self) -> None:

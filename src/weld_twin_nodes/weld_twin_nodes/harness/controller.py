@@ -21,6 +21,8 @@ from weld_twin_msgs_py.messages.topics import JOINT_STATES
 
 TICK = 0.004
 """Seconds between two looks at what is due."""
+IDLE = 5
+"""Looks from one joint state to the next of an arm that stands: whoever listens has work to do."""
 
 
 class Controller(Node):
@@ -29,7 +31,6 @@ class Controller(Node):
 
     Parameters
     ----------
-    joint_names : sequence of str
     q : array, shape (n,)
         Where the arm stands.
     pace : float
@@ -73,6 +74,7 @@ class Controller(Node):
             JOINT_STATES.message_class(), JOINT_STATES.relative, JOINT_STATES.offered.to_rclpy()
         )
         self._now: tuple[Any, Goal, list[float], Future] | None = None
+        self._idle = 0
         self._timer = self.create_timer(TICK, self._look)
         self._server = ActionServer(
             self,
@@ -138,17 +140,19 @@ class Controller(Node):
     def _look(self) -> None:
         """Go on, and tell where the arm is."""
         if self._now is None:
-            self._tell()
+            self._idle = (self._idle + 1) % IDLE
+            if self._idle == 0:
+                self._tell()
             return
-        handle, goal, left, done = self._now
-        t = left.pop()
+        handle, goal, remaining, done = self._now
+        t = remaining.pop()
         way = course(goal, np.array([t]))
         self.q = way.q[0]
         self.track.append((self._tell(way.qd[0]), t))
         feedback = self._kind.Feedback(joint_names=list(self._names))
         feedback.desired.positions = self.q.tolist()
         handle.publish_feedback(feedback)
-        if handle.is_cancel_requested or not left:
+        if handle.is_cancel_requested or not remaining:
             self._now = None
             done.set_result('cancelled' if handle.is_cancel_requested else 'done')
 

@@ -42,13 +42,11 @@ class NodeProcess:
     ----------
     node : str or sequence of str
         A node of this package, or a whole command.
-    parameters : mapping
     folder : Path
         Where the parameter file and the log go.
 
     Attributes
     ----------
-    name : str
     known : bool
         Whether it is a node of this package, so that ``name`` is its name on the graph.
 

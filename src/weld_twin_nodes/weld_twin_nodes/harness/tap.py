@@ -12,15 +12,7 @@ from weld_twin_msgs_py.messages import from_messages
 
 
 class Tap:
-    """
-    Messages of one topic.
-
-    Attributes
-    ----------
-    topic : str
-    messages : list
-
-    """
+    """Messages of one topic."""
 
     def __init__(self, topic: str) -> None:
         self.topic = topic

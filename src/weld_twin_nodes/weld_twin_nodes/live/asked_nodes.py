@@ -33,7 +33,6 @@ class AskedNodes:
 
     Parameters
     ----------
-    node : CellNode
     note : callable
         Takes a key of the bag's provenance and its value.
 

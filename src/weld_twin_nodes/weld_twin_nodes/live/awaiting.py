@@ -16,7 +16,7 @@ LOOK = 0.1
 """Seconds of one turn of the loop that waits."""
 
 
-def spin_until(node: CellNode, told: Callable[[], bool], what: str) -> None:
+def spin_until(node: CellNode, reported: Callable[[], bool], what: str) -> None:
     """
     Serve a node until something is told; log and health say meanwhile what it waits for.
 
@@ -31,7 +31,7 @@ def spin_until(node: CellNode, told: Callable[[], bool], what: str) -> None:
     runner = SingleThreadedExecutor(context=node.context)
     runner.add_node(node)
     try:
-        while not told():
+        while not reported():
             if not node.context.ok():
                 raise ModelError(f'stopped while waiting for {what}')
             runner.spin_once(timeout_sec=LOOK)

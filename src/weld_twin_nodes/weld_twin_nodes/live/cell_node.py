@@ -102,6 +102,7 @@ class CellNode(Node):
         self._diagnostics = self.offer(DIAGNOSTICS, awaited=False)
         self.neighbours = NeighbourHealth(self)
         self.neighbours.hear(self._hear_counts)
+        self._partners += [self._named_twice, self._timeless]
         self.every(HEALTH_EVERY, self._tell_health)
         self._jumps = self.get_clock().create_jump_callback(
             JumpThreshold(
@@ -177,11 +178,13 @@ class CellNode(Node):
         asked = begun if self.ending_since is None else self.ending_since
         while True:
             live = readers(self, output.topic) <= self.neighbours.alive()
-            left = (begun + LAST_WORDS if live else asked + ALIVE) - time.monotonic()
+            remaining = (begun + LAST_WORDS if live else asked + ALIVE) - time.monotonic()
             # What stands still has had its time with the outputs before, and an ack is there or not.
-            if output.wait_for_all_acked(Duration(seconds=min(max(left, 1e-3), ACKNOWLEDGED))):
+            if output.wait_for_all_acked(
+                Duration(seconds=min(max(remaining, 1e-3), ACKNOWLEDGED))
+            ):
                 return True
-            if left <= 0.0:
+            if remaining <= 0.0:
                 return False
 
     def take_robot(self, robot: Robot | None, joint_names: tuple[str, ...] | None = None) -> None:
@@ -190,7 +193,6 @@ class CellNode(Node):
 
         Parameters
         ----------
-        robot : Robot, optional
         joint_names : sequence of str, optional
             What its joint states call its joints.
 
@@ -252,7 +254,6 @@ class CellNode(Node):
 
         Parameters
         ----------
-        topic : Topic
         callback : callable
             Takes an object that `weld_twin_msgs_py.messages.from_messages` reads. Messages of
             other types that stand for the same are turned into those of the table before.
@@ -558,6 +559,21 @@ class CellNode(Node):
         """Tell of what is missing here, from now on."""
         self.get_logger().warning(sentence)
         self.health.lasting[sentence] = sentence
+
+    def _named_twice(self) -> list[str]:
+        """Return that another node has this one's name, if one has."""
+        own = self.get_fully_qualified_name()
+        if not self.neighbours.twice(own):
+            return []
+        return [
+            f'another node of the name {own} is running: both publish, and both answer; end one of them'
+        ]
+
+    def _timeless(self) -> list[str]:
+        """Return that simulated time is asked for and has not begun, if so."""
+        if not self.setting('use_sim_time') or self.get_clock().now().nanoseconds:
+            return []
+        return ['use_sim_time is set, and nothing has come on /clock: time stands at zero']
 
     def _unmatched_event(self, _: str) -> None:
         """Tell at once of what the graph shows; the event itself does not know the partner."""

@@ -37,7 +37,7 @@ from weld_twin_msgs_py.messages.topics import (
 )
 
 from ..offline.loaded_model import LoadedModel, loaded
-from ..streams.arm_state import ArmState
+from ..streams.arm_state import ArmState, Moving
 from ..streams.looks_beside import LooksBeside
 from ..streams.pose_stream import PoseStream
 from ..streams.supervision import Supervision
@@ -52,6 +52,7 @@ from .run_node import run
 from .settings import Setting
 
 INACTIVE = 'the compensator is not active; configure and activate it'
+CHANGED = 'the model was exchanged while the goal was worked out; send it again'
 SHORT_TURN = 2e-4
 """Seconds after which threads take turns: what is worked out beside a pose must not keep it waiting."""
 LOOK_EVERY = 0.5
@@ -76,6 +77,7 @@ class Compensator(ManagedNode):
         self.robot = robot_of(self)
         self._intake = Intake(self.robot, joint_names=self.joint_names, mend=True)
         self._arm = ArmState()
+        self._moving: Moving | None = None
         self._around: tuple[Any, float | None] = (None, None)
         self._streamed: tuple[Any, float | None] = self._around
         self._model: LoadedModel | None = None
@@ -129,7 +131,7 @@ class Compensator(ManagedNode):
 
     def begin(self) -> None:
         """Correct from now on."""
-        if self._model is None or not self.managed:
+        if self._model is None or str(self._model.path) != self.setting('model'):
             self._take_model()
         assert self._model is not None
         self._watch = Supervision(self._model.promised)
@@ -140,12 +142,11 @@ class Compensator(ManagedNode):
     def finish(self) -> None:
         """Correct no more; a goal that runs ends as begun."""
         self._active = False
-        self._stream = None
+        self._stream, self._watch = None, Supervision()
 
     def destroy_node(self) -> None:
         """End what is worked out beside; what became of goals is written before."""
         self._audit.close()
-        self._judge.close()
         if self._looks is not None:
             self._looks.close()
         if self._relay is not None:
@@ -166,6 +167,8 @@ class Compensator(ManagedNode):
                 'the model does not say how sure it is nor where it was recorded: neither is looked at'
             )
         self._watch = Supervision(self._model.promised)
+        lawless = [self.robot.index(name) for name in read.lawless]
+        self._moving = Moving(lawless) if lawless else None
         self.get_logger().info(f'model {self._model.digest}: {len(read.effects)} effects')
 
     def _reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -215,15 +218,15 @@ class Compensator(ManagedNode):
         if taken[1]:
             self._arm.forget()
         self._arm.take(taken[0][1], time.monotonic())
+        if self._moving is not None:
+            self._moving.take(taken[0][0], taken[0][1])
 
     def _on_deviation(self, message: Any) -> None:
         now = time.monotonic()
         arm = self._arm.where(now, self._most_age)
-        if (
-            arm is not None
-            and self._model is not None
-            and not self._model.read.recorded(arm[None])[0]
-        ):
+        recorded = arm is None or self._model is None or self._model.read.recorded(arm[None])[0]
+        moving = self._moving is None or self._moving.at(from_messages.stamp_ns(message))
+        if not (recorded and moving):
             self._watch.pass_over(now)
             return
         self._watch.take(from_messages.vector3(message), now)
@@ -334,16 +337,19 @@ class Compensator(ManagedNode):
             return Decision(passed, why, partial(audit.settle, token, None, 'refused', why), token)
         if not applied:  # it does not wait for what is only told
             return Decision(goal, '', partial(self._judged_later, goal), token)
-        judged: Future = Future()
+        judged, watch = Future(), self._watch
         self._work_out(goal, judged.set_result)
-        found, columns = await judged
-        settled = partial(audit.judged, token, found)
-        if isinstance(found, Refusal):
-            return Decision(None, found.reason, settled, token)
-        trajectory = corrected_trajectory(goal.trajectory, columns, found.goal, found.waits)
+        result, columns = await judged
+        if self._watch is not watch:  # there is one for every model and activation
+            why = self._withdrawn() or CHANGED
+            return Decision(None, why, partial(audit.settle, token, None, 'refused', why), token)
+        settled = partial(audit.judged, token, result)
+        if isinstance(result, Refusal):
+            return Decision(None, result.reason, settled, token)
+        trajectory = corrected_trajectory(goal.trajectory, columns, result.goal, result.waits)
         rest = [name for name in goal.get_fields_and_field_types() if name != 'trajectory']
         sent = type(goal)(trajectory=trajectory, **{name: getattr(goal, name) for name in rest})
-        self._tell_added(goal.trajectory.header, found)
+        self._tell_added(goal.trajectory.header, result)
         return Decision(sent, '', settled, token)
 
     def _judged_later(self, goal: Any, below: str) -> None:
@@ -356,18 +362,18 @@ class Compensator(ManagedNode):
 
         self._work_out(goal, tell)
 
-    def _work_out(self, goal: Any, told: Callable[[Judged], None]) -> None:
+    def _work_out(self, goal: Any, reported: Callable[[Judged], None]) -> None:
         """Have a goal worked out beside, with what is known now."""
         start = self._arm.start(time.monotonic(), self.setting('max_age'))
         names = self._intake.joints.names
-        self._judge.judge(goal, names, self._present(), limits_of(self), start, told)
+        self._judge.judge(goal, names, self._present(), limits_of(self), start, reported)
 
-    def _tell_added(self, header: Any, found: CorrectedGoal) -> None:
+    def _tell_added(self, header: Any, result: CorrectedGoal) -> None:
         """Publish what is added at every point, at the time when the arm is to be there."""
         begun = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
         begun = begun or self.get_clock().now().nanoseconds
         encode = self._encoder(base_frame(self))[1]
-        for t, added in zip(found.goal.t, found.added, strict=True):
+        for t, added in zip(result.goal.t, result.added, strict=True):
             self._correction.publish(encode(begun + round(float(t) * 1e9), added))
 
     def _token(self) -> str | None:

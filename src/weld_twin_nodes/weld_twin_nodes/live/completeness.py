@@ -51,8 +51,8 @@ class SentBook:
     def _due_by(self, topic: str, now: float) -> int:
         """Return how many messages on a topic every listener should have by now [s]."""
         out = 0
-        for told in self._due.values():
-            early = [sent for then, sent in told if then <= now - UNDER_WAY and topic in sent]
+        for reported in self._due.values():
+            early = [sent for then, sent in reported if then <= now - UNDER_WAY and topic in sent]
             out += early[-1][topic].number if early else 0
         return out
 
@@ -100,11 +100,11 @@ class SentBook:
 
     def tellers(self, topic: str) -> set[str]:
         """Return the nodes that told of messages they sent on a topic."""
-        return {node for (node, _), told in self._tellers.items() if topic in told}
+        return {node for (node, _), reported in self._tellers.items() if topic in reported}
 
     def sent(self, topic: str) -> Sent | None:
         """Return what was sent on a topic by all who told, None if nobody did."""
-        rows = [told[topic] for told in self._tellers.values() if topic in told]
+        rows = [reported[topic] for reported in self._tellers.values() if topic in reported]
         if not rows:
             return None
         firsts = [row.first for row in rows if row.first is not None]
@@ -124,7 +124,6 @@ class Shortfall(NamedTuple):
 
     Attributes
     ----------
-    sent, recorded : int
     where : str
         'at the start', 'at the end', 'at both ends', or 'in between'.
 

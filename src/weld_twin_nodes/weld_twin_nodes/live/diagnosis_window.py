@@ -40,16 +40,11 @@ class Window:
 
     Parameters
     ----------
-    robot : Robot
     duration : float [s]
     measuring_frame : str
         What measurements must be given in; empty for the first frame that comes.
     joint_names : sequence of str, optional
         What the joint states call the joints, in the order of the robot.
-
-    Attributes
-    ----------
-    intake : Intake
 
     """
 

@@ -53,7 +53,6 @@ class Finding(NamedTuple):
     ----------
     stamp : int [ns]
         Of the last measurement looked at.
-    status : str
     sentence : str
         The verdict in words.
     values : dict
@@ -155,9 +154,9 @@ def find(job: Job) -> Finding:
     }
     for item in diagnosis.unsound:
         values[f'unsound: {item.kind}'] = item.sentence
-    for found in diagnosis.effects:
-        entry = found.effect.to_mapping()
-        values[found_name(found)] = {
+    for result in diagnosis.effects:
+        entry = result.effect.to_mapping()
+        values[found_name(result)] = {
             key: value for key, value in entry.items() if key not in ('effect', 'joint')
         }
     measured = recording.measured

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, wait
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -14,46 +14,40 @@ from weld_twin_core.twin.goal_correction import CorrectedGoal, Refusal
 from weld_twin_msgs_py.messages.topics import AUDIT
 
 from .cell_node import CellNode
+from .work_beside import WorkBeside
 
 WRITTEN = 1.0
 """Seconds an ending node gives its disk to take the audit."""
 
 
 class GoalAudit:
-    """
-    Tells of goals for a node, whose parameters ``apply`` and ``audit`` it reads.
-
-    Parameters
-    ----------
-    node : CellNode
-
-    """
+    """Tells of goals for a node, whose parameters ``apply`` and ``audit`` it reads."""
 
     def __init__(self, node: CellNode) -> None:
         self._node = node
         self._out = node.offer(AUDIT, awaited=False)
-        self._books = ThreadPoolExecutor(1)
+        self._books = WorkBeside()
         self._written: Future[None] | None = None
 
     def close(self) -> None:
         """End, when what became of goals is written."""
-        if self._written is not None:
-            wait([self._written], WRITTEN)
-        self._books.shutdown(wait=False, cancel_futures=True)
+        if self._written is not None and not wait([self._written], WRITTEN).done:
+            path = self._node.setting('audit')
+            self._node.get_logger().warning(f"audit '{path}' has not taken all lines")
 
-    def judged(self, model: str | None, found: CorrectedGoal | Refusal, below: str = '') -> None:
+    def judged(self, model: str | None, result: CorrectedGoal | Refusal, below: str = '') -> None:
         """Tell of a goal that was worked out; as `settle`."""
-        if isinstance(found, Refusal):
-            self.settle(model, found, 'refused', found.reason, below)
+        if isinstance(result, Refusal):
+            self.settle(model, result, 'refused', result.reason, below)
         else:
             self.settle(
-                model, found, 'corrected' if found.before else 'nothing to correct', '', below
+                model, result, 'corrected' if result.before else 'nothing to correct', '', below
             )
 
     def settle(
         self,
         model: str | None,
-        found: CorrectedGoal | Refusal | None,
+        result: CorrectedGoal | Refusal | None,
         verdict: str,
         why: str,
         below: str = '',
@@ -65,13 +59,12 @@ class GoalAudit:
         ----------
         model : str, optional
             Digest of the model.
-        found : CorrectedGoal or Refusal, optional
-        verdict, why : str
+        result : CorrectedGoal or Refusal, optional
         below : str
             What the controller said where it did not take it.
 
         """
-        largest = None if found is None else found.largest
+        largest = None if result is None else result.largest
         line: dict[str, Any] = {
             'time': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),
             'model': model,
@@ -81,28 +74,30 @@ class GoalAudit:
             'largest_m': None if largest is None else largest[0],
             'largest_rad': None if largest is None else largest[1],
         }
-        if isinstance(found, CorrectedGoal):
+        if isinstance(result, CorrectedGoal):
             line |= {
-                'expected_before_m': found.before,
-                'expected_after_m': found.after,
-                'bound_m': found.bound,
-                'waits_s': found.waits,
-                'notes': list(found.notes),
+                'expected_before_m': result.before,
+                'expected_after_m': result.after,
+                'bound_m': result.bound,
+                'waits_s': result.waits,
+                'notes': list(result.notes),
             }
         text = json.dumps(line)
         self._out.publish(AUDIT.message_class()(data=text))
-        told = f'goal {text}'
+        reported = f'goal {text}'
         if below or verdict == 'refused':
-            self._node.get_logger().warning(told)
+            self._node.get_logger().warning(reported)
             self._node.health.say(f'goal {line["verdict"]}: {line["why"]}')
         else:
-            self._node.get_logger().info(told)
+            self._node.get_logger().info(reported)
         self._write(text)
 
     def _write(self, text: str) -> None:
         """Add a line to the file beside: poses do not wait for a disk."""
         path = self._node.setting('audit')
         if path:
+            if self._written is not None and not self._written.done():
+                self._node.warn(path, f"audit '{path}' does not take lines; they wait")
             self._written = self._books.submit(self._append, path, text)
 
     def _append(self, path: str, text: str) -> None:

@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from weld_twin_core.errors import DataError, TwinError
@@ -20,6 +19,7 @@ from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.messages.goals import GoalPoints, beyond_tolerance, read_goal
 
 from .cell_node import CellNode
+from .work_beside import WorkBeside
 
 POLL = 0.002
 """Seconds between two looks at whether a goal is worked out."""
@@ -30,22 +30,11 @@ Judged = tuple[CorrectedGoal | Refusal, tuple[int, ...]]
 
 
 class GoalJudge:
-    """
-    Works out goals, one after the other.
-
-    Parameters
-    ----------
-    node : CellNode
-
-    """
+    """Works out goals, one after the other."""
 
     def __init__(self, node: CellNode) -> None:
         self._node = node
-        self._goals = ThreadPoolExecutor(1)
-
-    def close(self) -> None:
-        """End; what is not worked out is given up."""
-        self._goals.shutdown(wait=False, cancel_futures=True)
+        self._goals = WorkBeside()
 
     def judge(
         self,
@@ -54,26 +43,21 @@ class GoalJudge:
         model: ProgramModel,
         limits: GoalLimits,
         start: Start,
-        told: Callable[[Judged], None],
+        reported: Callable[[Judged], None],
     ) -> None:
         """
         Work a goal out; then tell.
 
         Parameters
         ----------
-        goal : message
         names : tuple of str
             What it calls the joints of the robot.
-        model : ProgramModel
-        limits : GoalLimits
-        start : Start
-        told : callable
 
         """
         try:
             points = self._read(goal, names)
         except TwinError as error:
-            told((Refusal(str(error)), ()))
+            reported((Refusal(str(error)), ()))
             return
         doing = self._goals.submit(corrected_goal, model, points.goal, limits, start)
 
@@ -83,9 +67,9 @@ class GoalJudge:
             timer.cancel()
             self._node.destroy_timer(timer)
             try:
-                told((_tolerated(goal, points, doing.result()), points.columns))
+                reported((_tolerated(goal, points, doing.result()), points.columns))
             except TwinError as error:
-                told((Refusal(str(error)), ()))
+                reported((Refusal(str(error)), ()))
 
         timer = self._node.every(POLL, look)
 
@@ -101,15 +85,15 @@ class GoalJudge:
 
 
 def _tolerated(
-    goal: Any, points: GoalPoints, found: CorrectedGoal | Refusal
+    goal: Any, points: GoalPoints, result: CorrectedGoal | Refusal
 ) -> CorrectedGoal | Refusal:
     """Return a corrected goal, or that it goes beyond what the goal itself tolerates."""
-    if isinstance(found, Refusal):
-        return found
+    if isinstance(result, Refusal):
+        return result
     beyond = beyond_tolerance(
         [*goal.path_tolerance, *goal.goal_tolerance],
         goal.trajectory.joint_names,
         points.columns,
-        found.goal.q - points.goal.q,
+        result.goal.q - points.goal.q,
     )
-    return Refusal(beyond, found.largest) if beyond else found
+    return Refusal(beyond, result.largest) if beyond else result

@@ -17,7 +17,11 @@ from typing import Any, NamedTuple
 from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.exceptions import InvalidTopicNameException
 from rclpy.task import Future
+from rclpy.validate_topic_name import validate_topic_name
+
+from weld_twin_core.errors import ModelError
 
 from .cell_node import CellNode
 
@@ -69,7 +73,6 @@ class GoalRelay:
 
     Parameters
     ----------
-    node : CellNode
     kind : action class
         `control_msgs/FollowJointTrajectory`.
     controller : str
@@ -90,8 +93,7 @@ class GoalRelay:
         since: Callable[[object], str],
     ) -> None:
         self._node, self._kind, self._decide, self._since = node, kind, decide, since
-        own = controller.rstrip('/')
-        self.below = own if own.endswith(ACTION) else f'{own}/{ACTION}'
+        self.below = _action_of(node, controller)
         # What waits for an answer must not keep the executor from taking it.
         group = ReentrantCallbackGroup()
         self._client = ActionClient(node, kind, self.below, callback_group=group)
@@ -182,22 +184,24 @@ class GoalRelay:
         """Pass the result through, and say where the model was withdrawn meanwhile."""
         running = self._pending.pop(id(above.request))
         running.above = above
-        found = await running.outcome
+        outcome = await running.outcome
         if running.cancelling is not None:  # the result may overtake the answer to the cancel
             await running.cancelling
         self._running.remove(running)
-        if isinstance(found, str):
+        if isinstance(outcome, str):
             above.abort()
-            return self._kind.Result(error_code=self._kind.Result.INVALID_GOAL, error_string=found)
-        result = found.result
+            return self._kind.Result(
+                error_code=self._kind.Result.INVALID_GOAL, error_string=outcome
+            )
+        result = outcome.result
         happened = self._since(running.token)
         if happened:
-            told = f'weld_twin: ended as begun, though {happened}'
-            result.error_string = '; '.join(filter(None, [result.error_string, told]))
-            self._node.get_logger().warning(told)
-        if found.status == GoalStatus.STATUS_SUCCEEDED:
+            reported = f'weld_twin: ended as begun, though {happened}'
+            result.error_string = '; '.join(filter(None, [result.error_string, reported]))
+            self._node.get_logger().warning(reported)
+        if outcome.status == GoalStatus.STATUS_SUCCEEDED:
             above.succeed()
-        elif found.status == GoalStatus.STATUS_CANCELED and above.is_cancel_requested:
+        elif outcome.status == GoalStatus.STATUS_CANCELED and above.is_cancel_requested:
             above.canceled()
         else:
             above.abort()
@@ -228,6 +232,32 @@ class GoalRelay:
                 running.outcome.set_result(
                     f'{self.below} is gone: whether the arm still moves is not known'
                 )
+
+
+def _action_of(node: CellNode, controller: str) -> str:
+    """
+    Return the name of a controller's action.
+
+    Raises
+    ------
+    ModelError
+        It is no name, or this node's own.
+
+    """
+    own = controller.rstrip('/')
+    below = own if own.endswith(ACTION) else f'{own}/{ACTION}'
+    try:
+        validate_topic_name(below)
+    except InvalidTopicNameException as error:
+        raise ModelError(
+            f"controller '{controller}' is no name: {str(error).splitlines()[0].rstrip(':')}"
+        ) from None
+    if not own or node.resolve_topic_name(below) == node.resolve_topic_name(f'~/{ACTION}'):
+        raise ModelError(
+            f"controller '{controller}' names no controller: goals go from this node to the action "
+            f'{ACTION} of the node that moves the arm'
+        )
+    return below
 
 
 def _call_back(sent: Future) -> None:

@@ -32,7 +32,6 @@ class Input:
 
     Parameters
     ----------
-    topic : str
     required : bool
         Whether the node can do nothing without it.
     patience : float [s]
@@ -159,11 +158,11 @@ class Health:
         """Return the node itself and each of its inputs, since the last call."""
         now = time.monotonic()
         every = [*filter(None, [self.fault]), *self.lasting.values(), *self._said[-3:]]
-        told = list(dict.fromkeys(every))  # what begins to last is said, too
+        reported = list(dict.fromkeys(every))  # what begins to last is said, too
         own = Status(
             self._node,
-            ERROR if self.fault else WARN if told else OK,
-            '; '.join(told) or self.running,
+            ERROR if self.fault else WARN if reported else OK,
+            '; '.join(reported) or self.running,
             {
                 'inputs': len(self.inputs),
                 'told': self._said_in_all,

@@ -65,7 +65,6 @@ class Neighbours:
 
         Parameters
         ----------
-        there : collection of str
         publishers, subscribers : callable
             From the name of a topic to how many the own graph has.
 
@@ -101,10 +100,8 @@ class Meeting:
 
     Parameters
     ----------
-    node : CellNode
     within : float [s]
         Longest wait.
-    action : callable
 
     """
 

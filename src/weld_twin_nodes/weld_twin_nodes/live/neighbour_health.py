@@ -14,7 +14,7 @@ from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import DIAGNOSTICS
 
-from .outputs import NODE, REACHED
+from .outputs import NODE, REACHED, RUN
 from .typed_input import reader
 
 Statuses = dict[str, dict[str, str]]
@@ -30,6 +30,8 @@ class NeighbourHealth:
     def __init__(self, node: Node) -> None:
         self._read = reader(DIAGNOSTICS.type)
         self._told_at: dict[str, float] = {}
+        self._runs: dict[str, dict[str, float]] = {}
+        self._twice: dict[str, float] = {}
         self._hearers: list[Hearer] = []
         self._subscription: Any = node.create_subscription(
             DIAGNOSTICS.message_class(),
@@ -54,7 +56,20 @@ class NeighbourHealth:
             while (taken := handle.take_message(self._subscription.msg_type, True)) is not None:
                 self._take(taken[0])
         now = time.monotonic()
-        return {node for node, told in self._told_at.items() if now - told < ALIVE}
+        return {node for node, reported in self._told_at.items() if now - reported < ALIVE}
+
+    def twice(self, node: str) -> bool:
+        """Return whether two nodes of one name tell of themselves."""
+        return time.monotonic() - self._twice.get(node, -2.0 * ALIVE) < 2.0 * ALIVE
+
+    def _take_run(self, node: str, run: str, now: float) -> None:
+        """Take note of a start of a node: it runs twice where another spoke between two of its words."""
+        reported = {
+            each: at for each, at in self._runs.get(node, {}).items() if now - at < 2.0 * ALIVE
+        }
+        if any(at > reported.get(run, now) for at in reported.values()):
+            self._twice[node] = now
+        self._runs[node] = {**reported, run: now}
 
     def _take(self, data: bytes) -> None:
         """Hand on what nodes of the project tell; statuses of others are not even read."""
@@ -65,6 +80,9 @@ class NeighbourHealth:
         except TwinError:  # somebody else's, and none of the inputs
             return
         now = time.monotonic()
-        self._told_at.update({row[NODE]: now for row in statuses.values() if NODE in row})
+        for row in statuses.values():
+            if NODE in row:
+                self._told_at[row[NODE]] = now
+                self._take_run(row[NODE], row.get(RUN, ''), now)
         for hearer in [*self._hearers]:
             hearer(statuses)

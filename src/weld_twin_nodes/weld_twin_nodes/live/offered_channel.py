@@ -29,15 +29,7 @@ UNTOLD = 'RIHS01_' + 64 * '0'
 
 
 def offered_channel(topic: str, kind: str, publishers: Sequence[Any]) -> Channel:
-    """
-    Return a topic as its publishers offer it.
-
-    Parameters
-    ----------
-    topic, kind : str
-    publishers : sequence of rclpy TopicEndpointInfo
-
-    """
+    """Return a topic as its publishers offer it."""
     digest = next((str(info.topic_type_hash) for info in publishers), '')
     text = ''
     if kind not in TYPES.types:

@@ -25,7 +25,6 @@ class Sent(NamedTuple):
 
     Attributes
     ----------
-    number : int
     first, last : int, optional [ns]
         Header stamps of the first and the last message, where the type has a header.
 

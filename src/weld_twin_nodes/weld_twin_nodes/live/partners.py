@@ -24,7 +24,6 @@ def unheard_publishers(
 
     Parameters
     ----------
-    node : Node
     topic : str
         Its name after remapping, with the namespace.
     kind : str
@@ -64,7 +63,6 @@ def elsewhere(node: Node, topic: str, own: str, kinds: Sequence[str]) -> str:
 
     Parameters
     ----------
-    node : Node
     topic : str
         The input's name after remapping, with the namespace.
     own : str

@@ -31,7 +31,6 @@ class QosOverrides:
 
     Parameters
     ----------
-    node : Node
     given : iterable of str
         Names of the parameters that the node was started with.
     topics : collection of str

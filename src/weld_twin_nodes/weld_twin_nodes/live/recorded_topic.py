@@ -42,7 +42,6 @@ class RecordedTopic:
 
     Parameters
     ----------
-    node : CellNode
     name : str
         Resolved: with remappings and namespace.
     kind : str

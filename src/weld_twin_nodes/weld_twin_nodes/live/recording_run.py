@@ -198,25 +198,25 @@ class RecordingRun:
         out = {}
         for name, topic in self._topics.items():
             count, first, last = topic.taken
-            found = shortfall(
+            result = shortfall(
                 self._book.sent(name), Sent(count - dropped.get(name, 0), first, last)
             )
-            if found is not None and not (self._joins and found.where == AT_START):
-                out[name] = found
+            if result is not None and not (self._joins and result.where == AT_START):
+                out[name] = result
         return out
 
     def _conclude(self) -> None:
         """Note what every publisher sent and what is missing of it, and say so."""
         self._concluded = True
         lacking = self._shortfalls()
-        told: dict[str, Any] = {}
+        reported: dict[str, Any] = {}
         for name, topic in self._topics.items():
             sent = self._book.sent(name)
             if name in lacking:
-                told[name] = lacking[name].to_mapping()
+                reported[name] = lacking[name].to_mapping()
             elif sent is not None and 0 < sent.number <= topic.taken.number:
-                told[name] = {'sent': sent.number, 'recorded': sent.number, 'missing': 0}
-        self._bag.note(COMPLETENESS, told)
+                reported[name] = {'sent': sent.number, 'recorded': sent.number, 'missing': 0}
+        self._bag.note(COMPLETENESS, reported)
         sentences = [short.sentence(name) for name, short in lacking.items()]
         sentences += [f'{name}: nobody published this topic' for name in self._untyped]
         silent = set(self._book.never_told())
@@ -228,8 +228,8 @@ class RecordingRun:
         for k, sentence in enumerate(sentences):
             self._node.get_logger().warning(sentence)
             self._node.health.lasting[f'incomplete {k}'] = sentence
-        if told and not lacking:
-            total = sum(row['sent'] for row in told.values())
+        if reported and not lacking:
+            total = sum(row['sent'] for row in reported.values())
             self._node.get_logger().info(f'all {total:,} messages that were sent are in the bag')
 
     def close(self) -> None:

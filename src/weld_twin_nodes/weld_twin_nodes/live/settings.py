@@ -23,7 +23,6 @@ class Setting:
 
     Attributes
     ----------
-    name : str
     default : bool, int, float, str or list of str
         Also fixes the type, unless ``numbers`` is set.
     description : str

@@ -73,7 +73,6 @@ class MeasuredInputs:
 
     Parameters
     ----------
-    node : CellNode
     on_pose, on_point : callable
         Take the messages.
 

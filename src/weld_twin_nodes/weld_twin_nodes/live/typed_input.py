@@ -39,11 +39,8 @@ class TypedInput:
 
     Parameters
     ----------
-    node : Node
-    topic : Topic
     kinds : sequence of str
         Message types that are understood, the usual one first.
-    wanted : Qos
     take : callable
         Takes the type and the bytes of a message.
     required : bool

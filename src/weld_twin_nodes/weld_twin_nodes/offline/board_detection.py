@@ -54,13 +54,13 @@ def detector(board: Mapping[str, Any]) -> Callable[[Path], Corners]:
         raise ModelError(
             "weld-twin detect needs OpenCV: install it with pip install 'weld_twin[camera]'"
         ) from None
-    found = _finder(cv2, board)
+    result = _finder(cv2, board)
 
     def corners(path: Path) -> Corners:
         image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
         if image is None:
             raise DataError(f"image '{path}' cannot be read; OpenCV reads PNG, JPEG, TIFF and BMP")
-        labels, where = found(image)
+        labels, where = result(image)
         return [str(label) for label in labels], np.asarray(where, dtype=float).reshape(-1, 2)
 
     return corners

@@ -62,7 +62,7 @@ def weighed(
     if alone is None:
         return together, closes(together)
     pairs = ((together, alone), (alone, together))
-    heard = [_with_belief(found, other) for found, other in pairs]
+    heard = [_with_belief(result, other) for result, other in pairs]
     # What does not fit together, as after a knock between two recordings, may be sound by itself.
     heard = [one for one in heard if not _unsound(one)] or heard
     if not _same(together, alone):
@@ -74,28 +74,28 @@ def weighed(
     return _asking((stated or heard)[0], (together, alone)), ''
 
 
-def _asking(found: Mapping[str, Any], heard: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+def _asking(result: Mapping[str, Any], heard: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
     """Return a diagnosis that leaves the question open, with the other's experiment if it has none."""
-    plans = [one.get('next_experiment') for one in (found, *heard)]
+    plans = [one.get('next_experiment') for one in (result, *heard)]
     wanted = next((plan for plan in plans if plan and plan['motion'] is not None), plans[0])
-    return {**found, 'next_experiment': wanted}
+    return {**result, 'next_experiment': wanted}
 
 
-def closes(found: Mapping[str, Any]) -> str:
+def closes(result: Mapping[str, Any]) -> str:
     """
     Return why a diagnosis closes the question by itself; empty where it does not.
 
     Parameters
     ----------
-    found : mapping
+    result : mapping
         The content of diagnosis.json.
 
     """
-    verdict = found['verdict']
+    verdict = result['verdict']
     if not is_sure(verdict) or verdict['status'] not in STATED:
         return ''
-    open_ = verdict['status'] == 'ambiguous' and not _inseparable(found)
-    return '' if open_ or _to_confirm(found) else _words(found)
+    open_ = verdict['status'] == 'ambiguous' and not _inseparable(result)
+    return '' if open_ or _to_confirm(result) else _words(result)
 
 
 def is_sure(verdict: Mapping[str, Any]) -> bool:
@@ -108,11 +108,11 @@ def is_sure(verdict: Mapping[str, Any]) -> bool:
         Of diagnosis.json, of either schema.
 
     """
-    told = verdict.get('sure')
-    return float(verdict['confidence'] or 0.0) >= OLDER if told is None else bool(told)
+    reported = verdict.get('sure')
+    return float(verdict['confidence'] or 0.0) >= OLDER if reported is None else bool(reported)
 
 
-def belief(found: Mapping[str, Any], other: Mapping[str, Any]) -> float:
+def belief(result: Mapping[str, Any], other: Mapping[str, Any]) -> float:
     """
     Return how probable it is that an answer is right, with another of most of the same measurements.
 
@@ -122,12 +122,12 @@ def belief(found: Mapping[str, Any], other: Mapping[str, Any]) -> float:
         As `signs` takes them.
 
     """
-    own, same, against = signs(found, other)
+    own, same, against = signs(result, other)
     total = OWN * own + FOR * same + AGAINST * against + BEGIN
     return min(1.0 / (1.0 + exp(-total)), MOST)
 
 
-def signs(found: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float, float, float]:
+def signs(result: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float, float, float]:
     """
     Return the log odds of an answer, and of another as far as it speaks for it, and against it.
 
@@ -136,97 +136,99 @@ def signs(found: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float, fl
 
     Parameters
     ----------
-    found, other : mapping
+    result, other : mapping
         The contents of two diagnosis.json.
 
     """
     stated = other['verdict']['status'] in STATED
     heard = max(_log_odds(other), 0.0) if stated else 0.0
-    backed = _same(found, other, no_wider=True)
-    return _log_odds(found), heard * backed, heard * (not _same(found, other))
+    backed = _same(result, other, no_wider=True)
+    return _log_odds(result), heard * backed, heard * (not _same(result, other))
 
 
-def _log_odds(found: Mapping[str, Any]) -> float:
-    verdict = found['verdict']
+def _log_odds(result: Mapping[str, Any]) -> float:
+    verdict = result['verdict']
     learned = verdict.get('learned')
-    told = float((verdict['confidence'] if learned is None else learned) or 0.0)
-    held = min(max(told, EXTREME), 1.0 - EXTREME)
+    reported = float((verdict['confidence'] if learned is None else learned) or 0.0)
+    held = min(max(reported, EXTREME), 1.0 - EXTREME)
     return log(held / (1.0 - held))
 
 
-def _with_belief(found: Mapping[str, Any], other: Mapping[str, Any]) -> Mapping[str, Any]:
+def _with_belief(result: Mapping[str, Any], other: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return a diagnosis with the confidence that it has beside another."""
-    verdict = found['verdict']
+    verdict = result['verdict']
     if verdict['status'] not in STATED:
-        return found
-    told = belief(found, other)
-    earned = {'confidence': told, 'learned': told, 'sure': told >= CLOSED}
-    return {**found, 'verdict': {**verdict, **earned}}
+        return result
+    reported = belief(result, other)
+    earned = {'confidence': reported, 'learned': reported, 'sure': reported >= CLOSED}
+    return {**result, 'verdict': {**verdict, **earned}}
 
 
-def _same(found: Mapping[str, Any], other: Mapping[str, Any], *, no_wider: bool = False) -> bool:
+def _same(result: Mapping[str, Any], other: Mapping[str, Any], *, no_wider: bool = False) -> bool:
     """
     Return whether two answers name as many causes, each of one among those of the other.
 
     With ``no_wider``, whether all that the other names beside each other is named by the first as
     well: an answer that leaves more open says nothing of what the first rules out.
     """
-    if any(one['verdict']['status'] not in STATED for one in (found, other)):
+    if any(one['verdict']['status'] not in STATED for one in (result, other)):
         return False
-    left = _sites(other)
-    for group in _sites(found):
-        match = next((own for own in left if (own <= group if no_wider else own & group)), None)
+    remaining = _sites(other)
+    for group in _sites(result):
+        match = next(
+            (own for own in remaining if (own <= group if no_wider else own & group)), None
+        )
         if match is None:
             return False
-        left.remove(match)
-    return not left
+        remaining.remove(match)
+    return not remaining
 
 
-def _sites(found: Mapping[str, Any]) -> list[set[tuple[str, str | None]]]:
-    return [{(e['effect'], e.get('joint')) for e in group} for group in sets_named(found)]
+def _sites(result: Mapping[str, Any]) -> list[set[tuple[str, str | None]]]:
+    return [{(e['effect'], e.get('joint')) for e in group} for group in sets_named(result)]
 
 
-def sets_named(found: Mapping[str, Any]) -> Sequence[Sequence[Mapping[str, Any]]]:
+def sets_named(result: Mapping[str, Any]) -> Sequence[Sequence[Mapping[str, Any]]]:
     """Return what each cause that is named may be, one group a cause."""
-    return found['verdict'].get('indistinguishable') or ()
+    return result['verdict'].get('indistinguishable') or ()
 
 
-def _unsound(found: Mapping[str, Any]) -> bool:
-    return bool(found['verdict']['status'] == 'unsound')
+def _unsound(result: Mapping[str, Any]) -> bool:
+    return bool(result['verdict']['status'] == 'unsound')
 
 
-def _words(found: Mapping[str, Any]) -> str:
+def _words(result: Mapping[str, Any]) -> str:
     """Return why an answer closes the question, where it does."""
-    told = {'identified': 'the causes are identified', 'ambiguous': ALIKE}
-    return told.get(found['verdict']['status'], 'nothing is left to explain above the noise')
+    reported = {'identified': 'the causes are identified', 'ambiguous': ALIKE}
+    return reported.get(result['verdict']['status'], 'nothing is left to explain above the noise')
 
 
-def _open_ends(found: Mapping[str, Any]) -> bool:
+def _open_ends(result: Mapping[str, Any]) -> bool:
     """
     Return whether causes are named beside each other that some motion would part.
 
     What can be parted among those named is asked first. So an experiment that asks something else
     found no motion for it; nor did one that would part nothing.
     """
-    wanted = found.get('next_experiment')
-    if found['verdict']['status'] != 'ambiguous' or wanted is None:
-        return bool(found['verdict']['status'] == 'ambiguous')
+    wanted = result.get('next_experiment')
+    if result['verdict']['status'] != 'ambiguous' or wanted is None:
+        return bool(result['verdict']['status'] == 'ambiguous')
     sigma = wanted['expected_separation_sigma']
     if sigma is not None and sigma < NOTHING:
         return False
     sides = [{(e['effect'], e.get('joint')) for e in side} for side in wanted.get('between') or ()]
     open_ = len(sides) == 2 and any(
-        sides[0] & group and sides[1] & group for group in _sites(found)
+        sides[0] & group and sides[1] & group for group in _sites(result)
     )
-    return open_ and not _inseparable(found)
+    return open_ and not _inseparable(result)
 
 
-def _to_confirm(found: Mapping[str, Any]) -> bool:
+def _to_confirm(result: Mapping[str, Any]) -> bool:
     """Return whether joints that hardly moved have to move before anything is sure."""
-    return bool((found.get('next_experiment') or {}).get('confirms'))
+    return bool((result.get('next_experiment') or {}).get('confirms'))
 
 
-def _inseparable(found: Mapping[str, Any]) -> bool:
+def _inseparable(result: Mapping[str, Any]) -> bool:
     """Return whether no motion parts what is left."""
-    wanted = found.get('next_experiment')
+    wanted = result.get('next_experiment')
     return wanted is not None and wanted['motion'] is None

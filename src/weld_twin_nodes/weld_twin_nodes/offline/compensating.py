@@ -35,8 +35,6 @@ class Compensated(NamedTuple):
 
     Attributes
     ----------
-    result : Compensation
-    model : Predictor
     outside : sequence of Stretch
         Of the nominal commands: where they leave what was recorded.
     least : float
@@ -69,10 +67,10 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
     """
     twin = build_twin(robot, path, mended=True)
     model = Predictor(twin, _posterior(robot, path))
-    stored, given, told = _model(robot, path), recording, ''
+    stored, given, reported = _model(robot, path), recording, ''
     if stored is not None:
         # Its clocks are its own, and commands need none.
-        recording, told = mended_source(stored, robot, given, -1)
+        recording, reported = mended_source(stored, robot, given, -1)
     nominal, real = Twin(twin.robot).poses(recording), twin.poses(recording)
     covariances = model.covariances(recording)
     share = None
@@ -87,7 +85,7 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
     motion = result.motion
     if stored is not None and recording is not given:
         motion = _as_given(motion, stored)
-    return Compensated(result, model, model.outside(recording), least, motion, told)
+    return Compensated(result, model, model.outside(recording), least, motion, reported)
 
 
 def _as_given(motion: JointMotion, stored: Model) -> JointMotion:

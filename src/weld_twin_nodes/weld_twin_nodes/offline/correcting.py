@@ -22,7 +22,7 @@ from weld_twin_core.motion.programs.repeated import repeated
 from weld_twin_core.twin.program_accuracy import Accuracy, along_seams
 from weld_twin_core.twin.program_correction import Caps, ProgramCorrection, correct_program
 from weld_twin_core.twin.program_model import ProgramModel
-from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis
+from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis, read_model
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 from weld_twin_msgs_py.programs import (
     Context,
@@ -63,10 +63,8 @@ class CorrectedProgram:
 
     Attributes
     ----------
-    program : Program
     texts : tuple of str
         One for every file of the program.
-    found : ProgramCorrection
     notes : tuple of str
         What a reader should know, in sentences.
 
@@ -91,7 +89,6 @@ def program_model(
 
     Parameters
     ----------
-    robot : Robot
     path : Path or str
         diagnosis.json, or an effects file.
     temperature : float, optional [degC]
@@ -107,12 +104,13 @@ def program_model(
     if Path(path).suffix.lower() == '.json' and (
         'model' in read_diagnosis(path) or read_diagnosis(path).get('unsound')
     ):
-        twin = load_model(robot, path, setup)
-        effects = of_the_robot(twin.effects)
+        placed, model = load_model(robot, path, setup).robot, read_model(robot, path)
+        result, posterior = model.found, read_posterior(robot, path)
+        if posterior is not None:
+            result, posterior = posterior.of_the_arm().centred(result)
+        effects = of_the_robot((*model.known, *result))
         _refuse_by_effort(effects, path)
-        posterior = read_posterior(robot, path)
-        posterior = None if posterior is None else posterior.without_clocks()
-        return ProgramModel(twin.robot, tuple(effects), posterior, temperature, setup)
+        return ProgramModel(placed, effects, posterior, temperature, setup)
     twin = build_twin(robot, path, mended=True)
     _refuse_by_effort(twin.effects, path)
     return ProgramModel(twin.robot, tuple(twin.effects), None, temperature)
@@ -141,10 +139,6 @@ def corrected_program(
 
     Parameters
     ----------
-    program : Program
-    context : Context
-    model : ProgramModel
-    caps : Caps, optional
     start : array, shape (n,), optional
         Joint positions before the first move.
     readings : str
@@ -168,7 +162,7 @@ def corrected_program(
     if not program.steps:
         raise DataError(f"no move was found in '{name}'; is its language {program.language}?")
     moves = to_moves(program, context.robot, context.controller)
-    found = correct_program(
+    result = correct_program(
         model,
         moves,
         held=program.held,
@@ -177,15 +171,17 @@ def corrected_program(
         written=lambda points: _read_back(program, context, points)[1],
     )
     seams = {move.seam for piece in moves.pieces for move in piece}
-    if seams <= set(found.left):
-        raise DataError(f"nothing in '{name}' can be corrected: {next(iter(found.left.values()))}")
-    texts, _ = _read_back(program, context, found.program.points)
+    if seams <= set(result.left):
+        raise DataError(
+            f"nothing in '{name}' can be corrected: {next(iter(result.left.values()))}"
+        )
+    texts, _ = _read_back(program, context, result.program.points)
     notes = _notes(program, context, model) + [
         f'{where} names no posture; the only one that was recorded was taken'
-        for where in found.travel.assumed
+        for where in result.travel.assumed
     ]
-    notes += [f'corrected without play, friction and lag: {why}' for why in found.calm.values()]
-    return CorrectedProgram(program, tuple(texts), found, tuple(notes))
+    notes += [f'corrected without play, friction and lag: {why}' for why in result.calm.values()]
+    return CorrectedProgram(program, tuple(texts), result, tuple(notes))
 
 
 def _read_back(
@@ -213,9 +209,9 @@ def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]
         out.append(TOOL_LEFT)
     if any(effect.name == 'base_pose' for effect in model.effects):
         out.append(BASE_MOVED)
-    left = [e.name for e in model.effects if e not in model.acting]
-    if left:
-        out.append(f'no program mends {", ".join(left)}')
+    remaining = [e.name for e in model.effects if e not in model.acting]
+    if remaining:
+        out.append(f'no program mends {", ".join(remaining)}')
     if model.posterior is None:
         out.append(NOT_SURE)
     elif frames := model.posterior.directions.frames:

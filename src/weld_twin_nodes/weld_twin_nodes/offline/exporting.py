@@ -78,11 +78,8 @@ def export(
     path : str or planned seam
         A path file, a bundled seam, an experiment as a diagnosis proposes it, or a seam that is
         planned already.
-    context : Context
-    language : str
     name : str
         Of the program.
-    speeds : Speeds
     trigger : int
         Number of the output that triggers the instrument.
     seam_speed : float [m/s]
@@ -243,12 +240,14 @@ def _read_again(made: Exported, text: str, language: str) -> None:
     """Refuse a program that does not lead where it is to lead when it is read."""
     tools = {'0': made.tool, '1': made.tool}
     controller = made.context.controller
-    told = made.context._replace(controller=replace(controller, tools=tools, bases={}, notes=[]))
-    program = read_sources([Source(made.name, text)], told, language)
-    found = travel(made.context.robot, to_moves(program, told.robot, told.controller))
-    if found.lost:
-        raise DataError(next(iter(found.lost.values())))
-    q = np.concatenate([piece.motion.q[piece.ends] for piece in found.pieces])
+    reported = made.context._replace(
+        controller=replace(controller, tools=tools, bases={}, notes=[])
+    )
+    program = read_sources([Source(made.name, text)], reported, language)
+    result = travel(made.context.robot, to_moves(program, reported.robot, reported.controller))
+    if result.lost:
+        raise DataError(next(iter(result.lost.values())))
+    q = np.concatenate([piece.motion.q[piece.ends] for piece in result.pieces])
     wanted = [move.q for move in made.moves]
     if language == 'joint-trajectory':
         wanted = [m.q for m in made.moves for _ in range(1 + (m.dwell > 0.0))]

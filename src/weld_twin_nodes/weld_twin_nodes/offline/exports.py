@@ -53,10 +53,10 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         shown = offset * 1e3 if slides else np.degrees(offset)
         units = ('m', 'mm') if slides else ('rad', 'deg')
-        told = f'{stands(name, offset, sliding=slides)} {to_mend(offset, sliding=slides)}'
+        reported = f'{stands(name, offset, sliding=slides)} {to_mend(offset, sliding=slides)}'
         if name in turned:
-            told += f' {TURNED_ROUND}'
-        meaning = told if offset else ''
+            reported += f' {TURNED_ROUND}'
+        meaning = reported if offset else ''
         rows.append((name, float(offset), units[0], f'{shown:.6f}', units[1], meaning))
     remarks = ''.join(f'# {line}\n' for line in _readings(model))
     table = csv_text(('joint', 'offset', 'unit', 'shown', 'shown_unit', 'meaning'), rows)
@@ -91,8 +91,6 @@ def write_all(
 
     Parameters
     ----------
-    directory : Path
-    model : Model
     notes : sequence of str
         Where it holds.
     given : GivenUrdf, optional
@@ -119,9 +117,9 @@ def _of_the_robot(model: Model, notes: Sequence[str]) -> list[str]:
 
 def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
     based = model.robot.with_frames(base=model.bases[0])
-    robot, left = corrected(based, (*_causes(model), *_changes(model)))
+    robot, remaining = corrected(based, (*_causes(model), *_changes(model)))
     # What the file has for use by itself, the effects that go with it take back.
-    left = (*left, *(effect.with_vector(-effect.vector()) for effect in _changes(model)))
+    remaining = (*remaining, *(effect.with_vector(-effect.vector()) for effect in _changes(model)))
     zeros = _zeros(model)
     if zeros.any():
         key = np.where(robot.prismatic, 0.0, zeros), np.where(robot.prismatic, zeros, 0.0)
@@ -135,7 +133,7 @@ def _corrected(model: Model) -> tuple[Robot, tuple[Effect, ...]]:
     source = f'{robot.source}; corrected by a diagnosis' if robot.source else 'diagnosis'
     if model.mended:
         source += f' of mended data: {" ".join(model.mended)}'
-    return replace(robot, source=source), left
+    return replace(robot, source=source), remaining
 
 
 def _changes(model: Model) -> tuple[Effect, ...]:
@@ -157,15 +155,15 @@ def _zeros(model: Model) -> np.ndarray:
 
 def _readings(model: Model) -> list[str]:
     """Return what was mended, and which readings the files take."""
-    told = _mended(model)
+    reported = _mended(model)
     if not any(mend.get('do') == 'joints' for mend in model.mends):
-        return told
+        return reported
     if _zeros(model).any():
         return [
-            *told,
+            *reported,
             'That is in the numbers below: they take the readings as they were recorded.',
         ]
-    return [*told, 'The numbers below take readings in which that is mended.']
+    return [*reported, 'The numbers below take readings in which that is mended.']
 
 
 def _causes(model: Model) -> tuple[Effect, ...]:

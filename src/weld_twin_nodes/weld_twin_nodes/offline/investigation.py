@@ -120,7 +120,7 @@ def changed(state: State) -> dict[str, str]:
 def take_in(
     state: State,
     bags: Sequence[str],
-    found: Mapping[str, Any],
+    result: Mapping[str, Any],
     why: str | None = None,
     changes: str = '',
 ) -> State:
@@ -129,10 +129,9 @@ def take_in(
 
     Parameters
     ----------
-    state : State
     bags : sequence of str
         The new recordings.
-    found : mapping
+    result : mapping
         The content of diagnosis.json.
     why : str, optional
         Why it closes the question, as `weighed` tells it; left out, this diagnosis alone counts.
@@ -145,14 +144,14 @@ def take_in(
     if rounds and rounds[-1].get('asked'):
         asked = rounds[-1]['asked']
         spent += float(asked['minutes'])
-        rounds[-1] = {**rounds[-1], 'asked': {**asked, 'decided': decided(asked, found)}}
+        rounds[-1] = {**rounds[-1], 'asked': {**asked, 'decided': decided(asked, result)}}
     new = [
         {**hashed('recording', Path(bag).resolve())._asdict(), 'changed': changes} for bag in bags
     ]
-    step: dict[str, Any] = {'recordings': new, 'believed': believed(found), 'asked': None}
+    step: dict[str, Any] = {'recordings': new, 'believed': believed(result), 'asked': None}
     out = {**state, 'rounds': [*rounds, step], 'spent_min': spent}
     kinds = [r['asked']['kind'] for r in rounds if r.get('asked')]
-    answer = question(found, float(state['budget_min']) - spent, kinds, why)
+    answer = question(result, float(state['budget_min']) - spent, kinds, why)
     if isinstance(answer, dict):
         step['asked'] = answer
         return out
@@ -160,9 +159,9 @@ def take_in(
     return {**out, 'state': status, 'why': reason}
 
 
-def believed(found: Mapping[str, Any]) -> dict[str, Any]:
+def believed(result: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a diagnosis says, in short."""
-    verdict = found['verdict']
+    verdict = result['verdict']
     return {
         'status': verdict['status'],
         'confidence': verdict['confidence'],
@@ -171,7 +170,7 @@ def believed(found: Mapping[str, Any]) -> dict[str, Any]:
         'indistinguishable': verdict.get('indistinguishable') or [],
         'candidates': [
             {key: item.get(key) for key in ('effect', 'joint', 'probability')}
-            for item in (found.get('candidates') or [])[:6]
+            for item in (result.get('candidates') or [])[:6]
         ],
         'causes': [
             {
@@ -186,16 +185,16 @@ def believed(found: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def question(
-    found: Mapping[str, Any], left: float, asked: Sequence[str], why: str | None = None
+    result: Mapping[str, Any], remaining: float, asked: Sequence[str], why: str | None = None
 ) -> dict[str, Any] | tuple[str, str]:
     """
     Return the next experiment, or why there is none: a word for the state, and a sentence.
 
     Parameters
     ----------
-    found : mapping
+    result : mapping
         The content of diagnosis.json.
-    left : float [min]
+    remaining : float [min]
         Of the budget.
     asked : sequence of str
         Kinds of experiment that were made already.
@@ -203,22 +202,22 @@ def question(
         Why the question is closed, as `weighed` tells it; left out, this diagnosis alone counts.
 
     """
-    if found['verdict']['status'] == 'unsound':
+    if result['verdict']['status'] == 'unsound':
         return 'unsound', 'data or set-up are wrong; the page of the last round says what'
-    why = closes(found) if why is None else why
+    why = closes(result) if why is None else why
     if why:
         return ('nothing would part them' if why == ALIKE else 'sure'), why
-    wanted = found.get('next_experiment')
+    wanted = result.get('next_experiment')
     by_hand = wanted and 'contact' in (wanted.get('motion') or {})
     sigma = wanted['expected_separation_sigma'] if wanted else None
-    if (not wanted or (sigma is not None and 0.0 < sigma < NOTHING)) and short(left):
+    if (not wanted or (sigma is not None and 0.0 < sigma < NOTHING)) and short(remaining):
         return (
             'budget spent',
-            f'{max(left, 0.0):.1f} min are left, and nothing that fits in would part what is left',
+            f'{max(remaining, 0.0):.1f} min are left, and nothing that fits in would part what is left',
         )
     if not wanted or wanted.get('motion') is None or by_hand:
-        told = '' if not wanted else f': {wanted["sentence"]}'
-        return 'nothing would part them', f'no motion decides between what is left{told}'
+        reported = '' if not wanted else f': {wanted["sentence"]}'
+        return 'nothing would part them', f'no motion decides between what is left{reported}'
     if sigma is not None and sigma < NOTHING:
         return (
             'nothing would part them',
@@ -229,17 +228,17 @@ def question(
             'nothing would part them',
             f'the data were widened {WIDENED} times and still nothing is sure',
         )
-    if wanted['cost'] > left:
+    if wanted['cost'] > remaining:
         return (
             'budget spent',
-            f'the next experiment takes {wanted["cost"]:.1f} min and {max(left, 0.0):.1f} are left',
+            f'the next experiment takes {wanted["cost"]:.1f} min and {max(remaining, 0.0):.1f} are left',
         )
     return _asked(wanted)
 
 
-def short(left: float) -> bool:
+def short(remaining: float) -> bool:
     """Return whether fewer minutes are left than a usual experiment takes at the least."""
-    return 60.0 * left < LEAST
+    return 60.0 * remaining < LEAST
 
 
 def _asked(wanted: Mapping[str, Any]) -> dict[str, Any]:
@@ -269,7 +268,7 @@ def foreseen(asked: Mapping[str, Any]) -> str:
     return f'it {word}, with a probability of {promise:.0%}'
 
 
-def decided(asked: Mapping[str, Any], found: Mapping[str, Any]) -> bool | None:
+def decided(asked: Mapping[str, Any], result: Mapping[str, Any]) -> bool | None:
     """
     Return whether an experiment decided what it said it would; None where it said nothing.
 
@@ -281,13 +280,13 @@ def decided(asked: Mapping[str, Any], found: Mapping[str, Any]) -> bool | None:
     ----------
     asked : mapping
         As `question` returned it.
-    found : mapping
+    result : mapping
         The content of the diagnosis.json with the new recording.
 
     """
     if not asked.get('between'):
         return None
-    verdict = found['verdict']
+    verdict = result['verdict']
     if verdict['status'] == 'unknown':
         found_causes = verdict.get('causes') or []
         # What has nothing of its own holds where the other does not.

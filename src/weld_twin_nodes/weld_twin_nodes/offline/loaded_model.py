@@ -31,10 +31,8 @@ class LoadedModel:
 
     Attributes
     ----------
-    path : Path
     digest : str
         Of the content of the file.
-    read : ProgramModel
     promised : Promise, optional
         How far measurements are from the twin that has the model.
     modified : float
@@ -113,11 +111,11 @@ def loaded(robot: Robot, path: str) -> LoadedModel:
 
 def _promised(content: dict[str, Any], read: ProgramModel) -> Promise | None:
     """Return what a model leaves on unseen data; None where its file does not say so."""
-    left = _number(content, 'shrink', 'rms_after_m')
-    if not left:
+    remaining = _number(content, 'shrink', 'rms_after_m')
+    if not remaining:
         return None
     unsure = 0.0 if read.posterior is None else read.posterior.recorded_m
-    return Promise.of(left, unsure, max(int(_number(content, 'gap', 'samples')), 1))
+    return Promise.of(remaining, unsure, max(int(_number(content, 'gap', 'samples')), 1))
 
 
 def _number(content: dict[str, Any], part: str, key: str) -> float:

@@ -79,7 +79,6 @@ def planned(
 
     Parameters
     ----------
-    robot : Robot
     plan_of : callable
         Returns the plan of so many stations.
     minutes : float, optional
@@ -198,12 +197,10 @@ def write_plan(folder: Path, context: Context, language: str | None, plan: Plann
 
     Parameters
     ----------
-    folder : Path
     context : Context
         The robot, and how its controller counts.
     language : str, optional
         Of the controller, for its names of the joints.
-    plan : Planned
 
     """
     robot = context.robot

@@ -97,7 +97,6 @@ def write_owned(path: Path | str, text: str) -> None:
     Parameters
     ----------
     path : Path or str
-    text : str
 
     """
     with new_file(path, force=True) as file:

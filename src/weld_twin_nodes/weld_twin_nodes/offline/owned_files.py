@@ -116,10 +116,8 @@ def change_of(folder: Path, made: Mapping[str, str], mark: str, *, adds: bool) -
 
     Parameters
     ----------
-    folder : Path
     made : mapping of str to str
         Digests of the new files by name.
-    mark : str
     adds : bool
         Whether files of this result that were not made again stay.
 
@@ -128,8 +126,8 @@ def change_of(folder: Path, made: Mapping[str, str], mark: str, *, adds: bool) -
     # The mark comes last: who finds the new one finds all the others.
     names = sorted(made, key=lambda name: (name == mark, name))
     place = {name: own.get(name) for name in names if digest(folder / name) != made[name]}
-    left = {name: own[name] for name in own if name not in made}
-    return Change(mark, place, {} if adds else left, {**(left if adds else {}), **made})
+    remaining = {name: own[name] for name in own if name not in made}
+    return Change(mark, place, {} if adds else remaining, {**(remaining if adds else {}), **made})
 
 
 def in_the_way(folder: Path, change: Change) -> Iterator[str]:
@@ -160,7 +158,6 @@ def carry_out(folder: Path, scratch: Path, kept: Callable[[str, str], object]) -
 
     Parameters
     ----------
-    folder, scratch : Path
     kept : callable
         Told every file that was not ours: its name, and the name that it has now.
 
@@ -226,13 +223,13 @@ def _decided(note: Path) -> Change:
     return Change(str(change.mark), place, _digests(change.drop), new)
 
 
-def _digests(told: Mapping[str, object]) -> Digests:
+def _digests(reported: Mapping[str, object]) -> Digests:
     """Return digests by names that stay in their folder, refused if one does not."""
-    for name in told:
+    for name in reported:
         path = PurePosixPath(name)
         if not path.parts or path.is_absolute() or '..' in path.parts or '\0' in name:
             raise ValueError(f'{name!r} is no name of a file in this folder')
-    return {name: str(value) for name, value in told.items()}
+    return {name: str(value) for name, value in reported.items()}
 
 
 def _is_no_list(folder: Path) -> bool:

@@ -31,8 +31,6 @@ def placed(recording: Recording, robot: Robot, align: frozenset[str]) -> tuple[R
 
     Parameters
     ----------
-    recording : Recording
-    robot : Robot
     align : frozenset of str
         Frames to fit: 'base', 'tool', both or none.
 
@@ -47,8 +45,8 @@ def placed(recording: Recording, robot: Robot, align: frozenset[str]) -> tuple[R
     names = ' and '.join(sorted(align))
     numbers, measured = NUMBERS * len(align), measured_of(recording)
     each = 3 if measured.rotation is None else 6
-    found = stops(recording)
-    seen = len(pose_cycles(found, robot)) if recording.joints.static else measured.t.size
+    result = stops(recording)
+    seen = len(pose_cycles(result, robot)) if recording.joints.static else measured.t.size
     if each * seen < WANTED * numbers:
         raise DataError(
             f'{names} cannot be fitted on {seen} different pose{"s"[: seen > 1]}: the fit takes '

@@ -55,7 +55,6 @@ class Predictor(NamedTuple):
 
     Attributes
     ----------
-    twin : Twin
     posterior : Posterior or None
         None for an effects file, or a diagnosis written without one.
     setup : int
@@ -88,14 +87,14 @@ class Predictor(NamedTuple):
             return []
         motion = recording.joints
         wrench, temperature = recording.wrench, recording.temperature
-        found = self.posterior.domain.outside(
+        result = self.posterior.domain.outside(
             motion.q,
             None if motion.static else motion.velocity,
             None if wrench is None else wrench.at(motion.t),
             None if temperature is None else temperature.at(motion.t),
         )
         t = motion.t - motion.t[0]
-        return [Stretch(float(t[a]), float(t[b]), why) for a, b, why in found]
+        return [Stretch(float(t[a]), float(t[b]), why) for a, b, why in result]
 
 
 class Written(NamedTuple):
@@ -106,7 +105,6 @@ class Written(NamedTuple):
     ----------
     rms_m : float or None
         RMS of measured minus twin, where something was measured.
-    outside : sequence of Stretch
     sigma_m : float or None
         Median of the standard deviation of position in its worst direction.
 
@@ -129,7 +127,6 @@ def predictor(
 
     Parameters
     ----------
-    robot : Robot
     path : Path or str
         diagnosis.json or an effects file.
     bag : Path or str
@@ -155,9 +152,11 @@ def predictor(
         chosen = 0
     else:
         chosen = _setup_of(path, model, bag)
-    source, told = mended_source(model, robot, recording, _fitted(path, bag, recording, chosen))
+    source, reported = mended_source(
+        model, robot, recording, _fitted(path, bag, recording, chosen)
+    )
     twin = timed(path, model, chosen, source)
-    return Predictor(twin, read_posterior(robot, path), chosen, source, told)
+    return Predictor(twin, read_posterior(robot, path), chosen, source, reported)
 
 
 def _fitted(path: Path | str, bag: Path | str, recording: Recording, chosen: int) -> int:

@@ -30,8 +30,6 @@ def write_prediction_table(path: Path | str, model: Predictor, recording: Record
     ----------
     path : Path or str
         Must not exist.
-    model : Predictor
-    recording : Recording
 
     Raises
     ------

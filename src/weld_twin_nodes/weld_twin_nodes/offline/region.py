@@ -48,7 +48,6 @@ def anywhere(robot: Robot, spread: float) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    robot : Robot
     spread : float [rad]
         Half the range of every joint about the posture of a usual seam, for the stations.
 
@@ -57,15 +56,14 @@ def anywhere(robot: Robot, spread: float) -> tuple[Array, Array]:
 
 
 def region(
-    robot: Robot, told: str, context: Context | None = None, language: str = ''
+    robot: Robot, given: str, context: Context | None = None, language: str = ''
 ) -> tuple[Array, Array]:
     """
     Return postures of a region, those that judge it, shape (K, n), and those that may be measured.
 
     Parameters
     ----------
-    robot : Robot
-    told : str
+    given : str
         ``x,y,z:x,y,z``, corners of a box in the robot's base frame [mm]; a program; or a bag.
     context : Context, optional
         For programs; with the frames of the program alone where left out.
@@ -78,14 +76,14 @@ def region(
         The region is none of these, or the arm does not reach it.
 
     """
-    if Path(told).is_dir():
-        q = read_recording(told, robot).joints.q
-    elif Path(told).is_file():
-        language = language or language_of(read_source(told), told, '')
+    if Path(given).is_dir():
+        q = read_recording(given, robot).joints.q
+    elif Path(given).is_file():
+        language = language or language_of(read_source(given), given, '')
         context = context or Context(robot, controller_of(robot, language))
-        q = _of_program(robot, told, context, language)
+        q = _of_program(robot, given, context, language)
     else:
-        q = _in_box(robot, _box(told))
+        q = _in_box(robot, _box(given))
     chosen = q[np.unique(np.linspace(0, len(q) - 1, min(POSTURES, len(q))).round().astype(int))]
     judged = np.unique(np.linspace(0, len(chosen) - 1, min(JUDGED, len(chosen))).round())
     return chosen[judged.astype(int)], chosen
@@ -100,16 +98,16 @@ def _of_program(robot: Robot, path: str, context: Context, language: str) -> Arr
     return np.concatenate(parts)
 
 
-def _box(told: str) -> Array:
+def _box(given: str) -> Array:
     """Return the lower and the upper corner of a box, shape (2, 3) [m]."""
     try:
-        numbers = [float(value) for value in told.replace(':', ',').split(',')]
+        numbers = [float(value) for value in given.replace(':', ',').split(',')]
     except ValueError:
         numbers = []
     box = np.array(numbers).reshape(2, 3) * 1e-3 if len(numbers) == SIDES else np.zeros((2, 3))
     if not (np.isfinite(box).all() and (box[1] > box[0]).all()):
         raise DataError(
-            f"the region '{told}' is no bag, no program and no box; a box is written x,y,z:x,y,z, its "
+            f"the region '{given}' is no bag, no program and no box; a box is written x,y,z:x,y,z, its "
             'lower and its upper corner in the base frame in mm'
         )
     return box
@@ -125,12 +123,12 @@ def _in_box(robot: Robot, box: Array) -> Array:
     goals[:, :3, 3] = (box[0] + halton(3, TRIED) * (box[1] - box[0])) @ base[:3, :3].T + base[
         :3, 3
     ]
-    found, error = np.tile(centre, (TRIED, 1)), np.zeros((TRIED, 6))
+    result, error = np.tile(centre, (TRIED, 1)), np.zeros((TRIED, 6))
     for share in np.linspace(0.0, 1.0, STEPS + 1)[1:]:
-        found, error = polish(robot, found, (1.0 - share) * pose + share * goals)
-    found = centred(robot, found)
-    inside = ((found >= robot.lower) & (found <= robot.upper)).all(axis=1)
-    out = found[inside & (np.abs(error).max(axis=1) < CLOSED)][:POSTURES]
+        result, error = polish(robot, result, (1.0 - share) * pose + share * goals)
+    result = centred(robot, result)
+    inside = ((result >= robot.lower) & (result <= robot.upper)).all(axis=1)
+    out = result[inside & (np.abs(error).max(axis=1) < CLOSED)][:POSTURES]
     if len(out) < FEWEST:
         raise DataError(
             f'{robot.name} reaches {len(out)} of {TRIED} places in the region, with its tool turned '

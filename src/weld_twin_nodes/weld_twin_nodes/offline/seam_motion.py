@@ -29,7 +29,6 @@ def plan_motion(
 
     Parameters
     ----------
-    robot : Robot
     path : str
         A kind of bundled seam, or the path of a path file.
     profile : str
@@ -49,8 +48,8 @@ def plan_motion(
     if path in KINDS:
         return plan(robot, default_seam(robot, path), law, rate, fit=not speed)
     seam, torch = read_path(path)
-    told = read_external(path, robot)
-    return plan(robot, seam, law, rate, torch=torch, fit=not speed, told=told)
+    reported = read_external(path, robot)
+    return plan(robot, seam, law, rate, torch=torch, fit=not speed, told=reported)
 
 
 def joint_motion(

@@ -54,7 +54,6 @@ class Simulation:
         The robot as it is, with the injected effects.
     twin : Twin
         The robot as it is believed to be.
-    motion : JointMotion
     stamps : array of int64, shape (N,) [ns]
         Of the joint states.
     seed : int
@@ -129,14 +128,14 @@ class Simulation:
 
     def _analysis(self, make: Messages) -> Iterator[Entry]:
         """Yield deviations, and metrics now and then and after the last one."""
-        count, told, stamp = 0, 0, 0
+        count, reported, stamp = 0, 0, 0
         metrics: dict[str, float | int] = {}
         for count, ((stamp, vector), metrics) in enumerate(self.deviations(), start=1):
             yield Entry(stamp, DEVIATION.name, make.vector3(stamp, vector, BASE))
             if count % METRICS_EVERY == 0:
-                told = count
+                reported = count
                 yield _metrics(make, stamp, metrics)
-        if count != told:
+        if count != reported:
             yield _metrics(make, stamp, metrics)
 
 

@@ -66,7 +66,6 @@ class Runner:
 
     Parameters
     ----------
-    pool : Pool
     store : Path, optional
         Directory of results; a task whose result is there already is not run again.
     tell : callable, optional
@@ -91,7 +90,6 @@ class Runner:
 
         Parameters
         ----------
-        tasks : sequence of Task
         meanwhile : callable, optional
             What this process does once others have the tasks.
 

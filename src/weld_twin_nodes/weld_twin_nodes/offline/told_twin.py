@@ -37,7 +37,6 @@ def build_twin(
 
     Parameters
     ----------
-    robot : Robot
     model : Path or str
         An effects file, or a diagnosis (``.json``) with what it found of the robot, how one
         set-up moved left out; empty for none.
@@ -139,8 +138,8 @@ def _diagnosed(robot: Robot, path: Path | str) -> Twin:
     if 'model' in data:
         return load_model(robot, path)
     try:
-        found = [_flat(entry) for entry in data['verdict']['effects']]
-        return Twin(robot, effects_from_list(found, robot))
+        result = [_flat(entry) for entry in data['verdict']['effects']]
+        return Twin(robot, effects_from_list(result, robot))
     except (KeyError, TypeError, AttributeError):
         raise ModelError(f"diagnosis '{path}' has no list 'verdict.effects'") from None
     except ModelError as error:

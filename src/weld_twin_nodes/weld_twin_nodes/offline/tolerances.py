@@ -32,7 +32,6 @@ def tolerance_entry(
 
     Parameters
     ----------
-    made : CorrectedProgram
     model : ProgramModel
         It was corrected with.
     tolerance : float [m]
@@ -48,20 +47,20 @@ def tolerance_entry(
     """
     if not 0.0 < tolerance < 1.0:
         raise DataError(f'--tolerance must be above zero, got {tolerance * 1e3:g} mm')
-    told = {}
+    reported = {}
     for name, value in zip(('before', 'after'), made.accuracy, strict=True):
         if value is None or value.worsts is None:
             raise DataError('--tolerance needs a model that says how sure it is: a diagnosis.json')
         probability = float(value.within(tolerance) or 0.0)
-        told[name] = {
+        reported[name] = {
             'probability': probability,
             'decision': conforms(probability),
             'sure_within_m': value.sure_within,
         }
     more = None
-    if told['after']['decision'] != 'kept':
+    if reported['after']['decision'] != 'kept':
         more = _postures_more(made, model, tolerance, noise)
-    return {'tolerance_m': tolerance, **told, 'postures_more': more}
+    return {'tolerance_m': tolerance, **reported, 'postures_more': more}
 
 
 def _postures_more(

@@ -147,18 +147,14 @@ class Verification:
 
     Attributes
     ----------
-    promised : Promise
     measured : Measured
         Over the samples that count.
-    samples : int
-    kept : bool
     causes : tuple of Left
         What moves the tool most first.
     off : Array
         Size of what is left at every sample that counts, shape (M,) [m].
     program : str
         Name of the program; empty where the robot was mended.
-    notes : tuple of str
 
     """
 
@@ -372,8 +368,8 @@ class _Seen:
             meant, _ = self._meant(start, way)
             off = self.seen.position - meant
         columns = columns[:, rows]
-        left = off[rows] - np.tensordot(shares, columns, axes=1)
-        return _Offs(off, off[rows], left, columns, shares, normal)
+        remaining = off[rows] - np.tensordot(shares, columns, axes=1)
+        return _Offs(off, off[rows], remaining, columns, shares, normal)
 
     def noise_m(self, off: Array) -> float | None:
         """Return the noise that repeats or neighbours show [m], None where there are none."""

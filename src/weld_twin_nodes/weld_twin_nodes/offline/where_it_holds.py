@@ -43,11 +43,11 @@ def elsewhere(posterior: Posterior, corrected: bool) -> str:
     if not corrected:
         return 'All this holds where it was measured, and says nothing of elsewhere in its reach.'
     if posterior.region is not None:
-        told, sigma = posterior.region
+        region, sigma = posterior.region
         return (
-            f"In the region '{told}' the corrected robot may still be off by {sigma * 1e3:.2g} mm (one "
-            'standard deviation); weld-twin investigate --tolerance MM --model diagnosis.json --region '
-            'says what to measure there.'
+            f"In the region '{region}' the corrected robot may still be off by {sigma * 1e3:.2g} mm "
+            '(one standard deviation); weld-twin investigate --tolerance MM --model diagnosis.json '
+            '--region says what to measure there.'
         )
     if posterior.anywhere_m > NOTHING_KNOWN:
         return (
@@ -67,7 +67,6 @@ def file_alone(alone: Alone, *, left: bool) -> list[str]:
 
     Parameters
     ----------
-    alone : Alone
     left : bool
         Whether the model has effects that the file cannot hold.
 

@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
 from weld_twin_core.arrays import Array
+from weld_twin_core.effects.curve import AT_REST
 from weld_twin_core.twin.goal_correction import Start
 
 STILL = 2e-4
@@ -17,6 +19,45 @@ PAUSE = 0.1
 """Time over which an arm is looked at [s]."""
 CAME = 1e-4
 """Motion of a joint [rad, m] that tells where it came from: more than noise, less than play."""
+MOVING = 2.0 * AT_REST
+"""Speed [rad/s or m/s] from which on a direction counts for 96 %."""
+SPAN = 20_000_000
+"""Time over which a speed is looked at [ns]: noise of encoders counts for little then."""
+REMEMBERED = 1000
+"""Joint states back to which a measurement may be late: two seconds of the usual 500 a second."""
+
+
+class Moving:
+    """
+    Tells afterwards whether joints moved: at rest nobody knows on which side what they lose is.
+
+    Parameters
+    ----------
+    columns : sequence of int
+        Of the joints.
+
+    """
+
+    def __init__(self, columns: Sequence[int]) -> None:
+        self._columns = list(columns)
+        self._lately: deque[tuple[int, Array]] = deque(maxlen=REMEMBERED)
+
+    def take(self, stamp: int, q: Array) -> None:
+        """Take joint positions (n,) [rad or m] at a stamp [ns]."""
+        if self._lately and stamp <= self._lately[-1][0]:
+            self._lately.clear()
+        self._lately.append((stamp, q[self._columns]))
+
+    def at(self, stamp: int) -> bool:
+        """Return whether all of them moved at a stamp [ns], or it is longer ago than is remembered."""
+        near: tuple[int, Array] | None = None
+        for at, q in reversed(self._lately):
+            if near is None:
+                near = (at, q) if at <= stamp else None
+            elif near[0] - at >= SPAN:
+                speed = np.abs(near[1] - q) / ((near[0] - at) * 1e-9)
+                return bool((speed > MOVING).all())
+        return True
 
 
 class ArmState:

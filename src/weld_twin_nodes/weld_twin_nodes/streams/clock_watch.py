@@ -154,24 +154,24 @@ class ClockWatch:
         return (self.measured.newest - self.twin.newest) * NANOSECOND
 
     def _by_motion(self, now: float) -> str:
-        found = shift(self.measured.samples, self.twin.samples)
-        if found is None:
-            found = shift(_recent(self.measured.samples), _recent(self.twin.samples))
-        before, self._before = self._before, found
-        if found is None:
+        result = shift(self.measured.samples, self.twin.samples)
+        if result is None:
+            result = shift(_recent(self.measured.samples), _recent(self.twin.samples))
+        before, self._before = self._before, result
+        if result is None:
             return ''
-        if before is None or abs(found - before) > STEADY:
+        if before is None or abs(result - before) > STEADY:
             self._set_at = now
             self._history.clear()
         if now - self._set_at > SPAN:  # what is compared is all of after the clock was set
-            self._history.append((now, found))
+            self._history.append((now, result))
         drift = self._drift()
         if drift:
             return drift
-        if before is None or abs(found - before) > STEADY or abs(found) < SHIFTED:
+        if before is None or abs(result - before) > STEADY or abs(result) < SHIFTED:
             return ''
-        trailing = ', or every joint trails by as much' if found > 0.0 else ''
-        return told(found, 3) + trailing
+        trailing = ', or every joint trails by as much' if result > 0.0 else ''
+        return told(result, 3) + trailing
 
     def _drift(self) -> str:
         """Return what is to be told of a shift that grows with time."""
@@ -221,12 +221,12 @@ def shift(measured: deque[Sample], twin: deque[Sample]) -> float | None:
     if none < BLURRED**2:
         return None
     shifts = np.arange(-REACH, REACH + 0.5 * STEP, STEP)
-    left = np.array([_left(at - s, seen, t, way) for s in shifts])
+    remaining = np.array([_left(at - s, seen, t, way) for s in shifts])
     # A weave is like itself again one period on; the shift nearest to none is the one meant.
-    good = np.flatnonzero(left <= 1.2 * left.min() + 1e-10)
+    good = np.flatnonzero(remaining <= 1.2 * remaining.min() + 1e-10)
     k = int(good[np.argmin(np.abs(shifts[good]))])
-    found = float(shifts[k]) + STEP * _vertex(left, k)
-    return found if _left(at - found, seen, t, way) < EXPLAINED * none else None
+    result = float(shifts[k]) + STEP * _vertex(remaining, k)
+    return result if _left(at - result, seen, t, way) < EXPLAINED * none else None
 
 
 def _arrays(samples: deque[Sample], epoch: int) -> tuple[Array, Array]:
@@ -240,10 +240,10 @@ def _left(at: Array, seen: Array, t: Array, way: Array) -> float:
     return float(((off - off.mean(axis=0)) ** 2).sum(axis=1).mean())
 
 
-def _vertex(left: Array, k: int) -> float:
+def _vertex(remaining: Array, k: int) -> float:
     """Return where between its neighbours the parabola through a least value has its vertex."""
-    if not 0 < k < left.size - 1:
+    if not 0 < k < remaining.size - 1:
         return 0.0
-    before, here, after = left[k - 1 : k + 2]
+    before, here, after = remaining[k - 1 : k + 2]
     bend = before - 2.0 * here + after
     return 0.0 if bend <= 0.0 else float(np.clip(0.5 * (before - after) / bend, -1.0, 1.0))

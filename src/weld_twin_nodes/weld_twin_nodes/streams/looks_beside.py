@@ -92,7 +92,7 @@ class LooksBeside:
         """Return the answer once it is there."""
         try:
             while self._link is not None and self._link.poll():
-                number, found = self._link.recv()
+                number, result = self._link.recv()
                 if not self._up:
                     self._up = True
                     if self._correction is not None:
@@ -100,7 +100,7 @@ class LooksBeside:
                     continue
                 self._busy = False
                 if number == self._number:
-                    answer: Found = found
+                    answer: Found = result
                     return answer
         except (EOFError, OSError):
             self.close()
@@ -139,10 +139,10 @@ def serve(link: Connection) -> None:
             correction = PoseCorrection(replace(bare, posterior=posterior), tool)
         else:
             try:
-                found = getattr(correction, what)(*content)
+                result = getattr(correction, what)(*content)
             except DataError as error:
-                found = error
-            link.send((number, found))
+                result = error
+            link.send((number, result))
 
 
 def main() -> int:

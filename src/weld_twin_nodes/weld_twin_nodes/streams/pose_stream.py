@@ -88,8 +88,6 @@ class PoseStream:
 
     Parameters
     ----------
-    correction : PoseCorrection
-    limits : GoalLimits
     passing : bool
         What is refused passes as it came; else nothing is sent.
     shadow : bool
@@ -279,9 +277,9 @@ class PoseStream:
         """Look at a pose exactly, from joints near it or from the look before; nothing else counts."""
         if self._beside is not None:
             self._beside.drop()
-        found = self.correction
+        result = self.correction
         try:
-            looked = found.exact(pose) if arm is None else found.first(pose, arm)
+            looked = result.exact(pose) if arm is None else result.first(pose, arm)
         except DataError as error:
             self._judge(error, now)
         else:
@@ -292,10 +290,10 @@ class PoseStream:
         if isinstance(looked, DataError):
             self._refused, self._opening = str(looked), False
             return
-        pose, found = looked.pose, self.correction
-        self._refused = found.refusal(looked, self._limits) or self._too_quick(looked, now)
+        pose, result = looked.pose, self.correction
+        self._refused = result.refusal(looked, self._limits) or self._too_quick(looked, now)
         self._tried = now
-        found.adopt(looked)
+        result.adopt(looked)
         before = self._doubted
         way = np.inf if before is None else np.linalg.norm(pose[:3, 3] - before)
         self._doubtful = bool(way > DOUBT_EVERY)

@@ -49,13 +49,13 @@ class Promise(NamedTuple):
     beside_noise: float
 
     @classmethod
-    def of(cls, left: float, unsure: float, samples: int) -> Promise:
+    def of(cls, remaining: float, unsure: float, samples: int) -> Promise:
         """
         Return it from what was left on unseen data.
 
         Parameters
         ----------
-        left : float [m]
+        remaining : float [m]
             RMS distance of measurements from the model.
         unsure : float [m]
             Standard deviation, in its worst direction, of what the model is not sure of.
@@ -64,8 +64,8 @@ class Promise(NamedTuple):
             its square, may be the model's.
 
         """
-        hidden = 2.0 * left**2 * sqrt(2.0 / (3.0 * samples))
-        rms = hypot(left, unsure)
+        hidden = 2.0 * remaining**2 * sqrt(2.0 / (3.0 * samples))
+        rms = hypot(remaining, unsure)
         return cls(rms, sqrt(hidden + 3.0 * (ANYWHERE * unsure) ** 2))
 
 
@@ -146,7 +146,7 @@ class Supervision:
                 f'from the twin, it leaves {promise.rms * 1e3:.3f} mm'
             )
 
-    def _look_at_mean(self, left: float) -> None:
+    def _look_at_mean(self, remaining: float) -> None:
         """Hold the mean of all groups against what the model leaves beside the noise [m]."""
         if len(self._groups) < GROUPS:
             return
@@ -159,11 +159,11 @@ class Supervision:
             spread *= (1.0 + alike) / (1.0 - alike)
         doubt = sqrt(spread / (GROUPS * (GROUPS - 1)))
         off = float(np.linalg.norm(mean))
-        if off > hypot(left, SURE * doubt):
+        if off > hypot(remaining, SURE * doubt):
             self._break(
                 f'the mean of the last {COUNT * GROUPS} measurements is {off * 1e3:.3f} mm from the '
                 f'twin, sure to {doubt * 1e3:.3f} mm; beside the noise it leaves at most '
-                f'{left * 1e3:.3f} mm'
+                f'{remaining * 1e3:.3f} mm'
             )
 
     def _break(self, why: str) -> None:

@@ -57,13 +57,8 @@ class JointStream:
 
     Parameters
     ----------
-    twin : Twin
     joint_names : sequence of str, optional
         What the joint states call the joints, in the order of the robot.
-
-    Attributes
-    ----------
-    intake : Intake
 
     """
 

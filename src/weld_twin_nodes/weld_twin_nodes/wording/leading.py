@@ -14,14 +14,14 @@ def in_order(diagnosis: Diagnosis) -> list[int]:
     Shares of places without a name say what their own motion tells, which a second place may tell
     as well; what a curve takes off is what a reader can have.
     """
-    told = diagnosis.contributions
+    reported = diagnosis.contributions
     count = len(diagnosis.causes)
-    if told is None:
+    if reported is None:
         return list(range(count))
     taken = [0.0] * count
-    for run, (left, parts) in enumerate(zip(told.left, told.parts, strict=True)):
+    for run, (remaining, parts) in enumerate(zip(reported.left, reported.parts, strict=True)):
         good = diagnosis.traces.trusted[run] if diagnosis.traces.trusted else slice(None)
-        whole = (left + parts.sum(axis=0))[good]
+        whole = (remaining + parts.sum(axis=0))[good]
         for k in range(count):
             part = parts[k][good]
             taken[k] += float((part * (2.0 * whole - part)).sum())

@@ -95,10 +95,10 @@ def left_with(diagnosis: Diagnosis, mended: Collection[int]) -> Left:
 
 def _left_with(diagnosis: Diagnosis, mended: tuple[int, ...]) -> Left:
     runs: list[tuple[np.ndarray, np.ndarray]] = []
-    for run, (left, parts) in enumerate(zip(*parted(diagnosis), strict=True)):
+    for run, (remaining, parts) in enumerate(zip(*parted(diagnosis), strict=True)):
         good = trusted(diagnosis, run)
         there = [k for k in range(len(parts)) if k not in mended]
-        before, after = as_it_is(diagnosis, run), left + parts[there].sum(axis=0)
+        before, after = as_it_is(diagnosis, run), remaining + parts[there].sum(axis=0)
         runs.append((_sizes(before[good]), _sizes(after[good])))
     sides = zip(*runs, strict=True) if runs else ((), ())
     both = [np.concatenate([np.zeros(0), *side]) for side in sides]
@@ -140,27 +140,28 @@ def taken_by_curve(diagnosis: Diagnosis, k: int) -> float | None:
     None where the cause has a name, or where its curve takes off what its place holds.
     """
     cause = diagnosis.causes[k]
-    left = left_without(diagnosis, k) if unnamed(cause) else None
-    if left is None:
+    remaining = left_without(diagnosis, k) if unnamed(cause) else None
+    if remaining is None:
         return None
-    taken = max(1.0 - (left.rms_after / max(left.rms, 1e-300)) ** 2, 0.0)
+    taken = max(1.0 - (remaining.rms_after / max(remaining.rms, 1e-300)) ** 2, 0.0)
     # Beside the interval of its share, what the curve falls short by is no news.
     return taken if taken < cause.share_ci90[0] - _APART else None
 
 
 def warning(diagnosis: Diagnosis, k: int) -> str:
     """Return that mending a cause makes the worst spot of the seam worse; nothing where not."""
-    left = left_without(diagnosis, k)
-    if left is None or not (left.grows or left.rises):
+    remaining = left_without(diagnosis, k)
+    if remaining is None or not (remaining.grows or remaining.rises):
         return ''
-    told = (
-        f'the largest deviation would grow from {_both(left)}'
-        if left.grows
-        else f'the RMS would rise from {millimetres(left.rms)} to {millimetres(left.rms_after)}'
+    reported = (
+        f'the largest deviation would grow from {_both(remaining)}'
+        if remaining.grows
+        else f'the RMS would rise from {millimetres(remaining.rms)} to '
+        f'{millimetres(remaining.rms_after)}'
     )
     if unnamed(diagnosis.causes[k]):
-        return f'Do not correct programs by its curve: {told}.'
-    return f'Not this alone: {told}; mend it together with the others.'
+        return f'Do not correct programs by its curve: {reported}.'
+    return f'Not this alone: {reported}; mend it together with the others.'
 
 
 def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
@@ -177,10 +178,10 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
             f'Look at {where}, first at {"; then at ".join(dict.fromkeys(at))}: what is found there '
             f'{depending(*on)}, and {_no_effect(diagnosis)} gives it.'
         )
-    left = left_without(diagnosis, k)
-    if left is None:
+    remaining = left_without(diagnosis, k)
+    if remaining is None:
         return [first]
-    if left.grows or left.rises:
+    if remaining.grows or remaining.rises:
         return [first, warning(diagnosis, k)]
     fault = curve_fault(diagnosis, k)
     if fault:
@@ -190,7 +191,7 @@ def look_at(diagnosis: Diagnosis, k: int) -> list[str]:
     return [
         first,
         f'Until that is found, programs can be corrected by its curve{without} (weld-twin '
-        f'correct): the largest deviation goes from {_both(left)}.',
+        f'correct): the largest deviation goes from {_both(remaining)}.',
     ]
 
 
@@ -215,14 +216,14 @@ def _no_effect(diagnosis: Diagnosis) -> str:
 
 def curve_fault(diagnosis: Diagnosis, k: int) -> str:
     """Return why programs are not to be corrected by the curve of a cause; nothing where they can."""
-    left = left_without(diagnosis, k)
-    if left is None or not unnamed(diagnosis.causes[k]):
+    remaining = left_without(diagnosis, k)
+    if remaining is None or not unnamed(diagnosis.causes[k]):
         return ''
-    if left.grows:
+    if remaining.grows:
         return 'makes the worst spot worse'
-    if left.rises:
+    if remaining.rises:
         return 'makes the whole worse'
-    return 'takes hardly anything off' if left.rms_after > STAYS * left.rms else ''
+    return 'takes hardly anything off' if remaining.rms_after > STAYS * remaining.rms else ''
 
 
 def _one_clock(diagnosis: Diagnosis) -> bool:
@@ -231,5 +232,5 @@ def _one_clock(diagnosis: Diagnosis) -> bool:
     return bool(levels) and set(levels) == {'ok'}
 
 
-def _both(left: Left) -> str:
-    return f'{millimetres(left.largest)} to {millimetres(left.largest_after)}'
+def _both(remaining: Left) -> str:
+    return f'{millimetres(remaining.largest)} to {millimetres(remaining.largest_after)}'

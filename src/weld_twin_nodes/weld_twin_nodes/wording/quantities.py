@@ -131,6 +131,14 @@ def left_of(shrink: Shrink) -> tuple[str, str]:
     return value, f'95{_GAP}% interval {ends}'
 
 
+def left_elsewhere(shrink: Shrink) -> str:
+    """Return how much of the gap is left where nothing was recorded, in a sentence."""
+    if shrink.elsewhere_ci95 is None:
+        return ''
+    _, ends = with_ends(shrink.ratio, *shrink.elsewhere_ci95)
+    return f' On a motion where nothing was recorded it may be {ends}.'
+
+
 def turns_only(diagnosis: Diagnosis) -> bool:
     """Tell whether what was found shows in the tool's orientation and not in its position."""
     shrink = diagnosis.shrink
@@ -175,11 +183,11 @@ def in_short(value: float, std: float | None, factor: float = 1.0, unit: str = '
     value = factor * value
     tail = unit if unit.startswith('°') else f' {unit}' if unit else ''
     places = min(max(_THREE - 1 - floor(log10(abs(value) or 1.0)), 0), 9)
-    told = _signed(f'{value:.{places}f}')
+    reported = _signed(f'{value:.{places}f}')
     if std is None or not isfinite(std) or std <= 0.0:
-        return f'{told}{tail}'
+        return f'{reported}{tail}'
     error = max(round(factor * std, places), 10.0**-places)
-    return f'{told} ± {error:.{places}f}{tail}'
+    return f'{reported} ± {error:.{places}f}{tail}'
 
 
 def _signed(number: str) -> str:
@@ -196,7 +204,6 @@ def short_rows(
 
     Parameters
     ----------
-    effect : Effect
     std : dict
         Standard errors by parameter.
     robot : Robot, optional
@@ -211,15 +218,15 @@ def short_rows(
         error: Any = std.get(p.name)
         factor, unit = display_unit(p.name, effect.unit(p, robot))
         if np.ndim(value):
-            told = _that_count(
+            reported = _that_count(
                 value, error, *((DEGREES, '°') if unit == 'mrad' else (factor, unit))
             )
         elif unit == 'mrad':
             beside = in_short(float(value), None, factor, unit)
-            told = f'{in_short(float(value), error, DEGREES, "°")} ({beside})'
+            reported = f'{in_short(float(value), error, DEGREES, "°")} ({beside})'
         else:
-            told = in_short(float(value), None if np.ndim(error) else error, factor, unit)
-        out += [(p.name, told)] if told else []
+            reported = in_short(float(value), None if np.ndim(error) else error, factor, unit)
+        out += [(p.name, reported)] if reported else []
     return out
 
 
@@ -248,10 +255,10 @@ def parameter_rows(
     """
     if isinstance(effect, TransmissionRipple):
         return _orders(effect, std, slides=robot is not None and effect.on_slide(robot))
-    told = [p for p in effect.parameters if np.size(getattr(effect, p.name))]
+    reported = [p for p in effect.parameters if np.size(getattr(effect, p.name))]
     return [
         (p.name, _shown(p.name, effect.unit(p, robot), getattr(effect, p.name), std.get(p.name)))
-        for p in told
+        for p in reported
     ]
 
 

@@ -46,23 +46,23 @@ def _together(sites: Sequence[Site]) -> str:
     kind = sites[0].effect
     own = [str(site.joint) for site in sites if site.effect == kind and site.joint]
     more = [f'{len(own) - _NAMED} more'] if len(own) > _NAMED else []
-    told = called(kind, listed([*own[:_NAMED], *more]) if own else None)
-    return listed([told, *(site_name(site) for site in sites if site.effect != kind)], 'or')
+    reported = called(kind, listed([*own[:_NAMED], *more]) if own else None)
+    return listed([reported, *(site_name(site) for site in sites if site.effect != kind)], 'or')
 
 
 def alternatives(diagnosis: Diagnosis, cause: Cause) -> tuple[Site, ...]:
     """Return what these data cannot tell apart, the most probable first; nothing where one is."""
-    found = [effect for k, effect in enumerate(diagnosis.model.found) if k in cause.members]
-    own = {Site(effect.name, effect.site) for effect in found} | {s for s, _ in cause.name[:1]}
+    result = [effect for k, effect in enumerate(diagnosis.model.found) if k in cause.members]
+    own = {Site(effect.name, effect.site) for effect in result} | {s for s, _ in cause.name[:1]}
     return next((group for group in open_sets(diagnosis) if own & set(group)), ())
 
 
 def switches(diagnosis: Diagnosis) -> tuple[Switch, ...]:
     """Return the switches, largest share first; none where no cause can be thought away."""
-    told = diagnosis.contributions
-    if told is None or not told.parts or diagnosis.contacts is not None:
+    reported = diagnosis.contributions
+    if reported is None or not reported.parts or diagnosis.contacts is not None:
         return ()
-    count = told.parts[0].shape[0]
+    count = reported.parts[0].shape[0]
     own = [k for k, cause in enumerate(diagnosis.causes) if cause.members]
     out = [Switch(cause_name(diagnosis, diagnosis.causes[k]), (k,)) for k in own[:MOST]]
     rest = tuple(own[MOST:]) + tuple(range(len(diagnosis.causes), count))
@@ -75,19 +75,19 @@ def parted(diagnosis: Diagnosis) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
 
     Without switches what is left is the residual after, and nothing is added to it.
     """
-    traces, told, all_switches = diagnosis.traces, diagnosis.contributions, switches(diagnosis)
-    if told is None or not all_switches:
+    traces, reported, all_switches = diagnosis.traces, diagnosis.contributions, switches(diagnosis)
+    if reported is None or not all_switches:
         return traces.after, tuple(np.zeros((0, *part.shape)) for part in traces.after)
-    return told.left, tuple(
+    return reported.left, tuple(
         np.array([part[list(switch.members)].sum(axis=0) for switch in all_switches])
-        for part in told.parts
+        for part in reported.parts
     )
 
 
 def as_it_is(diagnosis: Diagnosis, k: int) -> Array:
     """Return the deviation of a recording before anything is mended, (M, 3) [m]."""
-    left, parts = (item[k] for item in parted(diagnosis))
-    return left + parts.sum(axis=0) if parts.size else diagnosis.traces.before[k]
+    remaining, parts = (item[k] for item in parted(diagnosis))
+    return remaining + parts.sum(axis=0) if parts.size else diagnosis.traces.before[k]
 
 
 def trusted(diagnosis: Diagnosis, k: int) -> np.ndarray:

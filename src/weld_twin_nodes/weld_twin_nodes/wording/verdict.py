@@ -50,7 +50,7 @@ def verdict(diagnosis: Diagnosis) -> tuple[str, str]:
 
 def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
     size = _size(diagnosis)
-    names = [found_name(found) for found in diagnosis.effects]
+    names = [found_name(result) for result in diagnosis.effects]
     sure = odds(diagnosis.confidence)
     if diagnosis.families:
         kinds = [
@@ -69,16 +69,18 @@ def _identified(diagnosis: Diagnosis) -> tuple[str, str]:
             first = f'The {size} is explained best by {listed(names)}'
             return f'{first}; each is as sure as its card says.', _gain(diagnosis)
         return f'The {size} comes from {listed(names)} ({sure} sure).', _gain(diagnosis)
-    told = f'({sure} sure)' if diagnosis.confidence >= HALF else '(each as sure as its card says)'
+    reported = (
+        f'({sure} sure)' if diagnosis.confidence >= HALF else '(each as sure as its card says)'
+    )
     first = (
         f'The {size} comes from {len(names)} errors together, mostly '
-        f'{_families(diagnosis)}; the largest is {names[0]} {told}.'
+        f'{_families(diagnosis)}; the largest is {names[0]} {reported}.'
     )
     return first, _gain(diagnosis)
 
 
 def _families(diagnosis: Diagnosis) -> str:
-    counts = Counter(found.effect.name for found in diagnosis.effects)
+    counts = Counter(result.effect.name for result in diagnosis.effects)
     return listed([f'{called(name)} ({n})' for name, n in counts.most_common(2)])
 
 
@@ -86,8 +88,8 @@ def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
     size = _size(diagnosis)
     choices = '; and from '.join(_either(group) for group in open_sets(diagnosis)[:2])
     unsure = open_sites(diagnosis)
-    sure = [found for found in diagnosis.effects if site_of(found) not in unsure]
-    settled = listed([f'{found_name(found)}{_twins(diagnosis, found)}' for found in sure])
+    sure = [result for result in diagnosis.effects if site_of(result) not in unsure]
+    settled = listed([f'{found_name(result)}{_twins(diagnosis, result)}' for result in sure])
     if not choices:
         return f'The {size} comes from {settled}.', _gain(diagnosis)
     after = _gain(diagnosis, 'Either way')
@@ -95,7 +97,7 @@ def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
         return f'The {size} comes from {choices}: these data do not tell which.', after
     # The largest first, as the cards have it; what has no card of its own stays in front.
     share = share_by_site(diagnosis)
-    largest = max(share.get(site_of(found), 1.0) for found in sure)
+    largest = max(share.get(site_of(result), 1.0) for result in sure)
     if largest < max((share.get(site, 0.0) for site in unsure), default=0.0):
         first = f'from {choices} (these data do not tell which), in part from {settled}.'
     else:
@@ -103,9 +105,9 @@ def _ambiguous(diagnosis: Diagnosis) -> tuple[str, str]:
     return f'The {size} comes in part {first}', after
 
 
-def _twins(diagnosis: Diagnosis, found: Found) -> str:
+def _twins(diagnosis: Diagnosis, result: Found) -> str:
     """Return beside a name what is the same error on any motion, in brackets."""
-    own = site_of(found)
+    own = site_of(result)
     others = [site for same in diagnosis.same if own in same for site in same if site != own]
     if not others:
         return ''
@@ -122,12 +124,16 @@ def _either(group: Sequence[Site]) -> str:
 def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
     if diagnosis.causes and not (diagnosis.effects or diagnosis.families):
         return _placed(diagnosis)
-    size, left = millimetres(diagnosis.gap.rms_m), millimetres(diagnosis.unexplained.rms_m)
+    size, remaining = millimetres(diagnosis.gap.rms_m), millimetres(diagnosis.unexplained.rms_m)
     if diagnosis.effects:
-        names = listed([found_name(found) for found in diagnosis.effects[:_NAMED]])
-        first = (
-            f'Part of the gap of {size} comes from {names}, but {left} above the noise remains '
-            'that no effect in the library explains.'
+        names = listed([found_name(result) for result in diagnosis.effects[:_NAMED]])
+        first = f'Part of the gap of {size} comes from {names}'
+        if diagnosis.reasons and not diagnosis.unexplained.above_noise:
+            # The model takes all of it up, but by names that are rather wrong than right.
+            first += '; what else is at work has no name.'
+            return first, in_words(diagnosis.reasons[0], ())
+        first += (
+            f', but {remaining} above the noise remains that no effect in the library explains.'
         )
     else:
         first = f'No effect in the library{_without(diagnosis)} explains the gap of {size}.'
@@ -142,17 +148,19 @@ def _unknown(diagnosis: Diagnosis) -> tuple[str, str]:
 def _placed(diagnosis: Diagnosis) -> tuple[str, str]:
     """Return where an unknown cause sits, and what its curve or what fits best brings."""
     first, *others = (diagnosis.causes[k] for k in in_order(diagnosis))
-    told = f'comes mostly from {cause_words(first)};'
+    reported = f'comes mostly from {cause_words(first)};'
     if first.share < HALF and others:
         # What another place holds is more: "mostly" would say the opposite of the bars below.
-        told = f'comes in part from {cause_words(first)}, in part from {cause_words(others[0])};'
+        reported = (
+            f'comes in part from {cause_words(first)}, in part from {cause_words(others[0])};'
+        )
     why = 'no known effect explains it'
     if diagnosis.confidence < HALF:
         why = 'what causes it is open'
     if not_to_be_tried(diagnosis):
         why = f'what causes it is open: {untried_in_short(diagnosis)}, as asked'
     return (
-        f'The gap of {millimetres(diagnosis.gap.rms_m)} {told} {why}.',
+        f'The gap of {millimetres(diagnosis.gap.rms_m)} {reported} {why}.',
         f'{_instead(diagnosis)} on data not used for fitting; {_noise(diagnosis)}.',
     )
 
@@ -162,10 +170,10 @@ def _instead(diagnosis: Diagnosis) -> str:
     every, taken = switches(diagnosis), advised(diagnosis)
     if taken and len(taken) < len(every):
         where = [likely(diagnosis.causes[every[at].members[0]].place) for at in taken]
-        told = f'the curve{"s" if len(where) > 1 else ""} of {listed(where)} alone'
-        left = left_with(diagnosis, taken)
-        before, after = millimetres(left.rms), millimetres(left.rms_after)
-        return f'Programs corrected by {told}, {before} shrinks to {after}'
+        reported = f'the curve{"s" if len(where) > 1 else ""} of {listed(where)} alone'
+        remaining = left_with(diagnosis, taken)
+        before, after = millimetres(remaining.rms), millimetres(remaining.rms_after)
+        return f'Programs corrected by {reported}, {before} shrinks to {after}'
     shrink = diagnosis.shrink
     before, after = millimetres(shrink.rms_before_m), millimetres(shrink.rms_after_m)
     if shrink.ratio >= STAYS:

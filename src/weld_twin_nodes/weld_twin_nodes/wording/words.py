@@ -85,9 +85,9 @@ def called(effect: str) -> str:
     return (kind.traits.title if kind else '') or effect.replace('_', ' ')
 
 
-def found_name(found: Found) -> str:
+def found_name(result: Found) -> str:
     """Return a found effect as people say it."""
-    return cause(found.effect.name, found.effect.site)
+    return cause(result.effect.name, result.effect.site)
 
 
 def site_name(site: Site) -> str:
@@ -134,12 +134,12 @@ def likely(
 
 def leading(alternatives: Sequence[tuple[str, float]]) -> list[tuple[str, float]]:
     """Return the most probable, as many as are together likelier than not."""
-    told: list[tuple[str, float]] = []
+    reported: list[tuple[str, float]] = []
     for item in alternatives[:_OPEN]:
-        if sum(p for _, p in told) > HALF:
+        if sum(p for _, p in reported) > HALF:
             break
-        told.append(item)
-    return told
+        reported.append(item)
+    return reported
 
 
 def cause_words(cause: Cause) -> str:
@@ -223,19 +223,19 @@ def open_sites(diagnosis: Diagnosis) -> set[Site]:
     return {site for group in open_sets(diagnosis) for site in group}
 
 
-def site_of(found: Found) -> Site:
+def site_of(result: Found) -> Site:
     """Return the site of an effect that was found."""
-    return Site(found.effect.name, found.effect.site)
+    return Site(result.effect.name, result.effect.site)
 
 
 def cause_by_site(diagnosis: Diagnosis) -> dict[Site, int]:
     """Return which cause each effect in the twin belongs to."""
-    found = diagnosis.model.found
+    result = diagnosis.model.found
     return {
-        Site(found[m].name, found[m].site): k
+        Site(result[m].name, result[m].site): k
         for k, held in enumerate(diagnosis.causes)
         for m in held.members
-        if m < len(found)
+        if m < len(result)
     }
 
 
@@ -247,8 +247,8 @@ def share_by_site(diagnosis: Diagnosis) -> dict[Site, float]:
 def depending(*on: str) -> str:
     """Return what something without a name does, by what it may depend on."""
     words = [DEPENDENCES.get(name, name) for name in on if name != 'constant']
-    told = ['is constant'] if 'constant' in on else []
-    return ' or '.join([*told, *([f'depends on {listed(words, "or")}'] if words else [])])
+    reported = ['is constant'] if 'constant' in on else []
+    return ' or '.join([*reported, *([f'depends on {listed(words, "or")}'] if words else [])])
 
 
 def carries_curves(diagnosis: Diagnosis) -> bool:
@@ -261,8 +261,8 @@ def carries_curves(diagnosis: Diagnosis) -> bool:
 def untried_in_short(diagnosis: Diagnosis) -> str:
     """Return that some effects were not tried; of many only the first, as the first step has all."""
     names = not_to_be_tried(diagnosis)
-    told = names if len(names) <= _NAMED else [*names[: _NAMED - 1], f'{len(names) - 2} more']
-    return f'{listed(told)} {"was" if len(names) == 1 else "were"} not tried'
+    reported = names if len(names) <= _NAMED else [*names[: _NAMED - 1], f'{len(names) - 2} more']
+    return f'{listed(reported)} {"was" if len(names) == 1 else "were"} not tried'
 
 
 def not_to_be_tried(diagnosis: Diagnosis) -> list[str]:

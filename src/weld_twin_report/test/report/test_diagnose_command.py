@@ -11,8 +11,10 @@ import json
 import numpy as np
 import pytest
 import yaml
+from scipy.stats import chi2
 
 from weld_twin_core.arm.catalog import load
+from weld_twin_core.effects import Backlash
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import BagReader, provenance, read_recording, write_recording
@@ -393,9 +395,11 @@ def test_a_joint_taken_beyond_what_was_recorded_is_told_with_its_time(cell, foun
     margin = data['posterior']['recorded']['joints'][3]['margin']
     assert mine[0]['t_start'] == pytest.approx(2.0 + margin, abs=0.02)
     assert mine[0]['t_end'] == pytest.approx(4.0)
-    _, _, covariance = covariances(out)
-    near, far = np.sqrt(covariance[[0, -1]][:, range(3), range(3)].sum(axis=1))
-    assert far > near
+    _, predicted, covariance = covariances(out)
+    real = Twin(robot, [Backlash('elbow_joint', WIDTH)]).poses(Recording('far', JointMotion(t, q)))
+    for k in (0, -1):
+        off = predicted[k] - real.position[k]
+        assert off @ np.linalg.solve(covariance[k][:3, :3], off) < chi2.ppf(0.999, 3)
 
 
 def test_a_model_written_without_a_posterior_still_predicts_and_says_so(

@@ -133,6 +133,16 @@ def test_an_unknown_cause_is_told_by_what_it_depends_on():
     )
 
 
+def test_what_is_named_beside_a_cause_without_a_name_is_told_though_nothing_is_left():
+    case = diagnoses.backlash()
+    left = replace(case.unexplained, above_noise=False)
+    first, second = verdict(
+        replace(case, status='unknown', unexplained=left, reasons=('it has no name here',))
+    )
+    assert 'comes from backlash of elbow_joint; what else is at work has no name.' in plain(first)
+    assert plain(second) == 'It has no name here.'
+
+
 def test_what_is_certain_and_largest_is_to_be_done_first():
     case = diagnoses.ambiguous()
     sure = Found(effect_from_mapping({'effect': 'time_delay', 'delay': 0.01}), {})

@@ -299,7 +299,7 @@ def test_a_cause_has_one_figure_of_belief_and_no_part_is_less_sure_than_the_whol
 
 def test_the_whole_says_why_it_is_less_sure_than_its_parts():
     causes = tuple(
-        replace(c, name=((c.name[0][0], p),))
+        replace(c, name=((c.name[0][0], p),), probability=p)
         for c, p in zip(CIRCLE.causes, (0.98, 0.9, 0.8), strict=True)
     )
     top = part(report_page(replace(CIRCLE, causes=causes, confidence=0.7)), 'How sure', '</dl>')
@@ -310,8 +310,13 @@ def test_the_whole_says_why_it_is_less_sure_than_its_parts():
 
 def test_of_causes_that_fit_alike_the_figure_is_that_of_the_set():
     case = diagnoses.ambiguous()
-    names = tuple((site, 0.32) for site in case.indistinguishable[0])
-    case = replace(case, confidence=0.48, causes=(replace(case.causes[0], name=names),))
+    pair, alias = case.indistinguishable[0], Site('axis_parallelism', 'joint_a2')
+    # What is one error with another on any motion is named once, and believed all the same.
+    group = (*pair, alias)
+    names = tuple((site, p) for site, p in zip(group, (0.3, 0.2, 0.14), strict=True))
+    cause = replace(case.causes[0], name=names, probability=0.64)
+    same = ((pair[0], alias),)
+    case = replace(case, confidence=0.48, causes=(cause,), indistinguishable=(group,), same=same)
     page = report_page(case)
     card = part(page[page.index('class="cards"') :], 'How sure', '<dt>By how much')
     assert '64 % that it is one of these; which of them is open.' in card

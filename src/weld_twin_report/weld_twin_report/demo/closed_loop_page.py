@@ -68,7 +68,6 @@ def closed_loop_page(robot: str, seams: tuple[Seam, Seam], how: str, noise: floa
 
     Parameters
     ----------
-    robot : str
     seams : tuple of two Seam
         As it is, and corrected.
     how : str

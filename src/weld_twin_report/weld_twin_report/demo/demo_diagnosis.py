@@ -33,11 +33,11 @@ up, moves the tool alike there."""
 
 def find_causes(job: Job, progress: Progress) -> None:
     """Write the diagnosis, its page and the corrected model, and say the verdict."""
-    found = _diagnosed(job, job.recording, progress)
+    result = _diagnosed(job, job.recording, progress)
     folder = job.folder / 'diagnosis'
     folder.mkdir()
-    write_results(folder, found, [hashed('recording', job.bag)])
-    job.lines += ['', *verdict(found), f'diagnosis/{PAGE} has the whole answer']
+    write_results(folder, result, [hashed('recording', job.bag)])
+    job.lines += ['', *verdict(result), f'diagnosis/{PAGE} has the whole answer']
 
 
 def leave_open(job: Job, progress: Progress) -> None:
@@ -46,18 +46,23 @@ def leave_open(job: Job, progress: Progress) -> None:
     real = Twin(job.robot, effects_from_list(list(OPEN), job.robot)).poses(commanded)
     noise = np.random.default_rng(job.seed).normal(scale=NOISE, size=real.position.shape)
     seen = Measurements(commanded.joints.t, real.position + noise, real.rotation)
-    found = _diagnosed(job, commanded.with_measured(seen), progress)
+    result = _diagnosed(job, commanded.with_measured(seen), progress)
     folder = job.folder / 'open'
     folder.mkdir()
-    write_results(folder, found, [])
-    job.lines += ['', 'Another robot on the same seam:', *verdict(found), f'open/{PAGE} says more']
+    write_results(folder, result, [])
+    job.lines += [
+        '',
+        'Another robot on the same seam:',
+        *verdict(result),
+        f'open/{PAGE} says more',
+    ]
 
 
 def _diagnosed(job: Job, recording: Recording, progress: Progress) -> Diagnosis:
-    told: list[str] = []
+    reported: list[str] = []
 
     def tell(text: str) -> None:
-        told.append(text)
-        progress(min(len(told) / STEPS, 0.99))
+        reported.append(text)
+        progress(min(len(reported) / STEPS, 0.99))
 
     return diagnose([recording], job.robot, progress=tell)

@@ -29,7 +29,6 @@ class Job:
     ----------
     folder : Path
         Where results go.
-    robot : Robot
     effects : tuple of Effect
         What is wrong with the robot; the twin does not know.
     seam : str
@@ -48,7 +47,6 @@ class Job:
         Measured minus twin in the world frame.
     seam_deviation : array, shape (M, 3) [m]
         The same along, across and normal to the seam.
-    metrics : DeviationMetrics
     lines : list of str
         What to tell the user at the end.
 

@@ -45,8 +45,6 @@ def cell_page(
 
     Parameters
     ----------
-    database : Database
-    cell : str
     home : str, optional
         Address of the page of all cells.
     ways : Html, optional
@@ -91,10 +89,10 @@ def damaged_page(cell: str, why: str, home: str | None = None, ways: Html | None
 def _span(entries: Sequence[Entry]) -> str:
     """Return how many diagnoses there are, and of when."""
     count = len(entries)
-    told = counted(count, 'diagnosis', 'diagnoses')
+    reported = counted(count, 'diagnosis', 'diagnoses')
     first, last = entries[0].at.date(), entries[-1].at.date()
     more = 'the last ' if count == NEWEST else ''
-    return f'{more}{told}, {first}' + (f' to {last}' if last != first else '')
+    return f'{more}{reported}, {first}' + (f' to {last}' if last != first else '')
 
 
 def _headline(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> str:

@@ -78,7 +78,6 @@ def control_chart(
 
     Parameters
     ----------
-    title : str
     seconds : array, shape (N,)
         Since 1970, ascending.
     values : array, shape (N,)
@@ -86,7 +85,6 @@ def control_chart(
         What the values are.
     before : int, optional
         Number of diagnoses before the first change.
-    from_zero : bool
 
     """
     usual = baseline(values, before)

@@ -34,7 +34,6 @@ class Listed:
 
     Attributes
     ----------
-    cell, recording, robot : str
     at : str
         When it was recorded, ISO 8601; empty where the stamps are dates.
     align, effects_known, base_link, tip_link, contacts : str
@@ -75,9 +74,9 @@ class Listed:
         A file that is not there is told by its name: once it is there, it is another request.
         """
         files = [self.recording, self.robot, self.effects_known, self.contacts]
-        told = [_content(name) for name in files]
+        reported = [_content(name) for name in files]
         rest = (self.cell, self.at, self.align, self.base_link, self.tip_link, str(self.apply))
-        return digest(__version__, *told, *rest)
+        return digest(__version__, *reported, *rest)
 
 
 def _content(name: str) -> str:
@@ -131,23 +130,23 @@ def _check_heads(file: Path, heads: list[str], names: list[str]) -> None:
 def _line(file: Path, number: int, row: Mapping[str | None, str | None]) -> Listed:
     if None in row or None in row.values():
         raise DataError(f"'{file}' line {number} has not as many cells as the first line")
-    told = {str(name): str(value).strip() for name, value in row.items()}
+    reported = {str(name): str(value).strip() for name, value in row.items()}
     for name in NEEDED:
-        if not told[name]:
+        if not reported[name]:
             raise DataError(f"'{file}' line {number} has no {name}")
-    if why := not_a_cell(told['cell']):
+    if why := not_a_cell(reported['cell']):
         raise DataError(f"'{file}' line {number}: {why}")
     for name in PATHS:
-        if told.get(name):
-            told[name] = str(file.parent / told[name])
-    if (file.parent / told['robot']).is_file():
-        told['robot'] = str(file.parent / told['robot'])
+        if reported.get(name):
+            reported[name] = str(file.parent / reported[name])
+    if (file.parent / reported['robot']).is_file():
+        reported['robot'] = str(file.parent / reported['robot'])
     else:
-        told['robot'] = as_file(told['robot'])
-    apply = YES.get(told.pop('apply', '').lower())
+        reported['robot'] = as_file(reported['robot'])
+    apply = YES.get(reported.pop('apply', '').lower())
     if apply is None:
         raise DataError(f"'{file}' line {number}: apply is yes or no")
-    listed = Listed(**told, apply=apply)
+    listed = Listed(**reported, apply=apply)
     try:
         _ = listed.date
     except DataError as error:

@@ -33,10 +33,8 @@ def diagnosed(listed: Listed, key: str, limits: Limits, keep: str) -> dict[str, 
 
     Parameters
     ----------
-    listed : Listed
     key : str
         Of the run.
-    limits : Limits
     keep : str
         Directory for what the command wrote; empty to keep nothing.
 
@@ -80,8 +78,8 @@ def _unsound(out: Path) -> str:
     """Return what is wrong with data or set-up."""
     from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
 
-    told = read_diagnosis(out / 'diagnosis.json').get('unsound') or []
-    return str(told[0]['sentence']) if told else 'data or set-up are wrong'
+    reported = read_diagnosis(out / 'diagnosis.json').get('unsound') or []
+    return str(reported[0]['sentence']) if reported else 'data or set-up are wrong'
 
 
 def _warm(limits: Limits) -> Guarded:

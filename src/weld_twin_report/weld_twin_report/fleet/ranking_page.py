@@ -26,7 +26,6 @@ def ranking_page(database: Database, link: Callable[[str], str], ways: Html | No
 
     Parameters
     ----------
-    database : Database
     link : callable
         Address of the page of a cell.
     ways : Html, optional
@@ -93,8 +92,8 @@ def _cells(rows: Sequence[Mapping[str, Any]], link: Callable[[str], str]) -> Htm
     lead = 'The newest diagnosis of each cell, the largest gap first.'
     if len(rows) > ROWS:
         lead += f' {counted(len(rows) - ROWS, "cell")} with smaller gaps left out.'
-    told = [_row(row, link) for row in rows[:ROWS]]
-    return section('Cells', table(heads, told), id_='cells', lead=lead)
+    reported = [_row(row, link) for row in rows[:ROWS]]
+    return section('Cells', table(heads, reported), id_='cells', lead=lead)
 
 
 def _row(row: Mapping[str, Any], link: Callable[[str], str]) -> tuple[Child, ...]:

@@ -55,8 +55,6 @@ def run_fleet(
 
     Parameters
     ----------
-    listed : sequence of Listed
-    database : Database
     pool : Pool
         Where recordings are diagnosed.
     limits : Limits
@@ -65,7 +63,6 @@ def run_fleet(
         Directory for all that ``diagnose`` writes, a folder for each; workers must see it.
     again : bool
         Run what a limit or a crash ended before once more.
-    tell : callable
 
     """
     writing = _Writing(Runs(database))
@@ -98,7 +95,6 @@ class _Writing:
 
     Attributes
     ----------
-    runs : Runs
     touched : set of str
         Cells that have a new diagnosis.
 
@@ -112,8 +108,8 @@ class _Writing:
     def take(self, result: Mapping[str, Any]) -> Iterator[Run | None]:
         """Write a result, and those that wait; yield what was written, None for what was there."""
         before = len(self._waiting)
-        told = entry(result['entry']) if result['entry'] else None
-        self._waiting.append((Run(**result['run']), told))
+        reported = entry(result['entry']) if result['entry'] else None
+        self._waiting.append((Run(**result['run']), reported))
         # Once patience was in vain, results do not each wait for it again.
         yield from self._write(None if before == 0 else 0.0)
 
@@ -128,9 +124,9 @@ class _Writing:
 
     def _write(self, patience: float | None, *, quiet: bool = True) -> Iterator[Run | None]:
         while self._waiting:
-            run, told = self._waiting[0]
+            run, reported = self._waiting[0]
             try:
-                written = self.runs.write(run, told, patience)
+                written = self.runs.write(run, reported, patience)
             except Unavailable:
                 if quiet:
                     return

@@ -47,7 +47,6 @@ class Limits:
     memory : int
         Bytes of address space; a diagnosis of an hour's recording needs some 1.5 GB, most of it
         libraries.
-    cpu_s : int
     wall_s : float
         Seconds of computing, and in all.
     file : int
@@ -135,22 +134,22 @@ class Guarded:
             'file': limits.file,
             'folder': None if folder is None else str(folder.absolute()),
         }
-        found: dict[str, Any] = {}
+        result: dict[str, Any] = {}
         try:
             self._ask(asked)
             for line in self._answers(time.monotonic() + limits.wall_s):
-                found |= line
+                result |= line
                 if 'tell' in line:
                     tell(line['tell'])
                 if 'end' in line:
                     break
         except TimeoutError:
             self.close()
-            found = {'said': f'it took more than {limits.wall_s:g} s', 'end': -1}
+            result = {'said': f'it took more than {limits.wall_s:g} s', 'end': -1}
         except (EOFError, OSError, ValueError):
             self.close()
-            found = {'said': 'the process that runs commands has ended', 'end': -1}
-        return self._outcome(found, time.monotonic() - began)
+            result = {'said': 'the process that runs commands has ended', 'end': -1}
+        return self._outcome(result, time.monotonic() - began)
 
     def end(self) -> None:
         """End the warm process, and with it what runs there, from whichever thread."""
@@ -175,14 +174,14 @@ class Guarded:
             if pipe is not None:
                 pipe.close()
 
-    def _outcome(self, found: dict[str, Any], seconds: float) -> Outcome:
-        if 'code' in found:
+    def _outcome(self, result: dict[str, Any], seconds: float) -> Outcome:
+        if 'code' in result:
             return Outcome(
-                int(found['code']), str(found.get('said', '')), seconds, int(found['memory'])
+                int(result['code']), str(result.get('said', '')), seconds, int(result['memory'])
             )
-        ended = int(found.get('end', -1))
-        said = str(found.get('said', ''))
-        computed = float(found.get('cpu_s', 0.0)) >= self._limits.cpu_s
+        ended = int(result.get('end', -1))
+        said = str(result.get('said', ''))
+        computed = float(result.get('cpu_s', 0.0)) >= self._limits.cpu_s
         if ended == -signal.SIGXCPU or (ended == -signal.SIGKILL and computed):
             said = f'it took more than {self._limits.cpu_s} s of computing'
         if ended == -signal.SIGKILL and not said:
@@ -222,8 +221,8 @@ class Guarded:
         pipe = self._process.stdout.fileno()
         while True:
             while b'\n' not in self._rest:
-                left = until - time.monotonic()
-                if left <= 0.0 or not select.select([pipe], [], [], left)[0]:
+                remaining = until - time.monotonic()
+                if remaining <= 0.0 or not select.select([pipe], [], [], remaining)[0]:
                     raise TimeoutError
                 got = os.read(pipe, 1 << 16)
                 if not got or len(self._rest) > LONGEST:

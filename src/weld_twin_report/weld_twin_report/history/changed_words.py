@@ -53,7 +53,7 @@ def sentence(change: Change) -> str:
 def forecast(
     change: Change,
     seen: Sequence[Observation],
-    found: Sequence[Change],
+    result: Sequence[Change],
     limits: Mapping[str, float],
 ) -> dict[str, Any] | None:
     """
@@ -61,10 +61,9 @@ def forecast(
 
     Parameters
     ----------
-    change : Change
     seen : sequence of Observation
         All diagnoses of the cell.
-    found : sequence of Change
+    result : sequence of Change
         All that changed.
     limits : mapping of str to float
         Largest value allowed of an effect, SI units.
@@ -73,7 +72,7 @@ def forecast(
     what = coordinate(change.name)
     if change.kind != 'trend' or what.effect not in limits:
         return None
-    now = outlook(seen, found, change.name)
+    now = outlook(seen, result, change.name)
     if now is None:
         return None
     days = reaches(limits[what.effect], now)
@@ -86,11 +85,11 @@ def forecast(
     }
 
 
-def forecast_sentence(change: Change, told: Mapping[str, Any]) -> str:
+def forecast_sentence(change: Change, reported: Mapping[str, Any]) -> str:
     """Return when the limit is reached, in words."""
     what = coordinate(change.name)
-    limit = f'{told["limit"] * what.factor:g} {what.unit}'.rstrip()
-    low, high = told['weeks_5'], told['weeks_95']
+    limit = f'{reported["limit"] * what.factor:g} {what.unit}'.rstrip()
+    low, high = reported['weeks_5'], reported['weeks_95']
     if low is None:
         return f'{what.words} does not come near {limit}.'
     if high == 0.0:
@@ -118,8 +117,8 @@ def as_dict(change: Change) -> dict[str, Any]:
     }
 
 
-def since(found: Sequence[Change], day: float | None) -> list[Change]:
+def since(result: Sequence[Change], day: float | None) -> list[Change]:
     """Return the changes that may have come after a day; seasons always."""
     if day is None:
-        return list(found)
-    return [each for each in found if each.kind == 'season' or each.between[1] > day]
+        return list(result)
+    return [each for each in result if each.kind == 'season' or each.between[1] > day]

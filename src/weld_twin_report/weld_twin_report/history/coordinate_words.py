@@ -44,13 +44,13 @@ def coordinate(name: str) -> Coordinate:
         return Coordinate('tool_pose', None, words, factor, unit)
     effect, *joint, number = name.split(' ')
     kind = REGISTRY.get(effect)
-    told = [p for p in kind.parameters if p.differentiable] if kind else []
+    reported = [p for p in kind.parameters if p.differentiable] if kind else []
     factor, unit = 1.0, ''
-    if told:
-        parameter = told[min(int(number), len(told) - 1)]
+    if reported:
+        parameter = reported[min(int(number), len(reported) - 1)]
         factor, unit = display_unit(parameter.name, parameter.unit)
     where, _, source = ' '.join(joint).partition('<')
-    one = len(told) == 1 and number == '0'
+    one = len(reported) == 1 and number == '0'
     words = cause(effect, where or None) + ('' if one else f', part {int(number) + 1}')
     words += f' from {source}' if source else ''
     return Coordinate(effect, where or None, words, factor, unit)

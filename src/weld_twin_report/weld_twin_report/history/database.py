@@ -110,7 +110,6 @@ class Database:
         ----------
         cell : str
             A new name makes a new cell.
-        entry : Entry
 
         Raises
         ------
@@ -178,7 +177,6 @@ class Database:
 
         Parameters
         ----------
-        cell : str
         newest : int, optional
             Only so many, the last ones.
 
@@ -239,7 +237,7 @@ class Database:
             It does not take what was written.
 
         """
-        left = waits(self._patience if patience is None else patience)
+        remaining = waits(self._patience if patience is None else patience)
         while True:
             try:
                 with self._engine.connect() as plain:
@@ -247,7 +245,7 @@ class Database:
                     with connection.begin():
                         return work(connection)
             except self.sql.exc.SQLAlchemyError as error:
-                wait = next(left, None) if passes(error, connecting=connecting) else None
+                wait = next(remaining, None) if passes(error, connecting=connecting) else None
                 if wait is None:
                     with self._clear():
                         raise

@@ -41,8 +41,6 @@ class Entry:
         Name and fingerprint of the robot's model.
     recording : str
         SHA-256 of what was diagnosed.
-    status : str
-    confidence, gap_m, floor_m, unexplained_m : float or None
     effects : list of mappings
         What was named, as in ``verdict.effects``.
     names : tuple of str
@@ -186,32 +184,32 @@ def _coordinates(
     posterior: Mapping[str, Any] | None, file: Path
 ) -> tuple[tuple[str, ...], Array, Array, Array]:
     """Return names, values, widths before the data and covariance of what is the arm's own."""
-    told = [] if posterior is None else posterior['coordinates']
-    if not told or 'prior_std' not in told[0]:
+    reported = [] if posterior is None else posterior['coordinates']
+    if not reported or 'prior_std' not in reported[0]:
         raise DataError(
             f"diagnosis '{file}' does not say what was believed before the data: an older version "
             'wrote it; diagnose the recording again'
         )
     assert posterior is not None
-    count = Counter(each['name'] for each in told)
+    count = Counter(each['name'] for each in reported)
     # What has no name of its own cannot be followed from one diagnosis to the next.
     keep = [
         k
-        for k, each in enumerate(told)
+        for k, each in enumerate(reported)
         if not each['name'].startswith(PASSING) and count[each['name']] == 1
     ]
     # What is weighed over many priors cannot be freed of one; files of before 0.1 had one alone.
     plain = posterior.get(
         'single_prior',
-        {'value': [each['value'] for each in told], 'covariance': posterior['covariance']},
+        {'value': [each['value'] for each in reported], 'covariance': posterior['covariance']},
     )
-    whole = np.zeros((len(told), len(told)))
+    whole = np.zeros((len(reported), len(reported)))
     for k, row in enumerate(plain['covariance']):
         whole[k, : k + 1] = row
         whole[: k + 1, k] = row
     return (
-        tuple(told[k]['name'] for k in keep),
+        tuple(reported[k]['name'] for k in keep),
         np.array([float(plain['value'][k]) for k in keep]),
-        np.array([float(told[k]['prior_std']) for k in keep]),
+        np.array([float(reported[k]['prior_std']) for k in keep]),
         whole[np.ix_(keep, keep)],
     )

@@ -42,7 +42,9 @@ def engine_of(address: Any) -> Engine:
     if address.drivername.startswith('postgresql+psycopg'):
         # Neither a server that does not answer nor somebody's forgotten lock is waited for in vain.
         patience = {'connect_timeout': CONNECT, 'options': f'-c lock_timeout={LOCKED}s'}
-        patience = {key: told for key, told in patience.items() if key not in address.query}
+        patience = {
+            key: reported for key, reported in patience.items() if key not in address.query
+        }
     made = sqlalchemy.create_engine(address, connect_args=patience, pool_pre_ping=not lite)
     if lite:
         # Python's driver begins late and ends at a CREATE; both would let others in between.
@@ -80,7 +82,6 @@ def version_of(connection: Connection, shown: str, *, make: bool) -> int:
 
     Parameters
     ----------
-    connection : Connection
     shown : str
         The database, as people may read it.
     make : bool
@@ -113,9 +114,9 @@ def version_of(connection: Connection, shown: str, *, make: bool) -> int:
             'with --db, or restore it from a copy'
         )
     if row is None or not 0 < row[0] <= VERSION:
-        found = 'no version' if row is None else f'version {row[0]}'
+        result = 'no version' if row is None else f'version {row[0]}'
         raise DataError(
-            f"'{shown}' is a history of {found}, and this program knows versions up to {VERSION}; "
+            f"'{shown}' is a history of {result}, and this program knows versions up to {VERSION}; "
             'install a newer weld-twin'
         )
     return int(row[0])
@@ -129,7 +130,6 @@ def bring_up(connection: Connection, tables: MetaData, version: int) -> None:
     ----------
     connection : Connection
         In a transaction that writes.
-    tables : MetaData
     version : int
         What `version_of` told.
 

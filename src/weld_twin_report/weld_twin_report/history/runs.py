@@ -35,12 +35,10 @@ class Run:
     ----------
     key : str
         Of what was asked: recording, robot, options and program. The same is not asked twice.
-    cell, recording : str
     state : str
         'done', 'unsound', 'refused' or 'failed'.
     sentence : str
         What was told last: the verdict's status, or why there is none.
-    seconds : float
     memory : int
         Bytes it needed at most.
 
@@ -67,8 +65,6 @@ class Runs:
 
         Parameters
         ----------
-        run : Run
-        entry : Entry, optional
         patience : float, optional
             Seconds for which it is tried again; that of the database unless told.
 
@@ -92,8 +88,8 @@ class Runs:
             if entry is None:
                 raise
             state = REFUSED if isinstance(error, Refused) else FAILED
-            told = replace(run, state=state, sentence=str(error))
-            return told if self._write(told, None, patience) else None
+            reported = replace(run, state=state, sentence=str(error))
+            return reported if self._write(reported, None, patience) else None
 
     def _write(self, run: Run, entry: Entry | None, patience: float | None) -> bool:
         sql, runs = self._database.sql, self._database.table('runs')
@@ -106,11 +102,11 @@ class Runs:
             number = None
             if entry is not None:
                 number = self._database.put(connection, run.cell, entry)
-            told = {**asdict(run), 'verdict_id': number}
+            reported = {**asdict(run), 'verdict_id': number}
             # Another program may have written it since; only a failure is written over.
-            new = self._database.insert(runs).values(told)
+            new = self._database.insert(runs).values(reported)
             new = new.on_conflict_do_update(
-                index_elements=[runs.c.key], set_=told, where=runs.c.state == FAILED
+                index_elements=[runs.c.key], set_=reported, where=runs.c.state == FAILED
             )
             return bool(connection.execute(new).rowcount == 1)
 
@@ -186,8 +182,8 @@ class Runs:
         )
         if cell is not None:
             query = query.where(cells.c.name == cell)
-        told = 'a row' if cell is None else f'the newest diagnosis of cell {cell!r}'
-        with self._database.reading(told) as connection:
+        reported = 'a row' if cell is None else f'the newest diagnosis of cell {cell!r}'
+        with self._database.reading(reported) as connection:
             return [dict(row) for row in connection.execute(query).mappings()]
 
     def look(self, cell: str, entries: Sequence[Entry] | None = None) -> list[dict[str, Any]]:
@@ -196,7 +192,6 @@ class Runs:
 
         Parameters
         ----------
-        cell : str
         entries : sequence of Entry, optional
             Its newest diagnoses, where they are there already.
 
@@ -210,14 +205,14 @@ class Runs:
             return list(row.changes)
         entries = self._database.entries(cell, NEWEST) if entries is None else entries
         seen = observations(entries)
-        told = [as_dict(change) for change in changed(entries, seen)]
-        new_row = {'cell_id': number, 'newest': newest, 'diagnoses': count, 'changes': told}
+        reported = [as_dict(change) for change in changed(entries, seen)]
+        new_row = {'cell_id': number, 'newest': newest, 'diagnoses': count, 'changes': reported}
         new = self._database.insert(findings).values(new_row)
         new = new.on_conflict_do_update(index_elements=[findings.c.cell_id], set_=new_row)
         # Who may only read works it out anew.
         with suppress(Unavailable):
             self._database.write(lambda connection: connection.execute(new), patience=0.0)
-        return told
+        return reported
 
     def _state(self, cell: str) -> tuple[int, int, int]:
         """Return the number of a cell, that of its last diagnosis, and how many it has."""

@@ -44,8 +44,8 @@ def observations(entries: Sequence[Entry]) -> list[Observation]:
 
 def named(entries: Sequence[Entry]) -> set[str]:
     """Return the coordinates of the causes that entries name."""
-    found = ((each['effect'], each.get('joint')) for entry in entries for each in entry.effects)
-    return {f'{effect} {joint} 0' if joint else f'{effect} 0' for effect, joint in found}
+    result = ((each['effect'], each.get('joint')) for entry in entries for each in entry.effects)
+    return {f'{effect} {joint} 0' if joint else f'{effect} 0' for effect, joint in result}
 
 
 def likely(entries: Sequence[Entry]) -> set[str]:

@@ -73,7 +73,7 @@ def verified_of(path: Path | str, at: datetime | None = None) -> Verified | None
 
 
 def put_verified(
-    database: Database, connection: Connection, cell: str, found: Verified
+    database: Database, connection: Connection, cell: str, result: Verified
 ) -> int | None:
     """
     Add a verification within a transaction; return its number, None if it was there already.
@@ -92,14 +92,18 @@ def put_verified(
         raise DataError(
             f'there is no cell {cell!r} yet; add the diagnosis that was verified first'
         )
-    if own.kinematics != found.content.get('kinematics'):
+    if own.kinematics != result.content.get('kinematics'):
         raise DataError(f'cell {cell!r} has the robot {own.robot!r}, and this is of another')
     query = sql.select(rows.c.id).where(
-        rows.c.cell_id == own.id, rows.c.recording == found.recording
+        rows.c.cell_id == own.id, rows.c.recording == result.recording
     )
     if connection.execute(query).first() is not None:
         return None
-    values = {'at': stored(found.at), 'recording': found.recording, 'content': dict(found.content)}
+    values = {
+        'at': stored(result.at),
+        'recording': result.recording,
+        'content': dict(result.content),
+    }
     made = connection.execute(rows.insert().values(cell_id=own.id, **values))
     assert made.inserted_primary_key is not None
     return int(made.inserted_primary_key[0])

@@ -78,13 +78,13 @@ def on_what(diagnosis: Diagnosis) -> str:
 def judged_words(rule: Rule, size: float) -> str:
     """Return the verdict on a largest deviation [m], and where it is open its limits."""
     verdict = rule.judged(size)
-    told = f'{WORDS[verdict]}: {millimetres(size)} of {millimetres(rule.tolerance_m)} allowed'
+    reported = f'{WORDS[verdict]}: {millimetres(size)} of {millimetres(rule.tolerance_m)} allowed'
     if verdict == OPEN and rule.tolerance_m is not None:
         low = rule.tolerance_m - rule.to_pass * rule.uncertainty_m
         high = rule.tolerance_m + rule.to_fail * rule.uncertainty_m
         passes = f'passes up to {millimetres(low)}' if low > 0.0 else 'nothing passes'
-        told += f' ({passes}, fails above {millimetres(high)})'
-    return f'{told[:1].upper()}{told[1:]}'
+        reported += f' ({passes}, fails above {millimetres(high)})'
+    return f'{reported[:1].upper()}{reported[1:]}'
 
 
 def rule_data(rule: Rule) -> dict[str, Any]:
@@ -157,20 +157,20 @@ def _field(rule: Rule) -> Html:
 def _rows(diagnosis: Diagnosis, rule: Rule) -> list[tuple[Html | str, ...]]:
     """Return a row for the robot as it is, and for each of the causes that may be mended."""
     if not switches(diagnosis):
-        left = left_with(diagnosis, ())
-        first = _row(f'as it is{_where(diagnosis)}', left.rms, left.largest, rule)
+        remaining = left_with(diagnosis, ())
+        first = _row(f'as it is{_where(diagnosis)}', remaining.rms, remaining.largest, rule)
         if not diagnosis.effects:
             return [first]
         return [
             first,
-            _row('with what was found mended', left.rms_after, left.largest_after, rule),
+            _row('with what was found mended', remaining.rms_after, remaining.largest_after, rule),
         ]
     out, taken = [], set(advised(diagnosis))
     for mended in thought_mended(diagnosis):
-        left = left_with(diagnosis, mended)
+        remaining = left_with(diagnosis, mended)
         against = '' if set(mended) <= taken else ' (not advised)'
-        told = f'{_told(diagnosis, mended)}{against}'
-        out.append(_row(told, left.rms_after, left.largest_after, rule))
+        reported = f'{_told(diagnosis, mended)}{against}'
+        out.append(_row(reported, remaining.rms_after, remaining.largest_after, rule))
     return out
 
 
@@ -206,18 +206,22 @@ def mark(rule: Rule, size: float, before: str = '') -> Html:
     What stands ``before`` it is left out with it where no tolerance is given.
     """
     verdict = rule.judged(size)
-    told = f'{before}{WORDS[verdict]}' if verdict is not None or not before else ''
+    reported = f'{before}{WORDS[verdict]}' if verdict is not None or not before else ''
     return tag(
-        'span', told, class_=f'mark {verdict}', data_size=f'{1e3 * size:.9f}', data_before=before
+        'span',
+        reported,
+        class_=f'mark {verdict}',
+        data_size=f'{1e3 * size:.9f}',
+        data_before=before,
     )
 
 
 def _where(diagnosis: Diagnosis) -> str:
     """Return where along the recordings it is worst."""
-    found = worst(diagnosis)
-    if found is None:
+    result = worst(diagnosis)
+    if result is None:
         return ''
-    k, sample, _ = found
+    k, sample, _ = result
     name = f'{diagnosis.recordings[k].name}, ' if len(diagnosis.recordings) > 1 else ''
     return f', worst at {name}{instant(diagnosis, k, sample)}'
 
@@ -254,15 +258,15 @@ def _unequal(rule: Rule) -> str:
 
 def _standard(diagnosis: Diagnosis) -> Html | None:
     """Return the figures of ISO 9283, where the motion was repeated."""
-    found = _repeated(diagnosis)
-    if found is None:
+    result = _repeated(diagnosis)
+    if result is None:
         text = 'ISO 9283: no pose and no path was repeated, so there are no figures by it.'
         return tag('p', text, class_='note detail')
     tables = []
-    if found.poses:
-        tables.append(table(POSE_HEADS, pose_rows(found)[:_ROWS]))
-    if found.path is not None:
-        tables.append(table(PATH_HEADS, [path_row(found.path)]))
+    if result.poses:
+        tables.append(table(POSE_HEADS, pose_rows(result)[:_ROWS]))
+    if result.path is not None:
+        tables.append(table(PATH_HEADS, [path_row(result.path)]))
     return joined([tag('h3', 'ISO 9283'), *tables])
 
 

@@ -95,7 +95,6 @@ class Answer:
 
     Attributes
     ----------
-    diagnosis : Diagnosis
     rule : Rule, optional
         How the largest deviation is judged.
     brand : str, optional
@@ -168,10 +167,10 @@ class Answer:
         sure = [c.belief for c in self.causes if c.cause.name and c.belief is not None]
         if not sure or max(sure) < whole.confidence + _DIFFERS:
             return ''
-        told = ', '.join(odds(p) for p in sure[:_TOLD])
+        reported = ', '.join(odds(p) for p in sure[:_TOLD])
         if len(sure) == 1:
-            return f'. The cause alone, others or none beside it: {told}'
-        return f'. All at once is less likely than each alone: {told}'
+            return f'. The cause alone, others or none beside it: {reported}'
+        return f'. All at once is less likely than each alone: {reported}'
 
     # Shares of the squared gap: everywhere as finely as the finest of them needs.
 
@@ -183,9 +182,9 @@ class Answer:
         """Return a share as all of this answer are told."""
         return percent(share, self._places)
 
-    def share_of(self, told: CauseAnswer) -> tuple[str, str]:
+    def share_of(self, reported: CauseAnswer) -> tuple[str, str]:
         """Return the share of a cause and the ends of its interval."""
-        return ends_to(self._places, told.cause.share, *told.cause.share_ci90)
+        return ends_to(self._places, reported.cause.share, *reported.cause.share_ci90)
 
     @cached_property
     def remainder(self) -> tuple[tuple[str, float], ...]:
@@ -203,9 +202,9 @@ class Answer:
             ripple = Table('Transmission ripple by joint', RIPPLE_HEADS, ripple_rows(whole))
             return [kinds, *([ripple] if ripple.rows else [])]
         rows = []
-        for found in whole.effects:
-            values = parameter_rows(found.effect, found.std, whole.model.robot)
-            names = [found_name(found), *[''] * len(values)]
+        for result in whole.effects:
+            values = parameter_rows(result.effect, result.std, whole.model.robot)
+            names = [found_name(result), *[''] * len(values)]
             rows += [[name, *row] for name, row in zip(names, values, strict=False)]
         heads = ('Effect', 'Parameter', 'Value ± standard error')
         return [Table('Effects found', heads, rows)] if rows else []

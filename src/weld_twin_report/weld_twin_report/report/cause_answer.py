@@ -66,7 +66,6 @@ class CauseAnswer:
 
     Attributes
     ----------
-    diagnosis : Diagnosis
     k : int
         The cause, counted from 0.
     brand : str, optional
@@ -86,8 +85,8 @@ class CauseAnswer:
     @cached_property
     def name(self) -> str:
         """Return it as a heading."""
-        told = cause_name(self.diagnosis, self.cause)
-        return f'{told[:1].upper()}{told[1:]}'
+        reported = cause_name(self.diagnosis, self.cause)
+        return f'{reported[:1].upper()}{reported[1:]}'
 
     @cached_property
     def effects(self) -> list[Effect]:
@@ -96,8 +95,8 @@ class CauseAnswer:
 
         Of a cause without a name only curves do: what imitates it says nothing of it.
         """
-        found = self.diagnosis.model.found
-        held = [found[m] for m in self.cause.members if m < len(found)]
+        result = self.diagnosis.model.found
+        held = [result[m] for m in self.cause.members if m < len(result)]
         return [e for e in held if e.name in CURVES] if unnamed(self.cause) else held
 
     @cached_property
@@ -109,11 +108,11 @@ class CauseAnswer:
     def meaning(self) -> list[str]:
         """Return what is wrong, in plain words: of each name that it may have."""
         names = [site.effect for site in self.alike] or [e.name for e in self.effects]
-        told = [REGISTRY[name].traits for name in dict.fromkeys(names)]
-        told = [traits for traits in told if traits.meaning]
-        if len(told) < 2:
-            return [f'{each.meaning[:1].upper()}{each.meaning[1:]}.' for each in told]
-        return [f'{each.title}: {each.meaning}.' for each in told]
+        reported = [REGISTRY[name].traits for name in dict.fromkeys(names)]
+        reported = [traits for traits in reported if traits.meaning]
+        if len(reported) < 2:
+            return [f'{each.meaning[:1].upper()}{each.meaning[1:]}.' for each in reported]
+        return [f'{each.title}: {each.meaning}.' for each in reported]
 
     @property
     def _should_it_be(self) -> str:
@@ -130,15 +129,14 @@ class CauseAnswer:
         Who believes the whole verdict believes each part of it: a part is never told as less sure.
         None where nothing is believed of it.
         """
-        named = {site: p for site, p in self.cause.name if site.effect not in CURVES}
-        if not named:
+        if all(site.effect in CURVES for site, _ in self.cause.name):
             place = self.cause.place
             return sum(p for _, p in leading(place)) if place else None
+        own = self.cause.probability
         if self.diagnosis.families:
-            return self.cause.probability
-        own = sum(named.get(s, 0.0) for s in self.alike) if self.alike else max(named.values())
+            return own
         whole = self.diagnosis.confidence if self.diagnosis.status in NAMING else 0.0
-        return min(max(own, whole), 1.0)
+        return max(own, whole)
 
     @cached_property
     def sure(self) -> list[str]:
@@ -158,15 +156,15 @@ class CauseAnswer:
     def _on(self) -> list[str]:
         if not self.cause.dependence:
             return ['What it depends on was not found.']
-        told = leading(self.cause.dependence)
-        on = depending(*(name for name, _ in told))
-        return [f'{odds(sum(p for _, p in told))} that it {on}; what it is, is open.']
+        reported = leading(self.cause.dependence)
+        on = depending(*(name for name, _ in reported))
+        return [f'{odds(sum(p for _, p in reported))} that it {on}; what it is, is open.']
 
     @cached_property
     def levels(self) -> str:
         """Return what is believed of place, dependence and name, each by itself."""
         at = str(self.cause.place[0][0]) if self.cause.place else ''
-        told = {
+        reported = {
             'Place': [(place_name(a), p) for a, p in self.cause.place],
             'Depends on': [(DEPENDENCES.get(on, on), p) for on, p in self.cause.dependence],
             # The place stands there already; other joints stand with their names.
@@ -178,7 +176,7 @@ class CauseAnswer:
         }
         each = '. '.join(
             f'{head}: {", ".join(f"{name} {odds(p)}" for name, p in items[:_LISTED])}'
-            for head, items in told.items()
+            for head, items in reported.items()
             if items
         )
         return f'{each}. Learned for each level by itself.' if each else ''
@@ -192,17 +190,17 @@ class CauseAnswer:
             [(DEPENDENCES.get(on, on), p) for on, p in self.cause.dependence],
             [(site_name(site), p) for site, p in self.cause.name if site.effect not in CURVES],
         )
-        told = [', '.join(f'{n} ({odds(p)})' for n, p in items[:_LISTED]) for items in levels]
-        told[-1] = 'none that was tried' if unnamed(self.cause) else told[-1]
-        return [f'{value} ({ends})', *told]
+        reported = [', '.join(f'{n} ({odds(p)})' for n, p in items[:_LISTED]) for items in levels]
+        reported[-1] = 'none that was tried' if unnamed(self.cause) else reported[-1]
+        return [f'{value} ({ends})', *reported]
 
     # How large it is, and what is left without it.
 
     @cached_property
     def off_by(self) -> list[str]:
         """Return by how much it is off, the most telling first; of those that fit alike, of one."""
-        told = values(self.diagnosis, self.cause, self.effects)
-        return [f's{self._should_it_be}', *told] if self.alike and told else told
+        reported = values(self.diagnosis, self.cause, self.effects)
+        return [f's{self._should_it_be}', *reported] if self.alike and reported else reported
 
     def off_in_short(self, most: int) -> list[str]:
         """Return the most telling of them, without radians, which the card has."""
@@ -211,10 +209,10 @@ class CauseAnswer:
     @cached_property
     def moved(self) -> list[np.ndarray]:
         """Return how it moves the tool at every stamp, (M, 3) [m], for each recording where known."""
-        told = self.diagnosis.contributions
-        if told is None or self.diagnosis.contacts is not None:
+        reported = self.diagnosis.contributions
+        if reported is None or self.diagnosis.contacts is not None:
             return []
-        return [parts[self.k] for parts in told.parts]
+        return [parts[self.k] for parts in reported.parts]
 
     @cached_property
     def own_square(self) -> float:
@@ -265,15 +263,15 @@ class CauseAnswer:
         if self.left is None:
             return None
         rms, rms_after, largest, largest_after = map(millimetres, self.left)
-        told = (
+        reported = (
             f'RMS {"falls" if self.left.rms_after < self.left.rms else "rises"} from '
             f'{rms} to {rms_after}, the largest '
             f'{"grows" if self.left.grows else "goes"} from {largest} to {largest_after}'
         )
         if not unnamed(self.cause):
-            return told, ''
+            return reported, ''
         short = taken_by_curve(self.diagnosis, self.k) is not None
-        return told, f' {_BY_CURVE}{_SHORT * short}'
+        return reported, f' {_BY_CURVE}{_SHORT * short}'
 
     # What to do about it.
 
@@ -295,16 +293,19 @@ class CauseAnswer:
         if self.diagnosis.families and len(effects) > 1:
             return [TOGETHER]
         if unnamed(self.cause):
-            told = look_at(self.diagnosis, self.k)
+            reported = look_at(self.diagnosis, self.k)
         elif not effects:
             return ['Measure as said under "What to measure next".']
         else:
             twins = same_words(self.diagnosis, *(Site(e.name, e.site) for e in effects))
             ways = filter(None, [*dict.fromkeys(map(gearing, effects)), self._warning])
-            told = [*dict.fromkeys(actions(effects, model.robot, model.mends)), *twins, *ways]
+            reported = [*dict.fromkeys(actions(effects, model.robot, model.mends)), *twins, *ways]
         if effects and self.alike:
-            return [f'Which of them it is must be measured first. S{self._should_it_be}', *told]
-        return told
+            return [
+                f'Which of them it is must be measured first. S{self._should_it_be}',
+                *reported,
+            ]
+        return reported
 
     @property
     def _warning(self) -> str:
@@ -325,14 +326,14 @@ class CauseAnswer:
         if fault:
             return head, f'Nothing is to be entered: the curve {fault}.'
         others = against(self.diagnosis) if unnamed(self.cause) else ''
-        told = self._correction
+        reported = self._correction
         if others:
             # A correction is made without the curves that are advised against.
             model = 'Its model is a copy of diagnosis.json'
-            told += f' {model} without the entries of {others} under found.'
+            reported += f' {model} without the entries of {others} under found.'
         if self.alike:
-            told = f'Nothing before it is known which it is. S{self._should_it_be} {told}'
-        return head, told
+            reported = f'Nothing before it is known which it is. S{self._should_it_be} {reported}'
+        return head, reported
 
     @property
     def where_to_enter(self) -> str:

@@ -37,8 +37,8 @@ def causes_cards(answer: Answer) -> Html | None:
     shown = big[:MOST]
     if not shown:
         return None
-    rest = [told for told in answer.causes if told not in shown]
-    cards = [_card(answer, told, rank) for rank, told in enumerate(shown, 1)]
+    rest = [reported for reported in answer.causes if reported not in shown]
+    cards = [_card(answer, reported, rank) for rank, reported in enumerate(shown, 1)]
     return section(
         'What causes it',
         _shares(answer, shown, rest),
@@ -53,7 +53,7 @@ def causes_cards(answer: Answer) -> Html | None:
 
 def _against(shown: list[CauseAnswer]) -> str:
     """Return how to read a share that is far smaller than what its cause moves."""
-    if all(told.own_square < told.cause.share + _APART for told in shown):
+    if all(reported.own_square < reported.cause.share + _APART for reported in shown):
         return ''
     return (
         ' Causes that move the tool at the same instants share what they explain together: a small '
@@ -64,11 +64,11 @@ def _against(shown: list[CauseAnswer]) -> str:
 def _shares(answer: Answer, shown: list[CauseAnswer], rest: list[CauseAnswer]) -> Html:
     """Return one row for each cause, for what is left and for the noise: a whole of 100 %."""
     rows: list[tuple[str, float, str, str]] = []
-    for rank, told in enumerate(shown, 1):
-        value, ends = answer.share_of(told)
-        label = f'{rank}. {cause_name(answer.diagnosis, told.cause)}'
-        rows.append((label, told.cause.share, f'{value} ({ends})', 'cause'))
-    smaller = sum(told.cause.share for told in rest)
+    for rank, reported in enumerate(shown, 1):
+        value, ends = answer.share_of(reported)
+        label = f'{rank}. {cause_name(answer.diagnosis, reported.cause)}'
+        rows.append((label, reported.cause.share, f'{value} ({ends})', 'cause'))
+    smaller = sum(reported.cause.share for reported in rest)
     if smaller > 0.0:
         rows.append(('smaller causes', smaller, answer.percent(smaller), 'cause'))
     rows += [(name, share, answer.percent(share), 'rest') for name, share in answer.remainder]
@@ -85,78 +85,78 @@ def _shares(answer: Answer, shown: list[CauseAnswer], rest: list[CauseAnswer]) -
     return tag('ul', *items, class_='bars wide shares')
 
 
-def _card(answer: Answer, told: CauseAnswer, rank: int) -> Html:
-    off = told.off_by
+def _card(answer: Answer, reported: CauseAnswer, rank: int) -> Html:
+    off = reported.off_by
     more = [f'and {len(off) - _VALUES} more'] if len(off) > _VALUES else []
     entries: list[tuple[str, Child]] = [
-        ('What that is', lines(told.meaning)),
-        ('How sure', _sure(told)),
+        ('What that is', lines(reported.meaning)),
+        ('How sure', _sure(reported)),
         ('By how much', lines([*off[:_VALUES], *more])),
-        ('Stands on', told.stands_on),
-        (_EFFECT[at_rest(answer.diagnosis)], _effect(told)),
-        ('If only this is mended', _mended(told, answer.rule)),
-        ('What to do', lines(joined(warned(text)) for text in told.to_do)),
-        told.at_the_controller,
+        ('Stands on', reported.stands_on),
+        (_EFFECT[at_rest(answer.diagnosis)], _effect(reported)),
+        ('If only this is mended', _mended(reported, answer.rule)),
+        ('What to do', lines(joined(warned(text)) for text in reported.to_do)),
+        reported.at_the_controller,
     ]
     return tag(
         'article',
-        tag('h3', tag('span', str(rank), class_='rank'), told.name),
-        tag('p', tag('b', answer.percent(told.cause.share)), ' of the gap', class_='share'),
-        _box(told),
-        _picture(told),
+        tag('h3', tag('span', str(rank), class_='rank'), reported.name),
+        tag('p', tag('b', answer.percent(reported.cause.share)), ' of the gap', class_='share'),
+        _box(reported),
+        _picture(reported),
         pairs(entries),
         class_='card',
         id_=f'cause-{rank}',
     )
 
 
-def _box(told: CauseAnswer) -> Html | None:
+def _box(reported: CauseAnswer) -> Html | None:
     """Return the switch that thinks this cause mended."""
-    for at, switch in enumerate(switches(told.diagnosis)):
-        if switch.members == (told.k,):
+    for at, switch in enumerate(switches(reported.diagnosis)):
+        if switch.members == (reported.k,):
             box = tag('input', type='checkbox', data_switch=at, checked='')
             return tag('label', box, ' take as mended', class_='one-switch')
     return None
 
 
-def _sure(told: CauseAnswer) -> Html | None:
+def _sure(reported: CauseAnswer) -> Html | None:
     """Return how sure a cause is, and for engineers what each level of it is believed to be."""
-    levels = tag('summary', 'place, dependence and name'), told.levels
-    folded = tag('details', *levels, class_='detail') if told.levels else None
+    levels = tag('summary', 'place, dependence and name'), reported.levels
+    folded = tag('details', *levels, class_='detail') if reported.levels else None
     return (
-        tag('span', *(tag('span', text) for text in told.sure), folded, class_='lines')
-        if (told.sure)
+        tag('span', *(tag('span', text) for text in reported.sure), folded, class_='lines')
+        if (reported.sure)
         else None
     )
 
 
-def _effect(told: CauseAnswer) -> Html | None:
-    if told.moves is None:
+def _effect(reported: CauseAnswer) -> Html | None:
+    if reported.moves is None:
         return None
-    most, ways = told.moves
+    most, ways = reported.moves
     return joined([most, tag('span', ways, class_='detail') if ways else None])
 
 
-def _mended(told: CauseAnswer, rule: Rule | None) -> Html | None:
+def _mended(reported: CauseAnswer, rule: Rule | None) -> Html | None:
     """Return the gap that would be left if only this were mended, and whether that passes."""
-    if told.mended is None or told.left is None or rule is None:
+    if reported.mended is None or reported.left is None or rule is None:
         return None
-    after, how = told.mended
-    return joined([after, mark(rule, told.left.largest_after, ', '), '.', how or None])
+    after, how = reported.mended
+    return joined([after, mark(rule, reported.left.largest_after, ', '), '.', how or None])
 
 
-def _picture(told: CauseAnswer) -> Html | None:
+def _picture(reported: CauseAnswer) -> Html | None:
     """Return how far the cause moves the tool along the recording, or its curve."""
-    diagnosis = told.diagnosis
-    curve = furthest_off(diagnosis, told.cause)
+    diagnosis = reported.diagnosis
+    curve = furthest_off(diagnosis, reported.cause)
     # A constant is one value, and no picture.
     if curve is not None and curve[1].over != 'constant':
         return curve_figure(diagnosis, *curve)
-    if told.most is None:
+    if reported.most is None:
         return None
-    run = told.most[0]
+    run = reported.most[0]
     index = drawn(diagnosis, run)
-    size = 1e3 * np.linalg.norm(told.moved[run][index], axis=1)
+    size = 1e3 * np.linalg.norm(reported.moved[run][index], axis=1)
     dots = static(diagnosis, run)
     return chart(
         'How far it moves the tool',
@@ -175,6 +175,6 @@ def _smaller(rest: list[CauseAnswer]) -> Html | None:
     return tag(
         'details',
         tag('summary', counted(len(rest), 'smaller cause')),
-        table(LEVEL_HEADS, [told.row for told in rest], 'levels'),
+        table(LEVEL_HEADS, [reported.row for reported in rest], 'levels'),
         class_='detail',
     )

@@ -80,10 +80,10 @@ def changed_section(answer: Answer) -> Html | None:
     changed = answer.changed
     if changed is None:
         return None
-    told = tag('p', answer.nothing_changed)
+    reported = tag('p', answer.nothing_changed)
     return section(
         'What changed between the recordings',
-        table(changed.heads, changed.rows, 'changed') if changed.rows else told,
+        table(changed.heads, changed.rows, 'changed') if changed.rows else reported,
         id_='changed',
         lead=f'Against {answer.diagnosis.recordings[0].name}; the causes above are what all have in '
         'common.',
@@ -128,8 +128,8 @@ def _candidates(answer: Answer) -> Html | None:
     else:
         title = 'Candidates against each other'
         lead = f'{_GROUP if len(groups) > 1 else ""}{_RIVALS}'
-    told = tag('p', f'{lead} {_BARS}', class_='note')
-    return joined([tag('h3', title), told, *parts, note])
+    reported = tag('p', f'{lead} {_BARS}', class_='note')
+    return joined([tag('h3', title), reported, *parts, note])
 
 
 def _sets(answer: Answer) -> Html | None:
@@ -142,15 +142,15 @@ def _sets(answer: Answer) -> Html | None:
         guess = sentences(
             f'{names}: naming one of them would be a guess.' for names in answer.open
         )
-        told = [guess, *([tag('p', 'Why:'), reasons] if diagnosis.reasons else [])]
+        reported = [guess, *([tag('p', 'Why:'), reasons] if diagnosis.reasons else [])]
     elif diagnosis.families:
-        told = [reasons]
+        reported = [reasons]
     elif diagnosis.same:
-        told = [sentences(same_words(diagnosis))]
+        reported = [sentences(same_words(diagnosis))]
     else:
         none = f'{_NONE[bool(untried(diagnosis))]} {untried(diagnosis)}'
-        told = [tag('p', none.rstrip())]
-    return joined([tag('h3', 'What these data cannot tell apart'), *told])
+        reported = [tag('p', none.rstrip())]
+    return joined([tag('h3', 'What these data cannot tell apart'), *reported])
 
 
 def _absent(diagnosis: Diagnosis) -> Html | None:

@@ -38,7 +38,6 @@ class Line(NamedTuple):
         In the unit of the chart; what is not finite leaves a gap.
     colour : str
         A colour of the page's style: 'before', 'after', 'soft', 'good', 'care', 'bad'.
-    dashed : bool
     points : bool
         Dots in place of a line.
     marked : bool
@@ -83,13 +82,10 @@ def chart(
         Shown above; read out instead of the picture.
     x : array, shape (N,)
         Ascending; seconds since 1970 where ``dates`` is set.
-    lines : sequence of Line
-    axes : tuple of two Axis
     key : str, optional
         Charts of one key have one cursor, and share it with whatever else listens on the page.
     band : tuple of two arrays, shape (N,), optional
         Least and most, shaded in the colour of the first line.
-    dates : bool
     from_zero : bool
         Whether the axis starts at zero, as sizes do.
     height : int
@@ -152,7 +148,6 @@ def thinned(rows: Sequence[Array], most: int = POINTS) -> np.ndarray:
     ----------
     rows : sequence of array, shape (N,)
         What must keep its peaks; at least one.
-    most : int
 
     """
     count = rows[0].size

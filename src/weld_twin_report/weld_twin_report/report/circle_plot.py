@@ -32,11 +32,11 @@ def circles(diagnosis: Diagnosis) -> list[tuple[int, Circle]]:
     for k, (measured, before) in enumerate(
         zip(diagnosis.traces.measured, diagnosis.traces.before, strict=True)
     ):
-        found = (
+        result = (
             None if static(diagnosis, k) else circle_of((measured - before)[trusted(diagnosis, k)])
         )
-        if found is not None:
-            out.append((k, found))
+        if result is not None:
+            out.append((k, result))
     return out[:_MOST]
 
 
@@ -91,10 +91,10 @@ def reversals(recording: Recording) -> list[tuple[int, float]]:
 
 def circles_section(diagnosis: Diagnosis) -> Html | None:
     """Return the polar plots; None where nothing went round a circle."""
-    found = circles(diagnosis)
-    if not found:
+    result = circles(diagnosis)
+    if not result:
         return None
-    figures = [_figure(diagnosis, k, circle) for k, circle in found]
+    figures = [_figure(diagnosis, k, circle) for k, circle in result]
     return section(
         'The circle',
         tag('div', *figures, class_='panels'),
@@ -109,7 +109,7 @@ def _figure(diagnosis: Diagnosis, k: int, circle: Circle) -> Html:
     good = trusted(diagnosis, k)
     radial = _radial(circle, path, as_it_is(diagnosis, k))[good]
     name = diagnosis.recordings[k].name
-    told = (
+    reported = (
         f'{name}: radius {millimetres(circle.radius)}, '
         f'{along(diagnosis, k)[-1]:.1f} s; as it is from {millimetres(float(radial.min()))} to '
         f'{millimetres(float(radial.max()))}, so {millimetres(float(np.ptp(radial)))} out of round'
@@ -118,7 +118,7 @@ def _figure(diagnosis: Diagnosis, k: int, circle: Circle) -> Html:
     return tag(
         'figure',
         tag('canvas', data_circle=k, role='img', aria_label=label),
-        tag('figcaption', told),
+        tag('figcaption', reported),
         _key(bool(diagnosis.model.found)),
     )
 
@@ -132,7 +132,9 @@ def _key(changes: bool) -> Html:
         ('ink', 'tick at the rim: a joint turns back there; the joint of a cause is named, a long '
          'name by its number from the base'),
     ]  # fmt: skip
-    items = [tag('li', tag('i', class_=f'swatch {colour}'), ' ', told) for colour, told in rows]
+    items = [
+        tag('li', tag('i', class_=f'swatch {colour}'), ' ', reported) for colour, reported in rows
+    ]
     return tag('ul', *items, class_='key')
 
 

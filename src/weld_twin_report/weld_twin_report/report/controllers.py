@@ -123,7 +123,6 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
 
     Parameters
     ----------
-    effect : Effect
     brand : str or None
         One of `BRANDS`; None where the maker is not known.
     robot : Robot, optional
@@ -143,8 +142,8 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
     off = _off(effect, sliding)
     # The makers' fields of a zero are angles; what a slide's count is not known.
     if kind in _ANYWHERE and (brand is None or (sliding and kind == 'zero')):
-        told = _ANYWHERE[kind].format(**off)
-        return told + (
+        reported = _ANYWHERE[kind].format(**off)
+        return reported + (
             '.' if brand else '; --controller with the name of its maker tells the menu.'
         )
     place = _PLACES.get((str(brand), kind))

@@ -24,17 +24,16 @@ def correction_page(entry: Mapping[str, Any], inputs: Sequence[InputFile] = ()) 
     ----------
     entry : mapping
         The content of correction.json.
-    inputs : sequence of InputFile
 
     """
     title = f'{entry["program"]} · {entry["robot"]}'
-    told = tolerance_told(entry)
+    reported = tolerance_told(entry)
     body = main(
         ('Corrected program ', entry['language']),
         title,
         headline(entry),
         _figures(entry),
-        section('Tolerance', sentences(told), id_='tolerance') if told else None,
+        section('Tolerance', sentences(reported), id_='tolerance') if reported else None,
         _first_run(entry),
         _left(entry),
         _outside(entry),
@@ -62,8 +61,8 @@ def tolerance_told(entry: Mapping[str, Any]) -> list[str]:
     """Return in sentences whether a tolerance is kept; nothing where none was asked for."""
     if 'tolerance' not in entry:
         return []
-    told = entry['tolerance']
-    size, after = f'{told["tolerance_m"] * 1e3:.3g} mm', told['after']
+    reported = entry['tolerance']
+    size, after = f'{reported["tolerance_m"] * 1e3:.3g} mm', reported['after']
     decision = {
         'kept': 'it counts as kept',
         'not kept': 'it counts as not kept',
@@ -71,19 +70,19 @@ def tolerance_told(entry: Mapping[str, Any]) -> list[str]:
     }[after['decision']]
     out = [
         f'All along, the tool keeps within {size} of where the program means it with '
-        f'{told["before"]["probability"]:.0%} probability before and {after["probability"]:.0%} '
+        f'{reported["before"]["probability"]:.0%} probability before and {after["probability"]:.0%} '
         f'after: {decision} (from 95 % on, with guard bands as ISO 14253-1). After, it is 95 % sure '
         f'to keep within {after["sure_within_m"] * 1e3:.3f} mm.'
     ]
     if after['decision'] == 'kept':
         return out
-    more = told['postures_more']
+    more = reported['postures_more']
     if more is None:
         return [*out, 'No number of postures measured along it makes that sure with this model.']
     return [
         *out,
         f'{more} postures measured more along it make it 95 % sure: weld-twin investigate '
-        f'--tolerance {told["tolerance_m"] * 1e3:g} --model DIAGNOSIS --region {entry["program"]} '
+        f'--tolerance {reported["tolerance_m"] * 1e3:g} --model DIAGNOSIS --region {entry["program"]} '
         f'--postures {more} says which.',
     ]
 
@@ -140,10 +139,10 @@ def _left(entry: Mapping[str, Any]) -> Html | None:
     if not entry['left']:
         return None
     rows = []
-    for left in entry['left']:
-        places = [m['where'] for m in entry['moves'] if m['seam'] == left['seam']]
+    for remaining in entry['left']:
+        places = [m['where'] for m in entry['moves'] if m['seam'] == remaining['seam']]
         span = places[0] if len(places) == 1 else f'{places[0]} to {places[-1]}'
-        rows.append((span, left['why']))
+        rows.append((span, remaining['why']))
     return section(
         'Left as it was',
         table(('moves', 'why'), rows),
@@ -210,5 +209,5 @@ def _degrees(turn: float) -> str:
 def _notes(entry: Mapping[str, Any]) -> Html | None:
     if not entry['notes']:
         return None
-    told = sentences(f'{text[:1].upper()}{text[1:]}.' for text in entry['notes'])
-    return section('What was assumed', told, id_='notes')
+    reported = sentences(f'{text[:1].upper()}{text[1:]}.' for text in entry['notes'])
+    return section('What was assumed', reported, id_='notes')

@@ -40,10 +40,8 @@ def curve_figure(diagnosis: Diagnosis, m: int, curve: JointCurve) -> Html:
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     m : int
         Which of the effects found it is; their covariance makes the band.
-    curve : JointCurve
 
     """
     covariance = _spread(diagnosis, m)
@@ -83,11 +81,11 @@ def _spread(diagnosis: Diagnosis, m: int) -> Array | None:
 
 def furthest_off(diagnosis: Diagnosis, cause: Cause) -> tuple[int, JointCurve] | None:
     """Return which curve is furthest off of those that stand for a cause; a constant only alone."""
-    found = diagnosis.model.found
+    result = diagnosis.model.found
     curves = {
         m: effect
         for m in cause.members
-        if m < len(found) and isinstance(effect := found[m], JointCurve)
+        if m < len(result) and isinstance(effect := result[m], JointCurve)
     }
     if not curves:
         return None

@@ -49,8 +49,6 @@ def write_results(
 
     Parameters
     ----------
-    directory : Path
-    diagnosis : Diagnosis
     inputs : sequence of InputFile
         What it was made from.
     given : GivenUrdf, optional
@@ -87,7 +85,7 @@ def diagnosis_text(diagnosis: Diagnosis, inputs: Sequence[InputFile]) -> str:
     return json.dumps(_plain(content), indent=1, allow_nan=False) + '\n'
 
 
-def _candidates(diagnosis: Diagnosis, told: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _candidates(diagnosis: Diagnosis, reported: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """
     Return the candidates without effects that were asked to be left out.
 
@@ -98,7 +96,7 @@ def _candidates(diagnosis: Diagnosis, told: list[dict[str, Any]]) -> list[dict[s
     named = {site for group in diagnosis.indistinguishable for site in group}
     return [
         item if own in tried else {**item, 'excluded': True}
-        for own, item in zip(diagnosis.candidates, told, strict=True)
+        for own, item in zip(diagnosis.candidates, reported, strict=True)
         if own in tried or own.site in named
     ]
 

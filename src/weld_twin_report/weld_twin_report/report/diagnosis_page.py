@@ -71,10 +71,8 @@ def report_page(
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     inputs : sequence of InputFile
         What it was made from, as the page lists it.
-    sheet : Sheet, optional
 
     """
     sheet = sheet or Sheet()
@@ -103,9 +101,9 @@ def report_page(
         'rule': rule_data(rule),
         'circles': circle_data(diagnosis),
     }
-    told = Html(renamed(embedded(data, 'data'), sheet.joints))
+    reported = Html(renamed(embedded(data, 'data'), sheet.joints))
     scripts = [tag('script', own_file(name)) for name in SCRIPTS]
-    return document(title, main, told, charts=True, scripts=scripts)
+    return document(title, main, reported, charts=True, scripts=scripts)
 
 
 def _causes(answer: Answer, demand: Demand) -> tuple[Html | None, ...]:

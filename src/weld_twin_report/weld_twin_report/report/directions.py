@@ -35,7 +35,6 @@ def components(diagnosis: Diagnosis, k: int, vectors: Array) -> Array | None:
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     k : int
         The recording.
     vectors : array, shape (M, 3) [m]
@@ -86,12 +85,12 @@ def rms_words(parts: Array) -> str:
 
 def sides_words(part: Array) -> str:
     """Return to which side and how far, in words; a part is (3,) [m]."""
-    told = [
+    reported = [
         f'{millimetres(abs(float(value)))} {side[int(value < 0.0)]}'
         for value, side in zip(part, _SIDES, strict=True)
         if abs(value) >= _SEEN
     ]
-    return ', '.join(told)
+    return ', '.join(reported)
 
 
 def worst(diagnosis: Diagnosis) -> tuple[int, int, float] | None:

@@ -36,8 +36,13 @@ def family_rows(families: tuple[Family, ...]) -> list[list[str]]:
         like = [site_name(site) for site, _ in family.like] if family.named else []
         name = cause(family.effect, None) + ('' if family.named else ' (exchangeable)')
         without = f'{100.0 * family.growth:+.0f} %'
-        told = [millimetres(family.rms_m), without, ', '.join(joints[:_LARGEST]), ', '.join(like)]
-        rows.append([name, *told])
+        reported = [
+            millimetres(family.rms_m),
+            without,
+            ', '.join(joints[:_LARGEST]),
+            ', '.join(like),
+        ]
+        rows.append([name, *reported])
     return rows
 
 

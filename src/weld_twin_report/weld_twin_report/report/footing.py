@@ -76,8 +76,8 @@ def _sites(diagnosis: Diagnosis) -> set[Site]:
 
 def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
     """Return what to measure, why, and what it takes."""
-    told = {'sentence', 'reason', *_APART}
-    rest = {key: value for key, value in wanted.items() if key not in told}
+    reported = {'sentence', 'reason', *_APART}
+    rest = {key: value for key, value in wanted.items() if key not in reported}
     if wanted.get('motion'):
         rest['as a program'] = (
             'weld-twin export program next_experiment.yaml writes it in the language of the '
@@ -132,10 +132,10 @@ def _side(item: Mapping[str, Any], same: bool) -> str:
 
 def _left_open(answer: Answer, wanted: dict[str, Any]) -> list[Html]:
     """Return which open questions a measurement is not made for: motion may never part them."""
-    told = 'It is not made to tell whether it is {}: see what to do first.'
+    reported = 'It is not made to tell whether it is {}: see what to do first.'
     sets = zip(open_sets(answer.diagnosis), answer.open, strict=True)
     return [
-        tag('p', told.format(names), class_='note')
+        tag('p', reported.format(names), class_='note')
         for group, names in sets
         if not made_for(wanted, group)
     ]
@@ -176,10 +176,10 @@ def checks_section(diagnosis: Diagnosis) -> Html:
         for recording in diagnosis.recordings
         for note in recording.notes
     ]
-    found = tag('ul', *items, *_left_out(diagnosis), *notes, class_='checks')
+    result = tag('ul', *items, *_left_out(diagnosis), *notes, class_='checks')
     return section(
         'Are the data sound',
-        found if items or notes else tag('p', 'Nothing stood out.'),
+        result if items or notes else tag('p', 'Nothing stood out.'),
         id_='checks',
         lead='Looked at before any cause was.',
     )

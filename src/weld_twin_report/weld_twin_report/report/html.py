@@ -89,17 +89,17 @@ Figure = tuple[str, Child, Child]
 
 def figures(cells: Iterable[Figure]) -> Html:
     """Return the few large figures at the top of a page."""
-    told = [
+    reported = [
         tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
         for name, value, note in cells
     ]
-    return tag('dl', *told, class_='figures')
+    return tag('dl', *reported, class_='figures')
 
 
 def pairs(rows: Iterable[tuple[str, Child]]) -> Html:
     """Return heads and what belongs to each; what is empty is left out."""
-    told = [part for head, text in rows if text for part in (tag('dt', head), tag('dd', text))]
-    return tag('dl', *told, class_='pairs')
+    reported = [part for head, text in rows if text for part in (tag('dt', head), tag('dd', text))]
+    return tag('dl', *reported, class_='pairs')
 
 
 def sentences(texts: Iterable[Child]) -> Html:
@@ -109,8 +109,8 @@ def sentences(texts: Iterable[Child]) -> Html:
 
 def lines(texts: Iterable[Child]) -> Html | None:
     """Return texts below each other in a cell; None without any."""
-    told = [tag('span', text) for text in texts]
-    return tag('span', *told, class_='lines') if told else None
+    reported = [tag('span', text) for text in texts]
+    return tag('span', *reported, class_='lines') if reported else None
 
 
 def main(
@@ -125,10 +125,8 @@ def main(
         What sort of page it is, the second part in bold.
     subject : str
         What it is of.
-    headline : str
     cells : Html
         The figures.
-    *sections : str or None
 
     """
     bold = tag('b', kind[1]) if kind[1] else None
@@ -164,7 +162,6 @@ def document(
 
     Parameters
     ----------
-    title : str
     *body : str or None
         What stands in the body.
     allowed : str

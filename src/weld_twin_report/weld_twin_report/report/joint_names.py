@@ -16,13 +16,13 @@ from weld_twin_core.errors import ModelError
 _PREFIX = re.compile(r'[A-Za-z]{1,3}')
 
 
-def joint_labels(told: str, joints: Sequence[str]) -> dict[str, str]:
+def joint_labels(reported: str, joints: Sequence[str]) -> dict[str, str]:
     """
     Return what each joint is called on the page.
 
     Parameters
     ----------
-    told : str
+    reported : str
         A prefix such as ``A`` or ``J``, which the number of the joint follows, or a YAML file that
         gives a name to joints: ``shoulder_pan_joint: A1``. Empty for the names of the model.
     joints : sequence of str
@@ -34,23 +34,23 @@ def joint_labels(told: str, joints: Sequence[str]) -> dict[str, str]:
         It is neither, or the file names a joint that the robot does not have.
 
     """
-    if not told:
+    if not reported:
         return {}
-    if _PREFIX.fullmatch(told):
-        return {name: f'{told}{k}' for k, name in enumerate(joints, 1)}
-    path = Path(told)
+    if _PREFIX.fullmatch(reported):
+        return {name: f'{reported}{k}' for k, name in enumerate(joints, 1)}
+    path = Path(reported)
     if not path.is_file():
         raise ModelError(
-            f'--joint-names {told}: give a prefix of one to three letters such as A, or a YAML '
+            f'--joint-names {reported}: give a prefix of one to three letters such as A, or a YAML '
             'file with a line "joint: name" for each joint'
         )
     content = yaml.safe_load(path.read_text(encoding='utf-8'))
     if not isinstance(content, dict):
-        raise ModelError(f'{told}: expected lines "joint: name", one for each joint')
+        raise ModelError(f'{reported}: expected lines "joint: name", one for each joint')
     for name in content:
         if name not in joints:
             raise ModelError(
-                f'{told}: the robot has no joint {name!r}; it has {", ".join(joints)}'
+                f'{reported}: the robot has no joint {name!r}; it has {", ".join(joints)}'
             )
     return {str(name): str(label) for name, label in content.items()}
 

@@ -93,7 +93,7 @@ def header(answer: Answer) -> Html:
 def opening(answer: Answer, judged: Html | None = None) -> Html:
     """Return status, verdict, how it is judged, figures, actions and the causes in a table."""
     first, second = answer.verdict
-    told = (figures, _holds, _actions, causes_table, _words) if answer.sound else ()
+    reported = (figures, _holds, _actions, causes_table, _words) if answer.sound else ()
     return tag(
         'section',
         tag('p', answer.status, class_=f'status {answer.diagnosis.status}'),
@@ -101,7 +101,7 @@ def opening(answer: Answer, judged: Html | None = None) -> Html:
         tag('h1', first),
         tag('p', second, class_='second'),
         _mended(answer),
-        *(part(answer) for part in told),
+        *(part(answer) for part in reported),
         id_='verdict',
     )
 
@@ -126,8 +126,8 @@ def _holds(answer: Answer) -> Html | None:
     holds = answer.holds
     if holds is None:
         return None
-    told = ' '.join(filter(None, [holds.elsewhere, holds.file, *holds.open]))
-    return tag('p', told, class_='warn' if holds.wide else 'note')
+    reported = ' '.join(filter(None, [holds.elsewhere, holds.file, *holds.open]))
+    return tag('p', reported, class_='warn' if holds.wide else 'note')
 
 
 def _words(_: Answer) -> Html:
@@ -145,40 +145,40 @@ def figures(answer: Answer) -> Html:
     diagnosis = answer.diagnosis
     rows = [_off(diagnosis), _worst(diagnosis), _pass(diagnosis, answer.rule), _left(diagnosis)]
     if diagnosis.status in _SURE_OF:
-        told = f'{_SURE_OF[diagnosis.status]}{answer.together}{_among(diagnosis)}'
-        rows.append(('How sure', odds(diagnosis.confidence), told))
+        reported = f'{_SURE_OF[diagnosis.status]}{answer.together}{_among(diagnosis)}'
+        rows.append(('How sure', odds(diagnosis.confidence), reported))
     return drawn(filter(None, [*rows, _data(answer)]))
 
 
 def _off(diagnosis: Diagnosis) -> Figure:
     gap = diagnosis.gap
-    told = (
+    reported = (
         f'the gap: RMS of {counted(gap.samples, "sample")}. Measuring noise alone: '
         f'{millimetres(gap.noise_floor_m)}'
     )
     if gap.orientation_rms_rad is not None:
-        told += f'. The tool is turned by {small_turn(gap.orientation_rms_rad)}'
-        left = diagnosis.shrink.orientation_rad
-        if left is not None and diagnosis.effects:
-            told += f', with all mended by {small_turn(left[1])}'
-    return 'How far off', millimetres(gap.rms_m), told
+        reported += f'. The tool is turned by {small_turn(gap.orientation_rms_rad)}'
+        remaining = diagnosis.shrink.orientation_rad
+        if remaining is not None and diagnosis.effects:
+            reported += f', with all mended by {small_turn(remaining[1])}'
+    return 'How far off', millimetres(gap.rms_m), reported
 
 
 def _worst(diagnosis: Diagnosis) -> Figure | None:
     """Return the largest deviation, where and when it is, and to which side."""
-    found = worst(diagnosis)
-    if found is None or diagnosis.contacts is not None:
+    result = worst(diagnosis)
+    if result is None or diagnosis.contacts is not None:
         return None
-    k, sample, _ = found
+    k, sample, _ = result
     when = instant(diagnosis, k, sample)
-    told = f'at {when}' if at_rest(diagnosis) else f'{when} after the start'
+    reported = f'at {when}' if at_rest(diagnosis) else f'{when} after the start'
     if len(diagnosis.recordings) > 1:
-        told = f'{diagnosis.recordings[k].name}, {told}'
-    told += _place(diagnosis, k, sample)
+        reported = f'{diagnosis.recordings[k].name}, {reported}'
+    reported += _place(diagnosis, k, sample)
     parts = components(diagnosis, k, as_it_is(diagnosis, k))
     if parts is not None and sides_words(parts[sample]):
-        told += f': {sides_words(parts[sample])}'
-    return 'At the worst spot', millimetres(largest(diagnosis)), told
+        reported += f': {sides_words(parts[sample])}'
+    return 'At the worst spot', millimetres(largest(diagnosis)), reported
 
 
 def _place(diagnosis: Diagnosis, k: int, sample: int) -> str:
@@ -192,15 +192,15 @@ def _pass(diagnosis: Diagnosis, rule: Rule | None) -> Figure | None:
     if rule is None or diagnosis.contacts is not None or not diagnosis.traces.t:
         return None
     before, taken = largest(diagnosis), advised(diagnosis)
-    told: list[Child] = ['as it is, on what was recorded']
+    reported: list[Child] = ['as it is, on what was recorded']
     if taken or (diagnosis.effects and not switches(diagnosis)):
         after = left_with(diagnosis, taken).largest_after
-        told.append(f'; with {_which(diagnosis, taken)} mended {millimetres(after)} at most')
-        told.append(mark(rule, after, _APART))
+        reported.append(f'; with {_which(diagnosis, taken)} mended {millimetres(after)} at most')
+        reported.append(mark(rule, after, _APART))
     link = 'Each combination' if len(switches(diagnosis)) > 1 else 'How it is judged'
     link = 'Write it here' if rule.tolerance_m is None else link
-    told.append(joined(['. ', tag('a', link, href='#acceptance')]))
-    return 'May we weld with it', mark(rule, before), joined(told)
+    reported.append(joined(['. ', tag('a', link, href='#acceptance')]))
+    return 'May we weld with it', mark(rule, before), joined(reported)
 
 
 def _which(diagnosis: Diagnosis, taken: tuple[int, ...]) -> str:
@@ -214,10 +214,11 @@ def _which(diagnosis: Diagnosis, taken: tuple[int, ...]) -> str:
 def _left(diagnosis: Diagnosis) -> Figure:
     every, taken = switches(diagnosis), advised(diagnosis)
     if taken and len(taken) < len(every):
-        left = left_with(diagnosis, taken)
-        told = f'RMS, {percent(left.rms_after / left.rms)} of the RMS gap, on data not used for fitting'
+        remaining = left_with(diagnosis, taken)
+        share = percent(remaining.rms_after / remaining.rms)
+        reported = f'RMS, {share} of the RMS gap, on data not used for fitting'
         name = f'Left with {_which(diagnosis, taken)} mended'
-        return name, millimetres(left.rms_after), told
+        return name, millimetres(remaining.rms_after), reported
     mended = diagnosis.effects or every or not diagnosis.model.found
     name = 'Left with all mended' if mended else 'Left with what fits best'
     return name, millimetres(diagnosis.shrink.rms_after_m), _how_much(diagnosis)
@@ -249,27 +250,27 @@ def _data(answer: Answer) -> Figure | None:
         return None
     counts = {level: sum(c.level == level for c in checks) for level in ('warning', 'note')}
     fine = len(checks) - sum(counts.values())
-    told = [counted(n, level) for level, n in counts.items() if n]
+    reported = [counted(n, level) for level, n in counts.items() if n]
     if counts['warning']:
         about = [c.name.replace('_', ' ') for c in checks if c.level == 'warning']
-        told[0] += f' ({listed(about)})'
+        reported[0] += f' ({listed(about)})'
     out, every = left_out(diagnosis)
     if out:
-        told.append(f'{out} of {counted(every, "sample")} left out')
-    told += _instrument(answer)
-    word = 'yes, see the notes' if told else 'yes'
+        reported.append(f'{out} of {counted(every, "sample")} left out')
+    reported += _instrument(answer)
+    word = 'yes, see the notes' if reported else 'yes'
     word = 'see the warnings' if counts['warning'] else word
-    words = f'{passed(fine, len(checks))}{"; " if told else ""}{"; ".join(told)}. '
+    words = f'{passed(fine, len(checks))}{"; " if reported else ""}{"; ".join(reported)}. '
     return 'Were the data good', word, joined([words, tag('a', 'Which', href='#checks')])
 
 
 def _instrument(answer: Answer) -> list[str]:
     """Return which cause sits with what measured, and how much of the gap that makes."""
     return [
-        f'but cause {k}, {answer.percent(told.cause.share)} of the gap, sits at '
-        f'{likely(told.cause.place)}'
-        for k, told in enumerate(answer.causes[:_CAUSES], 1)
-        if {at for at, _ in leading(told.cause.place)} & {'instrument', 'clock'}
+        f'but cause {k}, {answer.percent(reported.cause.share)} of the gap, sits at '
+        f'{likely(reported.cause.place)}'
+        for k, reported in enumerate(answer.causes[:_CAUSES], 1)
+        if {at for at, _ in leading(reported.cause.place)} & {'instrument', 'clock'}
     ]
 
 
@@ -279,7 +280,7 @@ def causes_table(answer: Answer) -> Html | None:
     causes = answer.causes[:_CAUSES]
     if not causes or rule is None or diagnosis.contacts is not None or diagnosis.families:
         return None
-    rows = [_row(answer, told, rule) for told in causes]
+    rows = [_row(answer, reported, rule) for reported in causes]
     if len(switches(diagnosis)) > 1:
         rows.append(_together(diagnosis, rule))
     top = tag('tr', *(tag('th', head, scope='col') for head in _HEADS))
@@ -291,19 +292,19 @@ def causes_table(answer: Answer) -> Html | None:
     )
 
 
-def _row(answer: Answer, told: CauseAnswer, rule: Rule) -> Html:
-    value, ends = answer.share_of(told)
-    left = told.left
+def _row(answer: Answer, reported: CauseAnswer, rule: Rule) -> Html:
+    value, ends = answer.share_of(reported)
+    remaining = reported.left
     cells: list[Child] = [
         joined([tag('b', value), f' ({ends})']),
-        lines(told.off_in_short(_VALUES)) or 'open',
-        lines(told.sure) or 'not judged',
+        lines(reported.off_in_short(_VALUES)) or 'open',
+        lines(reported.sure) or 'not judged',
         'cannot be said: nothing that was tried stands for it'
-        if left is None
-        else _left_over(left.rms_after, left.largest_after, rule),
-        told.where_to_enter,
+        if remaining is None
+        else _left_over(remaining.rms_after, remaining.largest_after, rule),
+        reported.where_to_enter,
     ]
-    first = tag('a', f'{told.k + 1}. {told.name}', href=f'#cause-{told.k + 1}')
+    first = tag('a', f'{reported.k + 1}. {reported.name}', href=f'#cause-{reported.k + 1}')
     with_heads = zip(_HEADS[1:], cells, strict=True)
     return tag(
         'tr',
@@ -313,18 +314,18 @@ def _row(answer: Answer, told: CauseAnswer, rule: Rule) -> Html:
 
 
 def _left_over(rms: float, most: float, rule: Rule) -> Html:
-    told = [f'{millimetres(rms)} RMS, {millimetres(most)} at most', mark(rule, most, _APART)]
-    return joined(told)
+    reported = [f'{millimetres(rms)} RMS, {millimetres(most)} at most', mark(rule, most, _APART)]
+    return joined(reported)
 
 
 def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
-    left = left_with(diagnosis, range(len(switches(diagnosis))))
-    told = _left_over(left.rms_after, left.largest_after, rule)
+    remaining = left_with(diagnosis, range(len(switches(diagnosis))))
+    reported = _left_over(remaining.rms_after, remaining.largest_after, rule)
     return tag(
         'tr',
         tag('th', 'All mended', scope='row'),
         *(tag('td', '', class_='blank') for _ in range(3)),
-        tag('td', told, data_head='If all are mended'),
+        tag('td', reported, data_head='If all are mended'),
         tag('td', '', class_='blank')
         if len(advised(diagnosis)) == len(switches(diagnosis))
         else tag('td', 'not advised', data_head=_HEADS[-1]),
@@ -333,10 +334,10 @@ def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
 
 def _more(diagnosis: Diagnosis) -> Html:
     more = len(diagnosis.causes) - _CAUSES
-    told: list[Child] = [f'{more} more on the cards. '] if more > 0 else []
+    reported: list[Child] = [f'{more} more on the cards. '] if more > 0 else []
     count = len(switches(diagnosis))
     if count > 2:
         every = len(thought_mended(diagnosis)) == 2**count
         name, at = ('Does it pass', 'acceptance') if every else ('What if', 'seam')
-        told += ['With only two of them mended: see ', tag('a', name, href=f'#{at}'), '. ']
-    return joined([*told, 'A click on a cause leads to its card.'])
+        reported += ['With only two of them mended: see ', tag('a', name, href=f'#{at}'), '. ']
+    return joined([*reported, 'A click on a cause leads to its card.'])

@@ -26,12 +26,12 @@ def static(diagnosis: Diagnosis, k: int) -> bool:
 
 def drawn(diagnosis: Diagnosis, k: int) -> np.ndarray:
     """Return which samples of a recording the page shows, the largest deviations among them."""
-    left, parts = parted(diagnosis)
+    remaining, parts = parted(diagnosis)
     good = np.flatnonzero(trusted(diagnosis, k))
     if not good.size:
         return good
-    each = max(_POINTS // (len(left) * (2 + parts[k].shape[0])), 60)
-    sizes = [np.linalg.norm(v[good], axis=1) for v in (as_it_is(diagnosis, k), left[k])]
+    each = max(_POINTS // (len(remaining) * (2 + parts[k].shape[0])), 60)
+    sizes = [np.linalg.norm(v[good], axis=1) for v in (as_it_is(diagnosis, k), remaining[k])]
     return np.asarray(good[thinned(sizes, each)])
 
 
@@ -50,10 +50,10 @@ def squares(diagnosis: Diagnosis) -> list[list[float]]:
     """
     if diagnosis.contacts is not None:
         return [[0.0]]
-    left, parts = parted(diagnosis)
+    remaining, parts = parted(diagnosis)
     stacked = [
         np.concatenate([one[None], more])[:, trusted(diagnosis, k)]
-        for k, (one, more) in enumerate(zip(left, parts, strict=True))
+        for k, (one, more) in enumerate(zip(remaining, parts, strict=True))
     ]
     if not stacked:
         return [[0.0]]
@@ -64,9 +64,9 @@ def squares(diagnosis: Diagnosis) -> list[list[float]]:
 
 def page_data(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return what the scripts of the page draw from; lengths in um, angles in degrees."""
-    left, parts = parted(diagnosis)
-    shown = range(0 if diagnosis.contacts is not None else len(left))
-    runs = [_run(diagnosis, k, left[k], parts[k]) for k in shown]
+    remaining, parts = parted(diagnosis)
+    shown = range(0 if diagnosis.contacts is not None else len(remaining))
+    runs = [_run(diagnosis, k, remaining[k], parts[k]) for k in shown]
     top, floor = _large(diagnosis), diagnosis.gap.noise_floor_m
     return {
         'runs': runs,
@@ -81,7 +81,7 @@ def page_data(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _run(diagnosis: Diagnosis, k: int, left: Array, parts: Array) -> dict[str, Any]:
+def _run(diagnosis: Diagnosis, k: int, remaining: Array, parts: Array) -> dict[str, Any]:
     traces, index = diagnosis.traces, drawn(diagnosis, k)
     recording = diagnosis.recordings[k] if k < len(diagnosis.recordings) else None
     bare = {} if parts.size else {'before': _micrometres(traces.before[k][index])}
@@ -91,7 +91,7 @@ def _run(diagnosis: Diagnosis, k: int, left: Array, parts: Array) -> dict[str, A
         'dots': static(diagnosis, k),
         't': [round(float(t), 3) for t in along(diagnosis, k)[index]],
         'path': _micrometres((traces.measured[k] - traces.before[k])[index]),
-        'left': _micrometres(left[index]),
+        'left': _micrometres(remaining[index]),
         'parts': [_micrometres(part[index]) for part in parts],
         'joints': [] if recording is None else _joints(diagnosis, recording, traces.t[k][index]),
     }

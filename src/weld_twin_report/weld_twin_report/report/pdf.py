@@ -28,13 +28,13 @@ def browser() -> str:
         There is none.
 
     """
-    found = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if found is None:
+    result = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if result is None:
         raise DataError(
             '--pdf needs Chromium, Chrome or Edge, and none is installed: apt-get install chromium, '
             'or print report.html from any browser'
         )
-    return found
+    return result
 
 
 def print_page(page: Path, out: Path) -> None:

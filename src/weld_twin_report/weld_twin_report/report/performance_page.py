@@ -19,7 +19,7 @@ from .performance_table import MEANINGS, POSE_HEADS, path_row, pose_rows, senten
 
 
 def performance_page(
-    found: Performance,
+    result: Performance,
     recording: Recording,
     robot: str,
     notes: Sequence[str],
@@ -30,24 +30,21 @@ def performance_page(
 
     Parameters
     ----------
-    found : Performance
-    recording : Recording
     robot : str
         Its name.
     notes : sequence of str
         How the frames were had, and what else a reader must know.
-    inputs : sequence of InputFile
 
     """
     subject = [robot, recording.name, recorded_at([recording])]
     body = main(
         ('Positional accuracy ', 'ISO 9283'),
         ' · '.join(part for part in subject if part),
-        sentence(found),
-        _figures(found),
-        _poses(found),
-        None if found.path is None else _path(found.path),
-        _told('What the standard asks for beyond this', found.lacking, 'lacking'),
+        sentence(result),
+        _figures(result),
+        _poses(result),
+        None if result.path is None else _path(result.path),
+        _told('What the standard asks for beyond this', result.lacking, 'lacking'),
         _told('How it was measured', [*notes, *recording.notes], 'notes'),
         section('What the letters mean', pairs(MEANINGS), id_='meanings'),
         inputs_section(inputs),
@@ -55,8 +52,8 @@ def performance_page(
     return document(f'ISO 9283 · {robot} · {recording.name}', body, charts=True)
 
 
-def _figures(found: Performance) -> Html:
-    poses = [pose.performance for pose in found.poses]
+def _figures(result: Performance) -> Html:
+    poses = [pose.performance for pose in result.poses]
     cells: list[Figure] = []
     if poses:
         count = f'{len(poses)} pose{"s"[: len(poses) > 1]}'
@@ -64,19 +61,19 @@ def _figures(found: Performance) -> Html:
             ('AP', millimetres(max(p.ap_m for p in poses)), f'the worst of {count}'),
             ('RP', millimetres(max(p.rp_m for p in poses)), f'the worst of {count}'),
         ]
-    if found.path is not None:
-        f = found.path.performance
+    if result.path is not None:
+        f = result.path.performance
         of = f'of {f.cycles} cycles of the path'
         cells += [('AT', millimetres(f.at_m), of), ('RT', millimetres(f.rt_m), of)]
     return figures(cells)
 
 
-def _poses(found: Performance) -> Html | None:
-    if not found.poses:
+def _poses(result: Performance) -> Html | None:
+    if not result.poses:
         return None
     return section(
         'Poses',
-        table(POSE_HEADS, pose_rows(found)),
+        table(POSE_HEADS, pose_rows(result)),
         id_='poses',
         lead='Each row is one commanded pose that was measured more than once.',
     )

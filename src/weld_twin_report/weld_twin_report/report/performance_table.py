@@ -37,9 +37,9 @@ MEANINGS = (
 """What each criterion is, in words; `weld_twin_core.metrics.iso9283` has the clauses."""
 
 
-def pose_rows(found: Performance) -> list[tuple[str, ...]]:
+def pose_rows(result: Performance) -> list[tuple[str, ...]]:
     """Return a row for each pose, as `POSE_HEADS` has it."""
-    return [_pose_row(f'P{k}', pose) for k, pose in enumerate(found.poses, 1)]
+    return [_pose_row(f'P{k}', pose) for k, pose in enumerate(result.poses, 1)]
 
 
 def _pose_row(name: str, pose: PoseTest) -> tuple[str, ...]:
@@ -74,15 +74,15 @@ def path_row(path: PathTest) -> tuple[str, ...]:
     return length, str(f.cycles), millimetres(f.at_m), millimetres(f.rt_m), f'{path.seconds:.1f} s'
 
 
-def sentence(found: Performance) -> str:
+def sentence(result: Performance) -> str:
     """Return the answer in one or two short sentences."""
     parts = []
-    if found.poses:
-        ap = max(pose.performance.ap_m for pose in found.poses)
-        rp = max(pose.performance.rp_m for pose in found.poses)
+    if result.poses:
+        ap = max(pose.performance.ap_m for pose in result.poses)
+        rp = max(pose.performance.rp_m for pose in result.poses)
         parts.append(_short('Poses', ap, rp))
-    if found.path is not None:
-        parts.append(_short('Path', found.path.performance.at_m, found.path.performance.rt_m))
+    if result.path is not None:
+        parts.append(_short('Path', result.path.performance.at_m, result.path.performance.rt_m))
     return ' '.join(parts)
 
 

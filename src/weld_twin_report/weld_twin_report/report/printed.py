@@ -49,15 +49,15 @@ def _data(diagnosis: Diagnosis) -> str:
     open_ones = [c for level in ('unsound', 'warning', 'note') for c in diagnosis.checks
                  if c.level == level]  # fmt: skip
     fine = len(diagnosis.checks) - len(open_ones)
-    told = [f'{check.level}: {check.sentence}' for check in open_ones[:_FINDINGS]]
+    reported = [f'{check.level}: {check.sentence}' for check in open_ones[:_FINDINGS]]
     if len(open_ones) > _FINDINGS:
-        told.append(f'{len(open_ones) - _FINDINGS} more are on the page.')
-    return ' '.join([f'{passed(fine, len(diagnosis.checks)).capitalize()}.', *told])
+        reported.append(f'{len(open_ones) - _FINDINGS} more are on the page.')
+    return ' '.join([f'{passed(fine, len(diagnosis.checks)).capitalize()}.', *reported])
 
 
 def _files(inputs: Sequence[InputFile]) -> Html:
     """Return files, the start of their hashes, the version, and when it was printed."""
-    told = [f'{PurePath(item.path).name} (SHA-256 {item.sha256[:_SHORT]}…)' for item in inputs]
-    more = [f'{len(told) - _FILES} more'] if len(told) > _FILES else []
-    named = '; '.join([*told[:_FILES], *more, f'weld_twin {__version__}'])
+    reported = [f'{PurePath(item.path).name} (SHA-256 {item.sha256[:_SHORT]}…)' for item in inputs]
+    more = [f'{len(reported) - _FILES} more'] if len(reported) > _FILES else []
+    named = '; '.join([*reported[:_FILES], *more, f'weld_twin {__version__}'])
     return tag('span', named, tag('span', id_='printed-at'))

@@ -27,13 +27,13 @@ def remainder(diagnosis: Diagnosis) -> tuple[tuple[str, float], ...]:
     if any(cause.rest for cause in diagnosis.causes):
         # What is left has a row of its own, with the place where most of it is.
         return (('noise', rest.noise),)
-    left = max(_left(diagnosis) - rest.noise, 0.0)
-    unnamed = rest.unexplained - left
+    remaining = max(_left(diagnosis) - rest.noise, 0.0)
+    unnamed = rest.unexplained - remaining
     # What has a place and no name is not explained by that.
     named = bool(diagnosis.effects or diagnosis.families or not diagnosis.causes)
     rows = [('not explained' if named else 'not placed', rest.unexplained), ('noise', rest.noise)]
     if unnamed >= _SPLIT:
-        rows[:1] = [('fitted, but not to be named', unnamed), ('not explained', left)]
+        rows[:1] = [('fitted, but not to be named', unnamed), ('not explained', remaining)]
     return tuple(rows)
 
 

@@ -23,7 +23,6 @@ class _Frames(NamedTuple):
     ----------
     language : str
         Whose world it counts from.
-    notation : Notation
     words : callable
         Takes its six or seven numbers.
     moved : str
@@ -76,10 +75,8 @@ def old_and_new(effect: RootPose, brand: str, robot: Robot) -> str:
 
     Parameters
     ----------
-    effect : RootPose
     brand : str
         'kuka', 'abb' or 'fanuc'.
-    robot : Robot
 
     """
     form = _FRAMES[brand]

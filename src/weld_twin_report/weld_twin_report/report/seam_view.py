@@ -58,12 +58,12 @@ def seam_section(diagnosis: Diagnosis) -> Html:
 
 def _switches(diagnosis: Diagnosis) -> Html | None:
     """Return a box to tick for every cause."""
-    found = switches(diagnosis)
-    if not found:
+    result = switches(diagnosis)
+    if not result:
         return None
     boxes = [
         tag('label', tag('input', type='checkbox', data_switch=k, checked=''), ' ', switch.label)
-        for k, switch in enumerate(found)
+        for k, switch in enumerate(result)
     ]
     buttons = [
         tag('button', text, type='button', data_all=value)
@@ -80,11 +80,11 @@ def _switches(diagnosis: Diagnosis) -> Html | None:
 
 def _figures(diagnosis: Diagnosis) -> Html:
     """Return the figures that follow the switches."""
-    left = left_with(diagnosis, range(len(switches(diagnosis))))
-    share = left.rms_after / max(left.rms, 1e-300)
+    remaining = left_with(diagnosis, range(len(switches(diagnosis))))
+    share = remaining.rms_after / max(remaining.rms, 1e-300)
     cells: tuple[tuple[str, str, str, Child], ...] = (
-        ('Left then', 'now-rms', millimetres(left.rms_after), 'RMS, on data not used for fitting'),
-        ('At the worst spot', 'now-max', millimetres(left.largest_after), joined([
+        ('Left then', 'now-rms', millimetres(remaining.rms_after), 'RMS, on data not used for fitting'),
+        ('At the worst spot', 'now-max', millimetres(remaining.largest_after), joined([
             f'of {_counting(diagnosis)}', tag('span', id_='now-verdict', data_before=': ')])),
         ('Of the gap', 'now-share', percent(share, int(share < _TENTH)), 'of its RMS is left'),
     )  # fmt: skip
@@ -115,16 +115,16 @@ def _panels(diagnosis: Diagnosis, changes: bool) -> list[Html]:
         if switches(diagnosis)
         else _after_words(diagnosis).capitalize()
     )
-    told = [('before', 'As it is', 'Seam coloured by deviation as it is')]
+    reported = [('before', 'As it is', 'Seam coloured by deviation as it is')]
     if changes:
-        told.append(('after', after, 'Seam coloured by deviation with causes mended'))
+        reported.append(('after', after, 'Seam coloured by deviation with causes mended'))
     return [
         tag(
             'figure',
             tag('figcaption', title, ', deviation ', tag('span', class_='times'), ' larger'),
             tag('canvas', data_side=side, tabindex='0', role='img', aria_label=label),
         )
-        for side, title, label in told
+        for side, title, label in reported
     ]
 
 
@@ -171,11 +171,11 @@ def _chart(diagnosis: Diagnosis, k: int) -> Html:
     index = drawn(diagnosis, k)
     if not index.size:
         return tag('p', 'No samples.')
-    left, before = parted(diagnosis)[0][k], as_it_is(diagnosis, k)
+    remaining, before = parted(diagnosis)[0][k], as_it_is(diagnosis, k)
     dots = static(diagnosis, k)
     lines = [Line('as it is', _size(before[index]), 'before', points=dots)]
     if switches(diagnosis) or diagnosis.model.found:
-        lines.append(Line(_after_words(diagnosis), _size(left[index]), 'after', points=dots))
+        lines.append(Line(_after_words(diagnosis), _size(remaining[index]), 'after', points=dots))
     floor = np.full(index.size, 1e3 * diagnosis.gap.noise_floor_m)
     lines.append(Line('measuring noise', floor, 'soft', dashed=True))
     axes = (Axis('station') if dots else Axis('time', 's'), Axis('deviation', 'mm'))
@@ -192,10 +192,10 @@ def _left_out(diagnosis: Diagnosis, k: int) -> str:
         return ''
     size = np.linalg.norm(diagnosis.traces.before[k], axis=1)
     worst = sorted(out[np.argsort(-size[out])][:_LISTED].tolist())
-    told = [seen_at(diagnosis, k, sample, float(size[sample])) for sample in worst]
+    reported = [seen_at(diagnosis, k, sample, float(size[sample])) for sample in worst]
     if out.size > _LISTED:
-        told.append(f'{out.size - _LISTED} more')
-    return f' ({counted(out.size, "sample")} left out: {listed(told)})'
+        reported.append(f'{out.size - _LISTED} more')
+    return f' ({counted(out.size, "sample")} left out: {listed(reported)})'
 
 
 def _after_words(diagnosis: Diagnosis) -> str:

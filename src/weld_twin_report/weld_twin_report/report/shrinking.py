@@ -5,7 +5,13 @@
 from __future__ import annotations
 
 from weld_twin_core.diagnosis.result import Diagnosis
-from weld_twin_nodes.wording.quantities import both_angles, left_of, millimetres, turns_only
+from weld_twin_nodes.wording.quantities import (
+    both_angles,
+    left_elsewhere,
+    left_of,
+    millimetres,
+    turns_only,
+)
 from weld_twin_nodes.wording.words import cause
 
 from .cause_list import leftover
@@ -65,12 +71,12 @@ def _judged(diagnosis: Diagnosis) -> str:
         before, after = map(both_angles, shrink.orientation_rad)
         return f'The position gap stays; the orientation gap of {before} shrinks to {after}.'
     value, interval = left_of(shrink)
-    left = f'{value} of the RMS gap is left ({interval})'
+    remaining = f'{value} of the RMS gap is left ({interval})'
     if not _apart(diagnosis):
-        return f'Judged on stretches left out in turn, {left}.'
+        return f'Judged on stretches left out in turn, {remaining}.{left_elsewhere(shrink)}'
     return (
         f'On {shrink.held_out}, which was not fitted, {millimetres(shrink.rms_before_m)} shrinks '
-        f'to {millimetres(shrink.rms_after_m)}: {left}.'
+        f'to {millimetres(shrink.rms_after_m)}: {remaining}.{left_elsewhere(shrink)}'
     )
 
 

@@ -66,7 +66,7 @@ def _with_these(diagnosis: Diagnosis, rule: Rule | None) -> list[str]:
     if diagnosis.status != 'ambiguous':
         return _mending(diagnosis)
     share = share_by_site(diagnosis)
-    sites = [site_of(found) for found in diagnosis.effects]
+    sites = [site_of(result) for result in diagnosis.effects]
     order = sorted(range(len(sites)), key=lambda k: -share.get(sites[k], 0.0))
     mending = _mending(diagnosis)
     first = _settled(diagnosis, rule)
@@ -88,11 +88,15 @@ def _settled(diagnosis: Diagnosis, rule: Rule | None) -> dict[Site, str]:
     for site in map(site_of, diagnosis.effects):
         if site in unsure:
             continue
-        left = left_without(diagnosis, held[site]) if site in held else None
+        remaining = left_without(diagnosis, held[site]) if site in held else None
         if share.get(site, 0.0) > most:
             out[site] = ''
-        elif left is not None and rule is not None and rule.judged(left.largest_after) == PASS:
-            out[site] = f'That alone leaves {millimetres(left.largest_after)} at most.'
+        elif (
+            remaining is not None
+            and rule is not None
+            and rule.judged(remaining.largest_after) == PASS
+        ):
+            out[site] = f'That alone leaves {millimetres(remaining.largest_after)} at most.'
     return out
 
 
@@ -100,15 +104,17 @@ def _telling(diagnosis: Diagnosis) -> list[str]:
     """Return what tells the open ones apart."""
     out = []
     for group in open_sets(diagnosis):
-        told = f'Find out whether it is {listed([site_name(site) for site in group], "or")}'
+        reported = f'Find out whether it is {listed([site_name(site) for site in group], "or")}'
         by = way(sorted({site.effect for site in group}))
         if by != ELSE:
-            out.append(f'{told}: {by}.')
+            out.append(f'{reported}: {by}.')
         elif diagnosis.contacts is not None or made_for(diagnosis.next_experiment, group):
-            out.append(f'{told}: measure what {_proposed(diagnosis)} proposes{_takes(diagnosis)}.')
+            out.append(
+                f'{reported}: measure what {_proposed(diagnosis)} proposes{_takes(diagnosis)}.'
+            )
         else:
             out.append(
-                f'{told}: record other postures and motions than these, and diagnose all together.'
+                f'{reported}: record other postures and motions than these, and diagnose all together.'
             )
     return out
 
@@ -141,14 +147,14 @@ def _mending(diagnosis: Diagnosis) -> list[str]:
 
 def _looking(diagnosis: Diagnosis) -> list[str]:
     """Return where to look, and what to measure, while no cause has a name."""
-    told = [_at(diagnosis, k) for k in in_order(diagnosis)[:_LARGEST]]
-    told = [text for text in told if text]
+    reported = [_at(diagnosis, k) for k in in_order(diagnosis)[:_LARGEST]]
+    reported = [text for text in reported if text]
     if diagnosis.next_experiment is not None:
-        told.append(
+        reported.append(
             f'Measure what {_proposed(diagnosis)} proposes{_takes(diagnosis)}, and diagnose all '
             'together.'
         )
-    return told
+    return reported
 
 
 def _again(diagnosis: Diagnosis) -> list[str]:
@@ -169,8 +175,8 @@ def _at(diagnosis: Diagnosis, k: int) -> str:
     cause = diagnosis.causes[k]
     if unnamed(cause):
         return ' '.join(look_at(diagnosis, k))
-    found = diagnosis.model.found
-    held = [found[m] for m in cause.members if m < len(found)]
+    result = diagnosis.model.found
+    held = [result[m] for m in cause.members if m < len(result)]
     model = diagnosis.model
     return ' '.join(actions(held, model.robot, model.mends))
 
@@ -182,8 +188,8 @@ def minutes(wanted: Mapping[str, Any] | None) -> str:
 
 
 def _takes(diagnosis: Diagnosis) -> str:
-    told = minutes(diagnosis.next_experiment)
-    return f' ({told})' if told else ''
+    reported = minutes(diagnosis.next_experiment)
+    return f' ({reported})' if reported else ''
 
 
 def _proposed(diagnosis: Diagnosis) -> str:

@@ -33,21 +33,21 @@ def untried(diagnosis: Diagnosis) -> str:
         for joint in joints if reason == REASON and not beside else ():
             still.setdefault(joint, []).append(cause(effect, None))
     asked = listed(not_to_be_tried(diagnosis))
-    told = []
+    reported = []
     if still:
         joints = [name for name in diagnosis.model.robot.joint_names if name in still]
         kinds = list(dict.fromkeys(kind for joint in joints for kind in still[joint]))
         more = [f'{len(kinds) - _KINDS} more'] if len(kinds) > _KINDS else []
         what = listed([*kinds[:_KINDS], *more])
         one = len(joints) == 1
-        told.append(
+        reported.append(
             f'{listed(joints)} hardly {"moves" if one else "move"}, so {what} could not be tried '
             f'there: only a recording in which {"it moves" if one else "they move"} can.'
         )
     if asked:
         verb = 'was' if len(not_to_be_tried(diagnosis)) == 1 else 'were'
-        told.append(f'{asked[:1].upper()}{asked[1:]} {verb} not tried, as asked.')
-    return ' '.join(told)
+        reported.append(f'{asked[:1].upper()}{asked[1:]} {verb} not tried, as asked.')
+    return ' '.join(reported)
 
 
 def weighed(diagnosis: Diagnosis) -> tuple[Candidate, ...]:

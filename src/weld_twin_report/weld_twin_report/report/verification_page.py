@@ -29,24 +29,28 @@ _SCALE = 1.15
 """Width of the drawing in units of the largest figure in it."""
 
 
-def headline(found: Verification) -> str:
+def headline(result: Verification) -> str:
     """Return in a sentence what was promised, what was measured, and whether that was kept."""
-    what = f'along {found.program}' if found.program else 'of the mended robot'
+    what = f'along {result.program}' if result.program else 'of the mended robot'
     noise = ''
-    if found.program:
+    if result.program:
         noise = (
-            f' ({millimetres(found.measured.least)} at least), without the '
-            f'{millimetres(found.measured.noise)} of measuring noise'
+            f' ({millimetres(result.measured.least)} at least), without the '
+            f'{millimetres(result.measured.noise)} of measuring noise'
         )
     return (
-        f'{"Kept" if found.kept else "Not kept"}: promised {what} {_promised(found.promised)}, '
-        f'measured {millimetres(found.measured.rms)} RMS{noise} ({found.samples} measurements).'
+        f'{"Kept" if result.kept else "Not kept"}: promised {what} {_promised(result.promised)}, '
+        f'measured {millimetres(result.measured.rms)} RMS{noise} ({result.samples} measurements).'
     )
 
 
-def told(found: Verification) -> list[str]:
+def told(result: Verification) -> list[str]:
     """Return the lines of the terminal: the headline, what is wrong, what became of each cause."""
-    return [headline(found), *found.notes, *(_told(found, left) for left in found.causes)]
+    return [
+        headline(result),
+        *result.notes,
+        *(_told(result, remaining) for remaining in result.causes),
+    ]
 
 
 def _promised(promise: Promise) -> str:
@@ -55,85 +59,76 @@ def _promised(promise: Promise) -> str:
     return f'{millimetres(promise.rms)} RMS ({millimetres(promise.low)} to {millimetres(promise.high)})'
 
 
-def _told(found: Verification, left: Left) -> str:
-    moves = f'as it was it moves the tool by {millimetres(left.rms_m)} here'
-    if left.state == 'open':
-        return f'{_name(left)}: {_STATES["open"]}; {moves}'
-    return f'{_name(left)}: {state(found, left)}, {_share(left)} of it is left; {moves}'
+def _told(result: Verification, remaining: Left) -> str:
+    moves = f'as it was it moves the tool by {millimetres(remaining.rms_m)} here'
+    if remaining.state == 'open':
+        return f'{_name(remaining)}: {_STATES["open"]}; {moves}'
+    return f'{_name(remaining)}: {state(result, remaining)}, {_share(remaining)} of it is left; {moves}'
 
 
-def state(found: Verification, left: Left) -> str:
+def state(result: Verification, remaining: Left) -> str:
     """Return what became of a cause; of a program it is what the correction left of it."""
-    if found.program and left.state in ('gone', 'stays'):
-        return 'is corrected' if left.state == 'gone' else 'is not corrected'
-    return _STATES[left.state]
+    if result.program and remaining.state in ('gone', 'stays'):
+        return 'is corrected' if remaining.state == 'gone' else 'is not corrected'
+    return _STATES[remaining.state]
 
 
-def _name(left: Left) -> str:
-    if len(left.sites) == 1:
-        return cause(left.sites[0].effect, left.sites[0].joint)
-    kind = left.sites[0].effect
-    return f'{called(kind)} of {listed([str(site.joint) for site in left.sites])}'
+def _name(remaining: Left) -> str:
+    if len(remaining.sites) == 1:
+        return cause(remaining.sites[0].effect, remaining.sites[0].joint)
+    kind = remaining.sites[0].effect
+    return f'{called(kind)} of {listed([str(site.joint) for site in remaining.sites])}'
 
 
-def _share(left: Left) -> str:
-    return f'{100.0 * left.share:.0f} ± {100.0 * left.std:.0f} %'
+def _share(remaining: Left) -> str:
+    return f'{100.0 * remaining.share:.0f} ± {100.0 * remaining.std:.0f} %'
 
 
-def verification_page(found: Verification, robot: str, inputs: Sequence[InputFile] = ()) -> str:
-    """
-    Return the page: one HTML file that needs nothing else.
-
-    Parameters
-    ----------
-    found : Verification
-    robot : str
-    inputs : sequence of InputFile
-
-    """
-    title = f'{found.program} · {robot}' if found.program else robot
+def verification_page(result: Verification, robot: str, inputs: Sequence[InputFile] = ()) -> str:
+    """Return the page: one HTML file that needs nothing else."""
+    title = f'{result.program} · {robot}' if result.program else robot
     body = main(
         ('After the correction', ''),
         title,
-        headline(found),
-        _figures(found),
-        *(tag('p', note, class_='warn') for note in found.notes),
-        _causes(found),
-        _drawn(found),
+        headline(result),
+        _figures(result),
+        *(tag('p', note, class_='warn') for note in result.notes),
+        _causes(result),
+        _drawn(result),
         inputs_section(inputs),
     )
     return document(f'After the correction · {title}', body, charts=True)
 
 
-def _figures(found: Verification) -> Html:
+def _figures(result: Verification) -> Html:
     span = ''
-    if found.promised.low is not None and found.promised.high is not None:
-        span = f'{millimetres(found.promised.low)} to {millimetres(found.promised.high)}'
+    if result.promised.low is not None and result.promised.high is not None:
+        span = f'{millimetres(result.promised.low)} to {millimetres(result.promised.high)}'
     noise = (
-        f'{millimetres(found.measured.least)} at least; noise of '
-        f'{millimetres(found.measured.noise)} taken out'
-        if found.program
+        f'{millimetres(result.measured.least)} at least; noise of '
+        f'{millimetres(result.measured.noise)} taken out'
+        if result.program
         else 'with its noise'
     )
     cells = (
-        ('Promised', millimetres(found.promised.rms), span),
-        ('Measured', millimetres(found.measured.rms), noise),
-        ('Kept', 'yes' if found.kept else 'no', f'{found.samples} measurements'),
+        ('Promised', millimetres(result.promised.rms), span),
+        ('Measured', millimetres(result.measured.rms), noise),
+        ('Kept', 'yes' if result.kept else 'no', f'{result.samples} measurements'),
     )
     return figures(cells)
 
 
-def _causes(found: Verification) -> Html | None:
-    if not found.causes:
+def _causes(result: Verification) -> Html | None:
+    if not result.causes:
         return None
     rows = [
         (
-            _name(left),
-            state(found, left),
-            '' if left.state == 'open' else _share(left),
-            millimetres(left.rms_m),
+            _name(remaining),
+            state(result, remaining),
+            '' if remaining.state == 'open' else _share(remaining),
+            millimetres(remaining.rms_m),
         )
-        for left in found.causes
+        for remaining in result.causes
     ]
     return section(
         'What became of the causes',
@@ -143,11 +138,11 @@ def _causes(found: Verification) -> Html | None:
     )
 
 
-def _drawn(found: Verification) -> Html:
+def _drawn(result: Verification) -> Html:
     """Return the drawing of every measurement beside what was promised."""
-    at = np.arange(1.0, len(found.off) + 1.0)
-    lines = [Line('measured', 1e3 * found.off, 'after', points=len(found.off) < 200)]
-    level = found.promised.rms if found.promised.high is None else found.promised.high
+    at = np.arange(1.0, len(result.off) + 1.0)
+    lines = [Line('measured', 1e3 * result.off, 'after', points=len(result.off) < 200)]
+    level = result.promised.rms if result.promised.high is None else result.promised.high
     lines.append(Line('promised at most, RMS', np.full(at.size, 1e3 * level), 'bad', dashed=True))
     picture = chart(
         'How far the tool is off',

@@ -16,7 +16,7 @@ _NOT = re.compile(
 """What a reader is told not to do."""
 
 
-def warned(told: str) -> list[Child]:
+def warned(reported: str) -> list[Child]:
     """Return an action as markup: what not to do stands out, and degrees have their sign."""
-    parts = _NOT.split(_DEGREES.sub('°', told))
+    parts = _NOT.split(_DEGREES.sub('°', reported))
     return [tag('strong', text) if k % 2 else text for k, text in enumerate(parts) if text]

@@ -39,14 +39,14 @@ def run_claims(
         for robot in robots
         for seam in seams
     ]
-    found = dict(zip(names, runner.run(tasks), strict=True))
+    result = dict(zip(names, runner.run(tasks), strict=True))
     return {
         'schema': 'weld_twin/claims/1',
         'seed': seed,
         'robots': [robot.name for robot in robots],
         'seams': list(seams),
-        'claims': [claim.as_dict() for claim in judge(found)],
-        'cases': [{**name._asdict(), **measured} for name, measured in found.items()],
+        'claims': [claim.as_dict() for claim in judge(result)],
+        'cases': [{**name._asdict(), **measured} for name, measured in result.items()],
     }
 
 

@@ -47,28 +47,28 @@ class Advice(NamedTuple):
 
 def parameter_words(name: str) -> str:
     """Return the name of a tolerance, such as ``base_pose.rotvec[1]``, as people say it."""
-    found = _NAME.fullmatch(name)
-    if found is None:
+    result = _NAME.fullmatch(name)
+    if result is None:
         return name.replace('_', ' ')
-    text = cause(found['effect'], found['joint'])
-    if found['at'] is None:
+    text = cause(result['effect'], result['joint'])
+    if result['at'] is None:
         return text
-    axis = _AXES[int(found['at']) % 3]
-    return f'{text}, {"about" if found["parameter"] == "rotvec" else "along"} {axis}'
+    axis = _AXES[int(result['at']) % 3]
+    return f'{text}, {"about" if result["parameter"] == "rotvec" else "along"} {axis}'
 
 
 def instruction(name: str) -> str:
     """Return what to do to keep a tolerance."""
-    found = _NAME.fullmatch(name)
-    if found is None:
+    result = _NAME.fullmatch(name)
+    if result is None:
         return f'tighten {name}'
-    if found['at'] is not None and (found['effect'], found['parameter']) in _FRAMES:
-        axis = _AXES[int(found['at']) % 3]
-        return _FRAMES[found['effect'], found['parameter']].format(axis=axis)
-    sentence = _DO.get(found['effect'])
+    if result['at'] is not None and (result['effect'], result['parameter']) in _FRAMES:
+        axis = _AXES[int(result['at']) % 3]
+        return _FRAMES[result['effect'], result['parameter']].format(axis=axis)
+    sentence = _DO.get(result['effect'])
     if sentence is None:
         return f'tighten the {parameter_words(name)}'
-    return sentence.format(joint=found['joint'] or 'the robot')
+    return sentence.format(joint=result['joint'] or 'the robot')
 
 
 def advised(parameters: Sequence[dict[str, Any]], most: int) -> list[Advice]:
@@ -82,7 +82,6 @@ def advised(parameters: Sequence[dict[str, Any]], most: int) -> list[Advice]:
     ----------
     parameters : sequence of dict
         Of the local study, with ``contribution_m``: what one tolerance makes, RMS along the seam.
-    most : int
 
     """
     whole = sum(row['contribution_m'] ** 2 for row in parameters)

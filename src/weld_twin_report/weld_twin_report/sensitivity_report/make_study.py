@@ -89,8 +89,8 @@ def study_files(place: Path, force: bool) -> AbstractContextManager[Path]:
 
 def make_figures(place: Path, setting: Setting, keys: Sequence[str]) -> list[Drawing]:
     """Draw figures and write them with their data."""
-    found = [draw(setting, key) for key in keys]
-    drawings = [drawing for drawing in found if drawing is not None]
+    result = [draw(setting, key) for key in keys]
+    drawings = [drawing for drawing in result if drawing is not None]
     for drawing in drawings:
         write_drawing(place, drawing)
     return drawings

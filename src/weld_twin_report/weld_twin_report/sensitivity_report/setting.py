@@ -46,20 +46,12 @@ class Setting:
 
     Attributes
     ----------
-    robot : Robot
-    tolerances : tuple of Tolerance
     seam : str
         What the seam or the bag is called.
     path : Path or None
         None where a recording is studied.
-    recording : Recording or None
-    torch : Torch
-    points : int
-    known : tuple of Effect
     normal : array, shape (3,), optional
         Out of the work, for a recording.
-    weld : WeldTolerance
-    effort : Effort
 
     """
 

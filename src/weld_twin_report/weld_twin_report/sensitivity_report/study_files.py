@@ -93,8 +93,8 @@ def indices_csv(result: dict[str, Any]) -> str:
 
 
 def _rows(result: dict[str, Any]) -> Iterator[list[Any]]:
-    for motion, found in result['motions'].items():
-        for by, outputs in found['global']['sobol'].items():
+    for motion, outcome in result['motions'].items():
+        for by, outputs in outcome['global']['sobol'].items():
             for output, indices in outputs.items():
                 for row in indices['indices']:
                     values = [row[key] for key in ('name', 'S1', 'S1_half', 'ST', 'ST_half')]

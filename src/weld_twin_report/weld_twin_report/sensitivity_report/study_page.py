@@ -70,8 +70,8 @@ def _study(study: dict[str, Any]) -> list[Html]:
 
 
 def _answer(motion: str, study: dict[str, Any]) -> Html:
-    found = study['global']
-    indices = found['sobol']['parameter']['d_norm']
+    result = study['global']
+    indices = result['sobol']['parameter']['d_norm']
     rows = sorted(indices['indices'], key=lambda row: -row['ST'])
     settled = 'converged' if indices['converged'] else 'not converged yet'
     first, *others = advised(study['local']['parameters'], _ADVISED)
@@ -88,7 +88,7 @@ def _answer(motion: str, study: dict[str, Any]) -> Html:
             f'{settled} (widest half-width '
             f'{indices["largest_ST_half"]:.3f}, change from half of N '
             f'{indices["largest_ST_change"]:.3f}); sum of first-order indices '
-            f'{indices["sum_S1"]:.2f}. The fast model is within {found["model_error"]:.0e} of the '
+            f'{indices["sum_S1"]:.2f}. The fast model is within {result["model_error"]:.0e} of the '
             'exact twin.',
             class_='note',
         ),
@@ -136,8 +136,8 @@ def _bars(rows: Sequence[dict[str, Any]]) -> Html:
 
 def _tighten(motions: dict[str, Any]) -> Html:
     parts: list[Html] = []
-    for motion, found in motions.items():
-        sobol = found['global']['sobol']
+    for motion, result in motions.items():
+        sobol = result['global']['sobol']
         columns = [
             tag(
                 'div',
@@ -153,8 +153,8 @@ def _tighten(motions: dict[str, Any]) -> Html:
 
 def _stack(motions: dict[str, Any]) -> Html:
     parts: list[Html] = []
-    for motion, found in motions.items():
-        stack = found['global']['stack']
+    for motion, result in motions.items():
+        stack = result['global']['stack']
         heads = (
             'of all runs',
             *(f'{row["percent"]:.0f} %' for row in stack['percentiles']['max_m']),
@@ -172,7 +172,7 @@ def _stack(motions: dict[str, Any]) -> Html:
         inside = [['as given', *_inside(stack)]]
         inside += [
             [f'{k.replace("_", " ")} halved', *_inside(v)]
-            for k, v in found['global']['halved'].items()
+            for k, v in result['global']['halved'].items()
         ]
         limits = stack['tolerance']
         parts += [

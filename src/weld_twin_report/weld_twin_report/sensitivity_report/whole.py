@@ -45,13 +45,13 @@ def run_study(
     designs = {name: _Designs(setting, name) for name in setting.studies}
     asked = _pieces(setting)
     jobs = {k: v for name, d in designs.items() for k, v in d.jobs(setting.studies[name]).items()}
-    found, done = run_all(runner, jobs, list(asked.values()), meanwhile)
+    result, done = run_all(runner, jobs, list(asked.values()), meanwhile)
     pieces = dict(zip(asked, done, strict=True))
     for name, design in designs.items():
         out['motions'][name] = {
             'local': pieces[name, 'local'],
             'sweeps': pieces[name, 'sweeps'],
-            'global': design.results(found),
+            'global': design.results(result),
         }
     if setting.path is not None:
         out['advice'] = {
@@ -59,7 +59,7 @@ def run_study(
             'placement': pieces['', 'placement'],
         }
     if RECORDED in setting.studies:
-        stacked = found[designs[RECORDED].stack_label][0]
+        stacked = result[designs[RECORDED].stack_label][0]
         out['recorded'] = _recorded(setting, stacked)
     return out
 
@@ -128,17 +128,17 @@ class _Designs:
             out[self._label(f'{effect} halved')] = study, tolerances, stack, halved
         return out
 
-    def results(self, found: dict[str, tuple[Outcomes, float]]) -> dict[str, Any]:
+    def results(self, result: dict[str, tuple[Outcomes, float]]) -> dict[str, Any]:
         """Return indices, measures and percentiles."""
         sobol = {
-            by: _indices(design, found[self._label(f'Sobol by {by}')][0])
+            by: _indices(design, result[self._label(f'Sobol by {by}')][0])
             for by, design in self._sobol.items()
         }
-        screened = self._morris.screening(found[self._label('Morris')][0].d_norm)
-        stacked, error = found[self.stack_label]
+        screened = self._morris.screening(result[self._label('Morris')][0].d_norm)
+        stacked, error = result[self.stack_label]
         stack = self._stack(stacked)
         halved = {
-            effect: self._stack(found[self._label(f'{effect} halved')][0]).as_dict()
+            effect: self._stack(result[self._label(f'{effect} halved')][0]).as_dict()
             for effect in self._effects
         }
         return {
@@ -154,10 +154,10 @@ class _Designs:
         return sensitivity.tolerance_stack(runs, setting.weld, seed=setting.effort.seed)
 
 
-def _indices(design: SobolDesign, found: Outcomes) -> dict[str, Any]:
+def _indices(design: SobolDesign, result: Outcomes) -> dict[str, Any]:
     out = {}
     for key in OUTPUTS:
-        values = getattr(found, key)
+        values = getattr(result, key)
         # An error may leave a direction alone altogether, as a purely planar one does.
         if np.ptp(values) > 1e-15:
             out[key] = design.indices(values).as_dict()

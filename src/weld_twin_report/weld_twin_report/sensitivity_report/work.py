@@ -91,13 +91,13 @@ def run_packed(
     """
     model = _model(study, tolerances)
     block = _samples(design)[start : start + BLOCK]
-    found = model(sensitivity.draws_at(drawn or tolerances, block))
-    return {'model_error': model.error, 'outcomes': packed(found)}
+    result = model(sensitivity.draws_at(drawn or tolerances, block))
+    return {'model_error': model.error, 'outcomes': packed(result)}
 
 
-def packed(found: Outcomes) -> str:
+def packed(result: Outcomes) -> str:
     """Return outcomes as text, without the digits that take most of the time of a fast model."""
-    return b64encode(np.ascontiguousarray(found, dtype='<f8').tobytes()).decode()
+    return b64encode(np.ascontiguousarray(result, dtype='<f8').tobytes()).decode()
 
 
 def unpacked(text: str) -> Outcomes:
@@ -108,10 +108,10 @@ def unpacked(text: str) -> Outcomes:
 
 def local(study: Study, tolerances: tuple[Tolerance, ...]) -> dict[str, Any]:
     """Return the local sensitivities, and how the arm stands."""
-    found = sensitivity.local_sensitivity(study, tolerances)
+    result = sensitivity.local_sensitivity(study, tolerances)
     stand = sensitivity.posture(study)
     return {
-        **found.as_dict(),
+        **result.as_dict(),
         'posture': {'s_m': study.s, **asdict(stand)},
         'expected_m': sensitivity.expected_deviation(study, tolerances),
     }
@@ -121,11 +121,11 @@ def sweeps(study: Study, tolerances: tuple[Tolerance, ...]) -> list[dict[str, An
     """Return the deviation over the size of every error, and where it stops being linear."""
     out = []
     for tolerance in tolerances:
-        found = sensitivity.sweep(study, tolerance, sensitivity.default_values(tolerance))
+        result = sensitivity.sweep(study, tolerance, sensitivity.default_values(tolerance))
         end = None
         if tolerance.unit == 'rad' and tolerance.effect != 'backlash':
             end = sensitivity.end_of_linearity(study, tolerance)
-        out.append({**found.as_dict(), 'linear_up_to': end})
+        out.append({**result.as_dict(), 'linear_up_to': end})
     return out
 
 
@@ -133,11 +133,11 @@ def profiles(robot: Robot, path: Path, tolerances: tuple[Tolerance, ...]) -> lis
     """Return what the time laws do to the seam, with a lag of every joint besides."""
     lag = sensitivity.default_tolerances(robot, ('servo_lag',))
     wanted = {t.name: t for t in (*lag, *tolerances)}
-    found = sensitivity.compare_profiles(robot, path, tuple(wanted.values()))
+    result = sensitivity.compare_profiles(robot, path, tuple(wanted.values()))
     still = sensitivity.compare_profiles(robot, path, tolerances)
     return [
         {**asdict(a), 'expected_without_lag_m': b.expected_m}
-        for a, b in zip(found, still, strict=True)
+        for a, b in zip(result, still, strict=True)
     ]
 
 
@@ -150,8 +150,8 @@ def placement(
     seed: int,
 ) -> list[dict[str, Any]]:
     """Return the best torch rotation and base placement."""
-    found = sensitivity.advise(robot, path, tolerances, torch=torch, tries=tries, seed=seed)
-    return [result.as_dict() for result in found]
+    outcome = sensitivity.advise(robot, path, tolerances, torch=torch, tries=tries, seed=seed)
+    return [result.as_dict() for result in outcome]
 
 
 def claim_case(robot: Robot, seam: str, seed: int) -> dict[str, float]:
@@ -177,8 +177,6 @@ def run_all(
 
     Parameters
     ----------
-    runner : Runner
-    jobs : mapping from label to Job
     pieces : sequence of Task
         Begun first, the longest in front: what is left for the end is short then.
     meanwhile : callable, optional
@@ -196,8 +194,8 @@ def run_all(
     results = runner.run(tasks, meanwhile)
     for label, result in zip(owners, results[len(pieces) :], strict=True):
         parts[label].append(result)
-    found = {label: (_joined(own), own[0]['model_error']) for label, own in parts.items()}
-    return found, results[: len(pieces)]
+    outcome = {label: (_joined(own), own[0]['model_error']) for label, own in parts.items()}
+    return outcome, results[: len(pieces)]
 
 
 def _joined(parts: list[dict[str, Any]]) -> Outcomes:

@@ -99,13 +99,13 @@ class Access:
             await _refuse(send, 403, why)
             return
         query = scope.get('query_string', b'').decode('latin-1')
-        told = [value for name, value in parse_qsl(query) if name == 'token']
-        right = [value for value in told if self._is_token(value)]
+        reported = [value for name, value in parse_qsl(query) if name == 'token']
+        right = [value for value in reported if self._is_token(value)]
         if self._settings.token and not (right or self._known(headers, cookies)):
             await _refuse(send, 401, 'This server needs its token: open the address it printed.')
             return
         kept = [_cookie(TOKEN, right[0])] if right and self._settings.token else []
-        if told and scope['method'] in ('GET', 'HEAD'):
+        if reported and scope['method'] in ('GET', 'HEAD'):
             # The token must not stay where others read it: in the address, and in the history.
             await _send_on(send, _without_token(scope['path'], query), kept)
             return
@@ -136,8 +136,8 @@ class Access:
         bearer = headers.get('authorization', '').removeprefix('Bearer ')
         return self._is_token(bearer) or self._is_token(cookies.get(TOKEN, ''))
 
-    def _is_token(self, told: str) -> bool:
-        return hmac.compare_digest(told.encode(), self._settings.token.encode())
+    def _is_token(self, reported: str) -> bool:
+        return hmac.compare_digest(reported.encode(), self._settings.token.encode())
 
 
 def _name(host: str) -> str:
@@ -165,8 +165,8 @@ def _cookie(name: str, value: str, seconds: int = YEAR) -> bytes:
     jar: SimpleCookie = SimpleCookie()
     jar[name] = value
     # Lax: who follows a link from elsewhere is still himself. What changes something is checked.
-    told = {'path': '/', 'httponly': 'yes', 'samesite': 'Lax', 'max-age': str(seconds)}
-    for key, how in told.items():
+    reported = {'path': '/', 'httponly': 'yes', 'samesite': 'Lax', 'max-age': str(seconds)}
+    for key, how in reported.items():
         jar[name][key] = how
     return jar[name].OutputString().encode('latin-1')
 
@@ -188,8 +188,8 @@ def _with_headers(send: Send, cookies: list[bytes], scope: Scope, body: Body) ->
         if message['type'] == 'http.response.start':
             if message['status'] >= 400 and scope['method'] == 'POST':
                 await _drained(body)
-            told = scope.get('cookies', cookies)  # an answer may say who the browser is
-            more = [*HEADERS, *((b'set-cookie', cookie) for cookie in told)]
+            reported = scope.get('cookies', cookies)  # an answer may say who the browser is
+            more = [*HEADERS, *((b'set-cookie', cookie) for cookie in reported)]
             message = {**message, 'headers': [*message.get('headers', []), *more]}
         await send(message)
 

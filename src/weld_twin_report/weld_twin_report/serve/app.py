@@ -59,8 +59,6 @@ def make_app(settings: Settings, queue: Queue, doors: Doors, live: Said = lambda
 
     Parameters
     ----------
-    settings : Settings
-    queue : Queue
     doors : Doors
         Told when requests begin and end.
     live : callable
@@ -126,8 +124,8 @@ class _Site:
             robot = self._model_of(request, form, beside)
             if not (beside / DIAGNOSIS).is_file():
                 raise DataError('choose the diagnosis that it is to be corrected by, or drop one')
-            told = {**form, 'robot': robot or form.get('robot', '')}
-            asked = asked_of_program(told, sorted(file.name for file in beside.iterdir()))
+            reported = {**form, 'robot': robot or form.get('robot', '')}
+            asked = asked_of_program(reported, sorted(file.name for file in beside.iterdir()))
             await run_in_threadpool(self._queue.add, replace(job, names=names).ask(asked))
         return RedirectResponse(f'/recordings/{job.key}', 303)
 
@@ -161,11 +159,11 @@ class _Site:
         if not key:
             return ''
         job = self._job(request, key)
-        found = self._queue.folder(job) / FOUND / DIAGNOSIS
-        if job.state != DONE or not found.is_file():
+        result = self._queue.folder(job) / FOUND / DIAGNOSIS
+        if job.state != DONE or not result.is_file():
             raise DataError('that recording has no diagnosis that corrects a program')
         beside.mkdir(parents=True, exist_ok=True)
-        shutil.copy(found, beside / DIAGNOSIS)
+        shutil.copy(result, beside / DIAGNOSIS)
         for name in job.names:
             if name == job.asked.robot:
                 shutil.copy(job.uploads(self._queue.folder(job)) / name, beside / name)
@@ -178,9 +176,11 @@ class _Site:
     def recording(self, request: Request, key: str) -> Response:
         job = self._job(request, key)
         ahead = self._queue.place(job) if job.state in OPEN else 0
-        found = self._queue.folder(job) / FOUND
+        result = self._queue.folder(job) / FOUND
         return HTMLResponse(
-            pages.job_page(job, ahead, _told(found / DIAGNOSIS), _written(job, found), self._ways)
+            pages.job_page(
+                job, ahead, _told(result / DIAGNOSIS), _written(job, result), self._ways
+            )
         )
 
     async def again(self, request: Request, key: str) -> Response:
@@ -206,14 +206,14 @@ class _Site:
 
     def file(self, request: Request, key: str, name: str) -> Response:
         job = self._job(request, key)
-        found = self._queue.folder(job) / FOUND
-        if name not in _written(job, found):
+        result = self._queue.folder(job) / FOUND
+        if name not in _written(job, result):
             raise HTTPException(404)
         headers = {'content-security-policy': SANDBOX}
         if name.lower().endswith('.html'):
-            return FileResponse(found / name, headers=headers)
+            return FileResponse(result / name, headers=headers)
         return FileResponse(
-            found / name, headers=headers, filename=name, media_type='application/octet-stream'
+            result / name, headers=headers, filename=name, media_type='application/octet-stream'
         )
 
     def program(self, request: Request, of: str = '') -> Response:
@@ -326,20 +326,20 @@ def _files(form: FormData, name: str) -> list[UploadFile]:
 def _told(file: Path) -> dict[str, Any] | None:
     """Return a diagnosis; None where there is none that can be read."""
     try:
-        told = json.loads(file.read_text(encoding='utf-8'))
+        reported = json.loads(file.read_text(encoding='utf-8'))
     except (OSError, ValueError):
         return None
-    return told if isinstance(told, dict) else None
+    return reported if isinstance(reported, dict) else None
 
 
-def _written(job: Job, found: Path) -> list[str]:
+def _written(job: Job, result: Path) -> list[str]:
     """Return the names of the files that somebody may fetch."""
-    if not found.is_dir():
+    if not result.is_dir():
         return []
     known: dict[str, str | None] = dict(pages.FILES)
     if job.kind == PROGRAM:
         known = {**dict(pages.PROGRAM_FILES), **dict.fromkeys(job.names)}
-    return [name for name in known if (found / name).is_file()]
+    return [name for name in known if (result / name).is_file()]
 
 
 def _cells(url: str, place: str, cell: str, ways: Html) -> Response:

@@ -50,7 +50,6 @@ class Body:
 
     Parameters
     ----------
-    bodies : Bodies
     party : str
         Who sends it.
     receive : callable

@@ -128,8 +128,8 @@ def protocol(doors: Doors) -> type[asyncio.Protocol]:
 
 def _client(transport: asyncio.Transport) -> Client:
     """Return address and port of the other side, as requests have them."""
-    told = transport.get_extra_info('peername') or ('', id(transport))
-    return str(told[0]), int(told[1])
+    reported = transport.get_extra_info('peername') or ('', id(transport))
+    return str(reported[0]), int(reported[1])
 
 
 def _most_open() -> int:

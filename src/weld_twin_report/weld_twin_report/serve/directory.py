@@ -127,9 +127,9 @@ class Directory:
             ) from None
         except OSError:  # a file system without locks
             pass
-        told = json.dumps({'schema': SCHEMA, 'process': os.getpid()}) + '\n'
+        reported = json.dumps({'schema': SCHEMA, 'process': os.getpid()}) + '\n'
         os.ftruncate(self._held, 0)
-        os.pwrite(self._held, told.encode(), 0)
+        os.pwrite(self._held, reported.encode(), 0)
 
 
 def _cut_off(name: str) -> bool:

@@ -30,7 +30,6 @@ class Field(NamedTuple):
 
     Attributes
     ----------
-    title, hint : str
     commands : tuple of str
         Those that take it.
     check : callable, optional
@@ -235,11 +234,6 @@ def given(form: Mapping[str, str], commands: Iterable[str]) -> dict[str, str]:
     """
     Return the fields of a form that some commands take, checked.
 
-    Parameters
-    ----------
-    form : mapping
-    commands : iterable of str
-
     Raises
     ------
     DataError
@@ -267,16 +261,16 @@ def _chosen(field: Field, text: str) -> str:
     return text
 
 
-def words(told: Mapping[str, str], command: str) -> list[str]:
+def words(reported: Mapping[str, str], command: str) -> list[str]:
     """Return the words of a command for the fields that it takes."""
     out = []
     for name, field in FIELDS.items():
-        if name in told and command in field.commands and name not in LARGEST:
+        if name in reported and command in field.commands and name not in LARGEST:
             option = (field.option or name).replace('_', '-')
-            values = told[name].splitlines() if field.lines else [told[name]]
+            values = reported[name].splitlines() if field.lines else [reported[name]]
             out += [f'--{option}={value}' for value in values]
-    if command == CORRECT and told.keys() & LARGEST.keys():
-        sizes = [told.get(name, size) + unit for name, (size, unit) in LARGEST.items()]
+    if command == CORRECT and reported.keys() & LARGEST.keys():
+        sizes = [reported.get(name, size) + unit for name, (size, unit) in LARGEST.items()]
         out += ['--max-correction', *sizes]
     return out
 
@@ -287,7 +281,6 @@ def sentence(text: str, command: str = '') -> str:
 
     Parameters
     ----------
-    text : str
     command : str
         The one that says it, where two fields are called alike; empty for those of a recording.
 
@@ -299,8 +292,8 @@ def sentence(text: str, command: str = '') -> str:
     }
     titles = {**titles, **ELSEWHERE}
 
-    def title(found: re.Match[str]) -> str:
-        name = found[1]
+    def title(result: re.Match[str]) -> str:
+        name = result[1]
         if name.endswith(('-columns', '-column')):
             return COLUMNS
         return f'“{titles[name]}”' if name in titles else 'a setting of the command line'

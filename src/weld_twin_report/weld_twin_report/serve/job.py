@@ -71,12 +71,12 @@ class Asked:
         unknown = data.keys() - own.keys() - FIELDS.keys() - {'told'}
         if unknown:
             raise DataError(f'it asks for {", ".join(sorted(unknown))}, which is not known')
-        told = {**older, **data.get('told', {})}
-        texts = [own.get(name, '') for name in ('robot', 'cell', 'at')] + list(told.values())
+        reported = {**older, **data.get('told', {})}
+        texts = [own.get(name, '') for name in ('robot', 'cell', 'at')] + list(reported.values())
         if not isinstance(own.get('apply', False), bool):
             raise DataError('it applies neither something nor nothing')
         _check_texts(texts)
-        return cls(**own, told=told)
+        return cls(**own, told=reported)
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,6 @@ class Job:
         Whose it is.
     names : tuple of str
         Of the files dropped.
-    asked : Asked
-    state : str
     said : str
         How far it is, or what was told last.
     since : float
@@ -142,14 +140,14 @@ class Job:
                 raise ValueError('it is no file')
             data: Mapping[str, Any] = json.loads((folder / FILE).read_text(encoding='utf-8'))
             later = data.get('later')
-            told = {
+            reported = {
                 **data,
                 'names': tuple(data['names']),
                 'asked': Asked.read(data['asked']),
                 'later': Asked.read(later) if later else None,
                 'party': data.get('party') or data['user'],
             }
-            job = cls(**told)
+            job = cls(**reported)
             job._check(folder)
         except _DAMAGED as error:
             raise DataError(f"'{folder / FILE}' cannot be read: {error}") from None

@@ -157,11 +157,11 @@ def _field(name: str, title: str, hint: str, value: str = '') -> Html:
     )
 
 
-def _fields(names: Sequence[str], told: Mapping[str, str]) -> list[Html]:
+def _fields(names: Sequence[str], reported: Mapping[str, str]) -> list[Html]:
     """Return fields of the table, filled with what was told before."""
     out = []
     for name in names:
-        field, value = FIELDS[name], told.get(name, '')
+        field, value = FIELDS[name], reported.get(name, '')
         if field.choices:
             out.append(_choice(name, field.title, field.choices, value))
         elif field.lines:
@@ -215,21 +215,19 @@ def _button(text: str, place: str, **fields: str) -> Html:
 
 
 def job_page(
-    job: Job, ahead: int, told: Mapping[str, Any] | None, files: Sequence[str], site: Site
+    job: Job, ahead: int, reported: Mapping[str, Any] | None, files: Sequence[str], site: Site
 ) -> str:
     """
     Return the page of a recording or program: its place, its progress, its question or its sheet.
 
     Parameters
     ----------
-    job : Job
     ahead : int
         How many come before it.
-    told : mapping, optional
+    reported : mapping, optional
         Its diagnosis.json, where there is one.
     files : sequence of str
         What may be fetched.
-    site : Site
 
     """
     if job.state in OPEN:
@@ -237,7 +235,7 @@ def job_page(
     if job.state == DONE:
         return page('verdict', *_result(job, files), site=site)
     if job.state == UNSOUND:
-        return page('unsound', *_question(job, told or {}), site=site)
+        return page('unsound', *_question(job, reported or {}), site=site)
     what = 'It could not be corrected' if job.kind == PROGRAM else 'It could not be diagnosed'
     what = 'One question first' if job.said == NO_ROBOT else what
     why = section(what, _said(job.said, job.command), id_='refused')
@@ -288,11 +286,11 @@ def _result(job: Job, files: Sequence[str]) -> tuple[Child, ...]:
     return (*out, _ask_again(job), _button('Delete it', f'{place}/delete'))
 
 
-def _question(job: Job, told: Mapping[str, Any]) -> tuple[Child, ...]:
+def _question(job: Job, reported: Mapping[str, Any]) -> tuple[Child, ...]:
     """Return what is wrong with data or set-up, and ask whether to correct it."""
     wrong = [
         joined
-        for each in told.get('unsound') or []
+        for each in reported.get('unsound') or []
         for joined in (
             _said(str(each['sentence'])),
             tag('p', sentence(str(each.get('remedy') or '')), class_='note'),
@@ -358,7 +356,6 @@ def program_page(jobs: Sequence[Job], of: str, site: Site, said: str = '') -> st
         Of the user; a program may be corrected by any that has a diagnosis.
     of : str
         Key of the one that is chosen first.
-    site : Site
     said : str
         Why it was refused before.
 

@@ -60,14 +60,7 @@ class Full(DataError):
 
 
 class Queue:
-    """
-    All jobs of a server.
-
-    Parameters
-    ----------
-    settings : Settings
-
-    """
+    """All jobs of a server."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings

@@ -80,7 +80,6 @@ def giving_way(
         All but the new one.
     sizes : mapping
         Bytes by the key of each, the new one too.
-    new : Job
     allowed : int
         Bytes of all.
     most : int
@@ -92,12 +91,12 @@ def giving_way(
         Nobody has more than a fair share, and it is too much all the same.
 
     """
-    left = sorted(jobs, key=lambda job: job.since)
+    remaining = sorted(jobs, key=lambda job: job.since)
     out: list[Job] = []
     while True:
         taken = Counter[str]()
         count = Counter[str]()
-        for job in [*left, new]:
+        for job in [*remaining, new]:
             taken[job.party] += sizes.get(job.key, 0)
             count[job.party] += 1
         too_large, too_many = taken.total() > allowed, count.total() > most
@@ -105,11 +104,11 @@ def giving_way(
             return out
         party, share = (taken if too_large else count).most_common(1)[0]
         fair = (allowed if too_large else most) / SHARES
-        oldest = next((j for j in left if j.party == party and j.state not in OPEN), None)
+        oldest = next((j for j in remaining if j.party == party and j.state not in OPEN), None)
         if oldest is None or share <= fair:
             raise NoRoom(
                 'the server keeps no more than it may, and that is used up; delete '
                 'recordings of yours that you need no longer, or ask whoever runs it'
             )
-        left.remove(oldest)
+        remaining.remove(oldest)
         out.append(oldest)

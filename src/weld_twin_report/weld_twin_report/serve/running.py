@@ -30,7 +30,6 @@ def serve(settings: Settings, tell: Callable[[str], None]) -> None:
 
     Parameters
     ----------
-    settings : Settings
     tell : callable
         Told the address once the server listens.
 

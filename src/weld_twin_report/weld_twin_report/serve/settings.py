@@ -22,7 +22,6 @@ class Settings:
     ----------
     directory : Path
         Where uploads and results lie.
-    host : str
     port : int
         0 for any that is free.
     names : tuple of str

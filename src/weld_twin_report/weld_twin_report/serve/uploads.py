@@ -45,8 +45,6 @@ async def save(uploads: Sequence[Upload], place: Path, most: int) -> tuple[str, 
 
     Parameters
     ----------
-    uploads : sequence of Upload
-    place : Path
     most : int
         Files allowed.
 
@@ -75,7 +73,6 @@ async def save_program(
 
     Parameters
     ----------
-    uploads : sequence of Upload
     model : sequence of Upload
         A ``diagnosis.json``, and a robot file; none where a recording's are taken.
     place, beside : Path
@@ -92,8 +89,8 @@ async def save_program(
         raise DataError('choose a program first')
     models = _names(model, (*OTHERS, '.json'), 'a diagnosis nor a robot file', 2)
     await _write(uploads, names, place / title(names))
-    told = [DIAGNOSIS if name.lower().endswith('.json') else name for name in models]
-    await _write(model, told, beside)
+    reported = [DIAGNOSIS if name.lower().endswith('.json') else name for name in models]
+    await _write(model, reported, beside)
     return names
 
 
@@ -140,7 +137,6 @@ def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
 
     Parameters
     ----------
-    form : mapping
     names : sequence of str
         Of the files dropped.
 
@@ -150,9 +146,9 @@ def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
         A field holds something that is no choice.
 
     """
-    told = given(_texts(form), (IMPORT, DIAGNOSE))
+    reported = given(_texts(form), (IMPORT, DIAGNOSE))
     tables = [name for name in names if name.lower().endswith(TABLES)]
-    if 'joint_signs' in told and not tables:
+    if 'joint_signs' in reported and not tables:
         raise DataError('signs are those of a table; the joints of a bag have their own')
     at, cell = _text(form, 'at'), _text(form, 'cell')[:CELL]
     if at:
@@ -160,7 +156,7 @@ def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
     if not cell.isprintable():
         raise DataError("a cell's name has signs that cannot be shown")
     robot = _robot(form, [name for name in names if name.lower() != 'metadata.yaml'])
-    return Asked(robot, _text(form, 'apply') == 'yes', cell, at, told)
+    return Asked(robot, _text(form, 'apply') == 'yes', cell, at, reported)
 
 
 def asked_of_program(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
@@ -169,7 +165,6 @@ def asked_of_program(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
 
     Parameters
     ----------
-    form : mapping
     names : sequence of str
         Of the files of its model.
 

@@ -42,7 +42,6 @@ class BulkKernel:
 
     Parameters
     ----------
-    robot : Robot
     channels : sequence of Channel
         DH values whose screws `screws` gives: 'theta', 'alpha', 'beta' and 'a' are turns about
         the axis that 'theta' and 'd', 'alpha', 'beta' and 'a' act on. Quickest in the order in

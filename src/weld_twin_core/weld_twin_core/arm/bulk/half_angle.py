@@ -57,8 +57,8 @@ def tangent_is_vectorised() -> bool:
     introspect = getattr(np.lib, 'introspect', None)  # since numpy 2.1
     if introspect is None:
         return False
-    found = introspect.opt_func_info(func_name='^tan$', signature='float64')
-    kernel = found.get('tan', {}).get('dd', {}).get('current', '')
+    result = introspect.opt_func_info(func_name='^tan$', signature='float64')
+    kernel = result.get('tan', {}).get('dd', {}).get('current', '')
     return bool(kernel.startswith(('AVX512', 'X86_V4')))
 
 
@@ -77,7 +77,6 @@ class HalfAngle:
     own : array, shape (3, size), optional
         Memory that is free during a call and may be used otherwise between calls. Of the second
         the result is part.
-    by_tangent : bool
 
     """
 

@@ -57,13 +57,11 @@ class Division:
 
     Parameters
     ----------
-    robot : Robot
     channels : sequence of Channel
         What is asked for.
 
     Attributes
     ----------
-    near, far : Piece
     sizes : tuple of int
         Joints of either piece.
     places : list of Place

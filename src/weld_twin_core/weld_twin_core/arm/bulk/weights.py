@@ -116,7 +116,6 @@ class Piece:
 
     Parameters
     ----------
-    run : sequence of Factor
     before, after : array, shape (4, 4)
         Base or tool frame, where the piece begins or ends the chain.
 

@@ -14,7 +14,7 @@ from ..soundness.mending import turned_joints
 
 
 def actions(
-    found: Sequence[Effect], robot: Robot, mends: Sequence[Mapping[str, Any]] = ()
+    result: Sequence[Effect], robot: Robot, mends: Sequence[Mapping[str, Any]] = ()
 ) -> tuple[str, ...]:
     """
     Return what to do about every effect found, one sentence each, in their order.
@@ -28,7 +28,7 @@ def actions(
 
     """
     turned = turned_joints(mends, robot)
-    return tuple(_action(effect, robot, turned) for effect in found)
+    return tuple(_action(effect, robot, turned) for effect in result)
 
 
 def _action(effect: Effect, robot: Robot, turned: Collection[str]) -> str:

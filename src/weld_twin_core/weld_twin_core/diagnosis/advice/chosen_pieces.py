@@ -128,8 +128,8 @@ def planned(
     whole = option.whole and sum(piece.seconds for piece in option.pieces) > room
     if whole or not _open(option, [], room):
         return None
-    told = normals(problem, model, alternatives, scale, option, now)
-    before = told.before()
+    reported = normals(problem, model, alternatives, scale, option, now)
+    before = reported.before()
     # Stations are foreseen one after the other; any other choice of them would come sooner.
     in_turn = option.static and any(e.on in AS_IT_WORKS for each in alternatives for e in each)
     chosen: list[int] = []
@@ -140,11 +140,11 @@ def planned(
         more = _open(option, chosen, room - spent)[: 1 if in_turn else None]
         if not more or (spent >= LEAST and _enough(gains)):
             break
-        pick, found, gained = _next(told, before, chosen, more, option, named)
+        pick, result, gained = _next(reported, before, chosen, more, option, named)
         if spent >= LEAST and gained < (1.0 + GAIN) * score:
             break
         chosen.append(pick)
-        gains, score = found, max(score, gained)
+        gains, score = result, max(score, gained)
     if not chosen:
         return None
     plan = _plan(option, chosen, score, before, gains, named)
@@ -172,15 +172,17 @@ def _plan(
     return Plan(option, tuple(chosen), score, apart, best, known, gains[best], decided)
 
 
-def _open(option: Candidate, chosen: Sequence[int], left: float) -> list[int]:
+def _open(option: Candidate, chosen: Sequence[int], remaining: float) -> list[int]:
     """Return the pieces that are not in yet and fit into the seconds left."""
     return [
-        k for k, piece in enumerate(option.pieces) if k not in chosen and piece.seconds <= left
+        k
+        for k, piece in enumerate(option.pieces)
+        if k not in chosen and piece.seconds <= remaining
     ]
 
 
 def _next(
-    told: Normals,
+    reported: Normals,
     before: Mapping[Pair, float],
     chosen: Sequence[int],
     more: Sequence[int],
@@ -192,7 +194,7 @@ def _next(
     pairs = sorted({(min(pair), max(pair)) for pair in before})
     # What the data at hand decide already is no question, unless nothing else is left.
     asked = [pair for pair in pairs if _mean(before, pair) < MARGIN * DECIDES] or pairs
-    after = told.added([way for pair in asked for way in (pair, pair[::-1])], chosen, more)
+    after = reported.added([way for pair in asked for way in (pair, pair[::-1])], chosen, more)
     for one, other in asked:
         # The mean over which of the two is true: where one contains the other, as play that may be
         # zero, only the truth of the larger one shows.

@@ -84,9 +84,9 @@ def next_experiment(
     best = max(plan.score for plan in plans)
     decided = not closed and all(plan.decided for plan in plans)
     if decided:
-        told = wider(_DECIDED)
+        reported = wider(_DECIDED)
     elif best == 0.0:
-        told = _outside(alternatives[0], alternatives[1]) if closed else wider(_ALIKE)
+        reported = _outside(alternatives[0], alternatives[1]) if closed else wider(_ALIKE)
     else:
         good = [plan for plan in plans if plan.score >= WORTH * best]
         if not problem.at_rest:
@@ -95,8 +95,8 @@ def next_experiment(
         least = min(plan.minutes for plan in good)
         # Half a minute is no reason to learn less.
         near = [plan for plan in good if plan.minutes <= least + NEAR]
-        told = _told(max(near, key=lambda plan: plan.apart), alternatives, model)
-    return told | {'skipped': skipped} if skipped else told
+        reported = _told(max(near, key=lambda plan: plan.apart), alternatives, model)
+    return reported | {'skipped': skipped} if skipped else reported
 
 
 def confirming(
@@ -157,9 +157,9 @@ _NARROW = (
 def _told(plan: Plan, alternatives: Sequence[Explanation], model: Model) -> dict[str, Any]:
     assert plan.pair is not None
     one, other = _apart(*(alternatives[k] for k in plan.pair))
-    told = ' from '.join(filter(None, (_named(one, other), _named(other, one))))
+    reported = ' from '.join(filter(None, (_named(one, other), _named(other, one))))
     reason = (
-        f'The data at hand tell {told} by {plan.before:.1f} standard deviations; this would add '
+        f'The data at hand tell {reported} by {plan.before:.1f} standard deviations; this would add '
         f'{plan.after:.0f}.'
     )
     return _entry(plan, reason, model, [_side(one), _side(other)])

@@ -60,10 +60,10 @@ Explanation = tuple[Effect, ...]
 
 
 def next_step(
-    found: Search,
+    result: Search,
     verdict: Verdict,
     limits: Limits | None = None,
-    rival: Curved | None = None,
+    alternative: Curved | None = None,
 ) -> dict[str, Any] | None:
     """
     Return the next experiment as `next_experiment` does, None when the question is closed.
@@ -74,54 +74,54 @@ def next_step(
         With the confidence that it has earned.
     limits : Limits, optional
         What an experiment may cost, and where it has to stay.
-    rival : Curved, optional
+    alternative : Curved, optional
         What explains the gap without a formula.
 
     """
     limits = limits or Limits()
-    if found.problem.untracked:
-        return _touches(found, verdict)
-    wanted = _parting(found, verdict, limits, rival)
+    if result.problem.untracked:
+        return _touches(result, verdict)
+    wanted = _parting(result, verdict, limits, alternative)
     if not limits.confirm or (wanted is not None and wanted['motion'] is not None):
         return wanted
-    problem, model = found.work.problem, found.small.model
+    problem, model = result.work.problem, result.small.model
     joints = narrow(problem.recordings, model.robot)
     if not joints:
         return wanted
     return {**confirming(problem, model, joints, limits), 'promise': None}
 
 
-def _touches(found: Search, verdict: Verdict) -> dict[str, Any] | None:
+def _touches(result: Search, verdict: Verdict) -> dict[str, Any] | None:
     """Return the contacts to make next: a motion in the air would show nothing."""
     if verdict.status in ('identified', 'none'):
         return None
-    listed = [found.small.model.found, *_in_place(found, verdict, named=True)]
-    return next_touches(found.problem, found.final.model, listed[:TOUCHED], found.scale)
+    listed = [result.small.model.found, *_in_place(result, verdict, named=True)]
+    return next_touches(result.problem, result.final.model, listed[:TOUCHED], result.scale)
 
 
 def _parting(
-    found: Search, verdict: Verdict, limits: Limits, rival: Curved | None
+    result: Search, verdict: Verdict, limits: Limits, alternative: Curved | None
 ) -> dict[str, Any] | None:
     """Return the experiment that parts what is believed from what else it could be."""
     if verdict.status in ('identified', 'none') and verdict.sure:
         return None
-    listed = [found.small.model.found, *_in_place(found, verdict, named=True)]
+    listed = [result.small.model.found, *_in_place(result, verdict, named=True)]
     named = len(listed)
     closed = verdict.status == 'ambiguous' and verdict.sure and len(listed) > 1
     if not closed:
-        room = Room(found.work.problem, found.small.model.robot, limits)
-        shapes = _without_names(found, rival, room.low, room.high)
+        room = Room(result.work.problem, result.small.model.robot, limits)
+        shapes = _without_names(result, alternative, room.low, room.high)
         if verdict.status == 'unknown' and verdict.confidence >= NAMELESS:
             listed, named = [*shapes, *listed], 1
         else:
             listed += shapes[:1]
-        listed += _in_place(found, verdict, named=False)
-        listed += _beside(found)
+        listed += _in_place(result, verdict, named=False)
+        listed += _beside(result)
     wanted = next_experiment(
-        found.work.problem,
-        found.small.model,
+        result.work.problem,
+        result.small.model,
         listed[:MOST],
-        _as_weighed(found),
+        _as_weighed(result),
         limits,
         closed=closed,
         named=min(named, MOST),
@@ -129,7 +129,7 @@ def _parting(
     return None if wanted is None else {**wanted, 'promise': _promise(verdict, wanted)}
 
 
-def _as_weighed(found: Search) -> Scale:
+def _as_weighed(result: Search) -> Scale:
     """
     Return the noise, as much larger as rows count less in a diagnosis.
 
@@ -137,9 +137,9 @@ def _as_weighed(found: Search) -> Scale:
     is learned beside it counts less (`effective_rows`). That neighbours in time say the same is taken
     into account where pieces of motion are foreseen.
     """
-    fit, problem, scale = found.small, found.work.problem, found.work.scale
+    fit, problem, scale = result.small, result.work.problem, result.work.scale
     apart = effective_share(fit.residual, problem.rows, problem.samples) * fit.residual.size
-    wider = float(np.sqrt(max(apart / max(found.effective(fit), 1e-9), 1.0)))
+    wider = float(np.sqrt(max(apart / max(result.effective(fit), 1e-9), 1.0)))
     return replace(scale, position=wider * scale.position, orientation=wider * scale.orientation)
 
 
@@ -164,49 +164,56 @@ def _promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
     return parted * max(believed, 0.0 if named else EVEN)
 
 
-def _in_place(found: Search, verdict: Verdict, *, named: bool) -> list[tuple[Effect, ...]]:
+def _in_place(result: Search, verdict: Verdict, *, named: bool) -> list[tuple[Effect, ...]]:
     """Return the explanations with a rival in an effect's place: those named, or the others."""
     sites = {site for group in verdict.sets for site in group}
-    own = found.small.model.found
-    rivals = [rival for slot in found.slots for rival in slot if (rival.site in sites) is named]
-    rivals.sort(key=lambda rival: -rival.probability)
-    fits = [rival.fit.model.found for rival in rivals]
+    own = result.small.model.found
+    rivals = [
+        alternative
+        for candidate_set in result.slots
+        for alternative in candidate_set
+        if (alternative.site in sites) is named
+    ]
+    rivals.sort(key=lambda alternative: -alternative.probability)
+    fits = [alternative.fit.model.found for alternative in rivals]
     return [effects for effects in fits if effects != own]
 
 
-def _beside(found: Search) -> list[tuple[Effect, ...]]:
+def _beside(result: Search) -> list[tuple[Effect, ...]]:
     """Return the explanations with one effect more, those first that come nearest to be needed."""
-    model = found.small.model
-    systems = found.work.beside(model, found.small.residual)
-    ranked = ranking(systems, found.library.units, found.effective(found.small))
+    model = result.small.model
+    systems = result.work.beside(model, result.small.residual)
+    ranked = ranking(systems, result.library.units, result.effective(result.small))
     taken = {(effect.name, effect.site) for effect in model.found}
     more = [choice for choice in ranked if choice.unit.site not in taken]
     return [(*model.found, choice.effect()) for choice in more[: MOST - 1]]
 
 
 def _without_names(
-    found: Search, rival: Curved | None, low: Array, high: Array
+    result: Search, alternative: Curved | None, low: Array, high: Array
 ) -> list[Explanation]:
     """
     Return the free-form explanation and the nearest other ones, likeliest first; none without a rival.
 
     Curves over an angle go on, free to bend, to what the joints may reach, from low to high, (n,).
     """
-    if rival is None:
+    if alternative is None:
         return []
-    fitted = rival.found.final.model.found
-    parts = [part for part in rival.form.parts if part.group.carried]
+    fitted = alternative.found.final.model.found
+    parts = [part for part in alternative.form.parts if part.group.carried]
     if not parts:
         return []
-    robot = rival.found.final.model.robot
+    robot = alternative.found.final.model.robot
     ends = {name: (low[i], high[i]) for i, name in enumerate(robot.joint_names)}
     out = [fitted]
-    kept = fitted[: len(rival.kept)]
-    for group in _others(rival.form.parts):
+    kept = fitted[: len(alternative.kept)]
+    for group in _others(alternative.form.parts):
         curves = [
-            c for p in rival.form.parts for c in (group if p is parts[0] else p.group).carried
+            c
+            for p in alternative.form.parts
+            for c in (group if p is parts[0] else p.group).carried
         ]
-        out.append(_fitted(rival.found, (*kept, *curves)))
+        out.append(_fitted(alternative.found, (*kept, *curves)))
     return [tuple(_wide(effect, ends) for effect in effects) for effects in out]
 
 
@@ -222,10 +229,10 @@ def _others(parts: Sequence[Part]) -> list[Group]:
     return out[:RIVALS]
 
 
-def _fitted(found: Search, effects: Explanation) -> Explanation:
-    few = found.problem.thinned(ROWS)
-    scale = replace(found.scale, weights=tuple(np.ones(m) for m in few.samples))
-    return fit(few, found.final.model.with_found(effects), scale, None, 3).model.found
+def _fitted(result: Search, effects: Explanation) -> Explanation:
+    few = result.problem.thinned(ROWS)
+    scale = replace(result.scale, weights=tuple(np.ones(m) for m in few.samples))
+    return fit(few, result.final.model.with_found(effects), scale, None, 3).model.found
 
 
 def _wide(effect: Effect, ends: dict[str, tuple[float, float]]) -> Effect:

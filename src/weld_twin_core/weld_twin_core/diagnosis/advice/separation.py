@@ -133,11 +133,13 @@ def normals(
     out = Normals({}, {})
     # The first is believed most: what parts it from each other decides.
     others = range(1, len(alternatives))
-    for true, rival in [pair for k in others for pair in ((0, k), (k, 0))]:
-        names = sorted({n for side in (now, *ahead) for n in side.names[rival]})
-        held = _held(model.with_found(alternatives[rival]), names)
-        out.now[true, rival] = np.diag(held) + _normal(_stacked(now, true, rival, names))
-        stacks = [_stacked(side, true, rival, names) for side in ahead]
+    for true, alternative in [pair for k in others for pair in ((0, k), (k, 0))]:
+        names = sorted({n for side in (now, *ahead) for n in side.names[alternative]})
+        held = _held(model.with_found(alternatives[alternative]), names)
+        out.now[true, alternative] = np.diag(held) + _normal(
+            _stacked(now, true, alternative, names)
+        )
+        stacks = [_stacked(side, true, alternative, names) for side in ahead]
         matrices = []
         for piece in candidate.pieces:
             stack, side = stacks[piece.recording], ahead[piece.recording]
@@ -145,7 +147,7 @@ def normals(
                 at = np.add.outer(np.array(piece.rows) * side.rows, np.arange(side.rows))
                 stack = stack[:, at.ravel()]
             matrices.append(_normal(stack))
-        out.pieces[true, rival] = np.array(matrices)
+        out.pieces[true, alternative] = np.array(matrices)
     return out
 
 
@@ -161,12 +163,12 @@ def _held(model: Model, names: Sequence[str]) -> Array:
     return np.array([*(by_name.get(name, 0.0) for name in names), 0.0])
 
 
-def _stacked(side: Side, true: int, rival: int, names: list[str]) -> Array:
+def _stacked(side: Side, true: int, alternative: int, names: list[str]) -> Array:
     """Return the rival's columns in the order of the names and, last, the difference."""
-    columns = side.columns[rival]
+    columns = side.columns[alternative]
     out = np.zeros((len(names) + 1, columns.shape[1]))
-    out[[names.index(name) for name in side.names[rival]]] = columns
-    out[-1] = side.predicted[true] - side.predicted[rival]
+    out[[names.index(name) for name in side.names[alternative]]] = columns
+    out[-1] = side.predicted[true] - side.predicted[alternative]
     return out
 
 
@@ -206,8 +208,8 @@ def _ahead(
     side = _side(further, candidate.model, alternatives, with_weights(scale, further), mark)
     if recording.joints.static:
         return side
-    told = float(np.ptp(recording.joints.t)) / EVERY / made.seen.t.size
-    share = float(np.sqrt(min(told, 1.0)))
+    reported = float(np.ptp(recording.joints.t)) / EVERY / made.seen.t.size
+    share = float(np.sqrt(min(reported, 1.0)))
     return replace(
         side,
         predicted=[p * share for p in side.predicted],

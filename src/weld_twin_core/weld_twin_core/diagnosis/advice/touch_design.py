@@ -222,8 +222,8 @@ def chosen(
     order: list[int] = []
     after: list[Design] = []
     for _ in range(min(count, len(rows))):
-        told = np.where(free, design.told(rows, weight), -np.inf)
-        best = int(np.argmax(told))
+        reported = np.where(free, design.told(rows, weight), -np.inf)
+        best = int(np.argmax(reported))
         free[best] = False
         design = design.after(rows[best])
         order.append(best)

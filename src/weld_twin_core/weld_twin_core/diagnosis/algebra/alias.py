@@ -40,5 +40,5 @@ def outside(columns: Array, span: Array) -> Array:
 
 def share_outside(columns: Array, span: Array) -> Array:
     """Return the share of each column, shape (K,), that a span does not hold; 0 of one that is zero."""
-    left = np.linalg.norm(outside(columns, span), axis=1)
-    return np.asarray(left / np.maximum(np.linalg.norm(columns, axis=1), 1e-300))
+    remaining = np.linalg.norm(outside(columns, span), axis=1)
+    return np.asarray(remaining / np.maximum(np.linalg.norm(columns, axis=1), 1e-300))

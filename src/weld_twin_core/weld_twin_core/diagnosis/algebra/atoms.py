@@ -129,6 +129,8 @@ class MovedJoint:
 
     def __init__(self, row: Array, first: Index) -> None:
         self.row, self.first = row, first
+        sizes = np.diff(np.append(first, row.size))
+        self._alike = int(sizes[0]) if sizes.size and (sizes == sizes[0]).all() else None
         self.square = self.summed(row)
         self.most = np.maximum.reduceat(np.abs(row), first)
 
@@ -156,7 +158,11 @@ class MovedJoint:
 
     def summed(self, rows: Array) -> Array:
         """Return the products with other rows, shape (..., rows), sample by sample."""
-        return np.asarray(np.add.reduceat(self.row * rows, self.first, axis=-1))
+        if self._alike is None:
+            return np.asarray(np.add.reduceat(self.row * rows, self.first, axis=-1))
+        shape = (self.first.size, self._alike)
+        each = rows.reshape(*rows.shape[:-1], *shape)
+        return np.asarray(np.einsum('sc,...sc->...s', self.row.reshape(shape), each))
 
     def moved_by(self, each: Array) -> Array:
         """Return what amounts, shape (..., samples), do to the tool, shape (..., rows)."""

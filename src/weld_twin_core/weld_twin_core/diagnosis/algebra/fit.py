@@ -263,8 +263,8 @@ def robust_scale(
         Coordinates that the residuals' own data determined; they took their share of the noise.
 
     """
-    told = problem.told_weights
-    residuals = [part * np.sqrt(own) for part, own in zip(residuals, told, strict=True)]
+    reported = problem.told_weights
+    residuals = [part * np.sqrt(own) for part, own in zip(residuals, reported, strict=True)]
     lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
     residuals = problem.as_sure(residuals)
     position = np.concatenate([measured_axes(part[:3]).ravel() for part in residuals])
@@ -276,7 +276,7 @@ def robust_scale(
     sigma = max(sigma, 1e-9)
     sigma_turn = max(sigma_turn, LEAST_TURN * sigma)
     weights = []
-    for part, own in zip(residuals, told, strict=True):
+    for part, own in zip(residuals, reported, strict=True):
         off = np.sqrt((part[:3] ** 2).sum(axis=0) / 3.0) / sigma
         if part.shape[0] > 3:
             off = np.maximum(off, np.sqrt((part[3:] ** 2).sum(axis=0) / 3.0) / sigma_turn)
@@ -308,11 +308,11 @@ def trusted(weights: Sequence[Array], few: int = 1) -> list[NDArray[np.bool_]]:
 
 def _strays(weights: Sequence[Array]) -> int:
     """Return how many samples are strays; 0 where they are too many, or too many in a row."""
-    found, in_a_row = [weight < (HUBER / STRAY) ** 2 for weight in weights], 0
-    for stray in found:
+    result, in_a_row = [weight < (HUBER / STRAY) ** 2 for weight in weights], 0
+    for stray in result:
         runs = np.diff(np.flatnonzero(np.concatenate([[True], ~stray, [True]]))) - 1
         in_a_row = max(in_a_row, int(runs.max()))
-    count, samples = sum(int(stray.sum()) for stray in found), sum(part.size for part in found)
+    count, samples = sum(int(stray.sum()) for stray in result), sum(part.size for part in result)
     return count if in_a_row <= STRAYS_TOGETHER and count <= STRAYS * samples else 0
 
 

@@ -145,9 +145,9 @@ class Model:
         """Return the model without found effect k."""
         return self.with_found(self.found[:k] + self.found[k + 1 :])
 
-    def with_found(self, found: tuple[Effect, ...]) -> Model:
+    def with_found(self, result: tuple[Effect, ...]) -> Model:
         """Return the model with other found effects."""
-        return replace(self, found=found)
+        return replace(self, found=result)
 
 
 def _moved(frame: Array, step: Array, *, left: bool) -> Array:

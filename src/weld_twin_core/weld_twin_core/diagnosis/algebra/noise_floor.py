@@ -62,7 +62,7 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
     independent = True
     for recording, part in zip(problem.recordings, residuals, strict=True):
         position = measured_axes(part[:3])
-        left = spread_of(position)
+        remaining = spread_of(position)
         static = recording.joints.static
         direct = _repeats(recording.joints.q, position) if static else _differences(position)
         if direct is None and recording.measured is not None:
@@ -71,7 +71,7 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
             independent = False
         # Of a linear axis one coordinate was measured: the other two add nothing to a distance.
         share = float(np.sqrt(position.shape[0] / 3.0))
-        least = min(left, WIDEST) if direct is None else min(direct, left)
+        least = min(remaining, WIDEST) if direct is None else min(direct, remaining)
         estimates.append((share * least, part.shape[1]))
     values, counts = zip(*estimates, strict=True)
     return NoiseFloor(float(np.average(values, weights=counts)), independent)

@@ -60,7 +60,7 @@ def _anchored(problem: Problem, model: Model) -> tuple[Array, Array]:
     if 'tool' in problem.align:
         pairs.append((model.robot.T_flange_tool, anchor.tool, False))
     sizes = np.repeat([FRAME_SHIFT, FRAME_TURN], 3)
-    off = [frame_offset(now, was, left=left) for now, was, left in pairs]
+    off = [frame_offset(now, was, left=remaining) for now, was, remaining in pairs]
     return np.tile(sizes**-2.0, len(pairs)), np.concatenate([np.zeros(0), *off])
 
 

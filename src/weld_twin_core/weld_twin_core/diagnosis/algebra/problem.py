@@ -197,8 +197,8 @@ class Problem:
     @cached_property
     def roots(self) -> list[Array | None]:
         """Return what makes independent rows of each recording's poses; None of those not told."""
-        told = (_measured(r).noise for r in self.recordings)
-        return [None if noise is None else noise.root for noise in told]
+        reported = (_measured(r).noise for r in self.recordings)
+        return [None if noise is None else noise.root for noise in reported]
 
     def touching(self, model: Model) -> Problem:
         """Return the problem with its contacts as a model sees them; no contacts, no change."""
@@ -261,9 +261,9 @@ class Problem:
         Of contacts whose uncertainty is known, in shares of the surest; one for all others. Where
         recordings are differently sure, less for those that are not.
         """
-        told = [None if r.contacts is None else r.contacts.sigma for r in self.recordings]
-        least = min((float(sigma.min()) for sigma in told if sigma is not None), default=0.0)
-        pairs = zip(told, self.samples, strict=True)
+        reported = [None if r.contacts is None else r.contacts.sigma for r in self.recordings]
+        least = min((float(sigma.min()) for sigma in reported if sigma is not None), default=0.0)
+        pairs = zip(reported, self.samples, strict=True)
         out = [np.ones(m) if sigma is None else (least / sigma) ** 2 for sigma, m in pairs]
         if not self.loose:
             return out
@@ -337,8 +337,8 @@ class Problem:
             rows = rows.reshape(*rows.shape[:-2], rows.shape[-2] * rows.shape[-1])  # of none, too
             own = taken[k] if taken else None
             if own is not None:
-                ways, left = own
-                rows = rows - ((rows @ ways.T) * (1.0 - left)) @ ways
+                ways, remaining = own
+                rows = rows - ((rows @ ways.T) * (1.0 - remaining)) @ ways
             out.append(rows)
         return out[0] if len(out) == 1 else np.concatenate(out, axis=-1)
 

@@ -31,6 +31,7 @@ from ..result import (
     Changed,
     Check,
     Diagnosis,
+    Found,
     Gap,
     Shares,
     Shrink,
@@ -50,7 +51,7 @@ from .share_intervals import with_intervals
 
 
 def answer(
-    found: Search,
+    result: Search,
     unseen: Unseen,
     evidence: Evidence,
     verdict: Verdict,
@@ -58,7 +59,7 @@ def answer(
     examined: Examined,
     posterior: Posterior,
     before: Stated,
-    rival: Curved | None = None,
+    alternative: Curved | None = None,
     placing: FreeForm | None = None,
     limits: Limits | None = None,
 ) -> Diagnosis:
@@ -73,7 +74,7 @@ def answer(
         The models that the recordings allow.
     before : Stated
         The table of answers, and what is said of the names.
-    rival : Curved or None
+    alternative : Curved or None
         What explains the gap without a formula.
     placing : FreeForm or None
         What tells place and dependence of an unknown gap.
@@ -81,73 +82,79 @@ def answer(
         What the next experiment may cost, and where it has to stay; None plans none.
 
     """
-    forms = rival, evidence.floor, found.work.beliefs, placing
-    told, shares = causes(found, unseen, before.table, verdict, *forms)
-    verdict, told, statements = calibrated(verdict, told, before, placing)
-    told = with_intervals(told, found, unseen, verdict, evidence.floor)
-    effects, verdict, told = named_effects(found, unseen, verdict, told)
-    robot = found.baseline.model.robot
+    forms = alternative, evidence.floor, result.work.beliefs, placing
+    reported, shares = causes(result, unseen, before.table, verdict, *forms)
+    verdict, reported, statements = calibrated(verdict, reported, before, placing)
+    reported = with_intervals(reported, result, unseen, verdict, evidence.floor)
+    effects, verdict, reported = named_effects(result, unseen, verdict, reported, posterior)
+    step = None if limits is None else next_step(result, verdict, limits, alternative)
     return Diagnosis(
-        gap=gap(found, evidence.floor),
-        where=locate(found, unseen, told),
+        gap=gap(result, evidence.floor),
+        where=locate(result, unseen, reported),
         status=verdict.status,
         effects=effects,
         indistinguishable=verdict.sets,
         reasons=verdict.reasons,
-        candidates=weighed_candidates(found, evidence),
+        candidates=weighed_candidates(result, evidence),
         shrink=shrink,
-        unexplained=unexplained(found.work.beliefs, evidence, verdict, shrink, placing),
-        next_experiment=None if limits is None else next_step(found, verdict, limits, rival),
-        actions=actions([named.effect for named in effects], robot, found.final.model.mends),
-        model=found.final.model,
+        unexplained=unexplained(result.work.beliefs, evidence, verdict, shrink, placing),
+        next_experiment=step,
+        actions=_mended(result, effects),
+        model=result.final.model,
         families=verdict.families,
         evidence=evidence,
         posterior=posterior,
-        **_parted(unseen, told, shares, verdict),
+        **_parted(unseen, reported, shares, verdict),
         statements=statements,
-        contacts=contact_spreads(found, unseen),
-        **_compared(found, examined, verdict),
+        contacts=contact_spreads(result, unseen),
+        **_compared(result, examined, verdict),
     )
+
+
+def _mended(result: Search, effects: Sequence[Found]) -> tuple[str, ...]:
+    """Return what to do about every effect, in their order."""
+    robot = result.baseline.model.robot
+    return actions([each.effect for each in effects], robot, result.final.model.mends)
 
 
 def _parted(
     unseen: Unseen,
-    told: tuple[Cause, ...],
+    reported: tuple[Cause, ...],
     shares: Shares,
     verdict: Verdict,
 ) -> dict[str, Any]:
     """Return what the levels of an answer say; what each cause adds, where the model stands for it."""
     return {
-        'causes': told,
+        'causes': reported,
         'shares': shares,
-        'contributions': contributions(unseen, told),
+        'contributions': contributions(unseen, reported),
         'confidence': verdict.confidence,
         'sure': verdict.sure,
         'complete': verdict.complete,
     }
 
 
-def _compared(found: Search, examined: Examined, verdict: Verdict) -> dict[str, Any]:
+def _compared(result: Search, examined: Examined, verdict: Verdict) -> dict[str, Any]:
     """Return the recordings, what they say of each other, and what no recording can say."""
     named = examined.given.may_change
     return {
-        'efforts': compared(found.problem.recordings, found.baseline.model.robot),
-        'recordings': found.problem.recordings,
-        'traces': traces(found),
-        'absent': found.library.absent | dict.fromkeys(not_told(found.problem), NOT_TOLD),
-        'checks': (*examined.checks, *untold_check(found, named)),
-        'changed': changed(found, named),
+        'efforts': compared(result.problem.recordings, result.baseline.model.robot),
+        'recordings': result.problem.recordings,
+        'traces': traces(result),
+        'absent': result.library.absent | dict.fromkeys(not_told(result.problem), NOT_TOLD),
+        'checks': (*examined.checks, *untold_check(result, named)),
+        'changed': changed(result, named),
         'may_change': named,
-        'unsound': examined.told(found.final.model.found),
-        'same': never_parted(found.baseline.model.robot, found.work.problem.align, verdict.sets),
+        'unsound': examined.told(result.final.model.found),
+        'same': never_parted(result.baseline.model.robot, result.work.problem.align, verdict.sets),
     }
 
 
-def changed(found: Search, families: Sequence[str]) -> tuple[Changed, ...]:
+def changed(result: Search, families: Sequence[str]) -> tuple[Changed, ...]:
     """Return what differs between the recordings beyond noise, by recording."""
     if not families:
         return ()
-    items = told(found.problem, found.final.model, found.scale, found.precision, families)
+    items = told(result.problem, result.final.model, result.scale, result.precision, families)
     return tuple(
         Changed(
             item.change.recording,
@@ -158,9 +165,9 @@ def changed(found: Search, families: Sequence[str]) -> tuple[Changed, ...]:
     )
 
 
-def untold_check(found: Search, families: Sequence[str]) -> tuple[Check, ...]:
+def untold_check(result: Search, families: Sequence[str]) -> tuple[Check, ...]:
     """Return a note of what may have changed without being seen."""
-    names = untold(found.problem, found.final.model, families)
+    names = untold(result.problem, result.final.model, families)
     if not names:
         return ()
     return (
@@ -173,20 +180,20 @@ def untold_check(found: Search, families: Sequence[str]) -> tuple[Check, ...]:
     )
 
 
-def gap(found: Search, floor: float) -> Gap:
+def gap(result: Search, floor: float) -> Gap:
     """
     Return the size of the gap over trusted samples.
 
     Parameters
     ----------
-    found : Search
+    result : Search
         Its baseline holds frames and known effects only.
     floor : float
         RMS of the noise alone, [m].
 
     """
-    parts = found.problem.residuals(found.baseline.model)
-    good = trusted(found.scale.weights)
+    parts = result.problem.residuals(result.baseline.model)
+    good = trusted(result.scale.weights)
     distance = np.concatenate(
         [np.linalg.norm(p[:3, g], axis=0) for p, g in zip(parts, good, strict=True)]
     )
@@ -204,38 +211,38 @@ def gap(found: Search, floor: float) -> Gap:
     )
 
 
-def traces(found: Search) -> Traces:
+def traces(result: Search) -> Traces:
     """Return the position residuals before and after, sample by sample."""
-    recordings = found.problem.recordings
-    before = found.problem.residuals(found.baseline.model)
-    after = found.problem.residuals(found.final.model)
+    recordings = result.problem.recordings
+    before = result.problem.residuals(result.baseline.model)
+    after = result.problem.residuals(result.final.model)
     return Traces(
         t=tuple(r.measured.t for r in recordings if r.measured is not None),
         measured=tuple(r.measured.position for r in recordings if r.measured is not None),
         before=tuple(p[:3].T for p in before),
         after=tuple(p[:3].T for p in after),
-        trusted=tuple(trusted(found.scale.weights)),
+        trusted=tuple(trusted(result.scale.weights)),
     )
 
 
-def weighed_candidates(found: Search, evidence: Evidence) -> tuple[Candidate, ...]:
+def weighed_candidates(result: Search, evidence: Evidence) -> tuple[Candidate, ...]:
     """Return the hypotheses for every slot, those of the strongest effect first."""
     out = []
-    for slot in evidence.slots:
-        least = _position_rms(found, slot[0])
-        for rival in slot:
-            rms = evidence.after * _position_rms(found, rival) / max(least, 1e-300)
+    for candidate_set in evidence.slots:
+        least = _position_rms(result, candidate_set[0])
+        for alternative in candidate_set:
+            rms = evidence.after * _position_rms(result, alternative) / max(least, 1e-300)
             shrink = 1.0 - rms / max(evidence.gap, 1e-300)
-            out.append(Candidate(rival.site, rival.probability, rms, shrink))
+            out.append(Candidate(alternative.site, alternative.probability, rms, shrink))
     return tuple(out)
 
 
-def _position_rms(found: Search, rival: Rival) -> float:
+def _position_rms(result: Search, alternative: Rival) -> float:
     """Return the RMS position residual of a rival's fit, weighted, [m]."""
-    parts = found.work.problem.by_sample(rival.fit.residual)
+    parts = result.work.problem.by_sample(alternative.fit.residual)
     total = sum(float((part[:, :3] ** 2).sum()) for part in parts)
-    count = sum(found.work.problem.samples)
-    return found.work.scale.position * float(np.sqrt(total / max(count, 1)))
+    count = sum(result.work.problem.samples)
+    return result.work.scale.position * float(np.sqrt(total / max(count, 1)))
 
 
 def unexplained(

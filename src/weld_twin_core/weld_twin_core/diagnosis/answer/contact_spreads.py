@@ -21,7 +21,7 @@ BASE = (5e-3, 5e-3)
 back on its feet is off by that much."""
 
 
-def contact_spreads(found: Search, unseen: Unseen) -> ContactResult | None:
+def contact_spreads(result: Search, unseen: Unseen) -> ContactResult | None:
     """
     Return how far tool points are from their contacts, or None where an instrument measured.
 
@@ -31,11 +31,11 @@ def contact_spreads(found: Search, unseen: Unseen) -> ContactResult | None:
         Of the final model; each place is left out in turn where there are enough.
 
     """
-    problem = found.problem
+    problem = result.problem
     if not problem.touched:
         return None
-    before, was = _of(problem, found.baseline.model)
-    after, now = _of(problem, found.final.model)
+    before, was = _of(problem, result.baseline.model)
+    after, now = _of(problem, result.final.model)
     held = _held_out(unseen)
     touched = tuple(
         Touched(
@@ -52,40 +52,40 @@ def contact_spreads(found: Search, unseen: Unseen) -> ContactResult | None:
     was_m, now_m, held_m = (
         float(np.concatenate(list(each.values())).mean()) for each in (before, after, held)
     )
-    return ContactResult(was_m, now_m, held_m, touched, known, not_seen(found))
+    return ContactResult(was_m, now_m, held_m, touched, known, not_seen(result))
 
 
-def not_seen(found: Search) -> tuple[str, ...]:
+def not_seen(result: Search) -> tuple[str, ...]:
     """
     Return what no contact shows, in words: errors that would hide below the noise of all together.
 
     Each constant error of a joint or a link is taken as large as machines have it; what its
     columns move is counted once places and tool are fitted.
     """
-    problem, model, scale = found.problem, found.final.model, found.scale
+    problem, model, scale = result.problem, result.final.model, result.scale
     features = problem.features(model)
     frames = problem.whitened(problem.frame_columns(features)[0], scale)
     span, hidden = span_of(frames), dict[str, list[str]]()
     for effect in plain_causes(model.robot, features[0].view, ('constant',)):
         rows = problem.whitened(problem.effect_columns(features, effect), scale)
-        left = np.linalg.norm(outside(rows, span), axis=1)
-        size = left * spreads_of(model.robot, effect)
+        remaining = np.linalg.norm(outside(rows, span), axis=1)
+        size = remaining * spreads_of(model.robot, effect)
         if size.max(initial=0.0) < 1.0:
             hidden.setdefault(effect.name.replace('_', ' '), []).append(str(effect.site))
     listed = [f'{name} of {", ".join(sites)}' for name, sites in hidden.items()]
-    return (*_base_hidden(found), *listed)
+    return (*_base_hidden(result), *listed)
 
 
-def _base_hidden(found: Search) -> tuple[str, ...]:
+def _base_hidden(result: Search) -> tuple[str, ...]:
     """Return what of the base no contact shows: all of it unless places are known."""
-    problem, model = found.problem, found.final.model
+    problem, model = result.problem, result.final.model
     if not problem.placed:
         return ('where the base stands',) if problem.untracked else ()
     rows = [
         problem.seen(k, np.stack([maker.column(('base', j)) for j in range(6)]))
         for k, maker in enumerate(problem.features(model))
     ]
-    size = np.linalg.norm(problem.whitened(rows, found.scale), axis=1)
+    size = np.linalg.norm(problem.whitened(rows, result.scale), axis=1)
     shown = size * np.repeat(BASE, 3) >= 1.0
     words = [f'the base along {axis}' for axis in 'xyz']
     words += [f'a turn of the base about {axis}' for axis in 'xyz']

@@ -3,8 +3,9 @@
 """
 The effects that a verdict names, with their standard errors.
 
-A standard error is the largest of what three reasons give: the covariance of `algebra.spread`; other
-optima that fit nearly as well; and formulas that are idealised.
+A standard error is the largest of what four reasons give: the covariance of `algebra.spread`; other
+optima that fit nearly as well; formulas that are idealised; and the models that the recordings allow
+besides, in which an arm has a little of every small error.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
+from ...twin.posterior import Posterior
 from ..algebra import spread
 from ..algebra.designed import Design, designed
 from ..algebra.fit import coordinates
@@ -37,7 +39,11 @@ UNSEEN = 1e-2
 
 
 def named_effects(
-    found: Search, unseen: Unseen, verdict: Verdict, causes: Sequence[Cause]
+    result: Search,
+    unseen: Unseen,
+    verdict: Verdict,
+    causes: Sequence[Cause],
+    posterior: Posterior,
 ) -> tuple[tuple[Found, ...], Verdict, tuple[Cause, ...]]:
     """
     Return the effects told, those that move the tool most first.
@@ -46,6 +52,8 @@ def named_effects(
     ----------
     unseen : Unseen
         Of the final model; tells how far each effect moves the tool.
+    posterior : Posterior
+        The models that the recordings allow.
 
     Returns
     -------
@@ -56,19 +64,20 @@ def named_effects(
         Each with its index in both.
 
     """
-    model = found.final.model
-    told = _told(model.found, verdict, causes, dense=found.dense)
+    model = result.final.model
+    reported = _told(model.found, verdict, causes, dense=result.dense)
     squares = (unseen.targets[1:] ** 2).sum(axis=1)
-    told.sort(key=lambda pair: -squares[pair[0]])
-    if not told:
+    reported.sort(key=lambda pair: -squares[pair[0]])
+    if not reported:
         return (), replace(verdict, sets=()), tuple(replace(c, effect=None) for c in causes)
-    share = max(found.effective(found.small) / found.small.residual.size, LEAST_SHARE)
-    errors = standard_errors(found.problem, model, found.scale, found.precision, share)
-    effects = tuple(Found(model.found[member], errors[member]) for member, _ in told)
-    at = {group: k for k, (_, group) in enumerate(told)}
+    share = max(result.effective(result.small) / result.small.residual.size, LEAST_SHARE)
+    fitted = result.problem, model, result.scale, result.precision
+    errors = standard_errors(*fitted, share, posterior)
+    effects = tuple(Found(model.found[member], errors[member]) for member, _ in reported)
+    at = {group: k for k, (_, group) in enumerate(reported)}
     return (
         effects,
-        replace(verdict, sets=tuple(verdict.sets[group] for _, group in told)),
+        replace(verdict, sets=tuple(verdict.sets[group] for _, group in reported)),
         tuple(replace(c, effect=None if c.effect is None else at.get(c.effect)) for c in causes),
     )
 
@@ -89,7 +98,12 @@ def _told(
 
 
 def standard_errors(
-    problem: Problem, model: Model, scale: Scale, precision: Array, share: float
+    problem: Problem,
+    model: Model,
+    scale: Scale,
+    precision: Array,
+    share: float,
+    posterior: Posterior | None = None,
 ) -> list[dict[str, Any]]:
     """
     Return the standard errors of every found effect, in the shape of its parameters.
@@ -104,6 +118,8 @@ def standard_errors(
         Of the prior of all fit coordinates, about zero.
     share : float
         Of the rows that count as independent.
+    posterior : Posterior, optional
+        The models that the recordings allow; without, the one that was fitted alone counts.
 
     """
     if not model.found:
@@ -115,7 +131,10 @@ def standard_errors(
         own = np.sqrt(variance[at : at + size])
         at += size
         own = np.maximum(own, _elsewhere(problem, model, scale, k, share))
-        out.append(effect.fit.errors(np.hypot(own, idealised(effect))))
+        own = np.hypot(own, idealised(effect))
+        if posterior is not None:
+            own = np.maximum(own, posterior.doubt(effect))
+        out.append(effect.fit.errors(own))
     return out
 
 

@@ -39,7 +39,7 @@ TOLD = 5e-4
 
 
 def with_intervals(
-    told: Sequence[Cause], found: Search, unseen: Unseen, verdict: Verdict, floor: float
+    reported: Sequence[Cause], result: Search, unseen: Unseen, verdict: Verdict, floor: float
 ) -> tuple[Cause, ...]:
     """
     Return causes with the 90 % intervals of their shares.
@@ -53,13 +53,13 @@ def with_intervals(
         RMS of the noise alone [m].
 
     """
-    curved = len(found.slots) != len(unseen.parts)
-    if verdict.status == 'unknown' or curved or not any(found.slots) or not unseen.parts:
-        return tuple(covering(cause) for cause in told)
-    tries = _tries(found, unseen, floor)
+    curved = len(result.slots) != len(unseen.parts)
+    if verdict.status == 'unknown' or curved or not any(result.slots) or not unseen.parts:
+        return tuple(covering(cause) for cause in reported)
+    tries = _tries(result, unseen, floor)
     return tuple(
         covering(cause) if cause.rest else _held(cause, tries[:, list(cause.members)].sum(axis=1))
-        for cause in told
+        for cause in reported
     )
 
 
@@ -70,22 +70,22 @@ def _held(cause: Cause, tries: Array) -> Cause:
     return replace(cause, share_ci90=(float(max(low, 0.0)), float(min(high, 1.0))))
 
 
-def _tries(found: Search, unseen: Unseen, floor: float) -> Array:
+def _tries(result: Search, unseen: Unseen, floor: float) -> Array:
     """Return draws of the share of every effect, (DRAWS, K)."""
     rng = np.random.default_rng(SEED)
     before = float(unseen.squares(unseen.bare).mean())
     after = float(unseen.squares(unseen.whole).mean())
     noise = min(floor**2, after)
-    moved = _coordinates(rng, found, (after - noise) / max(after, 1e-300))
+    moved = _coordinates(rng, result, (after - noise) / max(after, 1e-300))
     parted = _parted(_along(unseen, moved))
-    unsure = _noise_unsure(found, unseen, noise, before, after)
+    unsure = _noise_unsure(result, unseen, noise, before, after)
     # Of what is left above the noise any part may be the causes'.
-    left = rng.uniform(noise, after, DRAWS) + unsure * rng.standard_normal(DRAWS)
-    explained = 1.0 - left[:, None] / before
-    return parted * explained + _of_members(rng, found) * (1.0 - after / before)
+    remaining = rng.uniform(noise, after, DRAWS) + unsure * rng.standard_normal(DRAWS)
+    explained = 1.0 - remaining[:, None] / before
+    return parted * explained + _of_members(rng, result) * (1.0 - after / before)
 
 
-def _coordinates(rng: np.random.Generator, found: Search, missed: float) -> Array:
+def _coordinates(rng: np.random.Generator, result: Search, missed: float) -> Array:
     """
     Return how far the coordinates of all effects may be off, (DRAWS, K).
 
@@ -96,13 +96,15 @@ def _coordinates(rng: np.random.Generator, found: Search, missed: float) -> Arra
         formulas are believed to miss does.
 
     """
-    rows = found.small.residual.size
+    rows = result.small.residual.size
     doubt = (
-        1.0 / max(found.effective(found.small), 1.0)
-        + missed / found.work.beliefs.misfit_directions
+        1.0 / max(result.effective(result.small), 1.0)
+        + missed / result.work.beliefs.misfit_directions
     )
-    model = found.final.model
-    spread = covariance(found.problem, model, found.scale, found.precision, 1.0 / (rows * doubt))
+    model = result.final.model
+    spread = covariance(
+        result.problem, model, result.scale, result.precision, 1.0 / (rows * doubt)
+    )
     # A coordinate on a bound, or that the data do not show, stays.
     spread = np.nan_to_num(spread) + np.diag(
         np.concatenate([idealised(effect) for effect in model.found]) ** 2
@@ -134,37 +136,39 @@ def _parted(along: Array) -> Array:
 
 
 def _noise_unsure(
-    found: Search, unseen: Unseen, noise: float, before: float, after: float
+    result: Search, unseen: Unseen, noise: float, before: float, after: float
 ) -> float:
     """Return how far off the noise's part of the gap may be, standard deviation [m^2]."""
-    share = effective_share(found.final.residual, found.problem.rows, found.problem.samples)
+    share = effective_share(result.final.residual, result.problem.rows, result.problem.samples)
     count = 3.0 * share * unseen.trusted_labels().size
     # It happens to lie along the gap or against it; and its square is known from so many rows.
     along = 2.0 * np.sqrt(noise * before / count) * after / before
     return float(np.hypot(along, noise * np.sqrt(2.0 / count)))
 
 
-def _of_members(rng: np.random.Generator, found: Search) -> Array:
+def _of_members(rng: np.random.Generator, result: Search) -> Array:
     """Return what other members of the sets would change in the part of every effect, drawn."""
-    model = found.final.model.found
+    model = result.final.model.found
     sites = [Site(effect.name, effect.site) for effect in model]
     out = np.zeros((DRAWS, len(sites)))
-    for k, slot in enumerate(found.slots[: len(sites)]):
-        likely = [rival for rival in slot if rival.probability >= LISTED]
-        if len(likely) < 2 or sites[k] not in [rival.site for rival in likely]:
+    for k, candidate_set in enumerate(result.slots[: len(sites)]):
+        likely = [
+            alternative for alternative in candidate_set if alternative.probability >= LISTED
+        ]
+        if len(likely) < 2 or sites[k] not in [alternative.site for alternative in likely]:
             continue
-        parts = np.array([_with_member(found, rival, sites, k) for rival in likely])
-        own = parts[[rival.site for rival in likely].index(sites[k])]
-        belief = np.array([rival.probability for rival in likely])
+        parts = np.array([_with_member(result, alternative, sites, k) for alternative in likely])
+        own = parts[[alternative.site for alternative in likely].index(sites[k])]
+        belief = np.array([alternative.probability for alternative in likely])
         out += (parts - own)[rng.choice(len(likely), DRAWS, p=belief / belief.sum())]
     return out
 
 
-def _with_member(found: Search, rival: Rival, sites: list[Site], k: int) -> Array:
+def _with_member(result: Search, alternative: Rival, sites: list[Site], k: int) -> Array:
     """Return the part of every effect, (K,), where a rival stands in the place of effect k."""
     out = np.zeros(len(sites))
-    parts = _fitted_parts(found.work.problem, found.work.scale, rival.fit)
-    for effect, part in zip(rival.fit.model.found, parts, strict=True):
+    parts = _fitted_parts(result.work.problem, result.work.scale, alternative.fit)
+    for effect, part in zip(alternative.fit.model.found, parts, strict=True):
         site = Site(effect.name, effect.site)
         out[sites.index(site) if site in sites else k] += part
     return out

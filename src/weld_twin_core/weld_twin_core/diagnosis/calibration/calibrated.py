@@ -16,7 +16,7 @@ from ..result import NAMING, Cause
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
-from .features import Numbers, of_level, of_name, of_rest, of_situation, of_whole
+from .features import TOLD_AS, Numbers, of_level, of_name, of_rest, of_situation, of_whole
 from .weights import Calibration, Features, usual_calibration
 
 Key = TypeVar('Key')
@@ -59,6 +59,9 @@ class Stated:
     ----------
     names : tuple of Statement
         Of every effect found; of many small errors one for all that are named.
+    nameless : Statement or None
+        That a cause without a name is at work; None of many small errors, and where nothing was
+        found.
     situation : mapping from str to float
         Features of the diagnosis as a whole.
     rival : Curved or None
@@ -68,37 +71,48 @@ class Stated:
 
     table: tuple[Row, ...]
     names: tuple[Statement, ...]
+    nameless: Statement | None
     situation: Features
     rival: Curved | None
 
+    def put_to(self, evidence: Evidence) -> Evidence:
+        """Return evidence with what is believed of the names, and that a cause has none."""
+        believed = tuple(one.probability for one in self.names)
+        nameless = 0.0 if self.nameless is None else self.nameless.probability
+        return replace(evidence, believed=believed, nameless=nameless)
+
 
 def stated(
-    found: Search,
+    result: Search,
     unseen: Unseen,
     evidence: Evidence,
     table: tuple[Row, ...],
-    rival: Curved | None,
+    alternative: Curved | None,
 ) -> Stated:
     """
-    Return how probable it is of every effect found that one of its names is right.
+    Return how probable it is of every effect found that one of its names is right, or that none can be.
 
     Parameters
     ----------
-    rival : Curved or None
+    alternative : Curved or None
         The free-form explanation in place of all names.
 
     """
     learned = usual_calibration()
-    situation = of_situation(found, unseen, evidence, rival)
-    if found.dense:
+    situation = of_situation(result, unseen, evidence, alternative)
+    if result.dense:
         names = [Statement('name of many', 0, dict(situation), KIND)]
-        return Stated(table, tuple(names), situation, rival)
+        return Stated(table, tuple(names), None, situation, alternative)
     sizes = [unseen.rms(part) / max(evidence.floor, 1e-12) for part in unseen.targets[1:]]
     each = zip(table, sizes, unseen.wandered(), strict=False)
     on = evidence.structure.depends_on
     every = [of_name(row, size, float(wandered), on) for row, size, wandered in each]
     names = [_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every)]
-    return Stated(table, tuple(names), situation, rival)
+    if not names:
+        return Stated(table, (), None, situation, alternative)
+    whole = of_whole([one.probability for one in names], [one.features for one in names])
+    nameless = _told('nameless', None, {**situation, **whole}, learned)
+    return Stated(table, tuple(names), nameless, situation, alternative)
 
 
 def calibrated(
@@ -121,19 +135,20 @@ def calibrated(
 
     """
     learned = usual_calibration()
-    told, said = list[Cause](), list[Statement]()
+    reported, said = list[Cause](), list[Statement]()
     for k, cause in enumerate(causes):
         levels = _levels(k, cause, bool(verdict.families), before, placing, learned)
-        told.append(_with(cause, [one.probability for one in levels], learned))
+        reported.append(_with(cause, [one.probability for one in levels], learned))
         said += levels
-    slots = [cause for cause in told if cause.slot is not None]
+    slots = [cause for cause in reported if cause.slot is not None]
     names = [before.names[cause.slot].features for cause in slots if cause.slot is not None]
     whole = of_whole([cause.probability for cause in slots], names)
     verdict, more = _of_answer(verdict, {**before.situation, **whole}, learned)
     if verdict.sure and verdict.status in NAMING:
         # Who is sure of the whole answer is sure of each part of it.
-        told = [replace(cause, sure=True) for cause in told]
-    return verdict, tuple(told), (*said, *more)
+        reported = [replace(cause, sure=True) for cause in reported]
+    first = () if before.nameless is None else (before.nameless,)
+    return verdict, tuple(reported), (*said, *first, *more)
 
 
 def _levels(
@@ -152,8 +167,8 @@ def _levels(
         levels = [_told(one, k, more, learned) for one, more in zip(both, own, strict=True)]
         return [*levels, replace(name, cause=k)]
     if many and cause.name and not cause.rest:
-        told = {'place': KIND_AT, 'dependence': KIND_AT, 'name': KIND}
-        return [Statement(f'{on} of many', k, dict(situation), p) for on, p in told.items()]
+        reported = {'place': KIND_AT, 'dependence': KIND_AT, 'name': KIND}
+        return [Statement(f'{on} of many', k, dict(situation), p) for on, p in reported.items()]
     own = [{**situation, **of_rest(cause, level, placing)} for level in both]
     return [
         _told(f'{level} of the rest', k, more, learned)
@@ -166,9 +181,9 @@ def _of_answer(
 ) -> tuple[Verdict, list[Statement]]:
     """Return the verdict with how probable it is, and that nothing is missing."""
     group = 'many' if verdict.families else 'named' if verdict.status in NAMING else verdict.status
-    complete, answer = (
-        _told(kind, None, features, calibration) for kind in ('complete', f'answer, {group}')
-    )
+    told_as = {**features, **{f'told as {one}': float(group == one) for one in TOLD_AS}}
+    complete = _told('complete', None, told_as, calibration)
+    answer = _told(f'answer, {group}', None, features, calibration)
     out = replace(
         verdict,
         confidence=answer.probability,
@@ -194,14 +209,14 @@ def _with(cause: Cause, levels: Sequence[float], calibration: Calibration) -> Ca
         return replace(cause, name=named, probability=name[0], sure=False)
     if cause.slot is not None:
         place, dependence = (name[0] + (1.0 - name[0]) * p for p in (place, dependence))
-    told = name[0] if name else place if cause.place else 0.0
+    reported = name[0] if name else place if cause.place else 0.0
     return replace(
         cause,
         place=_led(cause.place, place),
         dependence=_led(cause.dependence, dependence),
         name=_scaled(cause.name, name[0]) if name else cause.name,
-        probability=told,
-        sure=calibration.sure('cause', told),
+        probability=reported,
+        sure=calibration.sure('cause', reported),
     )
 
 

@@ -30,6 +30,8 @@ MOVES = 0.02
 """Travel [rad, m] from which on a joint shows something at all."""
 ONLY = 'only '
 """Before a family that is named alone: some stand in for causes that no library has."""
+TOLD_AS = ('many', 'none', 'unknown')
+"""What an answer may be told as that names no few effects: what is missing hangs on it above all."""
 KINDS = {
     'name': 'one of the names of an effect found is right',
     'place': 'its place is right although its name is not',
@@ -39,6 +41,7 @@ KINDS = {
     'dependence of many': 'what they depend on is right',
     'place of the rest': 'the place of what has no name is right',
     'dependence of the rest': 'what it depends on is right',
+    'nameless': 'a cause is at work that has no name in the library, and what is named is wrong',
     'complete': 'no cause above the noise and a tenth of the squared gap is missing',
     'answer, named': 'the whole answer is right, where it is identified or ambiguous',
     'answer, unknown': 'the whole answer is right, where it is unknown',
@@ -49,52 +52,52 @@ KINDS = {
 
 
 def of_situation(
-    found: Search, unseen: Unseen, evidence: Evidence, rival: Curved | None
+    result: Search, unseen: Unseen, evidence: Evidence, alternative: Curved | None
 ) -> Numbers:
     """
     Return the features that all statements of a diagnosis share.
 
     Parameters
     ----------
-    found : Search
+    result : Search
         The effects found.
     unseen : Unseen
         Of its final model.
-    rival : Curved or None
+    alternative : Curved or None
         The free-form explanation in place of all names.
 
     """
     floor = max(evidence.floor, 1e-12)
     elsewhere = evidence.after if evidence.least is None else min(evidence.after, evidence.least)
-    travel = np.max([np.ptp(r.joints.q, axis=0) for r in found.problem.recordings], axis=0)
+    travel = np.max([np.ptp(r.joints.q, axis=0) for r in result.problem.recordings], axis=0)
     return plain(
         {
             'gap': log(evidence.gap / floor),
             'left': log(evidence.after / floor),
             'left elsewhere': log(elsewhere / max(evidence.fitted * evidence.chance, 1e-12)),
-            'left unexplained': Left(evidence, found.work.beliefs).share,
+            'left unexplained': Left(evidence, result.work.beliefs).share,
             'structure': evidence.structure.gain,
             'structure, errors': evidence.structure.sure,
-            'rows': log(found.effective(found.small)),
+            'rows': log(result.effective(result.small)),
             'joints moving': float((travel > MOVES).mean()),
             'causes': len(evidence.slots),
             'refused': len(evidence.refused),
-            'lacking': len(evidence.lacking),
+            'lacking': float(bool(evidence.lacking)),
             'cancelling': log(sum(evidence.parts)) if evidence.parts else 0.0,
-            'stations': float(found.problem.recordings[0].joints.static),
-            **_of_curves(unseen, rival),
+            'stations': float(result.problem.recordings[0].joints.static),
+            **_of_curves(unseen, alternative),
         }
     )
 
 
-def _of_curves(unseen: Unseen, rival: Curved | None) -> Numbers:
+def _of_curves(unseen: Unseen, alternative: Curved | None) -> Numbers:
     """Return how curves without a name compare with the names."""
-    if rival is None:
+    if alternative is None:
         return dict.fromkeys(('curves', 'curves instead', 'form'), 0.0)
     return {
-        'curves': len(rival.form.parts),
-        'curves instead': max(gain_of(unseen, rival.unseen)[0], -1.0),
-        'form': rival.form.gain,
+        'curves': len(alternative.form.parts),
+        'curves instead': max(gain_of(unseen, alternative.unseen)[0], -1.0),
+        'form': alternative.form.gain,
     }
 
 
@@ -133,7 +136,7 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
     )
 
 
-def of_level(row: Row, level: str, rival: Curved | None) -> Numbers:
+def of_level(row: Row, level: str, alternative: Curved | None) -> Numbers:
     """
     Return the features of the place, or of the dependence, of an effect found.
 
@@ -141,13 +144,13 @@ def of_level(row: Row, level: str, rival: Curved | None) -> Numbers:
     ----------
     level : str
         'place' or 'dependence'.
-    rival : Curved or None
+    alternative : Curved or None
         The free-form explanation; it may find the same.
 
     """
     weights = row.places() if level == 'place' else row.dependences()
     own = max(weights, key=lambda key: weights[key])
-    parts = rival.form.parts if rival is not None else ()
+    parts = alternative.form.parts if alternative is not None else ()
     seen = {part.group.at if level == 'place' else part.group.on for part in parts}
     return plain({f'weight of the {level}': odds(weights[own]), 'form agrees': float(own in seen)})
 
@@ -190,7 +193,10 @@ def of_whole(probabilities: Sequence[float], names: Sequence[Mapping[str, float]
 
     """
     alone = {
-        key: 1.0 for own in names for key, told in own.items() if key.startswith(ONLY) and told
+        key: 1.0
+        for own in names
+        for key, reported in own.items()
+        if key.startswith(ONLY) and reported
     }
     return plain(
         {

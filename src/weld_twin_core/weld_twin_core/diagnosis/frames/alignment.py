@@ -55,9 +55,9 @@ def initial_frames(problem: Problem, model: Model) -> Model:
         return model
     best = model
     for attempt in _attempts(align):
-        found = attempt(own, model)
-        if _gap(own, found) < _gap(own, best):
-            best = found
+        result = attempt(own, model)
+        if _gap(own, result) < _gap(own, best):
+            best = result
         if _gap(own, best) < NEAR:
             break
     return refined(few, best)
@@ -83,11 +83,11 @@ def rough_frames(
 
 def refined(problem: Problem, model: Model) -> Model:
     """Return the frames after a robust least-squares fit of the frames in ``problem.align``."""
-    found, model = model.found, model.with_found(())
+    result, model = model.found, model.with_found(())
     for _ in range(3):
         scale = robust_scale(problem, problem.residuals(model))
         model = fit(problem, model, scale, iterations=8).model
-    return model.with_found(found)
+    return model.with_found(result)
 
 
 def _attempts(align: frozenset[str]) -> list[Callable[[list[Track], Model], Model]]:
@@ -126,8 +126,8 @@ def _median_gap(tracks: list[Track], bases: tuple[Array, ...], tool: Array) -> f
 
 def _base_only(tracks: list[Track], model: Model) -> Model:
     tools, starts = model.robot.T_flange_tool[None], [base[None] for base in model.bases]
-    found = bases_of([Track.side_by_side([track]) for track in tracks], starts, tools)
-    return replace(model, bases=tuple(base[0] for base in found))
+    result = bases_of([Track.side_by_side([track]) for track in tracks], starts, tools)
+    return replace(model, bases=tuple(base[0] for base in result))
 
 
 def _tool_only(tracks: list[Track], model: Model) -> Model:

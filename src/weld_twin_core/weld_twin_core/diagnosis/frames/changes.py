@@ -117,8 +117,8 @@ def with_changes(
     candidates = _candidates(problem, model.robot, families)
     if not candidates:
         return problem, model
-    found = model.found
-    if not found:
+    result = model.found
+    if not result:
         # What all recordings have in common must not pass for what differs between them.
         model, precision = model.with_found(constant_errors(model.robot)), None
     prior = effect_precision(model) if precision is None else precision
@@ -132,7 +132,7 @@ def with_changes(
     few = replace(every, changes=picked)
     model = fit(few, model, scale, prior, iterations=8).model
     problem = replace(problem, changes=picked)
-    return problem, model if found else model.with_found(())
+    return problem, model if result else model.with_found(())
 
 
 def constant_errors(robot: Robot) -> tuple[Effect, ...]:
@@ -235,29 +235,29 @@ def _evidence(
     return gain - volume + 0.5 * float(np.log(ridge[more]).sum())
 
 
-def settled_between(found: Search, families: Sequence[str], beliefs: Beliefs) -> Search:
+def settled_between(result: Search, families: Sequence[str], beliefs: Beliefs) -> Search:
     """
     Return what was found with the differences between recordings chosen anew beside it.
 
     Before the effects were found, what they leave could pass for a difference, or hide one.
     """
-    if len(found.problem.recordings) < 2 or not families:
-        return found
-    before = [_site(change) for change in found.problem.changes]
+    if len(result.problem.recordings) < 2 or not families:
+        return result
+    before = [_site(change) for change in result.problem.changes]
     problem, model = with_changes(
-        found.problem, found.final.model, families, beliefs, found.precision
+        result.problem, result.final.model, families, beliefs, result.precision
     )
     scale = robust_scale(problem, problem.residuals(model))
-    final, scale = robust_fit(problem, model, scale, found.precision, rounds=1)
-    found = replace(found, problem=problem, scale=scale, final=final)
+    final, scale = robust_fit(problem, model, scale, result.precision, rounds=1)
+    result = replace(result, problem=problem, scale=scale, final=final)
     if [_site(change) for change in problem.changes] == before:
-        return found
-    work = replace(found.work, problem=replace(found.work.problem, changes=problem.changes))
-    small = replace(found.small.model, changes=final.model.changes)
-    start = replace(found.baseline.model, changes=final.model.changes)
+        return result
+    work = replace(result.work, problem=replace(result.work.problem, changes=problem.changes))
+    small = replace(result.small.model, changes=final.model.changes)
+    start = replace(result.baseline.model, changes=final.model.changes)
     bare, _ = robust_fit(problem, start, robust_scale(problem, problem.residuals(start)))
-    small_fit = replace(found.small, model=small)
-    return replace(found, work=work, small=small_fit, baseline=bare)
+    small_fit = replace(result.small, model=small)
+    return replace(result, work=work, small=small_fit, baseline=bare)
 
 
 def _site(change: Change) -> tuple[int, str, str | None]:
@@ -289,8 +289,8 @@ def told(
     for kind in (REGISTRY[name] for name in families):
         if kind.traits.fitted_with == 'base' and 'base' in problem.align:
             out += _bases(kind, problem, model, whole)
-    found = sorted(out, key=lambda each: each.change.recording)
-    return tuple(each for each in found if each.sure)
+    result = sorted(out, key=lambda each: each.change.recording)
+    return tuple(each for each in result if each.sure)
 
 
 def _bases(kind: type[Effect], problem: Problem, model: Model, whole: Array) -> list[Told]:
@@ -334,11 +334,11 @@ def untold(problem: Problem, model: Model, families: Sequence[str]) -> list[str]
     every = replace(thin, changes=candidates)
     free = replace(model, changes=candidates)
     inverse, size = unit_inverse(*_columns(every, free, scale, effect_precision(model)))
-    left = np.sqrt(np.diag(inverse)) / size
+    remaining = np.sqrt(np.diag(inverse)) / size
     out: dict[str, None] = {}
     for change, part in zip(candidates, _places(every, free), strict=True):
         effect = change.effect
-        open_ = left[part] > UNTOLD * spreads(model.robot, effect)
+        open_ = remaining[part] > UNTOLD * spreads(model.robot, effect)
         if open_.any():
             words = effect.name + (f' of {effect.site}' if effect.site else '')
             out[words if open_.all() else f'{words} (in part)'] = None

@@ -56,15 +56,15 @@ def in_turn(
         Tool vectors to start from.
 
     """
-    found = _started(bases, vectors)
+    result = _started(bases, vectors)
     for _ in range(ROUNDS):
-        found = [_based(*pair, turn, vectors, STEPS) for pair in zip(tracks, found, strict=True)]
-        vectors = _vectors(tracks, found, turn, vectors)
-    found = [_based(*pair, turn, vectors, ROUNDS) for pair in zip(tracks, found, strict=True)]
-    gaps = [_gaps(*pair, turn, vectors) for pair in zip(tracks, found, strict=True)]
+        result = [_based(*pair, turn, vectors, STEPS) for pair in zip(tracks, result, strict=True)]
+        vectors = _vectors(tracks, result, turn, vectors)
+    result = [_based(*pair, turn, vectors, ROUNDS) for pair in zip(tracks, result, strict=True)]
+    gaps = [_gaps(*pair, turn, vectors) for pair in zip(tracks, result, strict=True)]
     best = np.median(np.concatenate(gaps, axis=2), axis=2).argmin(axis=1)
     each = np.arange(len(best)), best
-    frames = tuple(transform(base.rotation[each], base.origin[each]) for base in found)
+    frames = tuple(transform(base.rotation[each], base.origin[each]) for base in result)
     return frames, transform(turn, vectors[each])
 
 
@@ -72,8 +72,8 @@ def bases_of(tracks: Sequence[Track], bases: Sequence[Array], tools: Array) -> t
     """Return the base frames of known tools, each (T, 4, 4); see `in_turn`."""
     turn, vectors = tools[:, :3, :3], tools[:, None, :3, 3]
     pairs = zip(tracks, _started(bases, vectors), strict=True)
-    found = [_based(*pair, turn, vectors, ROUNDS) for pair in pairs]
-    return tuple(transform(base.rotation[:, 0], base.origin[:, 0]) for base in found)
+    result = [_based(*pair, turn, vectors, ROUNDS) for pair in pairs]
+    return tuple(transform(base.rotation[:, 0], base.origin[:, 0]) for base in result)
 
 
 def _started(bases: Sequence[Array], vectors: Array) -> list[Bases]:

@@ -85,28 +85,28 @@ def shown(
     return kept, size[live], *np.linalg.eigh(scaled @ scaled.T)
 
 
-def held(found: Fit, problem: Problem, scale: Scale, precision: Array, given: Robot) -> Fit:
+def held(result: Fit, problem: Problem, scale: Scale, precision: Array, given: Robot) -> Fit:
     """
     Return the fit with the open directions as they were given, where the data bear that.
 
     ``precision``, (K,), is the prior precision of the found effects' coordinates, and may be
     empty; ``given`` has the frames that were given.
     """
-    free = open_directions(problem, found.model)
+    free = open_directions(problem, result.model)
     if not free.vectors.size:
-        return found
-    off, weight = _off(problem, found.model, given)
+        return result
+    off, weight = _off(problem, result.model, given)
     back = np.linalg.lstsq(weight[:, None] * free.vectors, -weight * off, rcond=1e-9)[0]
-    count = problem.shared_count + _between(found.model) + found.coordinates.size
+    count = problem.shared_count + _between(result.model) + result.coordinates.size
     step = np.concatenate([free.vectors @ back, np.zeros(count)])
-    model = stepped(problem, found.model, step)
+    model = stepped(problem, result.model, step)
     for _ in range(ROUNDS):
         model = stepped(problem, model, _closed_step(problem, model, scale, precision, free))
     residual = problem.whitened(problem.residuals(model), scale)
-    share = effective_share(found.residual, problem.rows, problem.samples)
-    most = WORSE * free.vectors.shape[1] / share * found.rss / max(found.residual.size, 1)
-    if residual @ residual > found.rss + most:
-        return found
+    share = effective_share(result.residual, problem.rows, problem.samples)
+    most = WORSE * free.vectors.shape[1] / share * result.rss / max(result.residual.size, 1)
+    if residual @ residual > result.rss + most:
+        return result
     return fit(problem, model, scale, precision if precision.size else None, iterations=0)
 
 

@@ -83,12 +83,15 @@ def never_parted(
     out = []
     for group in sets:
         known = [site for site in group if site.effect in REGISTRY]
-        left = [site for site in known if constant(REGISTRY[site.effect])]
-        left.sort(key=lambda site: not REGISTRY[site.effect].traits.set_at_controller)
-        while len(left) > 1:
-            first = of_no_size(left[0])
-            same = [left[0], *(s for s in left[1:] if always(robot, first, of_no_size(s), align))]
-            left = [site for site in left if site not in same]
+        remaining = [site for site in known if constant(REGISTRY[site.effect])]
+        remaining.sort(key=lambda site: not REGISTRY[site.effect].traits.set_at_controller)
+        while len(remaining) > 1:
+            first = of_no_size(remaining[0])
+            same = [
+                remaining[0],
+                *(s for s in remaining[1:] if always(robot, first, of_no_size(s), align)),
+            ]
+            remaining = [site for site in remaining if site not in same]
             if len(same) > 1:
                 out.append(tuple(same))
     return tuple(out)

@@ -46,8 +46,8 @@ class Library:
 
     def products(self, rows: Array) -> Array:
         """Return the products of all columns with rows, shape (R, rows), as shape (P, R)."""
-        found = [piece.products(rows) for piece in self.pieces]
-        return np.concatenate([np.zeros((0, rows.shape[0])), *found])
+        result = [piece.products(rows) for piece in self.pieces]
+        return np.concatenate([np.zeros((0, rows.shape[0])), *result])
 
     def column(self, number: int) -> Array:
         """Return one column, whitened, shape (rows,)."""
@@ -127,9 +127,9 @@ class _Shelf:
         if reason is not None:
             self.absent[kind.name] = reason
             return
-        found, trials = self._seeds(kind, joint)
-        seeds = [seed for seed in found if not hardly_moves(self.features, seed)]
-        if len(seeds) < len(found):
+        result, trials = self._seeds(kind, joint)
+        seeds = [seed for seed in result if not hardly_moves(self.features, seed)]
+        if len(seeds) < len(result):
             self._leave_out(kind.name, str(joint))
         self._place(kind.name, joint, seeds, trials)
 
@@ -144,8 +144,10 @@ class _Shelf:
 
     def _leave_out(self, family: str, joint: str) -> None:
         """Tell that a joint, too, hardly moves."""
-        told = self.absent.get(family, '')
-        others = told.removeprefix(f'{REASON} (').rstrip(')') if told.startswith(REASON) else ''
+        reported = self.absent.get(family, '')
+        others = (
+            reported.removeprefix(f'{REASON} (').rstrip(')') if reported.startswith(REASON) else ''
+        )
         joints = [*filter(None, others.split(', ')), joint]
         self.absent[family] = f'{REASON} ({", ".join(dict.fromkeys(joints))})'
 

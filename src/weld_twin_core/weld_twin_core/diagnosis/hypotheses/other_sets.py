@@ -138,10 +138,10 @@ class Sets:
     def of(self, wanted: Sequence[_Site]) -> list[Choice]:
         """Return some units as a set, each with the seed that serves it best beside the others."""
         chosen: list[Choice] = []
-        left = set(wanted)
-        while best := next((c for c in self.beside(chosen) if c.unit.site in left), None):
+        remaining = set(wanted)
+        while best := next((c for c in self.beside(chosen) if c.unit.site in remaining), None):
             chosen.append(best)
-            left.remove(best.unit.site)
+            remaining.remove(best.unit.site)
         return chosen
 
     def without(self, start: list[Choice], never: _Site) -> list[Choice]:
@@ -221,11 +221,11 @@ def _others(
 def _fitted(work: Workspace, now: Fit, chosen: Sequence[Choice]) -> Fit:
     """Return the fit of a set; what was found before starts at its values."""
     known = {(effect.name, effect.site): effect for effect in now.model.found}
-    found = tuple(known[site] for site in _names(chosen) if site in known)
+    result = tuple(known[site] for site in _names(chosen) if site in known)
     for choice in chosen:
         if choice.unit.site not in known:
-            found = merged(found, choice.effect())
-    return fit(work.problem, now.model.with_found(found), work.scale, None, 8)
+            result = merged(result, choice.effect())
+    return fit(work.problem, now.model.with_found(result), work.scale, None, 8)
 
 
 def ahead(work: Workspace, own: Fit, now: Fit, effective: Callable[[Fit], float]) -> float:
@@ -244,12 +244,14 @@ def ahead(work: Workspace, own: Fit, now: Fit, effective: Callable[[Fit], float]
     """
     trials = {unit.site: float(np.log(unit.trials)) for unit in work.library.units}
 
-    def cost(found: Fit) -> float:
-        return sum(trials.get(site, 0.0) + work.beliefs.enter_nats for site in sites(found))
+    def cost(result: Fit) -> float:
+        return sum(trials.get(site, 0.0) + work.beliefs.enter_nats for site in sites(result))
 
     more = float(own.coordinates.size - now.coordinates.size)
-    count = effective(min((now, own), key=lambda f: f.rss))
-    return evidence(now.rss, now.rss - own.rss, more, count) - cost(own) + cost(now)
+    differing = {family for family, _ in set(sites(own)) ^ set(sites(now))}
+    count = work.independent((now, own), differing, effective)
+    before, after = (work.left(one, differing) for one in (now, own))
+    return evidence(before, before - after, more, count) - cost(own) + cost(now)
 
 
 def _columns(chosen: Sequence[Choice]) -> list[int]:

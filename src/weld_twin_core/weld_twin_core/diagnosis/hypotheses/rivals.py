@@ -73,12 +73,12 @@ def rivals(
     rest = work.without(now, k).fit
     ranked, tried = contenders(work, rest, effective(now), now.model.found)
     own = next((c for c in ranked if c.unit.site == (effect.name, effect.site)), None)
-    # One count for all rivals: see `select`.
-    count = effective(min([now, *(other for _, other in tried)], key=lambda f: f.rss))
-    out = [Rival(Site(effect.name, effect.site), nats_in_place(rest, now, count, own), now)]
+    count = work.independent([now, *(f for _, f in tried)], [effect.name], effective)
+    place = Place(work, effect.name, rest, count)
+    out = [Rival(Site(effect.name, effect.site), place.nats(now, own), now)]
     for choice, other in tried:
-        nats = nats_in_place(rest, other, count, choice)
-        out.append(Rival(Site(*choice.unit.site), nats, other))
+        log_bayes_factor = place.nats(other, choice)
+        out.append(Rival(Site(*choice.unit.site), log_bayes_factor, other))
     for other_set in others:
         if other_set.instead_of == (effect.name, effect.site):
             first = next((s for s in other_set.newcomers(now) if s not in _sites(out)), None)
@@ -88,7 +88,7 @@ def rivals(
 
 
 def _sites(out: Sequence[Rival]) -> list[tuple[str, str | None]]:
-    return [(rival.site.effect, rival.site.joint) for rival in out]
+    return [(alternative.site.effect, alternative.site.joint) for alternative in out]
 
 
 def contenders(
@@ -123,37 +123,53 @@ def contenders(
 
 def weighed(out: Sequence[Rival], temperature: float) -> tuple[Rival, ...]:
     """Return rivals with probabilities that add up to one, most probable first."""
-    nats = np.array([r.nats for r in out])
-    weights = np.exp((nats - nats.max()) / temperature)
+    log_bayes_factor = np.array([r.nats for r in out])
+    weights = np.exp((log_bayes_factor - log_bayes_factor.max()) / temperature)
     weights /= weights.sum()
-    told = [replace(r, probability=float(w)) for r, w in zip(out, weights, strict=True)]
-    return tuple(sorted(told, key=lambda r: -r.probability))
+    reported = [replace(r, probability=float(w)) for r, w in zip(out, weights, strict=True)]
+    return tuple(sorted(reported, key=lambda r: -r.probability))
 
 
-def nats_in_place(
-    rest: Fit, full: Fit, count: float, choice: Choice | None = None, unused: int = 0
-) -> float:
+@dataclass(frozen=True, eq=False)
+class Place:
     """
-    Return the evidence of a fit in the place of an effect, by the rule that holds for all.
+    The place of an effect found, in which all that may stand there are weighed by one rule.
 
-    Parameters
+    Attributes
     ----------
+    family : str
+        Of the effect found.
     rest : Fit
-        The fit without the effect.
-    full : Fit
-        The fit with it, or with another in its place.
+        The fit without it.
     count : float
         Number of independent rows.
-    choice : Choice or None
-        The choice in its place, whose number of trials counts; none, and one is counted.
-    unused : int
-        Coordinates of what is in its place that buy nothing there, and cost nothing.
 
     """
-    freedom = float(full.coordinates.size - rest.coordinates.size - unused)
-    trials = 1.0
-    if choice is not None:
-        # Unused components of a vector effect buy nothing and cost nothing.
-        freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
-        trials = max(choice.unit.trials, 1.0)
-    return evidence(rest.rss, rest.rss - full.rss, freedom, count) - float(np.log(trials))
+
+    work: Workspace
+    family: str
+    rest: Fit
+    count: float
+
+    def nats(self, full: Fit, choice: Choice | None = None, unused: int = 0) -> float:
+        """
+        Return the evidence of a fit with something in this place.
+
+        Parameters
+        ----------
+        full : Fit
+            The fit with the effect, or with another in its place.
+        choice : Choice or None
+            The choice in its place, whose number of trials counts; none, and one is counted.
+        unused : int
+            Coordinates of what is in its place that buy nothing there, and cost nothing.
+
+        """
+        freedom = float(full.coordinates.size - self.rest.coordinates.size - unused)
+        trials = 1.0
+        if choice is not None:
+            # Unused components of a vector effect buy nothing and cost nothing.
+            freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
+            trials = max(choice.unit.trials, 1.0)
+        before, after = (self.work.left(one, [self.family]) for one in (self.rest, full))
+        return evidence(before, before - after, freedom, self.count) - float(np.log(trials))

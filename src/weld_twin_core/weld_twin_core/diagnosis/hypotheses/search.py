@@ -90,13 +90,13 @@ class Search:
         """Return the library searched."""
         return self.work.library
 
-    def effective(self, found: Fit) -> float:
+    def effective(self, result: Fit) -> float:
         """Return the number of independent rows of a fit on the workspace's measurements."""
-        return effective_rows(self.work.problem, found, self.bare_rss, self.work.beliefs)
+        return effective_rows(self.work.problem, result, self.bare_rss, self.work.beliefs)
 
 
 def effective_rows(
-    problem: Problem, found: Fit, bare_rss: float, beliefs: Beliefs, trust: float = 1.0
+    problem: Problem, result: Fit, bare_rss: float, beliefs: Beliefs, trust: float = 1.0
 ) -> float:
     """
     Return the number of independent rows that a fit's evidence may count.
@@ -111,7 +111,7 @@ def effective_rows(
 
     Parameters
     ----------
-    found : Fit
+    result : Fit
         A fit of the problem.
     bare_rss : float
         Whitened sum of squares before any effect was found.
@@ -119,11 +119,11 @@ def effective_rows(
         Exponent between 0 and 1; see above.
 
     """
-    share = effective_share(found.residual, problem.rows, problem.samples) ** trust
-    count = share * max(found.residual.size - problem.frame_count, 1)
+    share = effective_share(result.residual, problem.rows, problem.samples) ** trust
+    count = share * max(result.residual.size - problem.frame_count, 1)
     # What entered first explains most, and so does what its formula misses.
-    misfit = beliefs.misfit * (found.model.found[0].fit.ideal if found.model.found else 1.0)
-    explained = max(bare_rss - found.rss, 0.0) / max(found.rss, 1e-300) * count
+    misfit = beliefs.misfit * (result.model.found[0].fit.ideal if result.model.found else 1.0)
+    explained = max(bare_rss - result.rss, 0.0) / max(result.rss, 1e-300) * count
     return float(count / (1.0 + misfit**2 * explained / beliefs.misfit_directions))
 
 
@@ -150,9 +150,12 @@ def search(
     refused = list(chosen.refused)
     if not chosen.crowded:
         now = possible(work, now, refused)
-        now, slots = settled(
-            work, now, lambda f: effective_rows(small, f, bare, beliefs), progress
-        )
+
+        def effective(result: Fit) -> float:
+            return effective_rows(small, result, bare, beliefs)
+
+        work = work.beside_usual(now, effective)
+        now, slots = settled(work, now, effective, progress)
     final, scale = _fitted(full, now.model)
     if absurd := implausible(final.model):
         refused += absurd
@@ -174,7 +177,7 @@ def search(
     )
 
 
-def refitted(found: Search, small: Fit) -> Search:
+def refitted(result: Search, small: Fit) -> Search:
     """
     Return what was found with another choice of effects, fitted on all measurements.
 
@@ -184,9 +187,9 @@ def refitted(found: Search, small: Fit) -> Search:
         The choice, fitted on the workspace's measurements.
 
     """
-    final, scale = _fitted(found.problem, small.model)
+    final, scale = _fitted(result.problem, small.model)
     precision = effect_precision(final.model)
-    return replace(found, small=small, final=final, scale=scale, precision=precision)
+    return replace(result, small=small, final=final, scale=scale, precision=precision)
 
 
 def _fitted(full: Problem, model: Model) -> tuple[Fit, Scale]:
@@ -213,11 +216,11 @@ def _chosen(
     for _ in range(ROUNDS):
         before = names(model)
 
-        def effective(found: Fit, bare: float = bare) -> float:
-            return effective_rows(small, found, bare, beliefs)
+        def effective(result: Fit, bare: float = bare) -> float:
+            return effective_rows(small, result, bare, beliefs)
 
-        def hopeful(found: Fit, bare: float = bare) -> float:
-            return effective_rows(small, found, bare, beliefs, beliefs.hope)
+        def hopeful(result: Fit, bare: float = bare) -> float:
+            return effective_rows(small, result, bare, beliefs, beliefs.hope)
 
         refused = []
         steps = forward(work, now, hopeful, beliefs.many, progress, refused.append)
@@ -255,7 +258,7 @@ def settled(
     """Return the fit in which every effect is the best in its place, and its rivals."""
     if not now.model.found:
         return now, ()
-    sets = Sets.about(work, now)
+    sets, had = Sets.about(work, now), [names(now.model)]
     for attempt in range(SWAPS + 1):
         now, others = reconsidered(work, now, sets, effective)
         progress('other sets weighed')
@@ -264,11 +267,14 @@ def settled(
             slots.append(rivals(work, now, k, effective, others))
             progress(f'rivals of {Site(effect.name, effect.site)} weighed')
             leader, own = slots[-1][0], next(r for r in slots[-1] if r.fit is now)
-            if leader.nats > own.nats + AHEAD and attempt < SWAPS:
+            # What was had before comes back only where that is more than rounding.
+            most = own.nats + AHEAD * (names(leader.fit.model) in had)
+            if leader.nats > most and attempt < SWAPS:
                 swapped = backward(work, leader.fit, effective)
                 # A rival that does not earn a place itself takes none from what did.
                 if leader.site in [Site(e.name, e.site) for e in swapped.model.found]:
                     now = swapped
+                    had.append(names(now.model))
                     break
         else:
             break

@@ -198,25 +198,28 @@ def _less(alike: Alike, cross: Array, taken: Array, right: Array) -> Alike:
 def _grown(alike: Alike, rss: float, effective: float) -> Grown:
     each = np.arange(alike.seeds.size)
     live = np.einsum('sii->si', alike.normal) > FLAT * alike.size
-    left, pull = _scaled(alike, live)
-    whole = _together(left, pull, live.sum(axis=1, dtype=np.float64), rss, effective)
+    remaining, pull = _scaled(alike, live)
+    whole = _together(remaining, pull, live.sum(axis=1, dtype=np.float64), rss, effective)
     rest, chosen = live.copy(), np.zeros(live.shape, bool)
-    nats, gain = np.full(each.size, -np.inf), np.zeros(each.size)
+    log_bayes_factor, gain = np.full(each.size, -np.inf), np.zeros(each.size)
     for step in range(live.shape[1]):
-        falls = np.where(rest, pull**2 / np.einsum('sii->si', left), -1.0)
+        falls = np.where(rest, pull**2 / np.einsum('sii->si', remaining), -1.0)
         k = falls.argmax(axis=1)
         more = falls[each, k]
         worth = evidences(rss, gain + more, step + 1.0, effective)
-        better = (more >= 0.0) & (worth > nats)
+        better = (more >= 0.0) & (worth > log_bayes_factor)
         if not better.any():
             break
         chosen[each[better], k[better]] = True
         rest[each, k] = False
         rest[~better] = False
-        nats, gain = np.where(better, worth, nats), np.where(better, gain + more, gain)
-        left, pull = _projected(left, pull, k)
-    all_of_them = whole > nats
-    return Grown(np.where(all_of_them[:, None], live, chosen), np.maximum(whole, nats))
+        log_bayes_factor, gain = (
+            np.where(better, worth, log_bayes_factor),
+            np.where(better, gain + more, gain),
+        )
+        remaining, pull = _projected(remaining, pull, k)
+    all_of_them = whole > log_bayes_factor
+    return Grown(np.where(all_of_them[:, None], live, chosen), np.maximum(whole, log_bayes_factor))
 
 
 def _scaled(alike: Alike, live: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -234,16 +237,16 @@ def _together(scaled: Array, pull: Array, count: Array, rss: float, effective: f
     return np.where(count > 1, evidences(rss, gain, count, effective), -np.inf)
 
 
-def _projected(left: Array, pull: Array, k: Index) -> tuple[Array, Array]:
+def _projected(remaining: Array, pull: Array, k: Index) -> tuple[Array, Array]:
     """Return systems with one column each, k (S,), fitted and projected out."""
     each = np.arange(k.size)
-    row = left[each, k]
+    row = remaining[each, k]
     share = row / row[each, k][:, None]
     pull = pull - share * pull[each, k][:, None]
-    left = left - share[:, :, None] * row[:, None]
-    diagonal = np.einsum('sii->si', left)
+    remaining = remaining - share[:, :, None] * row[:, None]
+    diagonal = np.einsum('sii->si', remaining)
     diagonal[:] = np.maximum(diagonal, SINGULAR)
-    return left, pull
+    return remaining, pull
 
 
 def evidence(rss: float, gain: float, freedom: float, effective: float) -> float:
@@ -288,9 +291,9 @@ def evidences(rss: float, gain: Array, freedom: Array | float, effective: float)
 
     """
     # Where nothing was left before, nothing can fall.
-    left = np.maximum(rss - gain, PERFECT * rss) / rss if rss > 0.0 else np.ones_like(gain)
+    remaining = np.maximum(rss - gain, PERFECT * rss) / rss if rss > 0.0 else np.ones_like(gain)
     count = max(effective, FEWEST)
-    return np.asarray(-0.5 * count * np.log(left) - 0.5 * freedom * np.log(count))
+    return np.asarray(-0.5 * count * np.log(remaining) - 0.5 * freedom * np.log(count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,20 +356,20 @@ def ranking(
     """
     grown = systems.grown(effective)
     first = np.cumsum([0, *(len(unit.seeds) for unit in units)])
-    nats, group, row = (
+    log_bayes_factor, group, row = (
         np.full(first[-1], -np.inf),
         np.zeros(first[-1], int),
         np.zeros(first[-1], int),
     )
     for k, (alike, each) in enumerate(zip(systems.alike, grown, strict=True)):
-        nats[alike.seeds], group[alike.seeds] = each.nats, k
+        log_bayes_factor[alike.seeds], group[alike.seeds] = each.nats, k
         row[alike.seeds] = np.arange(alike.seeds.size)
-    worth = np.maximum.reduceat(nats, first[:-1]) if units else nats
+    worth = np.maximum.reduceat(log_bayes_factor, first[:-1]) if units else log_bayes_factor
     worth = worth - np.log([unit.trials for unit in units])
-    found = []
+    result = []
     for u in np.flatnonzero(worth > least).tolist():
-        seed = int(np.argmax(nats[first[u] : first[u + 1]]))
+        seed = int(np.argmax(log_bayes_factor[first[u] : first[u + 1]]))
         k, r = group[first[u] + seed], row[first[u] + seed]
         chosen = np.flatnonzero(grown[k].chosen[r])
-        found.append(Choice(units[u], seed, float(worth[u]), systems.alike[k], int(r), chosen))
-    return sorted(found, key=lambda choice: -choice.nats)
+        result.append(Choice(units[u], seed, float(worth[u]), systems.alike[k], int(r), chosen))
+    return sorted(result, key=lambda choice: -choice.nats)

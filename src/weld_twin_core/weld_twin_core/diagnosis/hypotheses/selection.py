@@ -4,22 +4,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
+from ...effects.registry import REGISTRY
 from ..algebra.fit import Fit, design, fit
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from .library import Library
 from .seed_systems import Choice, SeedSystems, Unit, evidence, ranking
 from .starts import searched, started
+from .usual_errors import UsualErrors, usual
 
 SHORTLIST = 4
 """Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
@@ -47,15 +50,75 @@ class Workspace:
     What selection works on: the problem, its noise, the shared library, and beliefs.
 
     The library's own products are computed once; residuals change, columns do not.
+
+    Attributes
+    ----------
+    errors : UsualErrors or None
+        What every arm is off by a little, once it is known how much that is.
+
     """
 
     problem: Problem
     scale: Scale
     library: Library
     beliefs: Beliefs
+    errors: UsualErrors | None = None
+    _left: WeakKeyDictionary[Fit, float] = field(
+        default_factory=WeakKeyDictionary, init=False, repr=False
+    )
     _less: WeakKeyDictionary[Fit, dict[int, Less]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
+
+    def beside_usual(self, now: Fit, effective: Callable[[Fit], float]) -> Workspace:
+        """
+        Return the same with the errors that every arm has a little of, as a fit shows them.
+
+        Parameters
+        ----------
+        now : Fit
+        effective : callable
+            Number of independent rows of a fit.
+
+        """
+        if usual(now.model.found):
+            return self
+        errors = UsualErrors.beside(self.problem, self.scale, now, effective)
+        return replace(self, errors=errors)
+
+    def _errors(self, about: Iterable[str]) -> UsualErrors | None:
+        """Return the errors beside which some families are weighed; none if they are such."""
+        return None if usual(REGISTRY[name] for name in about) else self.errors
+
+    def left(self, result: Fit, about: Iterable[str]) -> float:
+        """
+        Return what a fit leaves, whitened squares, to weigh some families by.
+
+        Beside the errors that every arm has a little of, unless the families are such themselves.
+
+        Parameters
+        ----------
+        about : iterable of str
+            The families.
+
+        """
+        errors = self._errors(about)
+        if errors is None:
+            return result.rss
+        if result not in self._left:
+            self._left[result] = errors.left(result)
+        return self._left[result]
+
+    def independent(
+        self, fits: Sequence[Fit], about: Iterable[str], effective: Callable[[Fit], float]
+    ) -> float:
+        """
+        Return the number of independent rows by which some families are weighed.
+
+        One count for all fits, that of the one which leaves least.
+        """
+        errors = self._errors(about)
+        return effective(min(fits, key=lambda f: f.rss)) if errors is None else errors.count
 
     def without(self, now: Fit, k: int) -> Less:
         """Return the fit without found effect k of another, made once."""
@@ -128,7 +191,7 @@ def forward(
         ranked = [choice for choice in ranked if not _repeats(choice, taken)]
         if not ranked:
             break
-        best, impossible = _best_of(work, now, _close(work, ranked), effective)
+        best, impossible = _first_possible(work, now, ranked, effective)
         if best is None:
             for effect in impossible:
                 refused(effect)
@@ -153,6 +216,34 @@ def _close(work: Workspace, ranked: list[Choice]) -> list[Choice]:
     return [c for c in ranked if c.nats > best - slack]
 
 
+def _first_possible(
+    work: Workspace, now: Fit, ranked: list[Choice], effective: Callable[[Fit], float]
+) -> tuple[Step | None, list[Effect]]:
+    """
+    Return the best choice that a machine can have, and better ones that none has.
+
+    What has no such size imitates a cause that the library lacks. What only has no such shape is
+    another family's, or that of several causes together: that ends no search.
+    """
+    impossible: list[Effect] = []
+    while ranked:
+        close = _close(work, ranked)[:SHORTLIST]
+        best, absurd = _best_of(work, now, close, effective)
+        impossible += absurd
+        misshapen = [effect for effect in absurd if _misshapen(now.model.robot, effect)]
+        if best is not None or not absurd or len(misshapen) < len(absurd):
+            return best, impossible
+        ranked = [choice for choice in ranked if choice not in close]
+    return None, impossible
+
+
+def _misshapen(robot: Robot, effect: Effect) -> bool:
+    """Return whether an effect is of a size that machines have, and only its shape is not."""
+    size, *_ = effect.parameters
+    bent = {p.name for p in effect.parameters if not p.linear} - {size.name}
+    return all(name in bent for name, _, _ in beyond(robot, effect))
+
+
 def _best_of(
     work: Workspace, now: Fit, close: list[Choice], effective: Callable[[Fit], float]
 ) -> tuple[Step | None, list[Effect]]:
@@ -161,7 +252,7 @@ def _best_of(
 
     Beside it, effects that would have done but that no machine has.
     """
-    tried = [(c, fitted_with(work, now.model, c.effect())) for c in close[:SHORTLIST]]
+    tried = [(c, fitted_with(work, now.model, c.effect())) for c in close]
     # One count for all, that of the fit which leaves least: a worse model explains less and would
     # otherwise be allowed more rows.
     count = effective(min((f for _, f in tried), key=lambda f: f.rss))
@@ -169,20 +260,20 @@ def _best_of(
     impossible: list[Effect] = []
     for choice, result in tried:
         freedom = result.coordinates.size - now.coordinates.size
-        nats = evidence(now.rss, now.rss - result.rss, freedom, count)
-        nats -= float(np.log(choice.unit.trials))
-        if nats <= work.beliefs.enter_nats:
+        log_bayes_factor = evidence(now.rss, now.rss - result.rss, freedom, count)
+        log_bayes_factor -= float(np.log(choice.unit.trials))
+        if log_bayes_factor <= work.beliefs.enter_nats:
             continue
         absurd = implausible(result.model)
         impossible += absurd
-        if not absurd and (best is None or nats > best.nats):
-            best = Step(choice.unit, nats, result)
+        if not absurd and (best is None or log_bayes_factor > best.nats):
+            best = Step(choice.unit, log_bayes_factor, result)
     return best, impossible
 
 
-def sites(found: Fit) -> list[tuple[str, str | None]]:
+def sites(result: Fit) -> list[tuple[str, str | None]]:
     """Return what is in the model of a fit."""
-    return [(effect.name, effect.site) for effect in found.model.found]
+    return [(effect.name, effect.site) for effect in result.model.found]
 
 
 def implausible(model: Model) -> list[Effect]:
@@ -201,14 +292,14 @@ def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:
     return fit(work.problem, model.with_found(merged(model.found, effect)), work.scale, None, 5)
 
 
-def merged(found: tuple[Effect, ...], effect: Effect) -> tuple[Effect, ...]:
+def merged(result: tuple[Effect, ...], effect: Effect) -> tuple[Effect, ...]:
     """Return the effects with one more, in one with its like where their kind can join."""
-    for k, other in enumerate(found):
+    for k, other in enumerate(result):
         if (other.name, other.site) == (effect.name, effect.site):
             both = other.search.joined(effect)
             if both is not None:
-                return (*found[:k], both, *found[k + 1 :])
-    return (*found, effect)
+                return (*result[:k], both, *result[k + 1 :])
+    return (*result, effect)
 
 
 def restarted(work: Workspace, now: Fit) -> Fit:
@@ -222,9 +313,9 @@ def restarted(work: Workspace, now: Fit) -> Fit:
             continue
         again = fitted_with(work, work.without(now, k).fit.model, effect)
         if again.rss < now.rss and not implausible(again.model):
-            found = list(again.model.found)
-            found.insert(k, found.pop())
-            now = fit(work.problem, again.model.with_found(tuple(found)), work.scale, None, 4)
+            result = list(again.model.found)
+            result.insert(k, result.pop())
+            now = fit(work.problem, again.model.with_found(tuple(result)), work.scale, None, 4)
     return now
 
 
@@ -251,12 +342,12 @@ def _worthless(
 ) -> int | None:
     """Return the effect that is worth least, where it is not worth its freedom."""
     count = effective(now)
-    nats = []
+    log_bayes_factor = []
     for one in less:
         freedom = now.coordinates.size - one.coordinates.size
-        nats.append(evidence(one.rss, one.rss - now.rss, freedom, count))
-    least = int(np.argmin(nats))
-    return least if nats[least] < work.beliefs.enter_nats else None
+        log_bayes_factor.append(evidence(one.rss, one.rss - now.rss, freedom, count))
+    least = int(np.argmin(log_bayes_factor))
+    return least if log_bayes_factor[least] < work.beliefs.enter_nats else None
 
 
 def _negligible(work: Workspace, sizes: Sequence[float]) -> int | None:

@@ -49,11 +49,11 @@ def started(problem: Problem, model: Model, scale: Scale, effect: Effect) -> Eff
     if not searched(effect):
         return effect
     looker = _Looker.of(problem, model, scale)
-    zoom, found = 0, looker.profile(effect, 0)
-    while found is not None:
-        effect = found.effects[int(np.argmax(found.gains + _prior(found.effects)))]
+    zoom, result = 0, looker.profile(effect, 0)
+    while result is not None:
+        effect = result.effects[int(np.argmax(result.gains + _prior(result.effects)))]
         zoom += 1
-        found = looker.profile(effect, zoom)
+        result = looker.profile(effect, zoom)
     return effect
 
 
@@ -80,12 +80,12 @@ def profile(
     if not searched(effect):
         return None
     looker = _Looker.of(problem, model.without(k), scale)
-    found = looker.profile(effect, 0)
-    if found is None:
+    result = looker.profile(effect, 0)
+    if result is None:
         return None
-    left = problem.whitened(problem.residuals(model), scale)
-    here = float(looker.residual @ looker.residual - left @ left)
-    return found.effects, here - found.gains
+    remaining = problem.whitened(problem.residuals(model), scale)
+    here = float(looker.residual @ looker.residual - remaining @ remaining)
+    return result.effects, here - result.gains
 
 
 def _prior(effects: list[Effect]) -> Array:
@@ -137,23 +137,23 @@ class _Looker:
         trials = [effect.fit.starts(view, zoom) for view in views]
         # What moves the joint most says which instances; the others say what they do there.
         most = trials[moved_most(self.features, effect.site)]
-        told = most or next((own for own in trials if own is not None), None)
-        if told is None:
+        reported = most or next((own for own in trials if own is not None), None)
+        if reported is None:
             return None
-        found = told[0]
+        result = reported[0]
         pull, mass, shared = (np.zeros(()) for _ in range(3))
         for k, (maker, view) in enumerate(zip(self.features, views, strict=True)):
             own = trials[k]
-            same = own is not None and _same(own[0], found)
-            moved = own[1] if own is not None and same else _moved(found, view, joint)
+            same = own is not None and _same(own[0], result)
+            moved = own[1] if own is not None and same else _moved(result, view, joint)
             if memory:
                 moved = Picker(maker.recording.joints, maker.run.view.t).pick(moved)
             column = self._white(maker, joint, k)
             pull = pull + moved @ (column * residuals[k]).sum(axis=1)
             mass = mass + moved**2 @ (column**2).sum(axis=1)
             shared = shared + moved @ np.einsum('mc,mcp->mp', column, bases[k])
-        left = np.maximum(mass - (shared**2).sum(axis=1), 1e-12 * mass + 1e-300)
-        return _sized(found, pull, left)
+        remaining = np.maximum(mass - (shared**2).sum(axis=1), 1e-12 * mass + 1e-300)
+        return _sized(result, pull, remaining)
 
     def _white(self, maker: Features, joint: int, k: int) -> Array:
         """Return what one joint does in recording k, whitened, shape (M, c)."""

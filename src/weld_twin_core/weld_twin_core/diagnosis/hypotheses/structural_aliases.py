@@ -44,7 +44,7 @@ from .any_motion import (
 )
 from .library import build
 from .other_sets import ahead
-from .rivals import Rival, contenders, nats_in_place, weighed
+from .rivals import Place, Rival, contenders, weighed
 from .search import Search, refitted
 from .selection import Workspace, backward, fitted_with, implausible
 from .still_joints import hardly_moves, moved_most
@@ -61,7 +61,7 @@ MOST_PARTS = 6
 """Coordinates of a frame: what one of its size is made up of is looked for."""
 
 
-def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beliefs) -> Search:
+def with_structural_aliases(result: Search, exclude: Sequence[str], beliefs: Beliefs) -> Search:
     """
     Return what was found, each with the excluded families that may be the same error.
 
@@ -71,70 +71,71 @@ def with_structural_aliases(found: Search, exclude: Sequence[str], beliefs: Beli
         Families taken out of the library.
 
     """
-    named = found.slots[: len(found.small.model.found)]
-    outside = _outside(found, exclude) if named else None
-    slots, refused, behind = list[tuple[Rival, ...]](), list(found.refused), np.zeros(len(named))
-    for k, slot in enumerate(named):
-        more, best = _also(found, k, slot, exclude, outside)
-        if best is not None and (lead := _lead(found, best)) is not None:
+    named = result.slots[: len(result.small.model.found)]
+    outside = _outside(result, exclude) if named else None
+    slots, refused, behind = list[tuple[Rival, ...]](), list(result.refused), np.zeros(len(named))
+    for k, candidate_set in enumerate(named):
+        more, best = _also(result, k, candidate_set, exclude, outside)
+        if best is not None and (lead := _lead(result, best)) is not None:
             refused.append(best.fit.model.found[-1])
             behind = np.where(lead.replaced, np.maximum(behind, lead.nats), behind)
-            more = [rival for rival in more if rival.site != best.site]
-        slots.append(weighed([*slot, *more], beliefs.temperature) if more else slot)
+            more = [alternative for alternative in more if alternative.site != best.site]
+        slots.append(
+            weighed([*candidate_set, *more], beliefs.temperature) if more else candidate_set
+        )
     slots = [
-        tuple(replace(rival, behind=float(nats)) for rival in slot)
-        for slot, nats in zip(slots, behind, strict=True)
+        tuple(
+            replace(alternative, behind=float(log_bayes_factor)) for alternative in candidate_set
+        )
+        for candidate_set, log_bayes_factor in zip(slots, behind, strict=True)
     ]
-    slots += found.slots[len(named) :]
-    aliased = replace(found, slots=tuple(slots), refused=tuple(refused))
+    slots += result.slots[len(named) :]
+    aliased = replace(result, slots=tuple(slots), refused=tuple(refused))
     return _settable_first(aliased, frozenset(exclude))
 
 
-def _outside(found: Search, exclude: Sequence[str]) -> Workspace | None:
+def _outside(result: Search, exclude: Sequence[str]) -> Workspace | None:
     """Return the workspace with a library of what was taken out, or None where that is nothing."""
     if not exclude:
         return None
-    work = found.work
+    work = result.work
     others = [name for name in REGISTRY if name not in exclude]
-    return replace(work, library=build(work.problem, found.small.model, work.scale, others))
+    return replace(work, library=build(work.problem, result.small.model, work.scale, others))
 
 
 def _also(
-    found: Search,
+    result: Search,
     k: int,
-    slot: tuple[Rival, ...],
+    candidate_set: tuple[Rival, ...],
     exclude: Sequence[str],
     outside: Workspace | None,
 ) -> tuple[list[Rival], Rival | None]:
     """
-    Return what may be the same error as what is in a slot, and the best that was taken out.
+    Return what may be the same error as a set of candidates, and the best that was taken out.
 
     Each is fitted in its place, and none counts for more than what was found.
     """
-    work, now = found.work, found.small
+    work, now = result.work, result.small
     features = work.problem.features(now.model)
-    taken = {Site(e.name, e.site) for e in now.model.found} | {r.site for r in slot}
-    constants = [
-        rival.site
-        for rival in slot
-        if rival.probability >= work.beliefs.listed and constant(REGISTRY[rival.site.effect])
-    ]
-    seeds = [
-        *_same_anywhere(found, constants, exclude),
-        *_constants_here(found, features, constants),
-    ]
+    taken = {Site(e.name, e.site) for e in now.model.found} | {r.site for r in candidate_set}
+    likely = [r.site for r in candidate_set if r.probability >= work.beliefs.listed]
+    constants = [site for site in likely if constant(REGISTRY[site.effect])]
+    seeds = [*_same_anywhere(result, constants, exclude)]
+    seeds += _constants_here(result, features, constants)
     seeds = [seed for seed in seeds if Site(seed.name, seed.site) not in taken]
-    parts = _parts(found, k, exclude)
+    parts = _parts(result, k, exclude)
     if not seeds and not parts and outside is None:
         return [], None
     rest = work.without(now, k).fit
-    count, most = found.effective(now), max(rival.nats for rival in slot)
-    alike = [_in_place(found, features, rest, slot, seed, count) for seed in seeds]
-    alike += _together(found, rest, parts, count)
+    count, most = result.effective(now), max(alternative.nats for alternative in candidate_set)
+    family = now.model.found[k].name
+    place = Place(work, family, rest, work.independent([now], [family], result.effective))
+    alike = [_in_place(result, features, place, candidate_set, seed) for seed in seeds]
+    alike += _together(place, parts)
     best = None
     if outside is not None:
         _, tried = contenders(outside, rest, count, now.model.found, MOST_EXCLUDED)
-        more = [Rival(Site(*c.unit.site), nats_in_place(rest, f, count, c), f) for c, f in tried]
+        more = [Rival(Site(*c.unit.site), place.nats(f, c), f) for c, f in tried]
         alike += more
         # What is the same error on any motion is ahead by its fewer numbers alone.
         same = {Site(seed.name, seed.site) for seed in seeds}
@@ -153,37 +154,37 @@ class _Lead(NamedTuple):
     replaced: NDArray[np.bool_]
 
 
-def _lead(found: Search, other: Rival) -> _Lead | None:
+def _lead(result: Search, other: Rival) -> _Lead | None:
     """
     Return by how much something that was taken out is ahead of what was found, where it clearly is.
 
     Several effects may imitate one: those that are worth nothing beside it are replaced as well.
     """
-    work, now = found.work, found.small
-    own = backward(work, other.fit, found.effective)
+    work, now = result.work, result.small
+    own = backward(work, other.fit, result.effective)
     kept = {(e.name, e.site) for e in own.model.found}
     if (other.site.effect, other.site.joint) not in kept:
         return None
-    nats = ahead(work, own, now, found.effective)
-    if nats <= work.beliefs.enter_nats:
+    log_bayes_factor = ahead(work, own, now, result.effective)
+    if log_bayes_factor <= work.beliefs.enter_nats:
         return None
     replaced = [(e.name, e.site) not in kept for e in now.model.found]
-    return _Lead(nats, np.array(replaced))
+    return _Lead(log_bayes_factor, np.array(replaced))
 
 
-def _parts(found: Search, k: int, exclude: Sequence[str]) -> list[Effect]:
+def _parts(result: Search, k: int, exclude: Sequence[str]) -> list[Effect]:
     """
     Return errors that a person can set which together may be effect k, whatever the motion.
 
     Where a positioner stands beside a robot is the zero of its first axis, that of the robot's, or
     both at once.
     """
-    effects = found.small.model.found
+    effects = result.small.model.found
     own, taken = effects[k], {(e.name, e.site) for e in effects}
     if not constant(type(own)) or own.fit.coordinates().size < MOST_PARTS:
         return []
-    robot = found.baseline.model.robot
-    frames = [frame_columns(robot, name) for name in sorted(found.work.problem.align)]
+    robot = result.baseline.model.robot
+    frames = [frame_columns(robot, name) for name in sorted(result.work.problem.align)]
     fitted = span_of(np.concatenate(frames)) if frames else None
     span, out = np.concatenate([columns(robot, own), *frames]), []
     for each in settable(robot, frozenset(exclude)):
@@ -194,50 +195,49 @@ def _parts(found: Search, k: int, exclude: Sequence[str]) -> list[Effect]:
     return out
 
 
-def _together(found: Search, rest: Fit, parts: Sequence[Effect], count: float) -> list[Rival]:
+def _together(place: Place, parts: Sequence[Effect]) -> list[Rival]:
     """Return errors that take a place together, where none of them does as well without another."""
-    problem, scale = found.work.problem, found.work.scale
+    problem, scale, rest = place.work.problem, place.work.scale, place.rest.model
 
     def with_those(some: Sequence[Effect]) -> tuple[float, Fit]:
-        own = fit(problem, rest.model.with_found((*rest.model.found, *some)), scale, None, 4)
-        return nats_in_place(rest, own, count), own
+        own = fit(problem, rest.with_found((*rest.found, *some)), scale, None, 4)
+        return place.nats(own), own
 
     while len(parts) > 1:
-        nats, own = with_those(parts)
+        log_bayes_factor, own = with_those(parts)
         fewer = [[e for e in parts if e is not one] for one in parts]
         best = max(fewer, key=lambda some: with_those(some)[0])
-        if with_those(best)[0] < nats:
-            return [Rival(Site(e.name, e.site), nats, own) for e in parts]
+        if with_those(best)[0] < log_bayes_factor:
+            return [Rival(Site(e.name, e.site), log_bayes_factor, own) for e in parts]
         parts = best
     return []
 
 
 def _in_place(
-    found: Search,
+    result: Search,
     features: list[Features],
-    rest: Fit,
-    slot: tuple[Rival, ...],
+    place: Place,
+    candidate_set: tuple[Rival, ...],
     seed: Effect,
-    count: float,
 ) -> Rival:
     """Return an effect fitted in the place of a slot."""
-    own = fitted_with(found.work, rest.model, seed)
-    unused = _unused(found, features, slot, seed) if hardly_moves(features, seed) else 0
-    return Rival(Site(seed.name, seed.site), nats_in_place(rest, own, count, unused=unused), own)
+    own = fitted_with(result.work, place.rest.model, seed)
+    unused = _unused(result, features, candidate_set, seed) if hardly_moves(features, seed) else 0
+    return Rival(Site(seed.name, seed.site), place.nats(own, unused=unused), own)
 
 
-def _settable_first(found: Search, exclude: frozenset[str]) -> Search:
+def _settable_first(result: Search, exclude: frozenset[str]) -> Search:
     """
     Return what was found with errors that a person can set in the place of those they always are.
 
     The tilt of an axis may be the zero of its joint whatever the motion: no measurement can decide,
     mending one mends both, and the zero is what a controller takes.
     """
-    robot, align = found.baseline.model.robot, found.work.problem.align
-    effects = list(found.small.model.found)
+    robot, align = result.baseline.model.robot, result.work.problem.align
+    effects = list(result.small.model.found)
     taken = {(e.name, e.site) for e in effects}
     chosen: dict[int, Site] = {}
-    for k, own in enumerate(effects[: len(found.slots)]):
+    for k, own in enumerate(effects[: len(result.slots)]):
         if (
             not constant(type(own))
             or own.traits.set_at_controller
@@ -251,26 +251,28 @@ def _settable_first(found: Search, exclude: frozenset[str]) -> Search:
                 taken.add((other.name, other.site))
                 break
     if not chosen:
-        return found
-    work = found.work
-    rest = found.small.model.with_found(tuple(e for k, e in enumerate(effects) if k not in chosen))
+        return result
+    work = result.work
+    rest = result.small.model.with_found(
+        tuple(e for k, e in enumerate(effects) if k not in chosen)
+    )
     model = fit(work.problem, rest, work.scale, None, 4).model
     kept = iter(model.found)
     placed = tuple(e if k in chosen else next(kept) for k, e in enumerate(effects))
     small = fit(work.problem, model.with_found(placed), work.scale, None, 4)
     slots = tuple(
-        _led_by(slot, chosen[k], small) if k in chosen else slot
-        for k, slot in enumerate(found.slots)
+        _led_by(candidate_set, chosen[k], small) if k in chosen else candidate_set
+        for k, candidate_set in enumerate(result.slots)
     )
-    return replace(refitted(found, small), slots=slots)
+    return replace(refitted(result, small), slots=slots)
 
 
-def _led_by(slot: tuple[Rival, ...], site: Site, small: Fit) -> tuple[Rival, ...]:
+def _led_by(candidate_set: tuple[Rival, ...], site: Site, small: Fit) -> tuple[Rival, ...]:
     """Return a slot with one site before all others, as likely as the likeliest."""
-    most = max(slot, key=lambda rival: rival.probability)
+    most = max(candidate_set, key=lambda alternative: alternative.probability)
     first = Rival(site, most.nats, small, most.probability)
-    rest = [rival for rival in slot if rival.site != site]
-    whole = sum(rival.probability for rival in (first, *rest))
+    rest = [alternative for alternative in candidate_set if alternative.site != site]
+    whole = sum(alternative.probability for alternative in (first, *rest))
     return tuple(replace(r, probability=r.probability / whole) for r in (first, *rest))
 
 
@@ -280,10 +282,10 @@ def _causes(names: Sequence[str]) -> list[type[Effect]]:
 
 
 def _same_anywhere(
-    found: Search, constants: Sequence[Site], exclude: Sequence[str]
+    result: Search, constants: Sequence[Site], exclude: Sequence[str]
 ) -> Iterator[Effect]:
     """Yield the excluded errors that some constants are on any motion."""
-    robot, align = found.baseline.model.robot, found.work.problem.align
+    robot, align = result.baseline.model.robot, result.work.problem.align
     kinds = [kind.name for kind in _causes(exclude) if constant(kind)]
     for other in _candidates(robot, kinds, align) if constants else ():
         if any(same_error(robot, of_no_size(own), other) for own in constants):
@@ -291,11 +293,11 @@ def _same_anywhere(
 
 
 def _constants_here(
-    found: Search, features: list[Features], constants: Sequence[Site]
+    result: Search, features: list[Features], constants: Sequence[Site]
 ) -> Iterator[Effect]:
     """Yield what is a constant of a joint on these motions, at the joints of some constants."""
     joints = [site.joint for site in constants]
-    for joint in _with_next(found.baseline.model.robot, joints):
+    for joint in _with_next(result.baseline.model.robot, joints):
         view = features[moved_most(features, joint)].view
         for kind in REGISTRY.values():
             if kind.traits.cause and kind.of == 'joint' and kind.applicable(view, joint) is None:
@@ -303,28 +305,30 @@ def _constants_here(
                 yield from _at_rest(features, kind, joint)
 
 
-def _unused(found: Search, features: list[Features], slot: Sequence[Rival], seed: Effect) -> int:
+def _unused(
+    result: Search, features: list[Features], candidate_set: Sequence[Rival], seed: Effect
+) -> int:
     """
     Return how many coordinates of an effect of a joint at rest are none of what it is there.
 
     Of the waves of a bearing that stands still each is a constant lean: four are no more than two,
     and where the twist of a link is one of these, it takes no more than the twist.
     """
-    own = _whitened(found, features, seed)
+    own = _whitened(result, features, seed)
     sizes = np.linalg.eigvalsh(own @ own.T)
     used = [int((sizes >= SAME_AT_REST**2 * sizes[-1]).sum())]
-    for rival in slot:
-        if constant(REGISTRY[rival.site.effect]):
-            other = _whitened(found, features, of_no_size(rival.site))
+    for alternative in candidate_set:
+        if constant(REGISTRY[alternative.site.effect]):
+            other = _whitened(result, features, of_no_size(alternative.site))
             used += [len(other)] if inside(other, own, SAME_AT_REST) else []
     return len(own) - min(used)
 
 
-def _whitened(found: Search, features: list[Features], effect: Effect) -> Array:
+def _whitened(result: Search, features: list[Features], effect: Effect) -> Array:
     """Return the columns of an effect on the data, (P, rows)."""
-    problem = found.work.problem
+    problem = result.work.problem
     columns = problem.effect_columns(features, effect)
-    return np.asarray(problem.whitened(columns, found.work.scale))
+    return np.asarray(problem.whitened(columns, result.work.scale))
 
 
 def _at_rest(features: list[Features], kind: type[Effect], joint: str) -> list[Effect]:
@@ -345,8 +349,8 @@ def _with_next(robot: Robot, joints: Sequence[str | None]) -> list[str]:
 def _best_of_each(more: Iterable[Rival]) -> list[Rival]:
     """Return the best rival of every site."""
     out: dict[Site, Rival] = {}
-    for rival in sorted(more, key=lambda one: one.nats):
-        out[rival.site] = rival
+    for alternative in sorted(more, key=lambda one: one.nats):
+        out[alternative.site] = alternative
     return list(out.values())
 
 

@@ -60,11 +60,11 @@ class _Claim:
 
 
 def causes(
-    found: Search,
+    result: Search,
     unseen: Unseen,
     table: Sequence[Row],
     verdict: Verdict,
-    rival: Curved | None,
+    alternative: Curved | None,
     floor: float,
     beliefs: Beliefs,
     placing: FreeForm | None = None,
@@ -74,7 +74,7 @@ def causes(
 
     Parameters
     ----------
-    rival : Curved or None
+    alternative : Curved or None
         The free-form explanation; it is the model itself where ``unseen`` is its own.
     floor : float
         RMS of the noise alone [m].
@@ -82,9 +82,9 @@ def causes(
         What tells the places of an unknown gap; the curves carried, where left out.
 
     """
-    told = _told_claims(found, table, verdict)
-    curved = rival if rival is not None and rival.unseen is unseen else None
-    claims, rest = _nameless(found, told, verdict, curved, placing, beliefs)
+    reported = _told_claims(result, table, verdict)
+    curved = alternative if alternative is not None and alternative.unseen is unseen else None
+    claims, rest = _nameless(result, reported, verdict, curved, placing, beliefs)
     squares = (
         unseen.squares(unseen.bare),
         unseen.squares(unseen.whole),
@@ -96,18 +96,18 @@ def causes(
     whole, spread = _as_placed(whole, spread, claims, placing)
     whole = np.array([s if c.kind is None else c.kind for c, s in zip(claims, whole, strict=True)])
     noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
-    left = max(1.0 - float(whole.sum()) - noise, 0.0)
+    remaining = max(1.0 - float(whole.sum()) - noise, 0.0)
     out = [
         _cause(claim, float(share), float(error))
         for claim, share, error in zip(claims, whole, spread, strict=True)
     ]
     out.sort(key=lambda cause: -cause.share)
     # Of what nothing is known, neither a place nor what stands beside it, there is nothing to tell.
-    much = left > beliefs.unexplained and bool(out)
+    much = remaining > beliefs.unexplained and bool(out)
     if rest is not None and (much or (rest.place and not out)):
         error = float(np.sqrt((spread**2).sum()))
-        out.append(replace(_cause(rest, left, error), rest=True))
-    return tuple(out), Shares(unexplained=left, noise=max(noise, 0.0))
+        out.append(replace(_cause(rest, remaining, error), rest=True))
+    return tuple(out), Shares(unexplained=remaining, noise=max(noise, 0.0))
 
 
 def _cause(claim: _Claim, share: float, error: float) -> Cause:
@@ -148,9 +148,9 @@ def _as_placed(
     parts = np.array([claim.taken or 0.0 for claim in claims])
     explained = max(float(whole[of_groups].sum()), float(parts.sum()))
     explained = min(explained, max(1.0 - float(whole[~of_groups].sum()), 0.0))
-    told = parts * explained / max(float(parts.sum()), 1e-300)
-    error = np.hypot(spread, told / max(placing.steady, 1.0))
-    return np.where(of_groups, told, whole), np.where(of_groups, error, spread)
+    reported = parts * explained / max(float(parts.sum()), 1e-300)
+    error = np.hypot(spread, reported / max(placing.steady, 1.0))
+    return np.where(of_groups, reported, whole), np.where(of_groups, error, spread)
 
 
 def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
@@ -158,10 +158,10 @@ def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
     return tuple((name, belief) for name, belief in ordered if belief >= LISTED)
 
 
-def _told_claims(found: Search, table: Sequence[Row], verdict: Verdict) -> list[_Claim]:
+def _told_claims(result: Search, table: Sequence[Row], verdict: Verdict) -> list[_Claim]:
     """Return a claim for every effect that is told, or for every group of many small ones."""
-    model = found.final.model.found
-    if found.dense:
+    model = result.final.model.found
+    if result.dense:
         return _claims_of_many(model, verdict)
     out: list[_Claim] = []
     for at, group in enumerate(verdict.sets):
@@ -184,7 +184,7 @@ def _member(
     A member that was taken out of the library may lead its set; the model holds another.
     """
     sites = [Site(effect.name, effect.site) for effect in model]
-    for among in (group, [rival.site for rival in row.slot]):
+    for among in (group, [alternative.site for alternative in row.slot]):
         for at, site in enumerate(sites):
             if site in among and at not in taken:
                 return at
@@ -192,8 +192,8 @@ def _member(
 
 
 def _nameless(
-    found: Search,
-    told: list[_Claim],
+    result: Search,
+    reported: list[_Claim],
     verdict: Verdict,
     curved: Curved | None,
     placing: FreeForm | None,
@@ -201,8 +201,9 @@ def _nameless(
 ) -> tuple[list[_Claim], _Claim | None]:
     """Return all claims with those of curves that the model holds, and what is left beside."""
     if verdict.status != 'unknown':
-        return told, None
-    model = found.final.model.found
+        # What was found and does not count as named is left, and nothing else says where it sits.
+        return reported, _rest([], beliefs) if len(reported) < len(result.slots) else None
+    model = result.final.model.found
     if placing is None and curved is not None:
         placing = curved.form
     parts = placing.parts if placing is not None else ()
@@ -211,29 +212,29 @@ def _nameless(
         places.setdefault(part.group.at, []).append(part)
     places = _merged(places)
     held = _carried_by(places, curved) if places else {}
-    claims, left = list(told), list[Part]()
-    taken = {at for claim in told for at in claim.members}
+    claims, remaining = list(reported), list[Part]()
+    taken = {at for claim in reported for at in claim.members}
     for k, effect in enumerate(model if curved is not None else ()):
         if k not in taken and not effect.traits.bends:
             levels = {effect.at: 1.0}, {effect.on: 1.0}
             claims.append(_Claim((k,), *levels, {Site(effect.name, effect.site): 1.0}))
     for place, own in places.items():
         if not held[place]:
-            left += own
+            remaining += own
             continue
         curves = {Site(model[k].name, model[k].site): 1.0 for k in held[place]}
         levels = (_place_of(place, own, beliefs), _dependence_of(own))
         share = float(sum(part.share for part in own))
         claims.append(_Claim(held[place], *levels, curves, share))
-    return claims, _rest(left, beliefs)
+    return claims, _rest(remaining, beliefs)
 
 
-def _rest(left: list[Part], beliefs: Beliefs) -> _Claim:
+def _rest(remaining: list[Part], beliefs: Beliefs) -> _Claim:
     """Return what is left beside everything told, where the most of it is."""
-    if not left:
+    if not remaining:
         return _Claim((), {}, {}, {})
     places: dict[str, list[Part]] = {}
-    for part in left:
+    for part in remaining:
         places.setdefault(part.group.at, []).append(part)
     places = _merged(places)
     first = max(places, key=lambda at: sum(part.share for part in places[at]))
@@ -241,16 +242,16 @@ def _rest(left: list[Part], beliefs: Beliefs) -> _Claim:
     return _Claim((), _place_of(first, own, beliefs), _dependence_of(own), {})
 
 
-def _carried_by(places: dict[str, list[Part]], rival: Curved | None) -> dict[str, Members]:
+def _carried_by(places: dict[str, list[Part]], alternative: Curved | None) -> dict[str, Members]:
     """Return the curves of the model that stand for each place; the largest has what is over."""
     out: dict[str, Members] = dict.fromkeys(places, ())
-    if rival is None:
+    if alternative is None:
         return out
     largest = max(places, key=lambda place: sum(part.share for part in places[place]))
     # Joints that were put under one cause bring their curves along.
     owner = {part.group.at: place for place, parts in places.items() for part in parts}
-    at = len(rival.kept)
-    for part in rival.form.parts:
+    at = len(alternative.kept)
+    for part in alternative.form.parts:
         members = tuple(range(at, at + len(part.group.carried)))
         out[owner.get(part.group.at, largest)] += members
         at += len(members)
@@ -302,12 +303,12 @@ def _claims_of_many(model: tuple[Effect, ...], verdict: Verdict) -> list[_Claim]
         if not (family.named and family.needed):
             continue
         whole = 1.0 + sum(part for _, part in family.like)
-        told = [(site, share / whole) for site, share in family.needed]
-        told += [(site, part / whole) for site, part in family.like]
+        reported = [(site, share / whole) for site, share in family.needed]
+        reported += [(site, part / whole) for site, part in family.like]
         place: dict[str, float] = {}
         dependence: dict[str, float] = {}
         name: dict[Site, float] = {}
-        for site, part in told:
+        for site, part in reported:
             own = next(e for e in model if (e.name, e.site) == (site.effect, site.joint))
             place[own.at] = place.get(own.at, 0.0) + part
             dependence[own.on] = dependence.get(own.on, 0.0) + part
@@ -379,11 +380,11 @@ def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | No
     others = tuple(k for k in range(len(fields)) if k not in named)
     groups = [cause.members for cause in causes] + [others] * bool(others)
     parts = np.array([fields[list(group)].sum(axis=0) for group in groups])
-    left = unseen.whole
-    rest = unseen.bare - left - parts.sum(axis=0)
+    remaining = unseen.whole
+    rest = unseen.bare - remaining - parts.sum(axis=0)
     sizes = (parts**2).mean(axis=1)
     parts += rest * (sizes / max(float(sizes.sum()), 1e-300))[:, None]
-    split = [_metres(unseen, part) for part in (left, *parts)]
+    split = [_metres(unseen, part) for part in (remaining, *parts)]
     return Contributions(
         left=tuple(split[0]),
         parts=tuple(np.array(each) for each in zip(*split[1:], strict=True)),

@@ -53,23 +53,23 @@ class Curved:
         return self.unseen.rms(self.unseen.whole)
 
 
-def curved(found: Search, beliefs: Beliefs) -> Curved | None:
+def curved(result: Search, beliefs: Beliefs) -> Curved | None:
     """
     Return the free-form explanation of the whole gap, without any name; None where there is none.
 
     Parameters
     ----------
-    found : Search
+    result : Search
         The set-up's own motion that it holds stays beside the curves.
 
     """
-    if found.dense:
+    if result.dense:
         return None
-    return _beside(found, _setup(found), beliefs)
+    return _beside(result, _setup(result), beliefs)
 
 
 def standing(
-    found: Search, verdict: Verdict, alone: Curved | None, beliefs: Beliefs
+    result: Search, verdict: Verdict, alone: Curved | None, beliefs: Beliefs
 ) -> Curved | None:
     """
     Return curves for what an 'unknown' verdict leaves beside the names that it tells.
@@ -82,75 +82,75 @@ def standing(
         The free-form explanation without names.
 
     """
-    if verdict.status != 'unknown' or found.dense:
+    if verdict.status != 'unknown' or result.dense:
         return alone
-    told = {site for group in verdict.sets for site in group}
+    reported = {site for group in verdict.sets for site in group}
     named = [
         effect
-        for effect, slot in zip(found.final.model.found, found.slots, strict=False)
-        if {Site(effect.name, effect.site), slot[0].site} & told
+        for effect, candidate_set in zip(result.final.model.found, result.slots, strict=False)
+        if {Site(effect.name, effect.site), candidate_set[0].site} & reported
     ]
     if not named:
-        wandering = None if alone else _beside(found, _setup(found), beliefs, wandering=True)
+        wandering = None if alone else _beside(result, _setup(result), beliefs, wandering=True)
         return alone or wandering
-    kept = [*_setup(found), *named]
-    beside = _beside(found, kept, beliefs)
-    if beside is None and found.final.model.found != tuple(kept):
-        beside = _beside(found, kept, beliefs, wandering=True)
+    kept = [*_setup(result), *named]
+    beside = _beside(result, kept, beliefs)
+    if beside is None and result.final.model.found != tuple(kept):
+        beside = _beside(result, kept, beliefs, wandering=True)
     return beside
 
 
-def _setup(found: Search) -> list[Effect]:
-    return [effect for effect in found.final.model.found if not effect.traits.cause]
+def _setup(result: Search) -> list[Effect]:
+    return [effect for effect in result.final.model.found if not effect.traits.cause]
 
 
-def bare_fit(found: Search, kept: Sequence[Effect] = ()) -> tuple[Problem, Fit, Scale]:
+def bare_fit(result: Search, kept: Sequence[Effect] = ()) -> tuple[Problem, Fit, Scale]:
     """Return some of the measurements, the fit on them of frames and what stays, and its noise."""
-    small = found.problem.thinned(ROWS)
-    start = found.baseline.model.with_found(tuple(kept))
+    small = result.problem.thinned(ROWS)
+    start = result.baseline.model.with_found(tuple(kept))
     noise = robust_scale(small, small.residuals(start))
     return small, *robust_fit(small, start, noise, rounds=1)
 
 
 def _beside(
-    found: Search, kept: Sequence[Effect], beliefs: Beliefs, *, wandering: bool = False
+    result: Search, kept: Sequence[Effect], beliefs: Beliefs, *, wandering: bool = False
 ) -> Curved | None:
-    small, bare, scale = bare_fit(found, kept)
+    small, bare, scale = bare_fit(result, kept)
     form = free_form(small, scale, bare, np.zeros(0), beliefs, wandering=wandering)
     if not form.parts:
         return None
     model = bare.model.with_found((*bare.model.found, *form.curves))
     own = bare.coordinates.size
     precision = np.concatenate([np.zeros(own), form.precision])
-    full = found.problem
+    full = result.problem
     scale = robust_scale(full, full.residuals(fit(small, model, scale, precision, 4).model))
     final, scale = robust_fit(full, model, scale, precision, rounds=1)
-    changed = replace(found, final=final, scale=scale, precision=precision)
+    changed = replace(result, final=final, scale=scale, precision=precision)
     unseen = Unseen.of(full, scale, final, precision)
     return Curved(form, bare.model.found, changed, unseen)
 
 
-def gain_of(named: Unseen, rival: Unseen) -> tuple[float, float]:
+def gain_of(named: Unseen, alternative: Unseen) -> tuple[float, float]:
     """
     Return what a rival takes off the squared unseen error, as a share and in standard errors.
 
     Parameters
     ----------
-    named, rival : Unseen
+    named, alternative : Unseen
         The model held against the rival, and the rival, both whole.
 
     """
-    before, after = named.squares(named.whole), rival.squares(rival.whole)
-    told = gain(before, after, named.trusted_labels(), rival.trusted_labels())
-    return told.share, told.steady
+    before, after = named.squares(named.whole), alternative.squares(alternative.whole)
+    reported = gain(before, after, named.trusted_labels(), alternative.trusted_labels())
+    return reported.share, reported.steady
 
 
 def carried(
-    found: Search,
+    result: Search,
     unseen: Unseen,
     shrink: Shrink,
     verdict: Verdict,
-    rival: Curved | None,
+    alternative: Curved | None,
     holdout: Sequence[Recording],
     beliefs: Beliefs,
 ) -> tuple[Search, Unseen, Shrink, Verdict]:
@@ -161,33 +161,33 @@ def carried(
     ----------
     found, unseen, shrink
         Of the effects found.
-    rival : Curved or None
+    alternative : Curved or None
         The free-form explanation; carried where the verdict is 'unknown' and it predicts as well.
         What makes unseen data worse than the nominal robot does is not carried at all, nor told.
 
     """
     if verdict.status != 'unknown':
-        return found, unseen, shrink, verdict
-    if rival is not None and _worth(unseen, rival, verdict, beliefs):
-        found, unseen = rival.found, rival.unseen
-        shrink = held_out_shrink(found, unseen, holdout, beliefs)
+        return result, unseen, shrink, verdict
+    if alternative is not None and _worth(unseen, alternative, verdict, beliefs):
+        result, unseen = alternative.found, alternative.unseen
+        shrink = held_out_shrink(result, unseen, holdout, beliefs)
     if shrink.rms_after_m <= shrink.rms_before_m:
-        return found, unseen, shrink, verdict
+        return result, unseen, shrink, verdict
     # Without a name there is no reason to carry what makes unseen data worse.
-    found = replace(found, final=found.baseline, precision=np.zeros(0), slots=(), dense=False)
-    unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    shrink = held_out_shrink(found, unseen, holdout, beliefs)
-    return found, unseen, shrink, replace(verdict, sets=())
+    result = replace(result, final=result.baseline, precision=np.zeros(0), slots=(), dense=False)
+    unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
+    shrink = held_out_shrink(result, unseen, holdout, beliefs)
+    return result, unseen, shrink, replace(verdict, sets=())
 
 
-def _worth(named: Unseen, rival: Curved, verdict: Verdict, beliefs: Beliefs) -> bool:
+def _worth(named: Unseen, alternative: Curved, verdict: Verdict, beliefs: Beliefs) -> bool:
     """
     Return whether curves are carried: instead of names that do not stand, or clearly beside others.
 
     Curves that hardly help beside names would put places under suspicion for nothing.
     """
     if verdict.sets:
-        share, steady = gain_of(named, rival.unseen)
+        share, steady = gain_of(named, alternative.unseen)
         return share >= beliefs.beaten_share and steady >= beliefs.beaten_steady
-    left = named.rms(named.whole)
-    return rival.rms_m <= beliefs.curve_room * left
+    remaining = named.rms(named.whole)
+    return alternative.rms_m <= beliefs.curve_room * remaining

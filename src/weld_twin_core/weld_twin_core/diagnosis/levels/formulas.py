@@ -25,6 +25,7 @@ from ...twin.resampling import Picker
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
+from ..hypotheses.usual_errors import UsualErrors
 from ..unseen.folds import least_gain
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
@@ -99,20 +100,29 @@ class Missed(NamedTuple):
         return tuple((at, _misses(one)) for at, one in best.items())
 
 
-def missed(found: Search, unseen: Unseen, beliefs: Beliefs) -> Missed:
+def missed(result: Search, unseen: Unseen, beliefs: Beliefs) -> Missed:
     """Return what the formulas of the effects found miss, as far as it is beyond doubt."""
-    if found.dense:
+    if result.dense:
         return Missed()
     loose = [
         one
-        for one in sorted(scatter(found, unseen), key=lambda one: -one.share)
+        for one in sorted(scatter(result, unseen), key=lambda one: -one.share)
         if one.share >= beliefs.beaten_share and one.steady >= beliefs.scatter_sure
     ]
-    forms = tuple(one for one in beside_names(found, unseen) if _fails(one, beliefs))
-    return Missed(tuple(loose), forms)
+    forms = [one for one in beside_names(result, unseen) if _fails(one, beliefs)]
+    if forms:
+        # A field is what small errors everywhere do as well: names fail by what is beyond those.
+        own = result.problem, result.scale, result.final
+        small = UsualErrors.beside(*own, lambda fit: float(fit.residual.size))
+        at = {(one.at, one.on) for one in forms}
+        beyond = beside_names(result, unseen.along(small.columns))
+        forms = [one for one in beyond if (one.at, one.on) in at and _fails(one, beliefs)]
+    return Missed(tuple(loose), tuple(forms))
 
 
-def no_noise(verdict: Verdict, rival: Curved | None, left: Missed, beliefs: Beliefs) -> Verdict:
+def no_noise(
+    verdict: Verdict, alternative: Curved | None, remaining: Missed, beliefs: Beliefs
+) -> Verdict:
     """
     Return 'unknown' in the place of 'none' where what looks like noise follows something.
 
@@ -120,7 +130,7 @@ def no_noise(verdict: Verdict, rival: Curved | None, left: Missed, beliefs: Beli
     ----------
     verdict : Verdict
         Of any other status, nothing changes.
-    rival : Curved or None
+    alternative : Curved or None
         The free-form explanation, whether or not it can be carried to another motion.
 
     """
@@ -129,9 +139,9 @@ def no_noise(verdict: Verdict, rival: Curved | None, left: Missed, beliefs: Beli
     reasons = [
         f'what remains is no noise of the instrument: {100.0 * one.share:.0f} % of it lies along '
         f'the motion of {one.joint}'
-        for one in left.scattered
+        for one in remaining.scattered
     ]
-    form = None if rival is None else rival.form
+    form = None if alternative is None else alternative.form
     if form and form.gain >= beliefs.beaten_share and form.steady >= beliefs.beaten_steady:
         places = ' and '.join(str(part.group) for part in form.parts)
         reasons.append(
@@ -158,9 +168,9 @@ def _misses(one: Beside) -> str:
     )
 
 
-def beside_names(found: Search, unseen: Unseen) -> list[Beside]:
+def beside_names(result: Search, unseen: Unseen) -> list[Beside]:
     """Return what free forms at the places of the effects found predict beside all of them."""
-    problem, model = unseen.problem, found.final.model
+    problem, model = unseen.problem, result.final.model
     if problem.touched or not model.found:
         return []
     features = problem.features(model)
@@ -168,10 +178,10 @@ def beside_names(found: Search, unseen: Unseen) -> list[Beside]:
     bases = unseen.bases()
     out = []
     for at, on, columns in _forms(problem, unseen.scale, features, {e.at for e in model.found}):
-        own = [s for e, s in zip(model.found, sizes, strict=True) if at in (e.at, 'instrument')]
-        told = least_gain([base.gain(columns) for base in bases])
-        share = float(np.sqrt(max(told.fall, 0.0))) / max([*own, 1e-12])
-        out.append(Beside(at, on, told.share, told.steady, share))
+        own = [s for e, s in zip(model.found, sizes, strict=False) if at in (e.at, 'instrument')]
+        reported = least_gain([base.gain(columns) for base in bases])
+        share = float(np.sqrt(max(reported.fall, 0.0))) / max([*own, 1e-12])
+        out.append(Beside(at, on, reported.share, reported.steady, share))
     return out
 
 

@@ -46,9 +46,9 @@ STATIC = ('constant', 'load')
 
 
 def placed(
-    found: Search,
+    result: Search,
     verdict: Verdict,
-    rival: Curved | None,
+    alternative: Curved | None,
     missed: Missed,
     beliefs: Beliefs,
 ) -> FreeForm | None:
@@ -60,9 +60,9 @@ def placed(
 
     Parameters
     ----------
-    found : Search
+    result : Search
         The effects found, before curves take their place.
-    rival : Curved or None
+    alternative : Curved or None
         The free-form explanation that can be carried; what stays beside it stays here too.
     missed : Missed
         What the formulas miss. Joints that noise comes from are places, too, where no group finds
@@ -71,31 +71,35 @@ def placed(
     """
     if verdict.status != 'unknown':
         return None
-    form = _grouped(found, verdict, rival, beliefs)
+    form = _grouped(result, verdict, alternative, beliefs)
     if any(one.on == 'place' for one in missed.forms):
         form = _with_field(form, beliefs)
-    form = arm_first(found, form)
+    form = arm_first(result, form)
     return _with_scatter(form, missed.scattered)
 
 
-def _grouped(found: Search, verdict: Verdict, rival: Curved | None, beliefs: Beliefs) -> FreeForm:
+def _grouped(
+    result: Search, verdict: Verdict, alternative: Curved | None, beliefs: Beliefs
+) -> FreeForm:
     """Return the groups of columns that tell place and dependence of what no name stands for."""
     none = np.zeros(0)
-    if found.dense:
+    if result.dense:
         # Beside many small errors it is what they leave that has no place yet.
-        bare = replace(found.final, model=found.final.model.with_found(()))
-        return free_form(found.problem, found.scale, bare, none, beliefs, whole_arm=True)
-    told = {site for group in verdict.sets for site in group}
+        bare = replace(result.final, model=result.final.model.with_found(()))
+        return free_form(result.problem, result.scale, bare, none, beliefs, whole_arm=True)
+    reported = {site for group in verdict.sets for site in group}
     own = [
-        e for e in found.final.model.found if Site(e.name, e.site) in told or not e.traits.cause
+        e
+        for e in result.final.model.found
+        if Site(e.name, e.site) in reported or not e.traits.cause
     ]
-    kept = own if rival is None else rival.kept
-    small, bare, scale = bare_fit(found, kept)
+    kept = own if alternative is None else alternative.kept
+    small, bare, scale = bare_fit(result, kept)
     form = free_form(small, scale, bare, none, beliefs, whole_arm=True)
     if form.parts:
         return form
-    if rival is not None:
-        return rival.form
+    if alternative is not None:
+        return alternative.form
     # What carries to no other posture may still be told from neighbours in time.
     return free_form(small, scale, bare, none, beliefs, whole_arm=True, wandering=True)
 
@@ -136,12 +140,12 @@ def _scattering(one: Scatter) -> Part:
     return Part(rounded, 1.0, ((rounded, ROUNDED), (jumping, JUMPING)), one.share)
 
 
-def arm_first(found: Search, form: FreeForm) -> FreeForm:
+def arm_first(result: Search, form: FreeForm) -> FreeForm:
     """Return a form whose field of the instrument is a set with the joints, where they are one."""
     fields = [part for part in form.parts if part.group.at == 'instrument']
-    if not fields or _tilt(found.problem, found.baseline.model) > TILT:
+    if not fields or _tilt(result.problem, result.baseline.model) > TILT:
         return form
-    small, bare, scale = bare_fit(found)
+    small, bare, scale = bare_fit(result)
     joints, bases = _joints(small, bare, scale), _bases(small, bare, scale)
     every = [group for each in joints.values() for group in each]
     arm = _gain(bases, every) if every else 0.0

@@ -67,9 +67,9 @@ class Scatter(NamedTuple):
     steady: float
 
 
-def scatter(found: Search, unseen: Unseen) -> list[Scatter]:
+def scatter(result: Search, unseen: Unseen) -> list[Scatter]:
     """Return the scatter of every joint; none where the data cannot tell it from the instrument's."""
-    problem, model = unseen.problem, found.final.model
+    problem, model = unseen.problem, result.final.model
     features = problem.features(model)
     parts = problem.by_sample(unseen.targets[0])
     static = any(recording.joints.static for recording in problem.recordings)
@@ -122,19 +122,19 @@ def _ways(maker: Features) -> Array:
     return np.concatenate([coordinates, sight, velocity[None], np.array(moved)])
 
 
-def _usual(left: Array) -> NDArray[np.bool_]:
+def _usual(remaining: Array) -> NDArray[np.bool_]:
     """Return which differences do not stand out, shape (M,)."""
-    length = (left**2).sum(axis=1)
+    length = (remaining**2).sum(axis=1)
     return np.asarray(length < GROSS * np.median(length))
 
 
-def _products(left: Array, ways: Array) -> tuple[Array, Array, Array]:
+def _products(remaining: Array, ways: Array) -> tuple[Array, Array, Array]:
     """
     Return the normal equations of the variances, for every stretch.
 
     Parameters
     ----------
-    left : array, shape (M, c)
+    remaining : array, shape (M, c)
         Differences in units of noise.
     ways : array, shape (K, c, M)
 
@@ -147,12 +147,14 @@ def _products(left: Array, ways: Array) -> tuple[Array, Array, Array]:
 
     """
     cross = np.einsum('acm,bcm->abm', ways, ways, optimize=True) ** 2
-    along = np.einsum('acm,mc->am', ways, left) ** 2
-    ends = [part[0] for part in np.array_split(np.arange(len(left)), STRETCHES)]
+    along = np.einsum('acm,mc->am', ways, remaining) ** 2
+    ends = [part[0] for part in np.array_split(np.arange(len(remaining)), STRETCHES)]
     return (
         np.moveaxis(np.add.reduceat(cross, ends, axis=-1), -1, 0),
         np.moveaxis(np.add.reduceat(along, ends, axis=-1), -1, 0),
-        np.array([*(ways**2).sum(axis=(1, 2)), float((left**2).sum()), float(left.size)]),
+        np.array(
+            [*(ways**2).sum(axis=(1, 2)), float((remaining**2).sum()), float(remaining.size)]
+        ),
     )
 
 

@@ -49,35 +49,35 @@ counts a fifth more where the many are many. From draws of 15 to 60 stations of 
 
 
 def fitted_together(
-    found: Search, exclude: Sequence[str], beliefs: Beliefs, progress: Callable[[str], None]
+    result: Search, exclude: Sequence[str], beliefs: Beliefs, progress: Callable[[str], None]
 ) -> Search:
     """
     Return what was found, or all families fitted together where that explains stations better.
 
     Parameters
     ----------
-    found : Search
+    result : Search
         The effects found one by one.
 
     """
-    stations = sum(found.problem.samples)
-    if not found.problem.at_rest or stations < BEAR[0]:
-        return found
+    stations = sum(result.problem.samples)
+    if not result.problem.at_rest or stations < BEAR[0]:
+        return result
     progress('many small errors at once: fitting them together')
-    best, left = found, np.inf
-    for less in _steps(found.problem, stations):
-        trial = _together(found, (*exclude, *less), beliefs, progress)
+    best, remaining = result, np.inf
+    for less in _steps(result.problem, stations):
+        trial = _together(result, (*exclude, *less), beliefs, progress)
         remains = unseen_rms(trial)
-        if remains < beliefs.better * left:
-            best, left = trial, remains
-    few = unseen_rms(found)
-    if not (found.final.model.found or found.crowded) and _by_chance(found, best):
-        return found
+        if remains < beliefs.better * remaining:
+            best, remaining = trial, remains
+    few = unseen_rms(result)
+    if not (result.final.model.found or result.crowded) and _by_chance(result, best):
+        return result
     # Several that were chosen on the parts left out as well have their lead by that.
-    chosen = len(found.final.model.found) >= beliefs.several and _relearned(best)
-    if found.crowded or left < (1.0 if chosen else beliefs.better) * few:
+    chosen = len(result.final.model.found) >= beliefs.several and _relearned(best)
+    if result.crowded or remaining < (1.0 if chosen else beliefs.better) * few:
         return best
-    return replace(found, many=best) if left < CHOSEN * few else found
+    return replace(result, many=best) if remaining < CHOSEN * few else result
 
 
 def _by_chance(none: Search, many: Search) -> bool:
@@ -113,17 +113,17 @@ def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:
 
 
 def _together(
-    found: Search,
+    result: Search,
     exclude: Sequence[str],
     beliefs: Beliefs,
     progress: Callable[[str], None],
 ) -> Search:
     """Return the fit of all families but some, and but those that no machine has so large."""
-    refused = list(found.refused)
+    refused = list(result.refused)
     while True:
-        model = found.small.model
+        model = result.small.model
         kept = model.with_found(tuple(e for e in model.found if e.name not in exclude))
-        final, scale, precision = many_small(found.problem, kept, exclude, beliefs, progress)
+        final, scale, precision = many_small(result.problem, kept, exclude, beliefs, progress)
         robot = final.model.robot
         absurd = [effect for effect in final.model.found if _too_large(robot, effect)]
         if not absurd:
@@ -131,7 +131,7 @@ def _together(
         refused += absurd
         exclude = (*exclude, *(effect.name for effect in absurd))
     return replace(
-        found,
+        result,
         scale=scale,
         final=final,
         precision=precision,
@@ -178,20 +178,22 @@ def _one_number(kind: type[Effect]) -> bool:
     return kind.of == 'joint' and kind.stage is Stage.JOINT and len(numbers) == 1 and linear
 
 
-def unseen_rms(found: Search) -> float:
+def unseen_rms(result: Search) -> float:
     """Return the RMS [m] on stretches and on regions of posture left out, both together."""
-    unseen = Unseen.of(found.problem, found.scale, found.final, found.precision)
-    ways = [each.rms(_unseen(found, each)) for each in unseen.every_way()]
+    unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
+    ways = [each.rms(_unseen(result, each)) for each in unseen.every_way()]
     return float(np.sqrt(np.mean(np.square(ways))))
 
 
-def _unseen(found: Search, each: Unseen) -> Array:
+def _unseen(result: Search, each: Unseen) -> Array:
     """Return what is left on parts left out, with the sizes of many learned anew for each."""
     return (
-        predicted(each, found.final.model, found.work.beliefs) if _relearned(found) else each.whole
+        predicted(each, result.final.model, result.work.beliefs)
+        if _relearned(result)
+        else each.whole
     )
 
 
-def _relearned(found: Search) -> bool:
+def _relearned(result: Search) -> bool:
     """Return whether the sizes of many are learned anew for every part left out."""
-    return found.dense and found.final.coordinates.size <= FEW_COLUMNS
+    return result.dense and result.final.coordinates.size <= FEW_COLUMNS

@@ -83,8 +83,8 @@ def _everything(
             if kind.traits.waves is None:
                 small = _as_found(kind.search.small(view, joint, most), have)
             elif _travel(view, joint) >= beliefs.wave_range:
-                told = orders_told(features, str(joint))
-                small = kind.search.small(view, joint, min(most, told))
+                reported = orders_told(features, str(joint))
+                small = kind.search.small(view, joint, min(most, reported))
             else:
                 small = []
             out += [effect for effect in small if not hardly_moves(features, effect)]
@@ -274,7 +274,7 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
     ]
     waves = {w.joint: w for w in each if w is not None}
     free = {i: _free(model, features, w, orders) for i, w in waves.items()}
-    found = list(model.found)
+    result = list(model.found)
     for _ in range(LINES if waves else 0):
         chi, i, k, step = max(
             (w.peak(residual, free[i]) for i, w in waves.items()), key=lambda item: item[0]
@@ -286,8 +286,8 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
             wave = step[0] * np.sin(angle) + step[1] * np.cos(angle)
             residual[r] = residual[r] - waves[i].columns[r] * wave
         free[i] = free[i] & (np.abs(orders - orders[k]) >= waves[i].apart)
-        found = _with_order(found, model.robot.joint_names[i], float(orders[k]))
-    return model.with_found(tuple(found))
+        result = _with_order(result, model.robot.joint_names[i], float(orders[k]))
+    return model.with_found(tuple(result))
 
 
 def _free(
@@ -303,10 +303,10 @@ def _free(
     return free
 
 
-def _with_order(found: list[Effect], joint: str, order: float) -> list[Effect]:
+def _with_order(result: list[Effect], joint: str, order: float) -> list[Effect]:
     return [
         effect.search.with_orders(np.append(effect.search.orders(), order))
         if effect.traits.waves and effect.site == joint
         else effect
-        for effect in found
+        for effect in result
     ]

@@ -33,17 +33,17 @@ MOST_LIKE = 2
 Members = Mapping[str, Sequence[int]]
 
 
-def weighed_families(found: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[Family, ...]:
+def weighed_families(result: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[Family, ...]:
     """
     Return what every kind of the final model accounts for on unseen data.
 
     Parameters
     ----------
-    found : Search
+    result : Search
         Of all kinds fitted together.
 
     """
-    effects = found.final.model.found
+    effects = result.final.model.found
     members: dict[str, list[int]] = {}
     for k, effect in enumerate(effects):
         if effect.traits.cause or effect.traits.bends:
@@ -51,7 +51,7 @@ def weighed_families(found: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[F
     always = [
         k for k, effect in enumerate(effects) if not (effect.traits.cause or effect.traits.bends)
     ]
-    case = _Case.of(found, unseen, always)
+    case = _Case.of(result, unseen, always)
     chosen = _chosen(case, members, beliefs.family_worth)
     out = []
     for name, index in members.items():
@@ -67,8 +67,8 @@ def _with_shares(
     families: Sequence[Family], case: _Case, chosen: Sequence[int]
 ) -> tuple[Family, ...]:
     """Return the kinds with their shares of what those chosen take off together."""
-    bare, left = (float((case.left(kept) ** 2).mean()) for kept in ((), chosen))
-    explained = max(1.0 - left / max(bare, TINY**2), 0.0)
+    bare, remaining = (float((case.left(kept) ** 2).mean()) for kept in ((), chosen))
+    explained = max(1.0 - remaining / max(bare, TINY**2), 0.0)
     whole = sum(one.rms_m**2 for one in families if one.chosen)
     return tuple(
         replace(one, share=explained * one.rms_m**2 / max(whole, TINY**2)) if one.chosen else one
@@ -93,11 +93,11 @@ class _Case:
     known: dict[tuple[int, ...], Array]
 
     @classmethod
-    def of(cls, found: Search, unseen: Unseen, always: Sequence[int]) -> _Case:
-        model = found.final.model
+    def of(cls, result: Search, unseen: Unseen, always: Sequence[int]) -> _Case:
+        model = result.final.model
         usual = believed(model)
-        usual = np.where(usual > 0.0, usual, found.precision)
-        views = unseen.held(usual, found.final.coordinates).every_way()
+        usual = np.where(usual > 0.0, usual, result.precision)
+        views = unseen.held(usual, result.final.coordinates).every_way()
         parts, first = [], 0
         for view in views:
             parts.append(first + _neighbours(view))
@@ -220,8 +220,8 @@ def _weighed(
             if part > 0.0:
                 like.append((part, other))
     like = sorted(like, key=lambda item: -item[0])[:MOST_LIKE]
-    told = tuple((_largest(case, others, members[other]), part) for part, other in like)
-    return replace(out, needed=_needed(case, others, own), like=told)
+    reported = tuple((_largest(case, others, members[other]), part) for part, other in like)
+    return replace(out, needed=_needed(case, others, own), like=reported)
 
 
 def _needed(
@@ -245,5 +245,5 @@ def _needed(
 
 def _largest(case: _Case, others: Sequence[int], own: Sequence[int]) -> Site:
     """Return the member of a kind that does most by itself."""
-    left = [float(np.median(case.left([*others, k]))) for k in own]
-    return case.sites[own[int(np.argmin(left))]]
+    remaining = [float(np.median(case.left([*others, k]))) for k in own]
+    return case.sites[own[int(np.argmin(remaining))]]

@@ -51,12 +51,18 @@ class Row:
     @property
     def mass(self) -> float:
         """Return the weight of all that are named together."""
-        return float(sum(rival.probability for rival in self.slot if rival.site in self.listed))
+        return float(
+            sum(
+                alternative.probability
+                for alternative in self.slot
+                if alternative.site in self.listed
+            )
+        )
 
     @property
     def others(self) -> list[Rival]:
         """Return those that are not named."""
-        return [rival for rival in self.slot if rival.site not in self.listed]
+        return [alternative for alternative in self.slot if alternative.site not in self.listed]
 
     @property
     def gap(self) -> float:
@@ -66,7 +72,10 @@ class Row:
     @property
     def margin(self) -> float:
         """Return by how much the leader is ahead of the best that is not named [nats]; inf of none."""
-        return min((self.leader.nats - rival.nats for rival in self.others), default=float('inf'))
+        return min(
+            (self.leader.nats - alternative.nats for alternative in self.others),
+            default=float('inf'),
+        )
 
     @property
     def apart(self) -> float:
@@ -76,11 +85,14 @@ class Row:
         The next rival and the frames were fitted, so this is what lies outside the span of both.
         """
         own = self.leader.fit.residual
-        return min((_rms(own - rival.fit.residual) for rival in self.others), default=float('inf'))
+        return min(
+            (_rms(own - alternative.fit.residual) for alternative in self.others),
+            default=float('inf'),
+        )
 
     def names(self) -> dict[Site, float]:
         """Return the weight of every name."""
-        return _marginal(self.slot, lambda rival: rival.site)
+        return _marginal(self.slot, lambda alternative: alternative.site)
 
     def places(self) -> dict[str, float]:
         """Return the weight of every place."""
@@ -101,42 +113,44 @@ def table_of(slots: Sequence[Slot], beliefs: Beliefs) -> tuple[Row, ...]:
         For every effect found, itself and its rivals, most probable first.
 
     """
-    return tuple(Row(slot, named_together(slot, beliefs)) for slot in slots)
+    return tuple(
+        Row(candidate_set, named_together(candidate_set, beliefs)) for candidate_set in slots
+    )
 
 
-def named_together(slot: Slot, beliefs: Beliefs) -> tuple[Site, ...]:
+def named_together(candidate_set: Slot, beliefs: Beliefs) -> tuple[Site, ...]:
     """Return the leader alone when it is sure, else all worth naming, the simplest first."""
-    if slot[0].probability >= beliefs.sure:
-        return (slot[0].site,)
-    listed = dict.fromkeys(r.site for r in slot if r.probability >= beliefs.listed)
+    if candidate_set[0].probability >= beliefs.sure:
+        return (candidate_set[0].site,)
+    listed = dict.fromkeys(r.site for r in candidate_set if r.probability >= beliefs.listed)
     return tuple(sorted(listed, key=_numbers))
 
 
-def effect_of(rival: Rival) -> Effect | None:
+def effect_of(alternative: Rival) -> Effect | None:
     """Return a rival's effect as it was fitted."""
-    for effect in rival.fit.model.found:
-        if (effect.name, effect.site) == (rival.site.effect, rival.site.joint):
+    for effect in alternative.fit.model.found:
+        if (effect.name, effect.site) == (alternative.site.effect, alternative.site.joint):
             return effect
     return None
 
 
-def place_of(rival: Rival) -> str:
+def place_of(alternative: Rival) -> str:
     """Return where a rival sits."""
-    effect = effect_of(rival)
-    return effect.at if effect is not None else str(rival.site.joint)
+    effect = effect_of(alternative)
+    return effect.at if effect is not None else str(alternative.site.joint)
 
 
-def dependence_of(rival: Rival) -> str:
+def dependence_of(alternative: Rival) -> str:
     """Return what a rival depends on."""
-    effect = effect_of(rival)
-    return effect.on if effect is not None else REGISTRY[rival.site.effect].traits.depends_on
+    effect = effect_of(alternative)
+    return effect.on if effect is not None else REGISTRY[alternative.site.effect].traits.depends_on
 
 
-def _marginal(slot: Slot, key: Callable[[Rival], Key]) -> dict[Key, float]:
+def _marginal(candidate_set: Slot, key: Callable[[Rival], Key]) -> dict[Key, float]:
     out: dict[Key, float] = {}
-    for rival in slot:
-        own = key(rival)
-        out[own] = out.get(own, 0.0) + rival.probability
+    for alternative in candidate_set:
+        own = key(alternative)
+        out[own] = out.get(own, 0.0) + alternative.probability
     return out
 
 

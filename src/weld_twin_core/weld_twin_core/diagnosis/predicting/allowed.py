@@ -79,7 +79,7 @@ def allowed(
     system = Conditioning(rows, prior, models.shown, models.noise)
     unseen = _unseen(problem, model, scale, precision, rows)
     lost = _lost(problem, model)
-    left = leftover(problem, scale, unseen, system.given, floor, models.rough, lost)
+    remaining = leftover(problem, scale, unseen, system.given, floor, models.rough, lost)
     curves = np.split(
         models.open, what.count - np.cumsum([k.size for k in what.knots[::-1]])[::-1]
     )
@@ -88,11 +88,12 @@ def allowed(
         what,
         models.mean,
         models.covariance,
-        plausible_arm.discrepancy(model.robot, left, np.array(fine), model.found),
+        plausible_arm.discrepancy(model.robot, remaining, np.array(fine), model.found),
         Domain.of(recordings, model.robot),
         left_open(problem, model),
         prior_std=prior.width,
         single=Conditioning(rows, prior, prior.width, models.noise).given(),
+        middle=remaining.middle,
     )
     return _with_usual_sigma(posterior, model, problem)
 
@@ -275,13 +276,13 @@ def left_open(problem: Problem, model: Model) -> tuple[str, ...]:
     A direction is named by the axes that make most of it: 'base z with tool z' is a shift of both
     along z by which no measured pose changes.
     """
-    found = open_directions(problem, model)
-    size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in found.names])
+    result = open_directions(problem, model)
+    size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in result.names])
     out = []
-    for vector in found.vectors.T:
+    for vector in result.vectors.T:
         share = np.abs(vector / size)
         order = [i for i in np.argsort(-share) if share[i] >= PARTNERS * share.max()]
-        out.append(' with '.join(_named(found.names[i]) for i in order[:MOST]))
+        out.append(' with '.join(_named(result.names[i]) for i in order[:MOST]))
     return tuple(out)
 
 

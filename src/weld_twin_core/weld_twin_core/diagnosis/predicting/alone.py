@@ -92,11 +92,11 @@ def _left(model: Model) -> tuple[Effect, ...]:
 
 def _constants(model: Model) -> Model:
     """Return the model with what a robot file holds, and how the recordings' set-ups differ."""
-    left = {id(effect) for effect in _left(model)}
+    remaining = {id(effect) for effect in _left(model)}
     held = tuple(
         effect
         for effect in of_the_robot([e for e in model.known + model.found if e.traits.cause])
-        if id(effect) not in left and isinstance(effect, ChannelError | FrameError)
+        if id(effect) not in remaining and isinstance(effect, ChannelError | FrameError)
     )
     return replace(model, known=(), found=held)
 

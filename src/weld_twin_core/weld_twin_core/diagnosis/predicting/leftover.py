@@ -12,9 +12,8 @@ how much the arm has of all the small errors that could be told.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +23,7 @@ from scipy.special import chdtri
 from ...arrays import Array
 from ...recording import Recording
 from ...twin.turns import just_turned
-from ..algebra.definite import Index
+from ..algebra.definite import Index, unit_diagonal
 from ..algebra.designed import Design
 from ..algebra.fit import TRUSTED, solve_scaled
 from ..algebra.independent_rows import by_sample
@@ -38,6 +37,15 @@ SHARES = (0.0, 0.25, 0.5, 0.75, 0.95)
 ROUGH = 0.5
 """Share of small errors of a usual size from which on all that is left is the arm's. A judgement: of two
 real arms under a tracker it is 0.3 to 0.6, and their stations repeat better than models predict."""
+NEIGHBOURS = (2, 8, 32, 128)
+"""Samples that are looked at together for what they have in common: two show what changes from one to
+the next, a hundred what is a tenth of the noise."""
+SURE = 2.0
+"""Standard errors from which on what neighbours have in common is no chance."""
+ROUNDING = 1e-10
+"""Added to a covariance of unit diagonal, so that it stays definite where its inverse hardly is."""
+AXES = slice(0, 3)
+"""Rows of a sample that are positions, or all that a contact sees."""
 STEPS = 60
 """Halvings of the bracket in which the size is sought; far below rounding."""
 
@@ -91,13 +99,15 @@ class Rest(NamedTuple):
     What is left over: per axis at the tool [m], about each axis [rad], in every gear [rad].
 
     ``turns``, shape (n,) [rad or m], is what is left over in joints that have just turned around,
-    on top of that.
+    on top of that. ``middle`` is how far to go from the fitted model to the middle of those allowed, as
+    a share of the way, to predict unseen postures best.
     """
 
     position: float
     orientation: float
     gear: float
     turns: Array
+    middle: float
 
 
 def leftover(
@@ -124,10 +134,9 @@ def leftover(
         How much motion was found to be lost in every joint.
 
     """
-    samples = _by_sample(problem)
-    errors, moments, pairs = _predicted(problem, unseen, given, samples)
+    samples, weight = _by_sample(problem), np.concatenate(scale.weights)
+    errors, moments, beside, middle = _predicted(problem, unseen, given, samples, weight > TRUSTED)
     levers = [unseen.turns[:, index].T @ unseen.turns[:, index] for index in samples]
-    weight = np.concatenate(scale.weights)
 
     def part(axes: slice) -> tuple[Array, Array, Array]:
         """Return errors, moments and levers on three axes of the samples that have them."""
@@ -145,16 +154,17 @@ def leftover(
     if all(index.size < 3 for index in samples):
         # Faces and lengths show one way each: nothing parts what is left by axes or gears.
         off, moment, _ = part(slice(0, 1))
-        position, gear = float(np.sqrt(max((off**2).mean() - moment.mean(), 0.0))), 0.0
+        remaining = max(float((off**2).mean() - moment.mean()), 0.0)
+        position, gear = float(np.sqrt(remaining)), 0.0
     else:
-        position, gear = _shared(*part(slice(0, 3)))
+        position, gear, remaining = _shared(*part(AXES))
     e, v, levered = part(slice(3, 6))
     # Without measured turns the tool turns as much as it shifts on an arm of a metre.
     turn = _size(e, v + gear**2 * levered, np.eye(3)) if e.size else position
-    common = _common(errors, moments, pairs, weight > TRUSTED)
-    share = _of_the_arm(*common, _noise(problem, floor, scale.position), rough, problem.at_rest)
+    noise = _noise(problem, floor, scale.position)
+    share = _of_the_arm(remaining / scale.position**2, beside, noise, rough, problem.at_rest)
     at_turns = _at_turns(problem, unseen, samples, errors, moments, lost)
-    return Rest(position * share, turn * share, gear * share, at_turns)
+    return Rest(position * share, turn * share, gear * share, at_turns, middle)
 
 
 def _at_turns(
@@ -176,7 +186,9 @@ def _at_turns(
     seen = np.array([k for k, error in enumerate(errors) if error.size >= 3], dtype=int)
     if not lost.any() or problem.at_rest or not seen.size:
         return out
-    excess = np.array([_excess(errors[k], errors[k], moments[k]) for k in seen])
+    excess = np.array(
+        [(errors[k][AXES] ** 2).mean() - moments[k].diagonal()[AXES].mean() for k in seen]
+    )
     near = np.concatenate([_turned(problem, k) for k in range(len(problem.recordings))])[seen]
     for i in np.flatnonzero(lost):
         here, beside = excess[near[:, i]], excess[~near[:, i]]
@@ -200,37 +212,15 @@ def _turned(problem: Problem, k: int) -> NDArray[np.bool_]:
     return just_turned(recording.joints, recording.measured.t)
 
 
-def _common(
-    errors: list[Array],
-    moments: list[Array],
-    pairs: list[tuple[int, int, Array]],
-    good: NDArray[np.bool_],
-) -> tuple[float, float]:
-    """Return the variance of what is left, and what of it neighbours have in common."""
-    own = [_excess(errors[k], errors[k], moments[k]) for k in np.flatnonzero(good)]
-    alike = [
-        _excess(errors[k], errors[n], moment)
-        for k, n, moment in pairs
-        if good[k] and good[n] and errors[k].size == errors[n].size
-    ]
-    return float(np.mean(own)), float(np.mean(alike or [0.0]))
-
-
-def _excess(one: Array, other: Array, moment: Array) -> float:
-    """Return by how much two samples' errors agree, beyond what open directions account for."""
-    axes = slice(0, 3)
-    return float(one[axes] @ other[axes] - np.trace(moment[axes, axes])) / one[axes].size
-
-
 def _of_the_arm(
-    left: float, beside: float, noise: float | None, rough: float, at_rest: bool
+    remaining: float, beside: float, noise: float | None, rough: float, at_rest: bool
 ) -> float:
     """
     Return the part of what is left over that is the arm's, as a factor of its size.
 
     Parameters
     ----------
-    left, beside : float
+    remaining, beside : float
         Variance of what is left, and what of it neighbours have in common [noise of the fit].
     noise : float, optional
         Standard deviation of the instrument [noise of the fit]; None where nothing tells it.
@@ -239,20 +229,24 @@ def _of_the_arm(
 
     """
     # Where open directions account for all of it, neighbours have nothing in common either.
-    left = max(left, 1e-12)
-    common = min(max(beside, 0.0), left)
-    alone = left - common
+    remaining = max(remaining, 1e-12)
+    common = min(max(beside, 0.0), remaining)
+    alone = remaining - common
     if noise is None:
         common += alone * min(rough / ROUGH, 1.0)
     elif at_rest:
         common += max(alone - noise**2, 0.0)
-    return float(np.sqrt(common / left))
+    return float(np.sqrt(common / remaining))
 
 
-def _shared(errors: Array, moments: Array, levers: Array) -> tuple[float, float]:
-    """Return what is left over per axis [m] and per gear [rad]: the likeliest mixture."""
+def _shared(errors: Array, moments: Array, levers: Array) -> tuple[float, float, float]:
+    """
+    Return what is left over per axis [m] and per gear [rad]: the likeliest mixture.
+
+    And the variance of an axis by both together [m^2].
+    """
     lever = float(np.trace(levers, axis1=1, axis2=2).mean()) / 3.0
-    best = (-np.inf, 0.0, 0.0)
+    best = (-np.inf, 0.0, 0.0, 0.0)
     for share in SHARES if lever > 0.0 else SHARES[:1]:
         shape = (1.0 - share) * np.eye(3) + share * levers / max(lever, 1e-300)
         size = _size(errors, moments, shape)
@@ -260,8 +254,8 @@ def _shared(errors: Array, moments: Array, levers: Array) -> tuple[float, float]
         solved = np.linalg.solve(whole, errors[..., None])[..., 0]
         likely = -0.5 * float(((errors * solved).sum(axis=1) + np.linalg.slogdet(whole)[1]).sum())
         gear = size * np.sqrt(share / max(lever, 1e-300))
-        best = max(best, (likely, size * np.sqrt(1.0 - share), float(gear)))
-    return best[1], best[2]
+        best = max(best, (likely, size * np.sqrt(1.0 - share), float(gear), size**2))
+    return best[1], best[2], best[3]
 
 
 def _by_sample(problem: Problem) -> list[Index]:
@@ -272,12 +266,16 @@ def _by_sample(problem: Problem) -> list[Index]:
 
 
 def _predicted(
-    problem: Problem, unseen: Unseen, given: Given, samples: list[Index]
-) -> tuple[list[Array], list[Array], list[tuple[int, int, Array]]]:
+    problem: Problem,
+    unseen: Unseen,
+    given: Given,
+    samples: list[Index],
+    good: NDArray[np.bool_],
+) -> tuple[list[Array], list[Array], float, float]:
     """
     Return the error of every sample predicted from other regions, and its second moment.
 
-    And of every sample with its neighbour, the numbers of both and their common moment.
+    And the variance that good samples have in common with their neighbours, and `_middle`.
     """
     errors, shifts = np.array(unseen.residual), np.zeros(unseen.residual.size)
     normal = unseen.own.normal()
@@ -285,7 +283,7 @@ def _predicted(
     right = unseen.own.times(unseen.residual) - unseen.pull
     place = np.repeat(np.arange(len(samples)), [index.size for index in samples])
     moments: list[Array] = [np.zeros((0, 0))] * len(samples)
-    pairs: list[tuple[int, int, Array]] = []
+    alike: list[_Alike] = []
     for b in np.unique(unseen.labels):
         out = unseen.labels == b
         mine, columns = unseen.own.within(np.flatnonzero(out)), unseen.columns[:, out]
@@ -295,31 +293,108 @@ def _predicted(
         errors[out] -= moved
         # The mean is counted from the fit to all rows, the error from the fit to the others.
         shifts[out] = mean @ columns - moved
-        spread, here = covariance @ columns, np.unique(place[out])
+        ways = np.vstack([_ways(covariance) @ columns, shifts[out]])
+        here = np.unique(place[out])
         ends = np.cumsum([0, *(samples[k].size for k in here)])
-        own = {k: slice(a, b) for k, a, b in zip(here, ends[:-1], ends[1:], strict=True)}
-
-        def moment(one: int, other: int) -> Array:
-            """Return the common second moment of two samples of the region."""
-            shift = np.outer(shifts[samples[one]], shifts[samples[other]])
-            return np.asarray(columns[:, own[one]].T @ spread[:, own[other]] + shift)  # noqa: B023
-
+        own = {k: ways[:, a:b] for k, a, b in zip(here, ends[:-1], ends[1:], strict=True)}
         for k in here:
-            moments[k] = moment(k, k)
-        pairs += [(k, n, moment(k, n)) for k, n in _neighbours(problem, here)]
-    return [errors[index] for index in samples], moments, pairs
+            moments[k] = own[k].T @ own[k]
+        for size, group in _neighbours(problem, here[good[here]]):
+            # Touches of several kinds see a point by so many rows each; the like are compared.
+            like = [k for k in group if samples[k].size == samples[group[0]].size]
+            if len(like) > 1:
+                each = [(errors[samples[k]][AXES], own[k][:, AXES]) for k in like]
+                alike.append(_Alike.of(size, each))
+    left = [errors[index] for index in samples]
+    use = np.concatenate([samples[k] for k in np.flatnonzero(good)])
+    return left, moments, _common(alike), _middle(errors[use], shifts[use], unseen.labels[use])
 
 
-def _neighbours(problem: Problem, here: Array) -> list[tuple[int, int]]:
-    """Return every sample of some and the next in time; of stations, the next in posture."""
-    if here.size < 2:
-        return []
+def _ways(covariance: Array) -> Array:
+    """Return the ways in which coordinates may be off, of one standard deviation each, shape (P, P)."""
+    scaled, deviation = unit_diagonal(covariance, ROUNDING)
+    return np.asarray(np.linalg.cholesky(scaled).T * deviation)
+
+
+def _middle(errors: Array, shifts: Array, labels: Array) -> float:
+    """
+    Return how far to go from the fitted model to the middle of those allowed, from 0 to 1.
+
+    Both predict every region from the others, and are weighed by how well they do [1]_. Not at all
+    where the gain is no more than chance from region to region: of an arm that is exact but for what
+    was found, all else that was allowed is noise.
+
+    References
+    ----------
+    .. [1] L. Breiman, "Stacked regressions", Machine Learning 24, 1996.
+
+    """
+    share = float(np.clip(errors @ shifts / max(float(shifts @ shifts), 1e-300), 0.0, 1.0))
+    gain = errors**2 - (errors - share * shifts) ** 2
+    each = np.array([gain[labels == b].sum() for b in np.unique(labels)])
+    sure = each.size > 1 and each.sum() > SURE * np.sqrt(each.size) * each.std(ddof=1)
+    return share if sure else 0.0
+
+
+class _Alike(NamedTuple):
+    """
+    What neighbours have in common, summed over all pairs of a group of ``size`` or fewer.
+
+    ``agree`` is the sum of products of errors, ``open`` that of what open directions account for,
+    ``square`` the sum of squared errors over samples, ``pairs`` and ``rows`` how many there are.
+    """
+
+    size: int
+    agree: float
+    open: float
+    square: float
+    pairs: int
+    rows: int
+
+    @classmethod
+    def of(cls, size: int, each: Sequence[tuple[Array, Array]]) -> _Alike:
+        """Return the sums of a group, of errors (c,) and ways to be off (R, c) each."""
+        square = sum(float(e @ e) for e, _ in each)
+        own = sum(float((w**2).sum()) for _, w in each)
+        whole, ways = (np.sum(part, axis=0) for part in zip(*each, strict=True))
+        agree, together = float(whole @ whole) - square, float((ways**2).sum()) - own
+        width = whole.size
+        return cls(
+            size, agree, together, square, width * len(each) * (len(each) - 1), width * len(each)
+        )
+
+
+def _common(alike: Sequence[_Alike]) -> float:
+    """
+    Return the variance that neighbours have in common, beyond open directions and chance.
+
+    Over few neighbours what changes fast shows, over many what is small. Samples that err against
+    each other have no white noise either.
+    """
+    result = [0.0]
+    for size in dict.fromkeys(one.size for one in alike):
+        mine = [one for one in alike if one.size == size]
+        pairs = sum(one.pairs for one in mine)
+        noise = sum(one.square for one in mine) / sum(one.rows for one in mine)
+        agree, own = (sum(v) / pairs for v in zip(*((o.agree, o.open) for o in mine), strict=True))
+        chance = SURE * float(np.hypot(noise * np.sqrt(2.0 / pairs), own))
+        result += [agree - own] * (agree - own > chance) + [-agree] * (-agree > chance)
+    return max(result)
+
+
+def _neighbours(problem: Problem, here: Array) -> Iterator[tuple[int, Array]]:
+    """Yield groups of neighbours in time, and how many there are at most; of stations, in posture."""
     if not problem.at_rest:
-        return [(int(k), int(n)) for k, n in pairwise(here)]
-    q = np.concatenate([_postures(r) for r in problem.recordings])[here]
-    apart = ((q[:, None] - q[None]) ** 2).sum(axis=2)
-    np.fill_diagonal(apart, np.inf)
-    return [(int(k), int(n)) for k, n in zip(here, here[apart.argmin(axis=1)], strict=True)]
+        for size in NEIGHBOURS:
+            for start in range(0, here.size - 1, size):
+                yield size, here[start : start + size]
+    elif here.size > 1:
+        q = np.concatenate([_postures(r) for r in problem.recordings])[here]
+        apart = ((q[:, None] - q[None]) ** 2).sum(axis=2)
+        np.fill_diagonal(apart, np.inf)
+        pairs = np.stack([np.arange(here.size), apart.argmin(axis=1)], axis=1)
+        for pair in np.unique(np.sort(pairs, axis=1), axis=0):
+            yield 2, here[pair]
 
 
 def _postures(recording: Recording) -> Array:
@@ -352,11 +427,11 @@ def _size(errors: Array, moments: Array, shape: Array) -> float:
 
 def _noise(problem: Problem, floor: NoiseFloor, unit: float) -> float | None:
     """Return the instrument's noise in units [m], told with the data or seen in them; None without."""
-    told = [
+    reported = [
         float(np.median(r.measured.sigma))
         for r in problem.recordings
         if r.measured is not None and r.measured.sigma is not None
     ]
-    if told:
-        return float(np.mean(told)) / unit
+    if reported:
+        return float(np.mean(reported)) / unit
     return floor.sigma / unit if floor.independent else None

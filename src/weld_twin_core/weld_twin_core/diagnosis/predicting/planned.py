@@ -56,7 +56,7 @@ TRIED = 6000
 CHOICE = 25.0
 """Stations at which a diagnosis, which has to choose among small errors, leaves twice what they would
 show it if all errors were fitted: measured on plans that the plant carried out, eleven of 16, 24
-and 40 stations (weld-twin lab plans, docs/first_measurement.md)."""
+and 40 stations (weld-twin lab coverage --plans, docs/first_measurement.md)."""
 DRAWS = 400
 """Of a tool's error at each posture, to count how many lie within the tolerance."""
 
@@ -243,7 +243,7 @@ def _chosen(region: _Region, count: int) -> tuple[list[int], Array, Array]:
     draws = np.random.default_rng(1).standard_normal((DRAWS, 3))
     noise = np.broadcast_to(region.noise, (len(region.offered), 3, 3))
     taken: list[int] = []
-    found = [_judged(region, covariance, 1.0, draws)]
+    result = [_judged(region, covariance, 1.0, draws)]
     for number in range(1, count + 1):
         best = _best(region, covariance, noise, taken)
         taken.append(best)
@@ -251,9 +251,9 @@ def _chosen(region: _Region, count: int) -> tuple[list[int], Array, Array]:
         gain = covariance @ rows.T
         covariance -= gain @ np.linalg.solve(rows @ gain + noise[best], gain.T)
         factor = 1.0 + (region.choice / number) ** 3
-        found.append(_judged(region, covariance, factor, draws))
-        found[-1] = (min(found[-1][0], found[0][0]), found[-1][1])
-    sigma, within = np.array(found).T
+        result.append(_judged(region, covariance, factor, draws))
+        result[-1] = (min(result[-1][0], result[0][0]), result[-1][1])
+    sigma, within = np.array(result).T
     return taken, sigma, within
 
 

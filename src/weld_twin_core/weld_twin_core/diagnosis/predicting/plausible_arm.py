@@ -36,18 +36,18 @@ MOST = 24
 """Coordinates of one ripple effect; more of them are high orders, part of what is left over."""
 
 
-def directions(robot: Robot, found: Sequence[Effect]) -> tuple[Effect, ...]:
+def directions(robot: Robot, result: Sequence[Effect]) -> tuple[Effect, ...]:
     """Return the effects whose coordinates are uncertain, at the values found or at zero."""
     out: list[Effect] = []
     for kind in [kind for kind in REGISTRY.values() if kind.traits.everywhere]:
         for joint in joints_of(kind, robot):
-            here = [e for e in found if (e.name, e.site) == (kind.name, joint)]
+            here = [e for e in result if (e.name, e.site) == (kind.name, joint)]
             if kind.traits.waves is None:
                 out += here[:1] or [_none_yet(kind, joint)]
             elif joint is not None and not robot.prismatic[robot.index(joint)]:
                 wave = reduce(_joined, here, _none_yet(kind, joint))
                 out += [wave.search.with_orders(ORDERS), *_finer(wave)]
-    for effect in found:
+    for effect in result:
         if (
             effect.traits.waves is None
             and _counts(effect)
@@ -76,7 +76,7 @@ def _finer(wave: Effect) -> list[Effect]:
     return [wave.search.with_orders(other)] if 0 < 2 * other.size <= MOST else []
 
 
-def middles(effects: Sequence[Effect], found: Sequence[Effect]) -> Array:
+def middles(effects: Sequence[Effect], result: Sequence[Effect]) -> Array:
     """
     Return where the prior of every coordinate lies, counted from the fitted model, shape (K,).
 
@@ -84,7 +84,7 @@ def middles(effects: Sequence[Effect], found: Sequence[Effect]) -> Array:
     and so are the waves of a joint that was fitted with many orders at once: their sizes were
     learned together there, and some of them alone must not be drawn back.
     """
-    dense = {(e.name, e.site) for e in found if e.search.orders().size > ORDERS.size}
+    dense = {(e.name, e.site) for e in result if e.search.orders().size > ORDERS.size}
     out = [np.zeros(0)]
     for effect in effects:
         if effect.traits.waves is not None:
@@ -131,7 +131,7 @@ def fine_knots(motions: Sequence[Array]) -> tuple[Array, ...]:
     return tuple(out)
 
 
-def discrepancy(robot: Robot, rest: Rest, fine: Array, found: Sequence[Effect]) -> Discrepancy:
+def discrepancy(robot: Robot, rest: Rest, fine: Array, result: Sequence[Effect]) -> Discrepancy:
     """
     Return what no parameter explains, with gears as uneven where they were not seen.
 
@@ -141,13 +141,13 @@ def discrepancy(robot: Robot, rest: Rest, fine: Array, found: Sequence[Effect]) 
         What is left over where it was recorded.
     fine : array, shape (n,)
         Height of every joint's fine curve.
-    found : sequence of Effect
+    result : sequence of Effect
         A curve without a formula among them says nothing beyond its ends, so that the joint may
         be off by as much as that there.
 
     """
     fine = np.array(fine)
-    for effect in found:
+    for effect in result:
         if effect.twin.off_outside() > 0.0:
             joint = robot.index(str(effect.site))
             fine[joint] = max(fine[joint], effect.twin.off_outside())

@@ -164,8 +164,8 @@ def hidden(columns: Array, frames: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """
     basis = np.linalg.svd(columns[frames], full_matrices=False)[2]
     own = np.linalg.norm(columns, axis=1)
-    left = np.linalg.norm(columns - (columns @ basis.T) @ basis, axis=1)
-    return np.asarray(~frames & (left <= OPEN * own))
+    remaining = np.linalg.norm(columns - (columns @ basis.T) @ basis, axis=1)
+    return np.asarray(~frames & (remaining <= OPEN * own))
 
 
 @dataclass
@@ -236,9 +236,9 @@ class _Chain:
         """Draw the variance of a row, given what the coordinates leave."""
         rows = self.rows
         rss = rows.share * float(rows.residual @ rows.residual)
-        left = max(rss - 2.0 * self.right @ drawn + drawn @ self.normal @ drawn, 0.0)
+        remaining = max(rss - 2.0 * self.right @ drawn + drawn @ self.normal @ drawn, 0.0)
         freedom = rows.share * rows.residual.size + NOISE_TRUST
-        self.noise = float(left + NOISE_TRUST * self.expected) / self.rng.chisquare(freedom)
+        self.noise = float(remaining + NOISE_TRUST * self.expected) / self.rng.chisquare(freedom)
 
     def _sizes(self, off: Array) -> None:
         """Draw the size of every small error, and how often each comes in every family."""

@@ -158,9 +158,9 @@ class Change:
         rest = self.rest
         flat = _flat(self.columns * shape[:, None, None])
         new = _orthonormal(_projected(flat, _flat(rest.basis)))
-        left = _projected(rest.residual.reshape(-1), new).reshape(rest.residual.shape)
+        remaining = _projected(rest.residual.reshape(-1), new).reshape(rest.residual.shape)
         basis = np.concatenate([_flat(rest.basis), new], axis=1)
-        return replace(rest, residual=left, basis=basis.reshape(*left.shape, -1))
+        return replace(rest, residual=remaining, basis=basis.reshape(*remaining.shape, -1))
 
     def nats(self, shape: Array) -> float:
         """
@@ -175,12 +175,12 @@ class Change:
         free = max(1.0 - after.basis.shape[2] / size, 0.0)
         total, fall = 0.0, 0.0
         for part in (slice(0, 3), slice(3, 6)):
-            before, left = (float((c.residual[:, part] ** 2).sum()) for c in (rest, after))
+            before, remaining = (float((c.residual[:, part] ** 2).sum()) for c in (rest, after))
             if before > 0.0:
                 count = max(after.share * free * after.residual[:, part].size, FEWEST)
-                fall += 0.5 * count * float(np.log(before / max(left, TINY**2 * before)))
+                fall += 0.5 * count * float(np.log(before / max(remaining, TINY**2 * before)))
                 total += count
-        return fall - 0.5 * float(self.columns.shape[2] * np.log(total))
+        return fall - 0.5 * float(self.columns.shape[2] * np.log(max(total, FEWEST)))
 
 
 def rest_of(parts: list[Array], problem: Problem, model: Model) -> Rest:
@@ -192,7 +192,7 @@ def rest_of(parts: list[Array], problem: Problem, model: Model) -> Rest:
     scale, n = _scale(parts), model.robot.n
     pairs = list(zip(problem.features(model), problem.rows, strict=True))
     arms = [np.concatenate([part(*pair) for part in (_arm, _grown, _scaled)]) for pair in pairs]
-    left, arm = (_whitened(each, scale) for each in ([part[None] for part in parts], arms))
+    remaining, arm = (_whitened(each, scale) for each in ([part[None] for part in parts], arms))
     things = {}
     for thing, channel, count in (('base', 'base', 6), ('tool', 'tool', 6), ('joints', 'q', n)):
         moved = [_moved(maker, channel, count, rows) for maker, rows in pairs]
@@ -204,10 +204,10 @@ def rest_of(parts: list[Array], problem: Problem, model: Model) -> Rest:
         bases = [bases[0] * (number == k)[:, None, None] for k in range(len(parts))]
     frames = np.concatenate([*bases, things['tool'][0]], axis=2)
     arm = arm[..., np.abs(arm).max(axis=(0, 1)) > 0.0]
-    basis = _basis(arm.reshape(left.size, -1), frames.reshape(left.size, -1))
-    left = _projected(left.reshape(-1, 1), basis).reshape(left.shape[:2])
-    basis = basis.reshape(*left.shape, -1)
-    return Rest(left, basis, things, problem.rows, problem.samples, scale.position)
+    basis = _basis(arm.reshape(remaining.size, -1), frames.reshape(remaining.size, -1))
+    remaining = _projected(remaining.reshape(-1, 1), basis).reshape(remaining.shape[:2])
+    basis = basis.reshape(*remaining.shape, -1)
+    return Rest(remaining, basis, things, problem.rows, problem.samples, scale.position)
 
 
 def thinned(problem: Problem, parts: list[Array]) -> tuple[Problem, list[Array]]:

@@ -55,13 +55,13 @@ def _moved(case: Case, step: Slip) -> str:
     )
 
 
-def _settled(case: Case, found: Settling) -> str:
-    recording = case.recordings[found.recording]
-    constant, unit = found.time_constant, 's'
+def _settled(case: Case, result: Settling) -> str:
+    recording = case.recordings[result.recording]
+    constant, unit = result.time_constant, 's'
     if recording.joints.static:
         constant, unit = constant / float(np.median(np.diff(recording.seen.t))), 'stations'
     return (
-        f'The set-up of {recording.name} settles by {length(found.size)} with a time constant of '
+        f'The set-up of {recording.name} settles by {length(result.size)} with a time constant of '
         f'{constant:.3g} {unit}, as in warming up.'
     )
 
@@ -76,8 +76,8 @@ TURN_TOLD = 1e-3
 
 def parted(case: Case) -> Sequence[Finding]:
     """Return which recordings have a tool of their own, where that explains what is left."""
-    told = any(change.effect.traits.fitted_with == 'tool' for change in case.model.changes)
-    if len(case.recordings) < 2 or told:
+    reported = any(change.effect.traits.fitted_with == 'tool' for change in case.model.changes)
+    if len(case.recordings) < 2 or reported:
         return ()
     shot = case.snapshot
     before = shot.arm()

@@ -49,14 +49,14 @@ STATES = 50
 def computed(case: Case) -> Sequence[Finding]:
     """Return the recordings whose poses were computed from the joint positions beside them."""
     return [
-        _told(recording, left)
+        _told(recording, remaining)
         for k, recording in enumerate(case.recordings)
-        if not recording.simulated and (left := _left(case, k)) is not None
+        if not recording.simulated and (remaining := _left(case, k)) is not None
     ]
 
 
-def _told(recording: Recording, left: float) -> Finding:
-    much = 'to the last digit' if left < 1e-7 else f'to {length(max(left, 1e-6))}'
+def _told(recording: Recording, remaining: float) -> Finding:
+    much = 'to the last digit' if remaining < 1e-7 else f'to {length(max(remaining, 1e-6))}'
     return mistake(
         f'The poses of {recording.name} agree with a rigid arm {much}, with no noise: they were '
         'computed from these joint positions, as the controller does, and not measured.',
@@ -87,9 +87,9 @@ def _left(case: Case, k: int) -> float | None:
         if not near:
             continue
         problem, (start, _) = min(near, key=lambda pair: pair[1][1])
-        left = _gap(problem, _fitted(problem, start, 12))
-        if left < max(COMPUTED, _rounding(problem, start)):
-            return left
+        remaining = _gap(problem, _fitted(problem, start, 12))
+        if remaining < max(COMPUTED, _rounding(problem, start)):
+            return remaining
     return None
 
 
@@ -128,8 +128,8 @@ def _stations(recording: Recording, model: Model) -> Problem | None:
 def _near(problem: Problem, model: Model) -> tuple[Model, float] | None:
     """Return the model after one step, and what it leaves; None where that is far off."""
     stepped = _fitted(problem, model, 1)
-    left = _gap(problem, stepped)
-    return (stepped, left) if left < NEAR else None
+    remaining = _gap(problem, stepped)
+    return (stepped, remaining) if remaining < NEAR else None
 
 
 def _fitted(problem: Problem, model: Model, iterations: int) -> Model:

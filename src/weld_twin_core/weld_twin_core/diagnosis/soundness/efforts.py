@@ -81,12 +81,12 @@ def with_sign(recordings: Sequence[Recording], robot: Robot) -> tuple[Recording,
         unit than N m.
 
     """
-    told = [recording.effort is not None for recording in recordings]
-    if not any(told):
+    reported = [recording.effort is not None for recording in recordings]
+    if not any(reported):
         return tuple(recordings)
-    if not all(told):
+    if not all(reported):
         raise DataError(
-            f'{recordings[told.index(False)].name} has no effort of the joints and other recordings '
+            f'{recordings[reported.index(False)].name} has no effort of the joints and other recordings '
             'have; record it in all of them, or leave --use-effort out'
         )
     if not any(np.ptp(r.effort.value, axis=0).any() for r in recordings if r.effort is not None):
@@ -117,55 +117,55 @@ def compared(recordings: Sequence[Recording], robot: Robot) -> Efforts | None:
         for i, name in enumerate(robot.joint_names)
     )
     difference = float(np.sqrt((gap**2).mean())) / whole if whole > 0.0 else 0.0
-    found = robot.mass is not None and difference > AGREES
+    result = robot.mass is not None and difference > AGREES
     return Efforts(
         recordings[0].effort_holds,
         loads.correlation(),
         robot.mass is not None,
         joints,
         difference,
-        _causes(loads, gap) if found else (),
+        _causes(loads, gap) if result else (),
     )
 
 
 def efforts(case: Case) -> Sequence[Finding]:
     """Return what the efforts are, and what they say of payload and torque constants."""
-    found = compared(case.recordings, case.model.robot)
-    return [] if found is None else [_told_sign(found), *_told_differences(found)]
+    result = compared(case.recordings, case.model.robot)
+    return [] if result is None else [_told_sign(result), *_told_differences(result)]
 
 
-def _told_differences(found: Efforts) -> Iterator[Finding]:
-    if not found.weighed:
+def _told_differences(result: Efforts) -> Iterator[Finding]:
+    if not result.weighed:
         yield note(
             'The robot model has no link masses, so the unit of the efforts is not checked; a '
             'compliance found with them is for each unit of effort.'
         )
-    elif found.causes:
-        yield warning(_told_causes(found))
-    elif found.difference > AGREES:
-        factors = [f'{j.joint} {j.factor:.2f}' for j in found.joints if j.factor is not None]
+    elif result.causes:
+        yield warning(_told_causes(result))
+    elif result.difference > AGREES:
+        factors = [f'{j.joint} {j.factor:.2f}' for j in result.joints if j.factor is not None]
         yield note(
-            f'Efforts and statics differ by {found.difference:.0%} of the load, and neither a '
+            f'Efforts and statics differ by {result.difference:.0%} of the load, and neither a '
             'payload nor the torque constant of one joint explains it: the masses of the links may '
             f'be rough. Measured for each N m of the model: {", ".join(factors)}.'
         )
 
 
-def _told_sign(found: Efforts) -> Finding:
-    meaning = 'what holds the load' if found.holds else 'the load itself, not what holds it'
-    if abs(found.correlation) < CLEAR:
+def _told_sign(result: Efforts) -> Finding:
+    meaning = 'what holds the load' if result.holds else 'the load itself, not what holds it'
+    if abs(result.correlation) < CLEAR:
         return warning(
             f'Springs take the measured efforts as {meaning}, and nothing confirms that: with '
-            f'gravity on the links they correlate by {found.correlation:.2f}.'
+            f'gravity on the links they correlate by {result.correlation:.2f}.'
         )
     sentence = (
         f'Springs take the measured efforts as {meaning}: so taken they correlate by '
-        f'{found.correlation:.2f} with gravity on the links.'
+        f'{result.correlation:.2f} with gravity on the links.'
     )
     return note(sentence)
 
 
-def _told_causes(found: Efforts) -> str:
+def _told_causes(result: Efforts) -> str:
     words = {
         'payload': '{value:+.2f} kg of payload (standard error {std:.2f}; left {left:.1%})',
         'torque_constant': 'an effort of {joint} that is {value:.3f} times the torque (standard error '
@@ -173,10 +173,10 @@ def _told_causes(found: Efforts) -> str:
         'link_mass': 'a link behind {joint} of {value:.2f} times its mass (left {left:.1%})',
         'link_masses': 'links of {value:.2f} times their masses (left {left:.1%})',
     }
-    each = [words[cause.name].format(**vars(cause)) for cause in found.causes]
+    each = [words[cause.name].format(**vars(cause)) for cause in result.causes]
     alone = 'explains it' if len(each) == 1 else 'explain it, each by itself'
     return (
-        f'Efforts and statics differ by {found.difference:.0%} of the load; {" or ".join(each)} '
+        f'Efforts and statics differ by {result.difference:.0%} of the load; {" or ".join(each)} '
         f'{alone}. The springs do not need to know which, a planned motion does: weigh what hangs on '
         'the flange, or hold the efforts against a known weight.'
     )
@@ -261,14 +261,14 @@ def _causes(loads: _Loads, gap: Array) -> tuple[EffortCause, ...]:
     ]
     offered += [('link_mass', name, loads.links[[i]]) for i, name in enumerate(names)]
     offered += [('link_masses', None, loads.links.sum(axis=0)[None])]
-    found, every = [], np.concatenate([*(columns for *_, columns in offered), nuisance])
+    result, every = [], np.concatenate([*(columns for *_, columns in offered), nuisance])
     noise = _left(every, gap)[2]
     for name, joint, columns in offered:
-        values, spread, left = _left(np.concatenate([columns, nuisance]), gap)
-        if left - noise < EXPLAINS * (before - noise):
+        values, spread, remaining = _left(np.concatenate([columns, nuisance]), gap)
+        if remaining - noise < EXPLAINS * (before - noise):
             value = float(values[0]) + (name != 'payload')
-            found.append(EffortCause(name, joint, value, float(spread[0]), left / before))
-    return tuple(sorted(found, key=lambda cause: cause.left))
+            result.append(EffortCause(name, joint, value, float(spread[0]), remaining / before))
+    return tuple(sorted(result, key=lambda cause: cause.left))
 
 
 def _only(i: int, columns: Array) -> Array:
@@ -282,7 +282,7 @@ def _left(columns: Array, gap: Array) -> tuple[Array, Array, float]:
     """Return coefficients, their standard errors, and the squared difference that is left."""
     matrix = columns.reshape(len(columns), -1).T
     values, *_ = np.linalg.lstsq(matrix, gap.ravel(), rcond=None)
-    left = float(((gap.ravel() - matrix @ values) ** 2).sum())
-    variance = left / max(gap.size - len(columns), 1)
+    remaining = float(((gap.ravel() - matrix @ values) ** 2).sum())
+    variance = remaining / max(gap.size - len(columns), 1)
     spread = np.sqrt(variance * np.diag(np.linalg.pinv(matrix.T @ matrix)).clip(0.0))
-    return values, spread, left
+    return values, spread, remaining

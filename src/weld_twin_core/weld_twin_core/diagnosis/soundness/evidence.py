@@ -99,24 +99,24 @@ class Case:
 
         Frames fitted at a wrong lag hide it, so they are fitted again with the lag undone.
         """
-        found = self._explained(self._lags(self.model))
-        if any(found) or self.gap < UNEXPLAINED:
-            return self._beyond_arm(found)
+        result = self._explained(self._lags(self.model))
+        if any(result) or self.gap < UNEXPLAINED:
+            return self._beyond_arm(result)
         # Nothing near explains what nobody could use: the clocks may be far apart.
         return self._explained(self._lags(self.model, wide=True), wide=True)
 
-    def _beyond_arm(self, found: list[Lag | None]) -> list[Lag | None]:
+    def _beyond_arm(self, result: list[Lag | None]) -> list[Lag | None]:
         """
         Return the lags that explain more than the arm's own errors could.
 
         On a way out and back play is late both times, and later where the arm is slower.
         """
-        if self.gap > BY_ITSELF or not any(found):
-            return found
+        if self.gap > BY_ITSELF or not any(result):
+            return result
         rest = self.rest[1]
         return [
             late if late is not None and late.after < LATE_WORTH * rest.left(k) else None
-            for k, late in enumerate(found)
+            for k, late in enumerate(result)
         ]
 
     def _explained(self, first: Sequence[Lag | None], *, wide: bool = False) -> list[Lag | None]:

@@ -93,9 +93,9 @@ class Examined:
     mistakes: tuple[Finding, ...]
     slips: tuple[Slip, ...] = ()
 
-    def told(self, found: Sequence[Effect]) -> tuple[Unsound, ...]:
+    def told(self, result: Sequence[Effect]) -> tuple[Unsound, ...]:
         """Return the mistakes, and the slips that a fit has among what it found."""
-        kept = {effect.key for effect in found}
+        kept = {effect.key for effect in result}
         slips = (slip for slip in self.slips if slip.effect().key in kept)
         own = (_gave_way(slip, self.given).told(applied=True) for slip in slips)
         return (*self.unsound, *own)
@@ -111,8 +111,10 @@ class Examined:
         """
         if len(problem.recordings) < 2 or not self.slips:
             return self
-        left = Case(problem, model).slips
-        kept = [slip for slip in self.slips if any(_same(slip, other, problem) for other in left)]
+        remaining = Case(problem, model).slips
+        kept = [
+            slip for slip in self.slips if any(_same(slip, other, problem) for other in remaining)
+        ]
         if not kept:
             return self
         mistakes = [_gave_way(slip, problem) for slip in kept]
@@ -159,14 +161,14 @@ def examine(
     """
     trial, mistakes, look = given, list[Finding](), _Look()
     for _ in range(ROUNDS):
-        found = streams(trial)
+        result = streams(trial)
         look = _Look()
-        if not found:
+        if not result:
             posed = aligned(trial.recordings, trial.robot, trial.align, _kept(known, given, trial))
             look = _looked(*with_changes(*posed, trial.may_change, beliefs or Beliefs()))
-            found = look.found
-        told = {each.sentence for each in mistakes}
-        fresh = [each for each in found if each.sentence not in told]
+            result = look.found
+        reported = {each.sentence for each in mistakes}
+        fresh = [each for each in result if each.sentence not in reported]
         mistakes += fresh
         if not fresh or any(each.mend is None for each in fresh):
             break
@@ -207,29 +209,29 @@ class _Look(NamedTuple):
         alone = len(self.posed[0].recordings) == 1
         dated = tuple(slip.effect() for slip in self.dated) if alone else ()
         problem = replace(self.posed[0], dated=dated)
-        told = tuple(each.sentence for each in mistakes)
+        reported = tuple(each.sentence for each in mistakes)
         made = tuple(e for each in mistakes if (e := as_entry(each.mend)) is not None)
-        return problem, replace(self.posed[1], mended=told, mends=made)
+        return problem, replace(self.posed[1], mended=reported, mends=made)
 
 
 def _looked(problem: Problem, model: Model) -> _Look:
     if problem.touched:
         touched = touches(problem, model)
         said = tuple(Check('contacts', 'warning', item.sentence) for item in touched.told)
-        found = list(touched.mistakes)
+        result = list(touched.mistakes)
         if not problem.untracked:
             checks, more = _checked_beside(touched.problem, touched.model)
-            said, found = (*said, *checks), [*found, *more]
-        return _Look(touched[:2], said, found, (), touched.told)
-    checks, found, dated = _checked(problem, model)
-    return _Look((problem, model), tuple(checks), found, dated)
+            said, result = (*said, *checks), [*result, *more]
+        return _Look(touched[:2], said, result, (), touched.told)
+    checks, result, dated = _checked(problem, model)
+    return _Look((problem, model), tuple(checks), result, dated)
 
 
 def _checked_beside(problem: Problem, model: Model) -> tuple[list[Check], list[Finding]]:
     """Return the same of an instrument's recordings beside contacts; nothing is mended there."""
     part = tracked_part(problem, model)
-    checks, found, dated = _checked(*part)
-    mistakes = [*found, *(_gave_way(slip, part[0]) for slip in dated)]
+    checks, result, dated = _checked(*part)
+    mistakes = [*result, *(_gave_way(slip, part[0]) for slip in dated)]
     return checks, [each._replace(mend=None) for each in mistakes]
 
 
@@ -247,11 +249,11 @@ def _checked(
     case = Case(problem, model)
     out: list[Check] = []
     for name, (look, passed) in CHECKS.items():
-        found = list(look(case))
-        mistakes = [each for each in found if each.level == 'unsound']
+        result = list(look(case))
+        mistakes = [each for each in result if each.level == 'unsound']
         if mistakes:
             return out, mistakes, ()
-        out += [Check(name, f.level, f.sentence) for f in found] or [Check(name, 'ok', passed)]
+        out += [Check(name, f.level, f.sentence) for f in result] or [Check(name, 'ok', passed)]
     return out, [], tuple(case.slips)
 
 

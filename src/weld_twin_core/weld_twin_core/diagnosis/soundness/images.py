@@ -41,9 +41,9 @@ CALIBRATE = 'calibrate the camera, at the focus and zoom that it is used with'
 def images(case: Case) -> Sequence[Finding]:
     """Return what is wrong with cameras and targets, by the images and by the arm."""
     seen = [r.images for r in case.recordings if r.images is not None]
-    found = [finding for one in seen for finding in _by_themselves(one)]
-    if found or not seen:
-        return found
+    result = [finding for one in seen for finding in _by_themselves(one)]
+    if result or not seen:
+        return result
     said = [
         Finding('note', f'Points are found within {one.fitted.pixel:.2f} px.')
         for one in seen
@@ -146,15 +146,15 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
     problem = case.problem.thinned(2000).of_frames()
     scale = problem.unit_scale()
     parts, _ = problem.frame_columns(problem.features(case.model))
-    left = problem.whitened(problem.residuals(case.model), scale)
+    remaining = problem.whitened(problem.residuals(case.model), scale)
     frames = problem.whitened(parts, scale)
     basis = (
         np.linalg.svd(frames.T, full_matrices=False)[0]
         if frames.size
-        else np.zeros((left.size, 0))
+        else np.zeros((remaining.size, 0))
     )
-    left = left - basis @ (basis.T @ left)
-    told: list[tuple[float, float, str]] = []
+    remaining = remaining - basis @ (basis.T @ remaining)
+    reported: list[tuple[float, float, str]] = []
     for kind, columns in (('target_scale', _larger), ('intrinsics', _farther)):
         each = [columns(r.images, r.seen.position) for r in problem.recordings]
         rows = [
@@ -167,9 +167,9 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
         column = problem.whitened(rows, scale)
         column = column - basis @ (basis.T @ column)
         size = float(column @ column)
-        share = float(column @ left) / size
-        told.append((share**2 * size / float(left @ left), share, kind))
-    explained, share, kind = max(told, default=(0.0, 0.0, ''))
+        share = float(column @ remaining) / size
+        reported.append((share**2 * size / float(remaining @ remaining), share, kind))
+    explained, share, kind = max(reported, default=(0.0, 0.0, ''))
     if abs(share) > TARGET_SCALE and explained > TARGET_EXPLAINS:
         yield _too_large(case, kind, share)
 

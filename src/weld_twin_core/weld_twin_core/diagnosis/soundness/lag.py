@@ -71,9 +71,13 @@ def lag(
     drifting = _polished(constant, joints, path, stamps, seen, free=2)
     trials = (Lag(0.0, 0.0, middle), constant, drifting)
     late = np.stack([trial.at(stamps) for trial in trials])
-    left = [float(v) for v in _misfits(seen, _along(path, joints, stamps - late))]
-    best, after = (drifting, left[2]) if left[2] < APART * left[1] else (constant, left[1])
-    return best._replace(before=left[0], after=after)
+    remaining = [float(v) for v in _misfits(seen, _along(path, joints, stamps - late))]
+    best, after = (
+        (drifting, remaining[2])
+        if remaining[2] < APART * remaining[1]
+        else (constant, remaining[1])
+    )
+    return best._replace(before=remaining[0], after=after)
 
 
 def _along(path: Array, joints: Array, t: Array) -> Array:

@@ -65,7 +65,7 @@ OFFSET_SPREAD, LINK_SPREAD, TWIST_SPREAD = 0.01, 1.5e-3, 5e-3
 Spread of what the zeros [rad], lengths [m] and twists [rad] of a plausible arm are off by.
 
 Wide on purpose: arms as delivered are off by tenths of a milliradian to some milliradians and by
-tenths of a millimetre (the two arms of docs/real_robots.md: 2 to 3 mm at the tool in all).
+tenths of a millimetre (the two arms of docs/real_arms.md: 2 to 3 mm at the tool in all).
 """
 OFFSET_MOST, LINK_MOST, TWIST_MOST = 0.13, 8e-3, 0.03
 """
@@ -85,7 +85,7 @@ SIBLING = 4e-3
 """
 RMS motion [m] of the tool by wrong lengths of links, from which they are those of another arm.
 
-The two arms of docs/real_robots.md are off by 2 to 3 mm in all, most of it by their zeros; arms of
+The two arms of docs/real_arms.md are off by 2 to 3 mm in all, most of it by their zeros; arms of
 one family differ by 5 to 30 mm.
 """
 LINKS_APART = LINK_SPREAD, 0.02

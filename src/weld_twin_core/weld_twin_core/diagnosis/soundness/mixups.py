@@ -58,9 +58,9 @@ def mixups(case: Case) -> Sequence[Finding]:
     arm = shot.arm()
     if arm.off < 1.0:
         return _frames(case, shot.gap(shot.model)) or _links(case, shot, arm)
-    found, rest = _unravelled(shot, arm, case.problem.align)
-    if found:
-        return [_told(each, arm.gap, rest.gap) for each in found]
+    result, rest = _unravelled(shot, arm, case.problem.align)
+    if result:
+        return [_told(each, arm.gap, rest.gap) for each in result]
     return _beyond(case, shot, arm) or _frames(case, shot.gap(shot.model))
 
 
@@ -95,21 +95,21 @@ def _told(tried: _Tried, before: float, after: float) -> Finding:
 def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list[_Tried], Arm]:
     """Return the fewest mix-ups that explain the gap, and the arm without them."""
     for first in (suspicions, doubles):
-        found: list[_Tried] = []
+        result: list[_Tried] = []
         arm, trial, look = start, shot, first
-        while arm.off > 1.0 and len(found) < MOST:
+        while arm.off > 1.0 and len(result) < MOST:
             best = _best(trial, arm, look(trial.robot), align)
             if best is None:
                 break
-            found.append(best)
+            result.append(best)
             trial, arm, look = best.undone, best.arm, suspicions
         factor = EXPLAINED if shot.possible or not trial.possible else HALVED
-        told = arm.off < start.off / factor or _as_given(shot, trial, start, align)
+        reported = arm.off < start.off / factor or _as_given(shot, trial, start, align)
         # What is shrunk leaves less of everything; it must leave less for its size as well.
         size = trial.shrunk(shot)
-        told = told and arm.gap < UNDONE and not _moves_frames(shot, trial, align)
-        if found and told and (size == 1.0 or arm.gap * size < start.gap / factor):
-            return found, arm
+        reported = reported and arm.gap < UNDONE and not _moves_frames(shot, trial, align)
+        if result and reported and (size == 1.0 or arm.gap * size < start.gap / factor):
+            return result, arm
     return [], start
 
 
@@ -129,8 +129,8 @@ def _as_given(shot: Snapshot, trial: Snapshot, start: Arm, align: frozenset[str]
 
     On short motions free frames and a bent arm take up much of any mistake.
     """
-    left = trial.gap_with(align)
-    return left < WORTH * start.gap and left < shot.gap_with(align) / EXPLAINED
+    remaining = trial.gap_with(align)
+    return remaining < WORTH * start.gap and remaining < shot.gap_with(align) / EXPLAINED
 
 
 def _best(
@@ -181,12 +181,12 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
         if not more - given:
             continue
         model = shot.aligned(given | more)
-        left = shot.gap(model)
-        if left < UNEXPLAINED:
+        remaining = shot.gap(model)
+        if remaining < UNEXPLAINED:
             if _plausible(shot.robot, model):
                 return ()
-            framed = _framed(shot, model, frozenset(more - given), before, left)
-            own = None if framed.kind == 'base_turned' else _within(shot, before, left, given)
+            framed = _framed(shot, model, frozenset(more - given), before, remaining)
+            own = None if framed.kind == 'base_turned' else _within(shot, before, remaining, given)
             if own and framed.kind == 'wrong_fixture' and own.at == shot.robot.joint_names[:1]:
                 # A fixture that is turned about the positioner's last axis is one with its zero.
                 own = own._replace(alike=(*own.alike, (framed.kind, framed.at)))
@@ -194,9 +194,11 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
     return ()
 
 
-def _within(shot: Snapshot, before: float, left: float, align: frozenset[str]) -> Finding | None:
+def _within(
+    shot: Snapshot, before: float, remaining: float, align: frozenset[str]
+) -> Finding | None:
     """Return the mix-up that explains as much with no more frames fitted than were to be."""
-    most = min(max(LARGE, 2.0 * left), UNDONE)
+    most = min(max(LARGE, 2.0 * remaining), UNDONE)
     for suspicion in suspicions(shot.robot):
         assert suspicion.mend is not None
         undone = shot.mended(suspicion.mend)
@@ -221,17 +223,17 @@ def _plausible(robot: Robot, model: Model) -> bool:
 
 
 def _framed(
-    shot: Snapshot, model: Model, more: frozenset[str], before: float, left: float
+    shot: Snapshot, model: Model, more: frozenset[str], before: float, remaining: float
 ) -> Finding:
     if more == {'base'} and shot.robot.behind:
-        return _fixture(shot.robot, model.bases, falls(before, left))
+        return _fixture(shot.robot, model.bases, falls(before, remaining))
     turn = _turned(shot.robot.T_world_base, model.bases[0]) if more == {'base'} else None
     if turn is not None:
-        return _base(shot.robot, turn, falls(before, left))
+        return _base(shot.robot, turn, falls(before, remaining))
     names = listed(sorted(more))
     return mistake(
         f'The gap of {length(before)} is almost only one of frames: with the {names} fitted '
-        f'{length(left)} remain.',
+        f'{length(remaining)} remain.',
         'other',
         tuple(sorted(more)),
         f'Have the {names} aligned (--align) if the instrument stands anywhere, or the tool '
@@ -240,7 +242,7 @@ def _framed(
     )
 
 
-def _base(robot: Robot, turn: Array, told: str) -> Finding:
+def _base(robot: Robot, turn: Array, reported: str) -> Finding:
     """Return the mistake that a base is that stands turned, shape (3, 3)."""
     vector = np.degrees(rotation_vector(turn))
     k, angle = int(np.abs(vector).argmax()), float(np.linalg.norm(vector))
@@ -256,7 +258,7 @@ def _base(robot: Robot, turn: Array, told: str) -> Finding:
     words = f'; a joint {first} whose zero is off by as much would look the same'
     return mistake(
         f'The base of the robot stands turned by {size:.0f} degrees about its {about} against '
-        f'the frame that was given; turned back, {told}.',
+        f'the frame that was given; turned back, {reported}.',
         'base_turned',
         ('base',),
         'Use the axes of the robot base that the controller counts in (for a UR: base or '
@@ -266,7 +268,7 @@ def _base(robot: Robot, turn: Array, told: str) -> Finding:
     )
 
 
-def _fixture(robot: Robot, bases: Sequence[Array], told: str) -> Finding:
+def _fixture(robot: Robot, bases: Sequence[Array], reported: str) -> Finding:
     """Return the mistake that poses were measured in another frame of the workpiece than was given."""
     seen = [np.asarray(np.linalg.inv(base)) for base in bases]
     steps = [np.asarray(robot.T_world_base @ pose) for pose in seen]
@@ -279,7 +281,7 @@ def _fixture(robot: Robot, bases: Sequence[Array], told: str) -> Finding:
     words = (
         f'The poses{which} were measured in the frame of another fixture than was given: on the '
         f'positioner it lies {length(far[k])} from there, turned by {angle:.1f} degrees; with it, '
-        f'{told}.'
+        f'{reported}.'
     )
     remedy = (
         "Give the frame of the fixture that was measured on (of a robot file 'tool' of the "
@@ -309,14 +311,14 @@ def _turned(given: Array, fitted: Array) -> Array | None:
 def _links(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     """Return that free frames and a bent arm took up what are the links of another one."""
     align = case.problem.align
-    found = _other_links(shot, align) if case.gap >= SIBLING else None
-    if found is None:
+    result = _other_links(shot, align) if case.gap >= SIBLING else None
+    if result is None:
         return ()
-    told, left = found
+    reported, remaining = result
     bundled = _best(shot, arm, robots(shot.robot), align)
     if bundled and bundled.arm.off < 1.0 and _other_links(bundled.undone, align) is None:
-        return (_told(bundled, left, bundled.arm.gap),)
-    return (told,)
+        return (_told(bundled, remaining, bundled.arm.gap),)
+    return (reported,)
 
 
 def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
@@ -396,18 +398,18 @@ def _other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Finding, float]
         model = bent(problem, model, precision, LARGE)
         return model, gap(problem, model)
 
-    left = fitted([*own, *_of_joints(shot, (JointCompliance,))])[1]
-    if left < LARGE:
+    remaining = fitted([*own, *_of_joints(shot, (JointCompliance,))])[1]
+    if remaining < LARGE:
         return None
     for spread in LINKS_APART:
         arm, after = fitted([*own, *_of_joints(shot, (LinkLength, LinkOffset))], spread)
-        if HALVED * after < left:
+        if HALVED * after < remaining:
             if _moved(problem, arm) <= SIBLING:
                 return None
             lengths = [e for e in arm.found if e.name in LENGTHS]
             worst = max(lengths, key=lambda e: abs(float(e.vector()[0])))
-            why = f'; with other lengths {falls(left, after)}'
-            return _foreign(arm.robot, worst, why), left
+            why = f'; with other lengths {falls(remaining, after)}'
+            return _foreign(arm.robot, worst, why), remaining
     return None
 
 

@@ -241,10 +241,10 @@ class _Seen:
             at = int(np.where(allowed, change.step_gains(k), -np.inf).argmax())
             shape = self._placed((np.arange(t.size) >= at).astype(np.float64), k)
             # Every instant was asked; the best of many is better than it should be.
-            nats = change.nats(shape) - float(np.log(t.size))
+            log_bayes_factor = change.nats(shape) - float(np.log(t.size))
             time = float(t[at - 1] + t[at]) / 2
-            slip = Slip(kind, joint, k, time, change.size(shape), nats)
-            yield _Trial(nats, change, shape, k, slip, at)
+            slip = Slip(kind, joint, k, time, change.size(shape), log_bayes_factor)
+            yield _Trial(log_bayes_factor, change, shape, k, slip, at)
 
     def named(self, smooth: _Trial) -> Slip | Settling | None:
         """Return what a smooth change of the base is by name, where no other shape does as well."""
@@ -268,17 +268,19 @@ class _Seen:
 
         constant = float(max(max(CONSTANTS, key=gain) * NEIGHBOURS, key=gain))
         shape, late = settled(constant), constant * float(np.ptp(t))
-        nats = self._base.nats(shape)
+        log_bayes_factor = self._base.nats(shape)
         slow = self.problem.recordings[k].joints.static or late > SLOW
-        if not slow or not self._surpasses(nats, shape, k, other_shapes(age)):
+        if not slow or not self._surpasses(log_bayes_factor, shape, k, other_shapes(age)):
             return None
-        return Settling(k, late, self._base.size(shape), nats)
+        return Settling(k, late, self._base.size(shape), log_bayes_factor)
 
-    def _surpasses(self, nats: float, shape: Array, k: int, others: Sequence[Array]) -> bool:
+    def _surpasses(
+        self, log_bayes_factor: float, shape: Array, k: int, others: Sequence[Array]
+    ) -> bool:
         """Return whether a change of the base tells much more than in other shapes, or of joints."""
         best = self._base.best([self._placed(other, k) for other in others])
-        rival = max(self._base.nats(best), self.rest.change('joints').nats(shape))
-        return nats > MARGIN + rival
+        alternative = max(self._base.nats(best), self.rest.change('joints').nats(shape))
+        return log_bayes_factor > MARGIN + alternative
 
     def _age(self, k: int) -> Array:
         """Return time in a recording as a share of it, shape (M,)."""

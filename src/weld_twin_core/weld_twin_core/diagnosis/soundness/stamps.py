@@ -97,10 +97,10 @@ def _apart(recording: Recording, k: int) -> Iterator[Finding]:
 def _in_bursts(given: Given, k: int) -> Iterator[Finding]:
     """Yield that measurements were stamped when they were sent, where an even clock explains more."""
     recording = given.recordings[k]
-    found = bursts(recording.seen.t)
-    if found is None or recording.contacts is not None:
+    result = bursts(recording.seen.t)
+    if result is None or recording.contacts is not None:
         return
-    before, even, after = _evenly(given, k, found)
+    before, even, after = _evenly(given, k, result)
     if before < NOISE or HALVED * after > before:
         return
     t = recording.seen.t
@@ -119,11 +119,11 @@ def _in_bursts(given: Given, k: int) -> Iterator[Finding]:
     )
 
 
-def _evenly(given: Given, k: int, found: Bursts) -> tuple[float, Bursts, float]:
+def _evenly(given: Given, k: int, result: Bursts) -> tuple[float, Bursts, float]:
     """Return the median gap [m] as stamped, the even stamps that explain most, and their gap."""
     alone = replace(given, recordings=(given.recordings[k],))
     count = given.recordings[k].seen.t.size
-    even = found
+    even = result
     for _ in range(ROUNDS):
         (late,) = _posed(_stamped(even, 0, count)(alone)).lags
         if late is None:

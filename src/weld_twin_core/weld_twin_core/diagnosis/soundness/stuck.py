@@ -45,8 +45,8 @@ def stuck(case: Case) -> Iterator[Finding]:
     for k, recording in enumerate(case.recordings):
         if whole := _whole(recording):
             yield whole
-        elif found := list(_joints(case, k)):
-            yield max(found, key=lambda pair: pair[0])[1]
+        elif result := list(_joints(case, k)):
+            yield max(result, key=lambda pair: pair[0])[1]
 
 
 def _whole(recording: Recording) -> Finding | None:
@@ -90,20 +90,20 @@ def _joints(case: Case, k: int) -> Iterator[tuple[float, Finding]]:
             if case.problem.align and refits < REFITS and (~inside).sum() > ENOUGH:
                 refits += 1
                 model, off = _unfitted(case, k, inside)
-            found = _freed_there(model, recording, k, i, (start, end), off)
-            if found is not None:
-                yield found
+            result = _freed_there(model, recording, k, i, (start, end), off)
+            if result is not None:
+                yield result
 
 
 def _longest(case: Case, k: int) -> list[tuple[int, int, int]]:
     """Return first sample, last sample and joint of every standing stretch, long ones first."""
     joints = case.recordings[k].joints
-    found = [
+    result = [
         (start, end, i)
         for i in range(joints.q.shape[1])
         for start, end in _runs(joints.q[:, i : i + 1], joints)
     ]
-    return sorted(found, key=lambda run: run[0] - run[1])
+    return sorted(result, key=lambda run: run[0] - run[1])
 
 
 def _unfitted(case: Case, k: int, inside: NDArray[np.bool_]) -> tuple[Model, Array]:
@@ -123,15 +123,15 @@ def _freed_there(
     gap, rest = float(np.median(off[inside])), float(np.median(off[~inside]))
     if gap < max(BY_ITSELF, STUCK_EXPLAINED * rest):
         return None
-    left = _freed(model, recording, k, i, inside)
-    if left > gap / STUCK_EXPLAINED:
+    remaining = _freed(model, recording, k, i, inside)
+    if remaining > gap / STUCK_EXPLAINED:
         return None
     sentence = (
         f'The reading of joint {name!r} of {recording.name} stands still '
         f'{_when(recording, *run)} while the joint moves: the gap there is '
-        f'{length(gap)}, and {length(left)} with the joint set free.'
+        f'{length(gap)}, and {length(remaining)} with the joint set free.'
     )
-    return gap / left, mistake(sentence, 'joints_stuck', (name,), REMEDY)
+    return gap / remaining, mistake(sentence, 'joints_stuck', (name,), REMEDY)
 
 
 def _runs(q: Array, joints: JointMotion) -> list[tuple[int, int]]:

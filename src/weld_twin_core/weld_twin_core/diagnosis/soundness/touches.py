@@ -86,8 +86,8 @@ def touches(problem: Problem, model: Model) -> Touched:
     if broken:
         return Touched(problem, model, mistakes=broken)
     usual = float(np.median(np.concatenate([np.linalg.norm(rows[k], axis=0) for k in every])))
-    told = tuple(each for own in every.values() for each in own.resorted(middles, usual))
-    if not told:
+    reported = tuple(each for own in every.values() for each in own.resorted(middles, usual))
+    if not reported:
         return Touched(problem, model)
     mended = [
         every[k].recording if k in every else recording
@@ -96,7 +96,7 @@ def touches(problem: Problem, model: Model) -> Touched:
     again, start = posed(mended, model.robot, problem.align, model.known, problem.given)
     loose = dict(zip(problem.given, problem.loose, strict=False))
     again = replace(again, loose=tuple(loose[k] for k in again.given if loose))
-    return Touched(again, start, told)
+    return Touched(again, start, reported)
 
 
 def _plain_fit(problem: Problem, model: Model) -> Model:
@@ -124,8 +124,8 @@ def _loose(problem: Problem, rows: list[Array]) -> tuple[float, ...]:
     for own in of.values():
         every = np.concatenate([rows[k][:3].ravel() for k in own])
         taken = sum(u.freedom for k in own if (u := problem.contact(k)) is not None)
-        left = max(1.0 - taken / every.size, LEFT)
-        noise[own] = max(robust_spread(every) / np.sqrt(left), SUREST)
+        remaining = max(1.0 - taken / every.size, LEFT)
+        noise[own] = max(robust_spread(every) / np.sqrt(remaining), SUREST)
     return tuple(float(value) for value in noise / noise.min())
 
 
@@ -154,12 +154,12 @@ class _Postures:
             if not set(tie.between) <= set(middles):
                 continue
             one, other = tie.between
-            found = float(np.linalg.norm(middles[one] - middles[other]))
-            if abs(found - tie.value) < max(BROKEN * tie.sigma, LEAST_BROKEN):
+            result = float(np.linalg.norm(middles[one] - middles[other]))
+            if abs(result - tie.value) < max(BROKEN * tie.sigma, LEAST_BROKEN):
                 continue
             yield mistake(
                 f'{one!r} and {other!r} are {tie.value * 1e3:.4g} mm apart by the artefact '
-                f'and {found * 1e3:.4g} mm by the postures: files or labels are mixed up.',
+                f'and {result * 1e3:.4g} mm by the postures: files or labels are mixed up.',
                 'other',
                 tie.between,
                 'Check which file belongs to which contact, and the length in the artefact',

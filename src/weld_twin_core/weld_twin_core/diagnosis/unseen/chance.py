@@ -119,14 +119,16 @@ def chance_gain(candidates: Candidates, steady: float, *, pooled: bool = False) 
     """
     rows = candidates.fixed.shape[1]
     rest = np.eye(rows) - _hat(candidates.fixed, candidates.precision)
-    left = rest @ noise(rows).T
+    remaining = rest @ noise(rows).T
     ways = [
-        [_Part.of(rest, left, np.flatnonzero(labels == b)) for b in np.unique(labels)]
+        [_Part.of(rest, remaining, np.flatnonzero(labels == b)) for b in np.unique(labels)]
         for labels in candidates.ways
     ]
     best = 0.0
     for group in candidates.groups:
-        each = [_shares(parts, group, rest, left, candidates.ridges, steady) for parts in ways]
+        each = [
+            _shares(parts, group, rest, remaining, candidates.ridges, steady) for parts in ways
+        ]
         best = max(best, float((np.mean if pooled else np.min)(each, axis=0).max()))
     return best
 
@@ -139,17 +141,17 @@ class _Part(NamedTuple):
     left: Array
 
     @classmethod
-    def of(cls, rest: Array, left: Array, rows: Index) -> _Part:
+    def of(cls, rest: Array, remaining: Array, rows: Index) -> _Part:
         """Return rows of what a fit leaves of unit rows, (rows, rows), and of targets, (rows, K)."""
         undone = np.linalg.pinv(rest[np.ix_(rows, rows)], rcond=FLAT, hermitian=True)
-        return cls(rows, np.asarray(undone, dtype=np.float64), undone @ left[rows])
+        return cls(rows, np.asarray(undone, dtype=np.float64), undone @ remaining[rows])
 
 
 def _shares(
     parts: Sequence[_Part],
     group: Array,
     rest: Array,
-    left: Array,
+    remaining: Array,
     ridges: Sequence[float],
     steady: float,
 ) -> Array:
@@ -160,7 +162,7 @@ def _shares(
     their own number of directions.
     """
     beside = group @ rest
-    normal, pull = beside @ group.T, group @ left
+    normal, pull = beside @ group.T, group @ remaining
     held = np.array(ridges)[:, None, None] * np.eye(len(group))
     after = []
     for part in parts:

@@ -26,7 +26,7 @@ Slot = tuple[Rival, ...]
 
 
 def borne_out(
-    found: Search, holdout: Sequence[Recording], exclude: Sequence[str], beliefs: Beliefs
+    result: Search, holdout: Sequence[Recording], exclude: Sequence[str], beliefs: Beliefs
 ) -> tuple[Search, float | None]:
     """
     Return the search with the effects and the rivals that held-out recordings bear out.
@@ -41,7 +41,7 @@ def borne_out(
 
     Returns
     -------
-    found : Search
+    result : Search
         Probabilities of the rivals that stay add up to one again.
     least : float or None [m]
         Least RMS on the held-out recordings over everything that could be in the model, one rival
@@ -49,67 +49,78 @@ def borne_out(
 
     """
     if not holdout:
-        return found, None
+        return result, None
     # What no machine has is left out of the model and its slots, and still is in the rivals' fits.
-    if len(found.slots) == len(found.small.model.found):
-        found = _exchanged(found, holdout, exclude, beliefs)
+    if len(result.slots) == len(result.small.model.found):
+        result = _exchanged(result, holdout, exclude, beliefs)
     slots, least = list[Slot](), list[float]()
-    for effect, slot in zip(found.final.model.found, found.slots, strict=False):
+    for effect, candidate_set in zip(result.final.model.found, result.slots, strict=False):
         own = Site(effect.name, effect.site)
-        close = [r for r in slot if r.probability >= beliefs.listed or r.site == own]
-        certain = slot[0].site == own and slot[0].probability >= beliefs.sure
+        close = [r for r in candidate_set if r.probability >= beliefs.listed or r.site == own]
+        certain = candidate_set[0].site == own and candidate_set[0].probability >= beliefs.sure
         if not certain and len(close) > 1:
-            left = _left(found, close, holdout, beliefs)
-            slot = _alike(
-                slot, own, dict(zip((r.site for r in close), left, strict=True)), beliefs
+            remaining = _left(result, close, holdout, beliefs)
+            candidate_set = _alike(
+                candidate_set,
+                own,
+                dict(zip((r.site for r in close), remaining, strict=True)),
+                beliefs,
             )
-            least += left
-        slots.append(slot)
-    return replace(found, slots=tuple(slots)), min(least, default=None)
+            least += remaining
+        slots.append(candidate_set)
+    return replace(result, slots=tuple(slots)), min(least, default=None)
 
 
 def _exchanged(
-    found: Search, holdout: Sequence[Recording], exclude: Sequence[str], beliefs: Beliefs
+    result: Search, holdout: Sequence[Recording], exclude: Sequence[str], beliefs: Beliefs
 ) -> Search:
     """Return the search with every effect replaced by its like where that alone carries over."""
-    for _ in found.slots:
-        likes = [r for r in _likes(found, beliefs) if r.site.effect not in exclude]
-        left = _left(found, likes, holdout, beliefs)
-        least = min(left, default=float('inf'))
-        if not likes or (1.0 + beliefs.parted) * least > left_on(found, holdout, beliefs):
+    for _ in result.slots:
+        likes = [r for r in _likes(result, beliefs) if r.site.effect not in exclude]
+        remaining = _left(result, likes, holdout, beliefs)
+        least = min(remaining, default=float('inf'))
+        if not likes or (1.0 + beliefs.parted) * least > left_on(result, holdout, beliefs):
             break
-        better = likes[left.index(least)]
-        tried = refitted(found, better.fit)
+        better = likes[remaining.index(least)]
+        tried = refitted(result, better.fit)
         if implausible(tried.final.model):
             break
         slots = tuple(
-            rivals(found.work, better.fit, k, tried.effective)
+            rivals(result.work, better.fit, k, tried.effective)
             for k in range(len(better.fit.model.found))
         )
-        found = with_structural_aliases(replace(tried, slots=slots), exclude, beliefs)
-    return found
+        result = with_structural_aliases(replace(tried, slots=slots), exclude, beliefs)
+    return result
 
 
-def _likes(found: Search, beliefs: Beliefs) -> Iterator[Rival]:
+def _likes(result: Search, beliefs: Beliefs) -> Iterator[Rival]:
     """Yield the rivals that could be in the model as well."""
-    for slot in found.slots:
-        for rival in slot:
-            if rival.probability >= beliefs.listed and rival.fit is not found.small:
-                yield rival
+    for candidate_set in result.slots:
+        for alternative in candidate_set:
+            if alternative.probability >= beliefs.listed and alternative.fit is not result.small:
+                yield alternative
 
 
 def _left(
-    found: Search, some: Sequence[Rival], holdout: Sequence[Recording], beliefs: Beliefs
+    result: Search, some: Sequence[Rival], holdout: Sequence[Recording], beliefs: Beliefs
 ) -> list[float]:
     """Return what each rival leaves on held-out recordings, RMS [m]."""
-    return [left_on(replace(found, final=rival.fit), holdout, beliefs) for rival in some]
+    return [
+        left_on(replace(result, final=alternative.fit), holdout, beliefs) for alternative in some
+    ]
 
 
-def _alike(slot: Slot, own: Site, left: dict[Site, float], beliefs: Beliefs) -> Slot:
+def _alike(candidate_set: Slot, own: Site, remaining: dict[Site, float], beliefs: Beliefs) -> Slot:
     """Return a slot without the rivals that leave more than the effect in the model."""
-    most = (1.0 + beliefs.parted) * min(left.values())
-    if left.get(own, most) > most:
-        return slot
-    kept = [rival for rival in slot if left.get(rival.site, most) <= most]
-    whole = sum(rival.probability for rival in kept)
-    return tuple(replace(rival, probability=rival.probability / whole) for rival in kept)
+    most = (1.0 + beliefs.parted) * min(remaining.values())
+    if remaining.get(own, most) > most:
+        return candidate_set
+    kept = [
+        alternative
+        for alternative in candidate_set
+        if remaining.get(alternative.site, most) <= most
+    ]
+    whole = sum(alternative.probability for alternative in kept)
+    return tuple(
+        replace(alternative, probability=alternative.probability / whole) for alternative in kept
+    )

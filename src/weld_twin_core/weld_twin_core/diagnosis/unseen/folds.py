@@ -133,8 +133,10 @@ def gain(before: Array, after: Array, labels: Array, after_labels: Array | None 
     others = labels if after_labels is None else after_labels
     names = np.intersect1d(labels, others)
     one, two = _means(before, labels)[names], _means(after, others)[names]
-    was, left = float(before.mean()), float(after.mean())
-    return Gain((was - left) / max(was, 1e-300), steadiness(one, two), was - left, left**0.5)
+    was, remaining = float(before.mean()), float(after.mean())
+    return Gain(
+        (was - remaining) / max(was, 1e-300), steadiness(one, two), was - remaining, remaining**0.5
+    )
 
 
 def _means(values: Array, labels: Array) -> Array:
@@ -144,8 +146,8 @@ def _means(values: Array, labels: Array) -> Array:
 
 def least_gain(ways: Sequence[Gain]) -> Gain:
     """Return the least that is gained over the ways to divide the data, and the most left."""
-    shares, steadies, falls, left = zip(*ways, strict=True)
-    return Gain(min(shares), min(steadies), min(falls), max(left))
+    shares, steadies, falls, remaining = zip(*ways, strict=True)
+    return Gain(min(shares), min(steadies), min(falls), max(remaining))
 
 
 def steadiness(before: Array, after: Array) -> float:

@@ -35,40 +35,37 @@ in a hundred strays, 70 stations have two or more in one recording of six."""
 
 
 def held_out_shrink(
-    found: Search, unseen: Unseen, holdout: Sequence[Recording], beliefs: Beliefs
+    result: Search, unseen: Unseen, holdout: Sequence[Recording], beliefs: Beliefs
 ) -> Shrink:
     """
     Return the gap before and after, on the held-out bags or on stretches taking their turn.
 
     Parameters
     ----------
-    found : Search
+    result : Search
         The fitted effects and the noise they leave.
 
     """
-    model = found.final.model
+    model = result.final.model
     steps, alone = _waterfall(unseen, model)
-    first, last = unseen.bare, unseen.whole
-    before, after = unseen.squares(first), unseen.squares(last)
-    turned = (unseen.turn_rms(first), unseen.turn_rms(last))
-    labels, source, elsewhere = unseen.trusted_labels(), 'blocked cross-validation', None
+    turned = unseen.turn_rms(unseen.bare), unseen.turn_rms(unseen.whole)
+    both = _judged(unseen), by_posture(unseen)
     if holdout:
-        elsewhere = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
-        before, after, labels = _on_bags(found, holdout, beliefs.other_setup)
         source = ', '.join(r.name for r in holdout)
-    ratio, interval = ratio_interval(before, after, labels, elsewhere, beliefs.farthest)
-    rms = float(np.sqrt(before.mean())), float(np.sqrt(after.mean()))
-    if not holdout and found.problem.at_rest:
-        other = by_posture(unseen)
-        ends = [_of_others(ratio, interval), _of_others(other.ratio, other.interval)]
-        interval = (min(low for low, _ in ends), max(high for _, high in ends))
-        if other.ratio > ratio:
-            ratio, rms = other.ratio, other.rms
+        pair = _on_bags(result, holdout, beliefs.other_setup)
+        ratio, interval = ratio_interval(*pair, both[0].ratio, beliefs.farthest)
+        rms = _rms(pair[0]), _rms(pair[1])
+    else:
+        source, reported = 'blocked cross-validation', both[0]
+        if result.problem.at_rest:
+            reported = max(both, key=lambda one: one.ratio)
+        rms, ratio, interval = reported.rms, reported.ratio, _of_others(both, 1)
     return Shrink(
         rms_before_m=rms[0],
         rms_after_m=rms[1],
         ratio=ratio,
         ci95=interval,
+        elsewhere_ci95=_of_others(both, both[1].parts),
         held_out=source,
         steps=steps,
         alone=alone,
@@ -76,21 +73,21 @@ def held_out_shrink(
     )
 
 
-def left_on(found: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> float:
+def left_on(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> float:
     """
     Return what the model leaves on held-out recordings, RMS over trusted samples [m].
 
     Parameters
     ----------
-    found : Search
+    result : Search
         Its final model is judged.
 
     """
-    return float(np.sqrt(_on_bags(found, holdout, beliefs.other_setup)[1].mean()))
+    return float(np.sqrt(_on_bags(result, holdout, beliefs.other_setup)[1].mean()))
 
 
 def reached_by_chance(
-    found: Search, unseen: Unseen, holdout: Sequence[Recording], beliefs: Beliefs
+    result: Search, unseen: Unseen, holdout: Sequence[Recording], beliefs: Beliefs
 ) -> float:
     """
     Return the ratio of what is left on held-out recordings to that on those fitted by chance alone.
@@ -100,7 +97,7 @@ def reached_by_chance(
 
     Parameters
     ----------
-    found : Search
+    result : Search
         Its final model is judged.
     unseen : Unseen
         Of this model.
@@ -108,7 +105,7 @@ def reached_by_chance(
     """
     if not holdout:
         return 1.0
-    _, there, labels = _on_bags(found, holdout, beliefs.other_setup)
+    _, there, labels = _on_bags(result, holdout, beliefs.other_setup)
     here = unseen.squares(unseen.whole)
     pairs = ((there, labels), (here, unseen.trusted_labels()))
     return float(np.exp(STUDENT * np.sqrt(sum(map(_log_variance, *zip(*pairs, strict=True))))))
@@ -128,32 +125,46 @@ def _log_sizes(squares: Array, labels: Array) -> Array:
     return np.asarray(0.5 * np.log(np.maximum(means, 1e-300)))
 
 
-def _of_others(ratio: float, interval: tuple[float, float]) -> tuple[float, float]:
-    """
-    Return the interval of what as many stations again will show.
-
-    They vary about the truth as much as these do, so that the variance counts twice.
-    """
-    if ratio <= 0.0:
-        return interval
-    low, high = (ratio * float((end / ratio) ** np.sqrt(2.0)) for end in interval)
-    return low, high
-
-
 class Judged(NamedTuple):
-    """RMS before and after [m], their ratio, and its 95 % interval."""
+    """RMS before and after [m], their ratio, its 95 % interval, and of how many parts it is."""
 
     rms: tuple[float, float]
     ratio: float
     interval: tuple[float, float]
+    parts: int
+
+
+def _of_others(judged: Sequence[Judged], among: int) -> tuple[float, float]:
+    """
+    Return the interval of what another motion will show, however the parts were cut.
+
+    One that is as large as ``among``-th of the motions judged varies about the truth that many times
+    as much as they do, and they vary besides: a motion like all of it counts twice, one in a region
+    of posture that was not recorded as often as there are regions, and once more.
+    """
+    ends = [one.interval for one in judged]
+    for k, (ratio, interval, _) in enumerate(one[1:] for one in judged):
+        if ratio > 0.0:
+            low, high = (ratio * float((e / ratio) ** np.sqrt(1.0 + among)) for e in interval)
+            ends[k] = low, high
+    return min(low for low, _ in ends), max(high for _, high in ends)
 
 
 def by_posture(whole: Unseen) -> Judged:
     """Return the gap before and after on regions of posture that take their turn."""
-    unseen = whole.by(posture_regions(whole.problem))
+    return _judged(whole.by(posture_regions(whole.problem)))
+
+
+def _judged(unseen: Unseen) -> Judged:
     before, after = unseen.squares(unseen.bare), unseen.squares(unseen.whole)
-    ratio, interval = ratio_interval(before, after, unseen.trusted_labels())
-    return Judged((float(np.sqrt(before.mean())), float(np.sqrt(after.mean()))), ratio, interval)
+    labels = unseen.trusted_labels()
+    ratio, interval = ratio_interval(before, after, labels)
+    parts = int(np.unique(labels).size)
+    return Judged((_rms(before), _rms(after)), ratio, interval, parts)
+
+
+def _rms(squares: Array) -> float:
+    return float(np.sqrt(squares.mean()))
 
 
 def _waterfall(
@@ -184,7 +195,7 @@ def _waterfall(
 
 
 def _on_bags(
-    found: Search, holdout: Sequence[Recording], other_setup: float
+    result: Search, holdout: Sequence[Recording], other_setup: float
 ) -> tuple[Array, Array, Array]:
     """Return squared errors before and after on held-out bags, and a stretch for every sample."""
     before: list[Array] = []
@@ -192,16 +203,16 @@ def _on_bags(
     labels: list[Array] = []
     for recording in holdout:
         if recording.contacts is not None:
-            for first, last in _on_contacts(found, recording):
+            for first, last in _on_contacts(result, recording):
                 before.append(first)
                 after.append(last)
                 labels.append(np.full(first.size, 8 * len(labels)))
             continue
-        problem = Problem((usable(recording),), frozenset({'base'}) & found.problem.align)
+        problem = Problem((usable(recording),), frozenset({'base'}) & result.problem.align)
         pair, good = [], np.ones(problem.samples[0], dtype=bool)
-        for model in (found.baseline.model, found.final.model):
+        for model in (result.baseline.model, result.final.model):
             parts = problem.residuals(
-                _for_bag(problem, model, found.problem.recordings, other_setup)
+                _for_bag(problem, model, result.problem.recordings, other_setup)
             )
             pair.append((parts[0][:3] ** 2).sum(axis=0))
             # What is an outlier shows best against the better model, which comes last.
@@ -214,13 +225,13 @@ def _on_bags(
     return np.concatenate(before), np.concatenate(after), np.concatenate(labels)
 
 
-def _on_contacts(found: Search, recording: Recording) -> list[tuple[Array, Array]]:
+def _on_contacts(result: Search, recording: Recording) -> list[tuple[Array, Array]]:
     """Return squared errors before and after at every place of held-out contacts."""
-    model = found.final.model
+    model = result.final.model
     problem, start = posed((recording,), model.robot, frozenset(), model.known)
-    own = [k for k, r in enumerate(found.problem.recordings) if r.contacts is not None]
+    own = [k for k, r in enumerate(result.problem.recordings) if r.contacts is not None]
     sizes = []
-    for fitted in (found.baseline.model, model):
+    for fitted in (result.baseline.model, model):
         base = fitted.bases[own[0] if own else 0]
         same = replace(
             start, robot=fitted.robot, bases=(base,) * len(start.bases), found=fitted.found

@@ -61,11 +61,11 @@ def structure(unseen: Unseen, model: Model, beliefs: Beliefs) -> Structure:
     """Return what generic columns add to a model on stretches not used for fitting."""
     base = unseen.base(range(len(model.found)))
     groups = list(_generic(unseen.problem, model, unseen.scale))
-    found = [(base.gain(columns), name) for name, columns in groups]
-    found.sort(key=lambda item: -item[0].share)
-    best = found[0][0]
+    result = [(base.gain(columns), name) for name, columns in groups]
+    result.sort(key=lambda item: -item[0].share)
+    best = result[0][0]
     least, certain = beliefs.dependence_gain, beliefs.dependence_sure
-    names = tuple(n for one, n in found[:TOLD] if one.share > least and one.steady > certain)
+    names = tuple(n for one, n in result[:TOLD] if one.share > least and one.steady > certain)
     chance = 0.0
     counts = best.share > beliefs.structure_gain and best.steady > beliefs.blatant_sure
     if counts and may_be_chance(unseen.residual.size, best.share):

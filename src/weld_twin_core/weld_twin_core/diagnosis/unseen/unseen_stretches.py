@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ..algebra.atoms import Rows, rows_of
+from ..algebra.atoms import Rows, Whole, rows_of
 from ..algebra.definite import Index, Triangle, factored, inverses, unit_diagonal
 from ..algebra.designed import Design, designed
 from ..algebra.fit import Fit, trusted
@@ -107,6 +107,30 @@ class Unseen:
         if key not in self._others:
             self._others[key] = replace(self, labels=labels)
         return self._others[key]
+
+    def along(self, columns: Array) -> Unseen:
+        """
+        Return the same with something fitted along that was found at zero.
+
+        Parameters
+        ----------
+        columns : array, shape (E, rows)
+            Whitened, each as large as it is believed to be.
+
+        """
+        count, more = self.columns.count, len(columns)
+
+        def taken() -> Array:
+            return np.concatenate([self.taken(), np.zeros((1, self.residual.size))])
+
+        return replace(
+            self,
+            columns=Design((*self.columns.pieces, Whole(columns))),
+            parts=(*self.parts, slice(count, count + more)),
+            taken=cache(taken),
+            precision=np.concatenate([self.precision, np.ones(more)]),
+            pull=np.concatenate([self.pull, np.zeros(more)]),
+        )
 
     def held(self, precision: Array, coordinates: Array) -> Unseen:
         """
@@ -295,9 +319,9 @@ class Unseen:
         total = self._total
         if index.size < self.columns.count:
             total = total[np.ix_(index, index)]
-        left = total - self._normal(b, index)
-        left[np.diag_indices_from(left)] += ROUNDED * np.diag(total)
-        return np.asarray(left)
+        remaining = total - self._normal(b, index)
+        remaining[np.diag_indices_from(remaining)] += ROUNDED * np.diag(total)
+        return np.asarray(remaining)
 
     def _right(self, b: int, mix: Array) -> Array:
         """Return the right-hand side of every column on all stretches but one."""
@@ -317,13 +341,13 @@ class Unseen:
         whole = _spread(self._total)
         ratios = np.zeros((len(self._spans), every.size))
         for b in range(len(self._spans)):
-            left = self._system(b, every)
-            system, size = unit_diagonal(left.copy(), DAMPING)
+            remaining = self._system(b, every)
+            system, size = unit_diagonal(remaining.copy(), DAMPING)
             step = factored(system)(self._right(b, mix) / size) / size
-            more = np.maximum(_spread(left) - whole, ROUNDED * whole)
+            more = np.maximum(_spread(remaining) - whole, ROUNDED * whole)
             ratios[b] = step**2 / np.maximum(more, 1e-300)
-        told = np.minimum(ratios, MOST_STEPS).mean(axis=0)
-        return np.array([told[part].max(initial=0.0) for part in self.parts])
+        reported = np.minimum(ratios, MOST_STEPS).mean(axis=0)
+        return np.array([reported[part].max(initial=0.0) for part in self.parts])
 
     def squares(self, residual: Array) -> Array:
         """
@@ -464,8 +488,8 @@ def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Uns
 def _taken(problem: Problem, scale: Scale, fit: Fit) -> Array:
     """Return what each effect takes off the final residual, exactly, shape (K, rows)."""
     without = (fit.model.without(k) for k in range(len(fit.model.found)))
-    left = [problem.whitened(problem.residuals(model), scale) for model in without]
-    return np.array(left).reshape(-1, fit.residual.size) - fit.residual
+    remaining = [problem.whitened(problem.residuals(model), scale) for model in without]
+    return np.array(remaining).reshape(-1, fit.residual.size) - fit.residual
 
 
 def _solved(solve: Solver, size: Array, right: Array) -> Array:

@@ -41,26 +41,26 @@ STRETCHES = 12
 """Stretches of time that the gap is told for: as many as a figure can show."""
 
 
-def locate(found: Search, final: Unseen, causes: Sequence[Cause] = ()) -> Where:
+def locate(result: Search, final: Unseen, causes: Sequence[Cause] = ()) -> Where:
     """
     Return where the gap lies.
 
     Parameters
     ----------
-    found : Search
+    result : Search
         Its baseline is the model before any effect was found.
     causes : sequence of Cause
         Of the answer, if there are any: joints and regimes are then theirs, so that they say what
         the answer says, also where a cause sits at no joint or its place is not certain.
 
     """
-    problem, start = found.problem, found.baseline.model
-    baseline = Unseen.of(problem, found.scale, found.baseline, np.zeros(0))
+    problem, start = result.problem, result.baseline.model
+    baseline = Unseen.of(problem, result.scale, result.baseline, np.zeros(0))
     shares = _map(problem, baseline, start)
     if causes:
         joints, regimes = _of_causes(causes, start.robot.joint_names)
-    elif found.final.model.found:
-        joints, regimes = _explained(final, found.final.model)
+    elif result.final.model.found:
+        joints, regimes = _explained(final, result.final.model)
     else:
         joints = {
             name: float(row.max())
@@ -85,7 +85,7 @@ def _of_causes(
     """Return the shares of the causes by their places and dependences, as far as believed."""
     joints, regimes = dict.fromkeys(names, 0.0), dict.fromkeys(REGIMES, 0.0)
     for cause in causes:
-        at, on = (sum(p for _, p in told) for told in (cause.place, cause.dependence))
+        at, on = (sum(p for _, p in reported) for reported in (cause.place, cause.dependence))
         for place, p in cause.place:
             if place in joints:
                 joints[place] += cause.share * p / at
@@ -94,9 +94,9 @@ def _of_causes(
     return joints, regimes
 
 
-def _explained(final: Unseen, found: Model) -> tuple[dict[str, float], dict[str, float]]:
+def _explained(final: Unseen, result: Model) -> tuple[dict[str, float], dict[str, float]]:
     """Return how much of the unseen squared gap the effects of every joint and regime explain."""
-    everything = range(len(found.found))
+    everything = range(len(result.found))
     total = final.squares(final.bare).mean()
     after = final.squares(final.whole).mean()
 
@@ -107,13 +107,13 @@ def _explained(final: Unseen, found: Model) -> tuple[dict[str, float], dict[str,
         return max(float(final.squares(less).mean() - after), 0.0)
 
     at = {
-        name: [k for k in everything if found.found[k].site == name]
-        for name in found.robot.joint_names
+        name: [k for k in everything if result.found[k].site == name]
+        for name in result.robot.joint_names
     }
     under = {
-        name: [k for k in everything if REGIME_OF[found.found[k].on] == name] for name in REGIMES
+        name: [k for k in everything if REGIME_OF[result.found[k].on] == name] for name in REGIMES
     }
-    free = [k for k in everything if found.found[k].site is None]
+    free = [k for k in everything if result.found[k].site is None]
     return (
         _shares({name: fall(members) for name, members in at.items()}, fall(free), total, after),
         _shares({name: fall(members) for name, members in under.items()}, 0.0, total, after),

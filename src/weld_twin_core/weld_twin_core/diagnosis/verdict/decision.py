@@ -5,7 +5,8 @@ From the table of answers to a verdict: what is told, and is it more than what h
 
 One rule decides. An effect counts as named where its name is likelier right than wrong, and nothing
 free at its place predicts what its formula should. What the others explain, and what nothing
-explains, has no name; where that is more, the gap is unknown.
+explains, has no name. Where that is more, or where a cause that has no name is likelier at work than
+not, the gap is unknown; what counts as named is told all the same.
 """
 
 from __future__ import annotations
@@ -29,6 +30,10 @@ _MANY_IMITATE = (
     'many small errors together fit best, but leave so much that they rather imitate a cause that '
     'is not in the library'
 )
+_FOREIGN = (
+    'where the evidence was like this, a cause that is not in the library was at work more often '
+    'than not, and what was found stood in for a part of it'
+)
 _NO_KIND = (
     'no kind of error is needed by these data more than the others: each takes the place of the '
     'rest'
@@ -40,10 +45,11 @@ class Verdict:
     """
     Status, one set of sites per effect told, families of many small ones, and how sure it is.
 
-    An effect that was found is told whatever the status: 'unknown' says that beside it something
-    is left that has no name. ``confidence`` is the probability that the whole answer is right,
-    ``sure`` says whether it keeps the promise of being wrong hardly ever, and ``complete`` is the
-    probability that no cause of any size is missing; all three are told by the calibration.
+    An effect that counts as named is told whatever the status: 'unknown' says that beside it
+    something is at work that has no name. ``confidence`` is the probability that the whole answer
+    is right, ``sure`` says whether it keeps the promise of being wrong hardly ever, and
+    ``complete`` is the probability that no cause of any size is missing; all three are told by the
+    calibration.
     """
 
     status: str
@@ -73,19 +79,19 @@ class Left:
     @property
     def high(self) -> bool:
         """Return whether what remains rises above a floor that was measured apart."""
-        told = self.evidence
-        return told.independent and self.rises(self.beliefs.above)
+        evidence = self.evidence
+        return evidence.independent and self.rises(self.beliefs.above)
 
     @property
     def wide(self) -> bool:
         """Return whether what remains is far wider than a floor that only the fit shows."""
-        told = self.evidence
-        return not told.independent and self.rises(self.beliefs.far_above)
+        evidence = self.evidence
+        return not evidence.independent and self.rises(self.beliefs.far_above)
 
     def rises(self, times: float) -> bool:
         """Return whether what remains is so many times the floor, and more than chance makes it."""
-        told = self.evidence
-        return told.after > max(times, told.leverage) * told.floor
+        evidence = self.evidence
+        return evidence.after > max(times, evidence.leverage) * evidence.floor
 
     @property
     def above_noise(self) -> bool:
@@ -95,45 +101,48 @@ class Left:
     @property
     def share(self) -> float:
         """Return the share of the squared gap above noise that is not explained."""
-        told = self.evidence
-        found = told.structure.gain * told.after**2 if self.structured else 0.0
-        over = told.after**2 - told.floor**2 if self.high else 0.0
+        evidence = self.evidence
+        structured = evidence.structure.gain * evidence.after**2 if self.structured else 0.0
+        over = evidence.after**2 - evidence.floor**2 if self.high else 0.0
         if self.wide:
             # Such a floor may be too low by that factor; what is beyond is left all the same.
-            over = told.after**2 - (self.beliefs.far_above * told.floor) ** 2
-        return float(np.clip(max(found, over) / self._excess, 0.0, 1.0))
+            over = evidence.after**2 - (self.beliefs.far_above * evidence.floor) ** 2
+        return float(np.clip(max(structured, over) / self._excess, 0.0, 1.0))
 
     @property
     def explained(self) -> float:
         """Return the share of the squared gap above noise that the model takes off unseen data."""
-        told = self.evidence
-        return float(np.clip((told.gap**2 - told.after**2) / self._excess, 0.0, 1.0))
+        evidence = self.evidence
+        return float(np.clip((evidence.gap**2 - evidence.after**2) / self._excess, 0.0, 1.0))
 
     @property
     def _excess(self) -> float:
-        told = self.evidence
-        least = self.beliefs.least_excess * told.floor**2
-        return max(told.gap**2 - told.floor**2, least, TINY)
+        evidence = self.evidence
+        least = self.beliefs.least_excess * evidence.floor**2
+        return max(evidence.gap**2 - evidence.floor**2, least, TINY)
 
 
 def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
     """Return the verdict, by the usual beliefs when none are given."""
-    left = Left(evidence, beliefs or Beliefs())
+    remaining = Left(evidence, beliefs or Beliefs())
     if evidence.families is not None:
-        return _of_families(left)
+        return _of_families(remaining)
     if not evidence.slots:
-        return _of_nothing(left)
-    sets = tuple(named_together(slot, left.beliefs) for slot in evidence.slots)
+        return _of_nothing(remaining)
+    sets = tuple(
+        named_together(candidate_set, remaining.beliefs) for candidate_set in evidence.slots
+    )
     likely = [
         p > LIKELIER and _holds(group, evidence)
         for p, group in zip(evidence.believed, sets, strict=True)
     ]
-    named = left.explained * _share_of(likely, evidence)
-    if named <= left.share + left.explained * _share_of([not one for one in likely], evidence):
-        told = tuple(group for group, holds in zip(sets, likely, strict=True) if holds)
-        return Verdict('unknown', told, _why_unknown(left, sets, likely))
-    reasons = tuple(_alike(group) for group in sets if len(group) > 1)
-    return Verdict('ambiguous' if reasons else 'identified', sets, reasons)
+    named = remaining.explained * _share_of(likely, evidence)
+    more = remaining.share + remaining.explained * _share_of([not one for one in likely], evidence)
+    reported = tuple(group for group, holds in zip(sets, likely, strict=True) if holds)
+    if named <= more or evidence.nameless > LIKELIER:
+        return Verdict('unknown', reported, _why_unknown(remaining, sets, likely))
+    reasons = tuple(_alike(group) for group in reported if len(group) > 1)
+    return Verdict('ambiguous' if reasons else 'identified', reported, reasons)
 
 
 def _holds(group: tuple[Site, ...], evidence: Evidence) -> bool:
@@ -152,37 +161,39 @@ def _share_of(some: list[bool], evidence: Evidence) -> float:
 
 
 def _why_unknown(
-    left: Left, sets: tuple[tuple[Site, ...], ...], likely: list[bool]
+    remaining: Left, sets: tuple[tuple[Site, ...], ...], likely: list[bool]
 ) -> tuple[str, ...]:
     """Return why something has no name, the gravest first."""
-    told = left.evidence
-    out = [_absurd(told)] if told.refused or told.lacking else []
-    out += [sentence for _, sentence in told.missed]
-    if left.share > left.beliefs.unexplained:
-        out.append(_depends(told))
+    evidence = remaining.evidence
+    out = [_absurd(evidence)] if evidence.refused or evidence.lacking else []
+    out += [sentence for _, sentence in evidence.missed]
+    if remaining.share > remaining.beliefs.unexplained:
+        out.append(_depends(evidence))
     doubted = [group[0] for group, holds in zip(sets, likely, strict=True) if not holds]
-    if doubted and not told.missed:
+    if doubted and not evidence.missed:
         names = ', '.join(map(str, doubted))
         out.append(
             f'what would fit best is {names}, and where the evidence was like this, such a name '
             'was wrong more often than right: it imitates a cause that is not in the library'
         )
-    return tuple(out) or (_depends(told),)
+    if not out and evidence.nameless > LIKELIER:
+        out.append(_FOREIGN)
+    return tuple(out) or (_depends(evidence),)
 
 
-def _of_nothing(left: Left) -> Verdict:
+def _of_nothing(remaining: Left) -> Verdict:
     """Return the verdict where no effect was found."""
-    told, beliefs = left.evidence, left.beliefs
-    if told.refused or told.lacking:
-        return Verdict('unknown', (), (_absurd(told),))
-    if left.share > beliefs.unexplained and left.above_noise:
-        return Verdict('unknown', (), (_depends(told),))
-    if left.wide:
+    evidence, beliefs = remaining.evidence, remaining.beliefs
+    if evidence.refused or evidence.lacking:
+        return Verdict('unknown', (), (_absurd(evidence),))
+    if remaining.share > beliefs.unexplained and remaining.above_noise:
+        return Verdict('unknown', (), (_depends(evidence),))
+    if remaining.wide:
         reason = (
             'what remains is far wider spread than noise, though it depends on nothing looked at'
         )
         return Verdict('unknown', (), (reason,))
-    if not told.independent and left.rises(beliefs.above):
+    if not evidence.independent and remaining.rises(beliefs.above):
         reason = (
             'nothing is found, but what remains is not spread as noise is, and nothing on these '
             'recordings shows the noise by itself: repeat some poses'
@@ -191,19 +202,21 @@ def _of_nothing(left: Left) -> Verdict:
     return Verdict('none', (), ('the gap does not rise above the noise',))
 
 
-def _of_families(left: Left) -> Verdict:
+def _of_families(remaining: Left) -> Verdict:
     """Return the families that unseen data need, each with the joints that they need it on."""
-    beliefs = left.beliefs
+    beliefs = remaining.beliefs
     families = []
-    for told in left.evidence.families or ():
-        members = tuple(item for item in told.members if item[1] > beliefs.member_least_m)
+    for reported in remaining.evidence.families or ():
+        members = tuple(item for item in reported.members if item[1] > beliefs.member_least_m)
         if members:
             needed, like = (
                 tuple(item for item in part if item[1] >= beliefs.joint_worth)
-                for part in (told.needed, told.like)
+                for part in (reported.needed, reported.like)
             )
-            named = told.missed(beliefs.family_worth)
-            families.append(replace(told, named=named, members=members, needed=needed, like=like))
+            named = reported.missed(beliefs.family_worth)
+            families.append(
+                replace(reported, named=named, members=members, needed=needed, like=like)
+            )
     families.sort(key=lambda family: -family.rms_m)
     sets = tuple(group for family in families if family.named for group in _sets_of(family))
     reason = (
@@ -213,9 +226,9 @@ def _of_families(left: Left) -> Verdict:
     whole = Verdict('identified', sets, (reason,), tuple(families))
     if not sets:
         return replace(whole, status='unknown', reasons=(reason, _NO_KIND))
-    if not all(p > LIKELIER for p in left.evidence.believed):
+    if not all(p > LIKELIER for p in remaining.evidence.believed):
         return replace(whole, status='unknown', reasons=(_MANY_IMITATE,))
-    if left.explained <= left.share:
+    if remaining.explained <= remaining.share:
         return replace(whole, status='unknown')
     alone = all(len(group) == 1 for group in sets)
     return whole if alone else replace(whole, status='ambiguous')

@@ -58,6 +58,9 @@ class Evidence:
     believed : tuple of float
         How probable it is of every effect found that its name is right, as the calibration has it;
         of many small errors, of all that are named.
+    nameless : float
+        How probable it is that a cause is at work that has no name in the library, as the
+        calibration has it.
     missed : tuple of (str, str)
         Places at which something free predicts beyond doubt what the formula of a name should, and
         that in words; at 'instrument' it speaks against every name.
@@ -79,11 +82,12 @@ class Evidence:
     chance: float = 1.0
     leverage: float = 1.0
     believed: tuple[float, ...] = ()
+    nameless: float = 0.0
     missed: tuple[tuple[str, str], ...] = ()
 
 
 def gathered(
-    found: Search,
+    result: Search,
     unseen: Unseen,
     leftover: Structure,
     shrink: Shrink,
@@ -109,9 +113,9 @@ def gathered(
         As `reached_by_chance` gives it.
 
     """
-    robot = found.final.model.robot
+    robot = result.final.model.robot
     return Evidence(
-        slots=found.slots,
+        slots=result.slots,
         structure=leftover,
         gap=shrink.rms_before_m,
         after=shrink.rms_after_m,
@@ -119,9 +123,9 @@ def gathered(
         fitted=unseen.rms(unseen.whole),
         independent=floor.independent,
         parts=_parts(unseen),
-        refused=tuple(_refused(robot, e) for e in found.refused if beyond(robot, e)),
-        lacking=tuple(_lacking(e) for e in found.refused if not beyond(robot, e)),
-        families=weighed_families(found, unseen, beliefs) if found.dense else None,
+        refused=tuple(_refused(robot, e) for e in result.refused if beyond(robot, e)),
+        lacking=tuple(_lacking(e) for e in result.refused if not beyond(robot, e)),
+        families=weighed_families(result, unseen, beliefs) if result.dense else None,
         least=least,
         chance=chance,
         leverage=_leverage(unseen, floor),

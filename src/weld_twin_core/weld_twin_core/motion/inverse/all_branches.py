@@ -31,7 +31,6 @@ def solve(robot: Robot, pose: Array, seed: Array | None = None) -> Array:
 
     Parameters
     ----------
-    robot : Robot
     pose : array, shape (4, 4)
         ``T_world_tool``.
     seed : array, shape (n,), optional
@@ -57,18 +56,18 @@ def solve(robot: Robot, pose: Array, seed: Array | None = None) -> Array:
     """
     robot.refuse_positioner('inverse kinematics')
     if family(robot) is None:
-        found, _ = search(robot, pose, seed)
+        result, _ = search(robot, pose, seed)
     else:
         candidates = branches(robot, pose[None])[:, 0]
         candidates = candidates[np.isfinite(candidates).all(axis=-1)]
         poses = np.broadcast_to(pose, (len(candidates), 4, 4))
-        found, error = polish(robot, candidates, poses)
-        found = centred(robot, found)
-        inside = ((found >= robot.lower) & (found <= robot.upper)).all(axis=-1)
-        found = found[inside & (np.abs(error).max(axis=-1) < CLOSED)]
-    if not len(found):
+        result, error = polish(robot, candidates, poses)
+        result = centred(robot, result)
+        inside = ((result >= robot.lower) & (result <= robot.upper)).all(axis=-1)
+        result = result[inside & (np.abs(error).max(axis=-1) < CLOSED)]
+    if not len(result):
         raise ReachError(f'{robot.name} cannot reach {where(pose)}: {why_not(robot, pose)}')
-    return found
+    return result
 
 
 def where(pose: Array) -> str:
@@ -85,15 +84,15 @@ def gap(missing: Array) -> str:
 
 def why_not(robot: Robot, pose: Array) -> str:
     """Return why a pose is not reached: too far, or past a joint limit."""
-    found, missing = search(_without_limits(robot), pose)
-    if not len(found):
+    result, missing = search(_without_limits(robot), pose)
+    if not len(result):
         return f'the nearest the tool gets is {gap(missing)}; move the seam or turn the torch'
-    excess = np.maximum(robot.lower - found, found - robot.upper)
+    excess = np.maximum(robot.lower - result, result - robot.upper)
     best = int(np.argmin(excess.max(axis=-1)))
     if excess[best].max() <= 0.0:
         return OTHER_POSTURE
     joint = int(np.argmax(excess[best]))
-    return past_limit(robot, joint, found[best, joint])
+    return past_limit(robot, joint, result[best, joint])
 
 
 def past_limit(robot: Robot, joint: int, value: float) -> str:
@@ -102,7 +101,6 @@ def past_limit(robot: Robot, joint: int, value: float) -> str:
 
     Parameters
     ----------
-    robot : Robot
     joint : int
         Counted from 0.
     value : float [rad or m]

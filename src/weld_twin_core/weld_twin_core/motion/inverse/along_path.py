@@ -45,7 +45,6 @@ class PathSolution:
 
     Attributes
     ----------
-    robot : Robot
     poses : array, shape (N, 4, 4)
         What was asked for.
     q : array, shape (N, n) [rad or m]
@@ -101,7 +100,6 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
 
     Parameters
     ----------
-    robot : Robot
     poses : array, shape (N, 4, 4)
         ``T_world_tool``, close enough together that neighbours are one small motion apart.
     seed : array, shape (n,), optional

@@ -34,7 +34,6 @@ class CarriedArm:
 
     Attributes
     ----------
-    robot : Robot
     count : int
         Joints that are told: those of a positioner, and the first ones of the robot itself.
 
@@ -76,19 +75,19 @@ class CarriedArm:
         still = {'T_world_base': np.eye(4), 'T_flange_tool': np.eye(4), 'controller': None}
         return self.robot.part(range(first, self.count), **still)
 
-    def _slid(self, told: Array) -> Array:
+    def _slid(self, reported: Array) -> Array:
         """Return the arm's base where the robot's own rows begin, shape (..., 4, 4)."""
         if self._track is None:
             return np.eye(4)
-        return forward(self._track, told[..., self.robot.behind :])
+        return forward(self._track, reported[..., self.robot.behind :])
 
-    def feet(self, told: Array) -> Array:
+    def feet(self, reported: Array) -> Array:
         """
         Return where the base of the arm is in the frame that the chain begins in.
 
         Parameters
         ----------
-        told : array, shape (..., count) [rad or m]
+        reported : array, shape (..., count) [rad or m]
 
         Returns
         -------
@@ -96,16 +95,16 @@ class CarriedArm:
 
         """
         if not self.count:
-            return np.broadcast_to(np.eye(4), (*told.shape[:-1], 4, 4))
-        return np.asarray(self.roots(told) @ self._slid(told))
+            return np.broadcast_to(np.eye(4), (*reported.shape[:-1], 4, 4))
+        return np.asarray(self.roots(reported) @ self._slid(reported))
 
-    def roots(self, told: Array) -> Array:
+    def roots(self, reported: Array) -> Array:
         """
         Return where the robot's own rows begin in the frame that the chain begins in.
 
         Parameters
         ----------
-        told : array, shape (..., count) [rad or m]
+        reported : array, shape (..., count) [rad or m]
 
         Returns
         -------
@@ -114,11 +113,11 @@ class CarriedArm:
         """
         robot = self.robot
         if not robot.behind:
-            return np.broadcast_to(robot.T_world_base, (*told.shape[:-1], 4, 4))
-        table = forward(robot.branches[0], told[..., : robot.behind][..., ::-1])
+            return np.broadcast_to(robot.T_world_base, (*reported.shape[:-1], 4, 4))
+        table = forward(robot.branches[0], reported[..., : robot.behind][..., ::-1])
         return np.asarray(np.linalg.inv(table) @ robot.T_root_base)
 
-    def seen(self, poses: Array, told: Array) -> Array:
+    def seen(self, poses: Array, reported: Array) -> Array:
         """
         Return poses as the arm's base sees them, shape (..., 4, 4).
 
@@ -126,45 +125,45 @@ class CarriedArm:
         ----------
         poses : array, shape (..., 4, 4)
             In the frame that the chain begins in.
-        told : array, shape (..., count) [rad or m]
+        reported : array, shape (..., count) [rad or m]
 
         """
-        return np.asarray(np.linalg.inv(self.feet(told)) @ poses) if self.count else poses
+        return np.asarray(np.linalg.inv(self.feet(reported)) @ poses) if self.count else poses
 
-    def whole(self, told: Array, q: Array) -> Array:
+    def whole(self, reported: Array, q: Array) -> Array:
         """Return positions (..., n) of all joints, of those told (..., count) and of the arm."""
         if not self.count:
             return q
-        told = np.broadcast_to(told, (*q.shape[:-1], self.count))
-        return np.concatenate([told, q], axis=-1)
+        reported = np.broadcast_to(reported, (*q.shape[:-1], self.count))
+        return np.concatenate([reported, q], axis=-1)
 
-    def solve(self, pose: Array, told: Array, seed: Array | None = None) -> Array:
+    def solve(self, pose: Array, reported: Array, seed: Array | None = None) -> Array:
         """
         Return every posture that reaches a pose, shape (K, n), as `solve` does.
 
         Parameters
         ----------
         pose : array, shape (4, 4)
-        told : array, shape (count,)
+        reported : array, shape (count,)
         seed : array, shape (n,), optional
 
         """
         seed = None if seed is None else seed[self.count :]
-        return self.whole(told, solve(self.arm, self.seen(pose, told), seed))
+        return self.whole(reported, solve(self.arm, self.seen(pose, reported), seed))
 
-    def solve_path(self, poses: Array, told: Array, seed: Array | None = None) -> PathSolution:
+    def solve_path(self, poses: Array, reported: Array, seed: Array | None = None) -> PathSolution:
         """
         Return the arm's own joints along a path, as `solve_path` does.
 
         Parameters
         ----------
         poses : array, shape (N, 4, 4)
-        told : array, shape (N, count)
+        reported : array, shape (N, count)
         seed : array, shape (n,), optional
 
         """
         seed = None if seed is None else seed[self.count :]
-        return solve_path(self.arm, self.seen(poses, told), seed)
+        return solve_path(self.arm, self.seen(poses, reported), seed)
 
     def polish(self, q: Array, poses: Array) -> tuple[Array, Array]:
         """
@@ -176,6 +175,6 @@ class CarriedArm:
         poses : array, shape (N, 4, 4)
 
         """
-        told = q[..., : self.count]
-        found, error = polish(self.arm, q[..., self.count :], self.seen(poses, told))
-        return self.whole(told, found), error
+        reported = q[..., : self.count]
+        result, error = polish(self.arm, q[..., self.count :], self.seen(poses, reported))
+        return self.whole(reported, result), error

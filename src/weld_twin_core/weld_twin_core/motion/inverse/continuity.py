@@ -68,7 +68,6 @@ def jumps(robot: Robot, q: Array, poses: Array) -> Mask:
 
     Parameters
     ----------
-    robot : Robot
     q : array, shape (..., N, n) [rad or m]
     poses : array, shape (N, 4, 4)
         Where the tool should be.

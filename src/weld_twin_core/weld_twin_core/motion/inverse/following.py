@@ -56,7 +56,6 @@ def follow(robot: Robot, poses: Array, seed: Array) -> Array | None:
 
     Parameters
     ----------
-    robot : Robot
     poses : array, shape (N, 4, 4)
         Evenly spaced, by and large: the polynomials are over the samples.
     seed : array, shape (6,) [rad or m]
@@ -76,8 +75,8 @@ def _piece(kernel: BulkKernel, poses: Array, start: Array) -> Array | None:
     half = len(poses) // 2
     if len(poses) <= _LONG:
         index, spread = _knots(len(poses))
-        found = _closed_knots(kernel, poses[index], start)
-        q = None if found is None else _corrected(kernel, poses, spread, *found)
+        result = _closed_knots(kernel, poses[index], start)
+        q = None if result is None else _corrected(kernel, poses, spread, *result)
         if q is not None or half < SHORT:
             return q
     before = _piece(kernel, poses[: half + 1], start)
@@ -110,13 +109,13 @@ def _closed_knots(kernel: BulkKernel, poses: Array, start: Array) -> tuple[Array
     """Return joint positions (K, 6) at the knots and their gains (K, 6, 12), if they close."""
     q = np.zeros((len(poses), 6)) + start
     for _ in range(_ROUNDS):
-        found, screws = kernel.screws(q)
-        twists = (found.reshape(-1, 16) @ _TWISTS).reshape(-1, 6, 12)
+        result, screws = kernel.screws(q)
+        twists = (result.reshape(-1, 16) @ _TWISTS).reshape(-1, 6, 12)
         try:
             gain = np.linalg.solve(screws.transpose(2, 0, 1), twists)
         except np.linalg.LinAlgError:
             return None
-        gap = _gap(found, poses)
+        gap = _gap(result, poses)
         q += _step(gain, gap)
         if np.abs(gap).max() < _ROUGH:
             near = np.abs(q[0] - start).max() < _NEAR and np.abs(gain).max() < _STIFF
@@ -130,24 +129,24 @@ def _corrected(
     """Return joint positions (N, 6) closed onto the poses, from those at the knots."""
     guess = spread @ knots
     gain = (spread @ gains.reshape(len(knots), -1)).reshape(-1, 6, 12)
-    q, left = guess, np.inf
+    q, remaining = guess, np.inf
     for _ in range(_ROUNDS):
         gap = _gap(kernel.poses(q), poses)
         size = np.abs(gap).max()
         if size < _CLOSED:
             return q
-        if not size < 0.1 * left:
+        if not size < 0.1 * remaining:
             return None
-        left = size
+        remaining = size
         q = q + _step(gain, gap)
         if not np.abs(q - guess).max() < _SMOOTH:
             return None
     return None
 
 
-def _gap(found: Array, poses: Array) -> Array:
+def _gap(result: Array, poses: Array) -> Array:
     """Return what is missing to rotation and position, shape (N, 12)."""
-    return (poses - found)[:, :3].reshape(-1, 12)
+    return (poses - result)[:, :3].reshape(-1, 12)
 
 
 def _step(gain: Array, gap: Array) -> Array:

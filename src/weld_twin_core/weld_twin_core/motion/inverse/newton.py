@@ -51,7 +51,6 @@ def polish(robot: Robot, q: Array, poses: Array, rounds: int = 12) -> tuple[Arra
 
     Parameters
     ----------
-    robot : Robot
     q : array, shape (N, n)
         A start near the solution.
     poses : array, shape (N, 4, 4)

@@ -29,7 +29,6 @@ def turns_to_middle(robot: Robot, low: Array, high: Array) -> Array:
 
     Parameters
     ----------
-    robot : Robot
     low, high : array, shape (..., n) [rad or m]
         Ends of the range of every joint.
 

@@ -22,7 +22,6 @@ def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
 
     Parameters
     ----------
-    robot : Robot
     program : MoveProgram
         With the points moved.
     piece : Piece
@@ -87,7 +86,7 @@ def _joint_part(
 
 
 def _closed(carried: CarriedArm, q: Array, poses: Array, move: Move) -> Array:
-    found, error = carried.polish(q, poses)
+    result, error = carried.polish(q, poses)
     if np.abs(error).max() > CLOSED:
         raise ReachError(f'{move.where}: out of reach, or at a singularity')
-    return found
+    return result

@@ -47,6 +47,8 @@ STANDS = (
 )
 LEAST_TIME = 0.02
 """Shortest time [s] of a move."""
+SLOW = 0.15
+"""Share of a move's way over which it speeds up from a stop: a judgement."""
 
 
 class Piece(NamedTuple):
@@ -55,8 +57,6 @@ class Piece(NamedTuple):
 
     Attributes
     ----------
-    moves : tuple of Move
-    motion : JointMotion
     move : array of int, shape (N,)
         Which move each sample belongs to.
     ends, vias : array of int, shape (M,)
@@ -77,7 +77,6 @@ class Travel(NamedTuple):
 
     Attributes
     ----------
-    pieces : tuple of Piece
     lost : dict of int to str
         Seams that could not be followed, with the reason.
     assumed : tuple of str
@@ -122,7 +121,6 @@ def travel(
     ----------
     robot : Robot
         Its base frame does not matter; the tool is that of each move.
-    program : MoveProgram
     start : array, shape (n,), optional
         Joint positions before the first move of every piece.
     known : callable, optional
@@ -171,13 +169,15 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
             'where the arm comes from is not known; let a joint move lead there, or say the '
             'joints with --start'
         )
-    told = course.program.external_at(move.end)
-    turned = np.abs(told - q[: told.size])[: arm.behind].max(initial=0.0)
+    reported = course.program.external_at(move.end)
+    turned = np.abs(reported - q[: reported.size])[: arm.behind].max(initial=0.0)
     if turned > CLOSED and not move.along:
         raise PathError(STANDS)
     poses, via = tool_way(arm, course.program, move, forward(arm, q))
     share = np.linspace(0.0, 1.0, len(poses))[:, None]
-    way = _on_the_way(carried, poses, q, q[: told.size] + share * (told - q[: told.size]))
+    way = _on_the_way(
+        carried, poses, q, q[: reported.size] + share * (reported - q[: reported.size])
+    )
     arm.check_positions(way)
     length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
     turn = float(np.linalg.norm(rotation_vector(poses[-1, :3, :3] @ poses[0, :3, :3].T)))
@@ -186,18 +186,18 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
     return _Reached(way, np.linspace(0.0, move.duration or duration, len(way)), via)
 
 
-def _on_the_way(carried: CarriedArm, poses: Array, q: Array, told: Array) -> Array:
+def _on_the_way(carried: CarriedArm, poses: Array, q: Array, reported: Array) -> Array:
     """Return joint positions along poses that begin where the arm stands, shape (K, n)."""
     if len(poses) < SHORT:
-        start = carried.whole(told, np.tile(q[told.shape[1] :], (len(poses), 1)))
+        start = carried.whole(reported, np.tile(q[reported.shape[1] :], (len(poses), 1)))
         near, error = carried.polish(start, poses)
         steps = np.abs(np.diff(near, axis=0, prepend=q[None])).max()
         if np.abs(error).max() < CLOSED and steps < NEAR:
             return near
-    found = carried.whole(told, carried.solve_path(poses, told, q).q)
-    if np.abs(found[0] - q).max() > NEAR:
+    result = carried.whole(reported, carried.solve_path(poses, reported, q).q)
+    if np.abs(result[0] - q).max() > NEAR:
         raise ReachError('the arm would have to change its posture on the way')
-    return found
+    return result
 
 
 def _joint_move(carried: CarriedArm, course: _Course, move: Move, q: Array | None) -> _Reached:
@@ -220,39 +220,39 @@ def _posture(
 ) -> Array:
     """Return the joint positions in which a move reaches a pose."""
     assert move.end is not None
-    arm, told = carried.robot, course.program.external_at(move.end)
-    found = carried.solve(pose, told, q)
+    arm, reported = carried.robot, course.program.external_at(move.end)
+    result = carried.solve(pose, reported, q)
     if move.suits is not None:
-        found = _turned(carried, found)
-        found = found[move.suits(found)]
-        if not len(found):
+        result = _turned(carried, result)
+        result = result[move.suits(result)]
+        if not len(result):
             raise ReachError('no posture of this robot there is the one that the program names')
     elif q is not None:
-        found = _turned(carried, found)
-    elif len(found) > 1:
-        found = _known(found, course, move)
+        result = _turned(carried, result)
+    elif len(result) > 1:
+        result = _known(result, course, move)
     near = np.zeros(arm.n) if q is None else q
-    return np.asarray(found[np.abs(found - near).sum(axis=1).argmin()])
+    return np.asarray(result[np.abs(result - near).sum(axis=1).argmin()])
 
 
-def _known(found: Array, course: _Course, move: Move) -> Array:
+def _known(result: Array, course: _Course, move: Move) -> Array:
     """Return the one posture that is known, where the program names none."""
-    known = found if course.known is None else found[course.known(found)]
+    known = result if course.known is None else result[course.known(result)]
     if len(known) != 1:
         raise ReachError(
-            f'{len(found)} postures reach this point and the program names none; '
+            f'{len(result)} postures reach this point and the program names none; '
             'let a move to joint positions come first, or say the joints with --start'
         )
     course.assumed.append(move.where)
     return known
 
 
-def _turned(carried: CarriedArm, found: Array) -> Array:
+def _turned(carried: CarriedArm, result: Array) -> Array:
     """Return every solution on every full turn that the limits allow for the arm's joints."""
-    last, arm = [found], carried.robot
+    last, arm = [result], carried.robot
     for turn in (-2.0 * np.pi, 2.0 * np.pi):
         for joint in np.flatnonzero(~arm.prismatic & (np.arange(arm.n) >= carried.count)):
-            moved = found.copy()
+            moved = result.copy()
             moved[:, joint] += turn
             inside = (moved >= arm.lower) & (moved <= arm.upper)
             last.append(moved[inside.all(axis=1)])
@@ -269,8 +269,6 @@ def tool_way(
     ----------
     arm : Robot
         With the tool of the move.
-    program : MoveProgram
-    move : Move
     begin : array, shape (4, 4)
         ``T_base_tool`` where it begins.
     count, at : int
@@ -353,13 +351,12 @@ def _eased(t: Array, from_rest: bool, to_rest: bool) -> Array:
     if t.size < 2:
         return t
     share = np.linspace(0.0, 1.0, t.size)
-    # Equal steps of way take longer near a stop: half a sine there is speed rising evenly enough.
-    slow = 0.15
-    speed = np.ones(t.size)
-    if from_rest:
-        speed = np.minimum(speed, 0.1 + share / slow)
-    if to_rest:
-        speed = np.minimum(speed, 0.1 + (1.0 - share) / slow)
-    pace = 1.0 / speed
-    steps = 0.5 * (pace[1:] + pace[:-1]) * np.diff(t)
-    return np.concatenate([[0.0], np.cumsum(steps)])
+    late = from_rest * _late(share) + to_rest * (_late(np.ones(1)) - _late(1.0 - share))
+    return np.asarray(t[-1] * (share + late))
+
+
+def _late(share: Array) -> Array:
+    """Return how much later a place is reached, its share of the way from a stop, than at full speed."""
+    # The speed rises from a tenth along the way; half a sine there is speed rising evenly enough.
+    near = np.minimum(share / SLOW, 0.9)
+    return np.asarray(SLOW * (np.log1p(10.0 * near) - near))

@@ -62,8 +62,8 @@ def _coupling(case: Case, draws: Array, combined: Array) -> dict[str, float]:
     for k, tolerance in enumerate(tolerances):
         each += exact_deviations(study, (tolerance,), draws[:20, k : k + 1])
     joint = exact_deviations(study, tolerances, draws[:20])
-    left = np.linalg.norm(joint - each, axis=-1).max(axis=1)
-    return {'coupling': float((left / combined[:20].max(axis=1)).max())}
+    remaining = np.linalg.norm(joint - each, axis=-1).max(axis=1)
+    return {'coupling': float((remaining / combined[:20].max(axis=1)).max())}
 
 
 def drift(case: Case) -> dict[str, float]:
@@ -98,10 +98,10 @@ def ranking(case: Case) -> dict[str, float]:
     labels = tuple(GROUPS[t.effect] for t in tolerances)
     design = SobolDesign(tuple(t.name for t in tolerances), 1024, labels, case.seed)
     fast = model(case.aggressive, tolerances)
-    found = design.indices(fast.at_probabilities(design.samples()).d_norm)
-    total = dict(zip(found.names, found.total, strict=True))
+    result = design.indices(fast.at_probabilities(design.samples()).d_norm)
+    total = dict(zip(result.names, result.total, strict=True))
     out = {f'ST_{label}': total[label] for label in ORDER}
-    out['ST_half'] = float(found.total_half.max())
+    out['ST_half'] = float(result.total_half.max())
     out['rank_holds'] = all(total[a] > total[b] for a, b in pairwise(ORDER))
     return out | _stability(case) | _per_unit(case)
 

@@ -59,11 +59,11 @@ def _distance(case: Case, *effects: Effect) -> Array:
 def linearity(case: Case) -> dict[str, float]:
     """Measure how far a sweep of joint offsets departs from proportion, alone and together."""
     offsets = default_tolerances(case.robot, ('joint_offset',))
-    found = [sweep(case.smooth, t, default_values(t)) for t in offsets]
+    result = [sweep(case.smooth, t, default_values(t)) for t in offsets]
     all_equal = together(case.smooth, offsets, default_values(offsets[0]), 'all joints')
     ends = [end_of_linearity(case.smooth, t) for t in offsets]
-    moving = [f for f in found if f.max_m.max() > 1e-9]
-    tenth = [float(np.interp(0.1 * DEGREE, f.values, f.max_m)) for f in found]
+    moving = [f for f in result if f.max_m.max() > 1e-9]
+    tenth = [float(np.interp(0.1 * DEGREE, f.values, f.max_m)) for f in result]
     return {
         'linear_departure_max': max(f.departure[-1] for f in moving),
         'linear_departure_min': min(f.departure[-1] for f in moving),
@@ -97,13 +97,13 @@ def leverage(case: Case) -> dict[str, float]:
 def lengths(case: Case) -> dict[str, float]:
     """Measure link length errors: their coefficients, their proportion, their shape."""
     links = default_tolerances(case.robot, ('link_length',))
-    found = local_sensitivity(case.smooth, links)
+    result = local_sensitivity(case.smooth, links)
     bends = [abs(sweep(case.smooth, t, default_values(t)).departure[-1]) for t in links]
     return {
-        'S_a_max': found.peak.max(),
-        'S_a_min': found.peak.min(),
+        'S_a_max': result.peak.max(),
+        'S_a_min': result.peak.min(),
         'S_a_departure': max(bends),
-        'S_a_spread': np.ptp(found.analytic, axis=1).max(),
+        'S_a_spread': np.ptp(result.analytic, axis=1).max(),
     }
 
 

@@ -122,13 +122,13 @@ def planning(case: Case) -> dict[str, float]:
         ('lag', ('joint_offset', 'link_length', 'link_twist', 'backlash', 'servo_lag')),
     ):
         tolerances = default_tolerances(case.robot, families)
-        found = {
+        result = {
             r.profile: r
             for r in compare_profiles(
                 case.robot, case.path, tolerances, profiles=profiles, points=POINTS
             )
         }
-        rough, fine = found['aggressive'], found['smooth']
+        rough, fine = result['aggressive'], result['smooth']
         out |= {
             f'plan_{label}_ratio': rough.expected_m / fine.expected_m,
             f'plan_{label}_ratio_same_time': rough.same_time_m / fine.same_time_m,

@@ -18,20 +18,8 @@ from weld_twin_core.arrays import Array
 MODULES = {
     'pinocchio': 'pinocchio_peer',
     'mujoco': 'mujoco_peer',
-    'roboticstoolbox': 'toolbox_peer',
-    'pybotics': 'pybotics_peer',
-    'kinpy': 'kinpy_peer',
-    'jax': 'jax_peer',
 }
-PACKAGES = {
-    'pinocchio': 'pin',
-    'mujoco': 'mujoco',
-    'roboticstoolbox': 'roboticstoolbox-python',
-    'pybotics': 'pybotics',
-    'kinpy': 'kinpy',
-    'jax': 'jax',
-    'salib': 'SALib',
-}
+PACKAGES = {'pinocchio': 'pin', 'mujoco': 'mujoco'}
 """What they are called on PyPI."""
 
 
@@ -47,7 +35,7 @@ class Peer:
     screws : callable or None
         Joint positions to poses and Jacobians (N, 6, n).
     dh : callable or None
-        Joint positions to poses and derivatives by the DH values, (N, 6 or 3, 4 n), of each row
+        Joint positions to poses and derivatives by the DH values, (N, 6, 4 n), of each row
         by theta, d, a, alpha.
     single : callable or None
         One joint position (n,) to a pose (4, 4).

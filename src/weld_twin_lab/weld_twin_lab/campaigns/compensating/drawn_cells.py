@@ -61,7 +61,6 @@ class Arm(NamedTuple):
 
     Attributes
     ----------
-    name : str
     seed : int
         Decides what it is off by, what is learned of it, and its goals.
     changed : bool

@@ -205,6 +205,7 @@ class CellTrial:
             'arm': self.arm.seed,
             'after': after,
             'inside': drawn.inside,
+            'model': line['model'],
             'verdict': line['verdict'],
             'why': line['why'],
             'before_m': offs[0][0],
@@ -309,6 +310,8 @@ def tried(
 def _changed(trial: CellTrial, known: Known) -> Iterator[str]:
     """Change the cell in every way that is not known yet, nothing first: that too could be noticed."""
     changes = {c['change'] for c in known.changes if c['robot'] == trial.name}
+    if changes:
+        trial.restore()  # a tracker that was never heard cannot be lost
     for k, what in enumerate((NOTHING, *CHANGES)):
         if what in changes:
             continue

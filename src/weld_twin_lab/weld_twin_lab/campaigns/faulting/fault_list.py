@@ -38,7 +38,6 @@ class Fault:
 
     Attributes
     ----------
-    name : str
     run : callable
         Does it, and leaves the cell in order.
     tell : sequence of str

@@ -57,7 +57,6 @@ class Scene(NamedTuple):
 
     Attributes
     ----------
-    name : str
     run : callable
         Does it on a stand whose nodes run; yields what was told.
     nodes : dict

@@ -141,7 +141,6 @@ class Stand:
         ----------
         node : str
             Its full name.
-        words : str
         within : float [s]
 
         """

@@ -46,12 +46,10 @@ class Finding:
 
     Attributes
     ----------
-    target : str
     case : int
         With the seed of the campaign it makes the same file again.
     what : str
         Exception and the place in this project's code where it came from.
-    times : int
 
     """
 

@@ -82,8 +82,6 @@ def mutate(rng: Random, seed: bytes, kind: str) -> bytes:
 
     Parameters
     ----------
-    rng : Random
-    seed : bytes
     kind : str
         'yaml' and 'json' are also changed as trees, 'binary' never as text.
 

@@ -70,7 +70,6 @@ class Target:
     ----------
     suffix, kind : str
         Of the file's name, and how it may be changed.
-    seeds : tuple of bytes
     read : callable
         Reads the file of a path.
 

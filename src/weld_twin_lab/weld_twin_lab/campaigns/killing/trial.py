@@ -43,10 +43,8 @@ class Trial:
 
     Attributes
     ----------
-    storage : str
     moment : float [s]
         After the first message; then it is killed, or told to end if ``closing``.
-    closing : bool
     split_mb : float [MB]
         Size of a file of the bag; 0 is without limit.
     wait : float [s]

@@ -204,23 +204,3 @@ def verdict(result: dict[str, Any], flat: float) -> bool:
         and all(node['rss_slope_mib_per_h'] <= flat for node in result['nodes'].values())
         and all(row.get('refused', 0) == row.get('missing', 0) == 0 for row in inputs)
     )
-
-
-def picture(path: Path, samples: dict[str, list[Usage]]) -> None:
-    """Draw memory and CPU share of each node over the time of the run."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9, 6), layout='constrained')
-    FigureCanvasAgg(figure)
-    memory, share = figure.subplots(2, 1, sharex=True)
-    for name, rows in samples.items():
-        t, rss, cpu = np.array(rows, dtype=np.float64).T
-        memory.plot(t / 60.0, rss / MIB, label=name)
-        share.plot(t[1:] / 60.0, np.diff(cpu) / np.diff(t) * 1e-9 * 100.0)
-    memory.set_ylabel('resident memory [MiB]')
-    memory.set_ylim(bottom=0.0)
-    share.set_ylabel('share of one core [%]')
-    share.set_xlabel('time [min]')
-    memory.legend(ncols=2, fontsize='small')
-    figure.savefig(path, dpi=110)

@@ -100,7 +100,6 @@ def played(folder: Path, locked: list[dict[str, str]]) -> dict[str, Any]:
 
     Parameters
     ----------
-    folder : Path
     locked : list of dict
         Environments of the parties, the first one that of the nodes too; empty without keys.
 

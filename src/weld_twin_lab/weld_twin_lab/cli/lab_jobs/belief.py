@@ -4,7 +4,7 @@
 
 Draws cases, diagnoses them, and fits for every kind of statement how often it is right, with the
 threshold from which it is told as sure. Writes weights.json (the file the diagnosis reads), what
-answers are worth on the cases to judge on, pictures, and the tables of statements: with --learn-from
+answers are worth on the cases to judge on, and the tables of statements: with --learn-from
 and --judge-on it is fitted anew from such tables without a diagnosis. Without cases to judge on,
 those learned from are judged by weights that had not seen them. Stopped, it goes on where it was
 when run again.

@@ -3,8 +3,7 @@
 """Time the twin beside its peers, after checking that they agree.
 
 Peers that are not installed are left out. One thread; contenders take turns, so that the ratios
-hold on a busy machine too. Writes benchmark.json, a table (benchmark.md) and how the cost grows
-(growth.png) to the directory.
+hold on a busy machine too. Writes benchmark.json and a table (benchmark.md) to the directory.
 """
 
 from __future__ import annotations
@@ -16,13 +15,6 @@ from weld_twin_nodes.offline.environment import THREADS
 
 from ...study import Study, option, options, study
 
-ONE_THREAD = {
-    **dict.fromkeys(THREADS, '1'),
-    'XLA_FLAGS': '--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1',
-    'JAX_PLATFORMS': 'cpu',
-}
-"""Read by the libraries when they are imported."""
-
 add_arguments = options(
     lambda parser: add_output(parser, 'where results go'),
     option('--quick', False, None, 'small sizes, to see that it runs'),
@@ -33,7 +25,7 @@ add_arguments = options(
 @study
 def run(study: Study) -> None:
     """Run the benchmark; print results as they come."""
-    os.environ.update(ONE_THREAD)
+    os.environ.update(dict.fromkeys(THREADS, '1'))  # read by libraries when they are imported
 
     from ...benchmark.all_races import FULL, QUICK, benchmark
 

@@ -14,6 +14,8 @@ from typing import Any
 
 from weld_twin_nodes.cli.options import add_command
 
+from ..retired import CAMPAIGNS, add_retired, add_retired_options
+
 FAILED = 1
 """Exit code of a campaign that ran and did not pass."""
 
@@ -32,6 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar='FILE',
             help='JSON file to write, or to replace if it is of the same campaign',
         )
+        add_retired_options(job, f'campaign {name}')
+    add_retired(jobs, CAMPAIGNS)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from weld_twin_core.arrays import Array
 
     from ...contest.arms import Errors
-    from ...contest.processes import Starter
 
 add_arguments = options(
     option('--cases', REQUIRED, 'DIR', 'as blind make wrote them'),
@@ -42,13 +41,13 @@ def run(study: Study) -> None:
     content, table = _sealed(study, methods)
     errors, measured = _arms(study, methods) if args.ur5 and args.ur10 else ({}, {})
     content['arms_mean_m'] = errors
-    text = told.page(table, content['methods'], content['closer'], errors, measured)
+    text = told.page(table, errors, measured)
     study.write('contest', content, text)
 
 
-def _sealed(study: Study, methods: dict[str, Starter]) -> tuple[dict[str, Any], str]:
+def _sealed(study: Study, methods: dict[str, list[str]]) -> tuple[dict[str, Any], str]:
     """Return what all methods are worth on the sealed cases, and the table."""
-    from ...contest import course, scores, told
+    from ...contest import course, scores
     from ...contest.entrants.never_knows import answer as silent
     from ...contest.open_form import read_case
 
@@ -67,12 +66,11 @@ def _sealed(study: Study, methods: dict[str, Starter]) -> tuple[dict[str, Any], 
         method: {name: run.trouble for name, run in said.items() if run.trouble}
         for method, said in runs.items()
     }
-    near = told.closer(runs, truth)
-    content = {'methods': found, 'troubles': troubles, 'closer': near, 'cases': names}
+    content = {'methods': found, 'troubles': troubles, 'cases': names}
     return content, scores.page(runs, truth, f'{len(names)} cases.')
 
 
-def _arms(study: Study, methods: dict[str, Starter]) -> tuple[Errors, dict[str, Array]]:
+def _arms(study: Study, methods: dict[str, list[str]]) -> tuple[Errors, dict[str, Array]]:
     """Return the mean errors of all methods on the measured arms, and what was measured."""
     from ...contest import arms, course
 

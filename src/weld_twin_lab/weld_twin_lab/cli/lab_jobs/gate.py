@@ -4,9 +4,7 @@
 
 Recordings come from the plant, as bags and as tables; each mistake is drawn anew. Sound ones have
 causes of all families in plausible size, on rich and poor motions, with and without alignment.
-With --real, stations of two measured arms and a servo axis are tried besides (docs/transfer.md says
-where the data come from): poor parts of them as they are, and the same mistakes put into them. A
-run that was interrupted goes on where it stopped.
+A run that was interrupted goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -18,14 +16,6 @@ add_arguments = options(
     option('--draws', 10, 'N', 'of every kind, as bag and as table'),
     option('--sound', 300, 'N', 'sound recordings'),
     option('--kinds', '', 'LIST', 'only these mistakes, comma-separated'),
-    option(
-        '--real',
-        None,
-        ('UR5', 'UR10', 'EMPS'),
-        'directories of real recordings, tried besides',
-        nargs=3,
-    ),
-    option('--real-draws', 30, 'N', 'of stations of either real arm'),
     out='directory for gate.json and gate.md',
     of='OUT',
     pool=True,
@@ -41,7 +31,7 @@ def run(study: Study) -> bool:
     from ...blind.simulator import require_simulator
     from ...gate.mistakes import KINDS
     from ...gate.table import page, result
-    from ...gate.tasks import drawn, real
+    from ...gate.tasks import drawn
 
     require_simulator()
     args, engine = study.args, engine_digest()
@@ -50,12 +40,7 @@ def run(study: Study) -> bool:
         if kind not in KINDS:
             raise DataError(f'there is no mistake {kind!r}; there are ' + ', '.join(KINDS))
     tasks = drawn(args.seed, kinds, args.draws, args.sound, engine)
-    more = real(args.real, kinds, args.draws, args.real_draws, engine) if args.real else []
-    found = study.tasks([*tasks, *more], 'trying the gate')
-    content = result(found[: len(tasks)], args.seed)
-    if more:
-        content['real'] = result(found[len(tasks) :], args.seed)
-        content['passed'] = content['passed'] and content['real']['passed']
+    content = result(study.tasks(tasks, 'trying the gate'), args.seed)
     study.write('gate', content, page(content))
     passed = bool(content['passed'])
     print(f'\ngate: {"passed" if passed else "FAILED"}, {study.out / "gate.json"}')

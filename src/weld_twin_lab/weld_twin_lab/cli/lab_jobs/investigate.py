@@ -4,9 +4,8 @@
 
 Cells of the plant with sealed causes are recorded on poor motions. Those that the diagnosis leaves
 open, or gets wrong, are investigated: the plant runs what is asked, three experiments and five minutes
-at most. Beside it the same minutes are spent on random motion, on a rich motion that is always the same,
-and on D-optimal postures. Writes investigate.json and investigate.md; a run that was interrupted goes on
-where it stopped, and one with --minutes writes what there is after so long.
+at most. Writes investigate.json and investigate.md; a run that was interrupted goes on where it stopped,
+and one with --minutes writes what there is after so long.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from ...study import Study, option, options, study
 add_arguments = options(
     option('--seed', 1, 'N', 'decides the cells'),
     option('--cells', 120, 'N', 'cells that are left open at first'),
-    option('--alone', False, None, 'leave out what the minutes come to otherwise'),
     option(
         '--minutes',
         float('inf'),
@@ -35,7 +33,5 @@ def run(study: Study) -> None:
 
     args = study.args
     with study.runner('investigating', study.out / PARTS) as runner:
-        result = investigated(
-            args.seed, args.cells, runner, study.tell, alone=args.alone, minutes=args.minutes
-        )
+        result = investigated(args.seed, args.cells, runner, study.tell, minutes=args.minutes)
     study.write('investigate', result, page(result))

@@ -1,66 +1,42 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Robot programs: are they read as they are meant, and does a corrected one help?
+"""Robot programs: does a corrected one help?
 
-In every language drawn programs are read again by the product and by an independent reader, and programs
-are broken at random (programs.json, programs.md). Seams of arms with sealed causes are recorded,
-diagnosed, corrected as programs and driven by the plant (corrections.json, corrections.md). Arms given
-as URDFs are planned, simulated, measured, diagnosed and corrected (urdf_arms.json, urdf_arms.md). With
---seams 0, --urdf-arms 0, or --drawn 0 and --broken 0, one part is left out. A run that was interrupted
-goes on where it stopped. Exits with 1 when a program is read wrongly, or a broken one not met with
-words.
+In every language seams of arms with sealed causes are recorded, diagnosed, corrected as programs and
+driven by the plant. Writes corrections.json and corrections.md; a run that was interrupted goes on
+where it stopped.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from ...study import Study, option, options, study
+from ...study import Study, head, option, options, study
 
 add_arguments = options(
-    option('--drawn', 200, 'N', 'programs a language'),
-    option('--broken', 2000, 'N', 'broken programs a language'),
-    option(
-        '--seams',
-        1,
-        'N',
-        'sealed seams a language that the plant runs before and after (default: 1)',
-    ),
-    option('--urdf-arms', 0, 'N', 'arms given as URDFs that go all the way (default: 0)'),
+    option('--seams', 1, 'N', 'sealed seams a language (default: 1)'),
     option('--seed', 1, 'N', 'decides the seams'),
-    option('--made', 'test/programs/made', 'DIR', 'programs as users have them'),
     pool=True,
 )
 
 
 @study
-def run(study: Study) -> bool:
-    """Try what is not tried yet, and print the tables."""
+def run(study: Study) -> None:
+    """Correct and drive what is not done yet, and print the table."""
+    from weld_twin_nodes.offline.task_pool import Task
+
     from ...blind.diagnosing import engine_digest
-    from ...programs import correction_table, urdf_table
-    from ...programs.study import PARTS, head_of, seams, urdf_arms
+    from ...blind.simulator import require_simulator
 
-    args, engine = study.args, engine_digest()
-    right = _read(study) if args.drawn or args.broken else True
-    for name, tasks, table in (
-        ('corrections', seams(args.seed, args.seams, engine), correction_table),
-        ('urdf_arms', urdf_arms(args.seed, args.urdf_arms, engine), urdf_table),
-    ):
-        if tasks:
-            cases = study.tasks(tasks, name, study.out / PARTS)
-            result = head_of(args.seed, engine, table.totals(cases), cases)
-            study.write(name, result, table.page(result))
-    return right
+    require_simulator()
+    from ...programs.cells import CELLS
+    from ...programs.correction_table import page, totals
+    from ...programs.corrections import corrected_seam
 
-
-def _read(study: Study) -> bool:
-    """Read what is drawn and what is broken, and return whether all went well."""
-    from ...programs.study import PARTS, read, summary
-
-    args = study.args
-    result = read(args.drawn, args.broken, Path(args.made), study.parts(PARTS))
-    study.write('programs', result, summary(result))
-    wrong = [line for part in ('round_trips', 'fuzz') for e in result[part] for line in e['wrong']]
-    for line in wrong:
-        study.tell(line)
-    return not wrong
+    seed, engine = study.args.seed, engine_digest()
+    tasks = [
+        Task(corrected_seam, (language, seed, k, engine), f'{language} {k}')
+        for language in CELLS
+        for k in range(study.args.seams)
+    ]
+    cases = study.tasks(tasks, 'corrections', study.out / 'parts')
+    found = {'engine': engine, 'seed': seed, 'totals': totals(cases), 'cases': cases}
+    study.write('corrections', head('programs/1', **found), page(found))

@@ -33,5 +33,6 @@ def answer(case: ContestCase) -> ContestAnswer:
     with warnings.catch_warnings():
         warnings.simplefilter('ignore', ConvergenceWarning)
         process.fit(known, off(case)[rows])
-    added = process.predict(features(case.ask.joints, case.times))
-    return ContestAnswer(nominal(case, case.ask.joints, case.times) + added, unknown=1.0)
+    added, sigma = process.predict(features(case.ask.joints, case.times), return_std=True)
+    there = nominal(case, case.ask.joints, case.times)
+    return ContestAnswer(there + added, unknown=1.0, sigma=sigma)

@@ -40,7 +40,6 @@ class Fitted:
         Corrections, and their standard errors.
     effect : array, shape (P,) [m]
         How far each moves the tool, RMS.
-    robot : Robot
 
     """
 

@@ -8,12 +8,20 @@ import json
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
+from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis.algebra.model import Model
+from weld_twin_core.twin.posterior import Posterior, pose_covariances
 from weld_twin_msgs_py.files.diagnosis_model import read_model
 from weld_twin_nodes.offline.told_twin import build_twin
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 from ..open_form import ContestAnswer, ContestCase
+
+TO_SIGMA = 1.4826
+"""Standard deviation of normal noise in median absolute deviations; a few outliers do not count."""
 
 
 def answer(case: ContestCase) -> ContestAnswer:
@@ -39,10 +47,24 @@ def answer(case: ContestCase) -> ContestAnswer:
     )
     sure = float(verdict['confidence'] or 0.0)
     status = verdict['status']
+    twin = model.twin(0)
     return ContestAnswer(
-        model.twin(0).poses(case.ask, case.times).position,
+        twin.poses(case.ask, case.times).position,
         causes,
         unknown=sure if status == 'unknown' else 0.0,
         none=sure if status == 'none' else 0.0,
         sure=(*(bool(cause['sure']) for cause in told), bool(verdict['sure'])),
+        sigma=_sigma(case, found.posterior, model),
     )
+
+
+def _sigma(case: ContestCase, posterior: Posterior | None, model: Model) -> Array | None:
+    """Return how sure the model is of what will be measured: of the pose, and the instrument's noise."""
+    measured = case.train.measured
+    if posterior is None or measured is None:
+        return None
+    twin = model.twin(0)
+    sure = pose_covariances(posterior, twin, case.ask, case.times)[:, :3, :3]
+    left = measured.position - twin.poses(case.train, measured.t).position
+    noise = TO_SIGMA * np.median(np.abs(left - np.median(left, axis=0)))
+    return np.asarray(np.sqrt(np.diagonal(sure, axis1=1, axis2=2) + noise**2))

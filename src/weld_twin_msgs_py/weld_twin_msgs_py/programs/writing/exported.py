@@ -31,11 +31,9 @@ class ExportMove(NamedTuple):
         Of the tool; of a joint move what its share of joint speed makes of it.
     share : float
         Of the joints' speeds.
-    stop : bool
     dwell : float [s]
     duration : float [s]
         How long it takes.
-    comment : str
 
     """
 
@@ -59,15 +57,12 @@ class Exported:
     ----------
     name : str
         Letters, digits and underscores, as all controllers take it.
-    moves : tuple of ExportMove
-    context : Context
     tool : array, shape (4, 4) [m]
         On the controller's flange.
     trigger : int
         Number of the digital output that tells the instrument when to measure.
     stations : bool
         The output is on while the arm stands; else from the first to the last move.
-    comments : tuple of str
 
     """
 
@@ -94,7 +89,6 @@ class Exported:
 
         Parameters
         ----------
-        move : ExportMove
         own : str
             A form with a number, of the arm's joints; external axes follow in the order of their names.
 

@@ -60,8 +60,6 @@ def sheet(program: Exported, language: str, file: str, speeds: str, notes: Seque
 
     Parameters
     ----------
-    program : Exported
-    language : str
     file : str
         Name of the program's file.
     speeds : str

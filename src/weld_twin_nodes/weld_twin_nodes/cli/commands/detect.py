@@ -44,10 +44,10 @@ def run(args: argparse.Namespace) -> int:
     find = detector(read_board(args.board))
     paths = _paths(args.images)
     header, beside = _joints(args.joints, paths)
-    rows, found = list[tuple[str, ...]](), 0
+    rows, result = list[tuple[str, ...]](), 0
     for path, own in zip(paths, beside, strict=True):
         labels, where = find(path)
-        found += bool(labels)
+        result += bool(labels)
         for label, (u, v) in zip(labels, where.tolist(), strict=True):
             rows.append((path.name, args.camera, label, f'{u:.4f}', f'{v:.4f}', *own))
     if not rows:
@@ -58,7 +58,7 @@ def run(args: argparse.Namespace) -> int:
     columns = ('image', 'camera', 'point', 'u [px]', 'v [px]', *header)
     with output_file(args) as out:
         out.write_text(csv_text(columns, rows), encoding='utf-8')
-    print(f'{args.out}: the board is in {found} of {len(paths)} images, {len(rows)} points')
+    print(f'{args.out}: the board is in {result} of {len(paths)} images, {len(rows)} points')
     return 0
 
 

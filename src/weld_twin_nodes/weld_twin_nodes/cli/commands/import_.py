@@ -71,10 +71,10 @@ def run(args: argparse.Namespace) -> int:
     if args.table or args.picture:
         _write_deviations(args, recording, off)
     kind = 'stations' if recording.joints.static else 'measurements along a motion'
-    found = deviation_metrics(measured.position, expected.position)
+    result = deviation_metrics(measured.position, expected.position)
     print(
-        f'{args.out}: {found.samples} {kind}; from the nominal twin, base and tool frame not '
-        f'fitted: RMS {found.rms_m * 1e3:.3f} mm, max {found.max_m * 1e3:.3f} mm'
+        f'{args.out}: {result.samples} {kind}; from the nominal twin, base and tool frame not '
+        f'fitted: RMS {result.rms_m * 1e3:.3f} mm, max {result.max_m * 1e3:.3f} mm'
     )
     return 0
 

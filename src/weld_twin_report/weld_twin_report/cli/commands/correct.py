@@ -197,8 +197,8 @@ def _length(text: str, option: str) -> float:
 
 def _tell(entry: dict[str, Any]) -> None:
     """Print what was left, where the model knows nothing, and what else is to be known."""
-    for left in entry['left']:
-        print(f'left as it was: {left["why"]}')
+    for remaining in entry['left']:
+        print(f'left as it was: {remaining["why"]}')
     outside = [move['where'] for move in entry['moves'] if move['outside']]
     if outside:
         print(f'{len(outside)} moves lie outside what the model knows, the first at {outside[0]}')

@@ -194,7 +194,7 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
         recordings = _read(args, twin.robot, 'base' in align, tell)
         count = len(args.bags)
         fitted, more = told(_bounded(recordings[:count]), changes, twin.robot)
-        found = diagnose(
+        result = diagnose(
             fitted,
             twin.robot,
             align=align,
@@ -206,7 +206,7 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             limits=_limits(args),
             progress=tell,
         )
-    return found if judged is None else _in_region(found, args.region, judged, fitted[0])
+    return result if judged is None else _in_region(result, args.region, judged, fitted[0])
 
 
 def _read(
@@ -222,26 +222,26 @@ def _read(
     for path in (*args.bags, *args.holdout):
         tell(f'reading {path}')
         if Path(path).suffix.lower() in TABLES:
-            found, _ = table_of(args, robot, path)  # what was assumed is in its notes
+            result, _ = table_of(args, robot, path)  # what was assumed is in its notes
         else:
             # Two clocks are for the checks of the data to name.
-            found = read_recording(path, robot, topics, one_clock=False, needs_measurements=True)
-            found = _described(found, args.contacts)
-        out.append(found if what is None else measured_by(found, what, own_frame=own_frame))
+            result = read_recording(path, robot, topics, one_clock=False, needs_measurements=True)
+            result = _described(result, args.contacts)
+        out.append(result if what is None else measured_by(result, what, own_frame=own_frame))
     return out
 
 
-def _in_region(found: Diagnosis, told: str, judged: Array, recording: Recording) -> Diagnosis:
+def _in_region(result: Diagnosis, reported: str, judged: Array, recording: Recording) -> Diagnosis:
     """Return the diagnosis with what to expect in a region that was asked for."""
     from weld_twin_core.effects.setup_motion import of_the_robot
     from weld_twin_core.twin.posterior import usual_sigma
     from weld_twin_core.twin.twin import Twin
 
-    if found.posterior is None:
-        return found
-    twin = Twin(found.model.twin(0).robot, of_the_robot(found.model.known + found.model.found))
-    sigma = usual_sigma(found.posterior, twin, recording, judged)
-    return replace(found, posterior=replace(found.posterior, region=(told, sigma)))
+    if result.posterior is None:
+        return result
+    twin = Twin(result.model.twin(0).robot, of_the_robot(result.model.known + result.model.found))
+    sigma = usual_sigma(result.posterior, twin, recording, judged)
+    return replace(result, posterior=replace(result.posterior, region=(reported, sigma)))
 
 
 def _changes(args: argparse.Namespace) -> dict[int, SetUpChange]:
@@ -288,8 +288,8 @@ def _described(recording: Recording, artefact: str | None) -> Recording:
     contacts = recording.contacts
     if artefact is None or contacts is None:
         return recording
-    told = Contacts(read_artefact(artefact), contacts.labels, contacts.value, contacts.sigma)
-    return replace(recording, contacts=told)
+    reported = Contacts(read_artefact(artefact), contacts.labels, contacts.value, contacts.sigma)
+    return replace(recording, contacts=reported)
 
 
 def _bounded(recordings: Sequence[Recording]) -> list[Recording]:

@@ -406,18 +406,18 @@ def _heard(
     from weld_twin_nodes.offline.set_up_changes import FRAMES
 
     first, later = recordings(state)
-    told = {**changed(state), **(dict.fromkeys(bags, changes) if changes else {})}
+    reported = {**changed(state), **(dict.fromkeys(bags, changes) if changes else {})}
     # Seen with another tool, or from elsewhere, they cannot be held against the first.
-    by_itself = not first or any(what in FRAMES for what in told.values())
+    by_itself = not first or any(what in FRAMES for what in reported.values())
     every = [*first, *later, *bags]
-    found = _diagnosed(every, state, place, told, confirm=by_itself, force=force)
+    result = _diagnosed(every, state, place, reported, confirm=by_itself, force=force)
     if by_itself:
-        return weighed(found)
+        return weighed(result)
     beside = place.with_name(f'{place.name}-experiments')
     try:
-        return weighed(found, _diagnosed([*later, *bags], state, beside, told, force=force))
+        return weighed(result, _diagnosed([*later, *bags], state, beside, reported, force=force))
     except TwinError:  # too few to be diagnosed by themselves
-        return weighed(found)
+        return weighed(result)
 
 
 def _diagnosed(
@@ -435,14 +435,14 @@ def _diagnosed(
 
     parser = argparse.ArgumentParser()
     diagnose.add_arguments(parser)
-    left = max(float(state['budget_min']) - float(state['spent_min']), LEAST)
+    remaining = max(float(state['budget_min']) - float(state['spent_min']), LEAST)
     words = [*bags, '--robot', state['robot'], '--out', str(place), *state['options']]
-    words += ['--experiment-minutes', f'{left:g}', *(['--force'] if force else [])]
+    words += ['--experiment-minutes', f'{remaining:g}', *(['--force'] if force else [])]
     words += ['--confirm'] if confirm else []
     words += [word for bag in bags if bag in changes for word in ('--changed', bag, changes[bag])]
     diagnose.run(parser.parse_args(words))
-    found: dict[str, Any] = json.loads((place / RESULT).read_text(encoding='utf-8'))
-    return found
+    result: dict[str, Any] = json.loads((place / RESULT).read_text(encoding='utf-8'))
+    return result
 
 
 def _write_experiment(

@@ -64,18 +64,18 @@ def run(args: argparse.Namespace) -> int:
     align = frames_named(args.align, '--align')
     recording = read_recording(args.bag, nominal, topics_of(args))
     robot, notes = placed(recording, nominal, align)
-    found = performance_of(recording, robot)
-    notes += _warnings(found, align)
+    result = performance_of(recording, robot)
+    notes += _warnings(result, align)
     with output(args, RESULT) as place:
-        _write(place, found, recording, robot, notes, args)
-    _print(found, notes, Console(width=WIDTH, highlight=False, markup=False))
+        _write(place, result, recording, robot, notes, args)
+    _print(result, notes, Console(width=WIDTH, highlight=False, markup=False))
     print(f'report: {Path(args.out) / PAGE}')
     return 0
 
 
 def _write(
     place: Path,
-    found: Performance,
+    outcome: Performance,
     recording: Recording,
     robot: Robot,
     notes: Sequence[str],
@@ -96,18 +96,18 @@ def _write(
         'robot': robot.name,
         'recording': recording.name,
         'align': args.align,
-        **found.as_dict(),
+        **outcome.as_dict(),
         'notes': [*notes, *recording.notes],
         'inputs': [item.as_dict() for item in inputs],
     }
-    write_text(place / PAGE, performance_page(found, recording, robot.name, notes, inputs))
+    write_text(place / PAGE, performance_page(outcome, recording, robot.name, notes, inputs))
     write_text(place / RESULT, json.dumps(result, indent=1, allow_nan=False) + '\n')
 
 
-def _warnings(found: Performance, align: frozenset[str]) -> list[str]:
+def _warnings(result: Performance, align: frozenset[str]) -> list[str]:
     """Return a sentence where the measuring frame cannot be that of the robot."""
-    sizes = [pose.performance.ap_m for pose in found.poses]
-    sizes += [] if found.path is None else [found.path.performance.at_m]
+    sizes = [pose.performance.ap_m for pose in result.poses]
+    sizes += [] if result.path is None else [result.path.performance.at_m]
     if max(sizes) < FAR or len(align) == 2:
         return []
     return [
@@ -116,14 +116,14 @@ def _warnings(found: Performance, align: frozenset[str]) -> list[str]:
     ]
 
 
-def _print(found: Performance, notes: Sequence[str], console: Console) -> None:
+def _print(result: Performance, notes: Sequence[str], console: Console) -> None:
     from rich.table import Table
 
     from ...report.performance_table import PATH_HEADS, POSE_HEADS, path_row, pose_rows, sentence
 
-    console.print(sentence(found))
-    paths = [] if found.path is None else [path_row(found.path)]
-    for heads, rows in ((POSE_HEADS, pose_rows(found)), (PATH_HEADS, paths)):
+    console.print(sentence(result))
+    paths = [] if result.path is None else [path_row(result.path)]
+    for heads, rows in ((POSE_HEADS, pose_rows(result)), (PATH_HEADS, paths)):
         if rows:
             table = Table(box=None, pad_edge=False)
             for head in heads:
@@ -131,7 +131,7 @@ def _print(found: Performance, notes: Sequence[str], console: Console) -> None:
             for row in rows:
                 table.add_row(*row)
             console.print(table)
-    for text in found.lacking:
+    for text in result.lacking:
         console.print(f'lacking: {text}')
     for text in notes:
         console.print(f'note: {text}')

@@ -209,11 +209,11 @@ def _print_summary(place: Path) -> None:
     from ...sensitivity_report.study_files import CLAIMS, RESULT
 
     if (place / RESULT).is_file():
-        for motion, found in json.loads((place / RESULT).read_text())['motions'].items():
-            inside = found['global']['stack']['inside']['both']
-            rows = found['global']['sobol']['parameter']['d_norm']['indices']
+        for motion, result in json.loads((place / RESULT).read_text())['motions'].items():
+            inside = result['global']['stack']['inside']['both']
+            rows = result['global']['sobol']['parameter']['d_norm']['indices']
             best = sorted(rows, key=lambda row: -row['ST'])[:3]
-            for first in advised(found['local']['parameters'], 1):
+            for first in advised(result['local']['parameters'], 1):
                 print(
                     f'{motion}: {first.instruction} first: from {first.now} to {first.wanted}, '
                     f'gains {1e3 * first.gain_m:.3f} mm'

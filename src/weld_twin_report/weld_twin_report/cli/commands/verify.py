@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
         args.bag, robot, topics_of(args), one_clock=False, needs_measurements=True
     )
     recording, mended = mended_source(model, robot, recording, args.setup - 1)
-    found = verified(
+    result = verified(
         content,
         model,
         recording,
@@ -75,15 +75,15 @@ def run(args: argparse.Namespace) -> int:
     )
     if mended:
         print(f'note: {mended}')
-    for line in told(found):
+    for line in told(result):
         print(line)
     if args.out:
-        _write(args, content, recording.epoch_ns, found)
-    return 0 if found.kept else NOT_KEPT
+        _write(args, content, recording.epoch_ns, result)
+    return 0 if result.kept else NOT_KEPT
 
 
 def _write(
-    args: argparse.Namespace, content: dict[str, Any], epoch_ns: int, found: Verification
+    args: argparse.Namespace, content: dict[str, Any], epoch_ns: int, result: Verification
 ) -> None:
     """Write verification.json and the page."""
     from weld_twin_msgs_py.files.input_files import hashed
@@ -92,14 +92,14 @@ def _write(
     from ...report.verification_page import verification_page
 
     inputs = [hashed('recording', args.bag), hashed('model', args.model)]
-    entry = found.as_dict() | {
+    entry = result.as_dict() | {
         'robot': content['model']['robot'],
         'kinematics': content['model']['kinematics'],
         'epoch_ns': epoch_ns,
         'inputs': [item.as_dict() for item in inputs],
     }
     with output(args, RESULT) as place:
-        write_text(place / PAGE, verification_page(found, str(entry['robot']), inputs))
+        write_text(place / PAGE, verification_page(result, str(entry['robot']), inputs))
         write_text(place / RESULT, json.dumps(entry, indent=1, allow_nan=False) + '\n')
     print(f'report: {Path(args.out) / PAGE}')
 

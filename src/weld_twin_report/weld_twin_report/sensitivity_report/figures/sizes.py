@@ -30,14 +30,14 @@ def angles(setting: Setting) -> Drawing:
     offsets = default_tolerances(setting.robot, ('joint_offset',))
     values = default_values(offsets[0], 50)
     single = [sweep(study, tolerance, values) for tolerance in offsets]
-    best = max(single, key=lambda found: float(found.max_m[-1]))
-    found = {
+    best = max(single, key=lambda result: float(result.max_m[-1]))
+    result = {
         best.name.split('.')[1]: best,
         'all joints together': together(study, offsets, values, 'all'),
     }
     table: dict[str, Array] = {'angle_deg': values / DEGREE}
     figure, (left, right) = panels(2)
-    for colour, (name, item) in zip(COLOURS, found.items(), strict=False):
+    for colour, (name, item) in zip(COLOURS, result.items(), strict=False):
         key = name.replace(' ', '_')
         table[f'{key}_d_norm'] = item.max_m / study.length
         table[f'{key}_proportional_d_norm'] = item.linear_m / study.length
@@ -72,10 +72,10 @@ def joints(setting: Setting) -> Drawing:
     figure, (left, right) = panels(2, width_ratios=(3, 2))
     slopes = []
     for colour, tolerance in zip(COLOURS, offsets, strict=False):
-        found = sweep(study, tolerance, values)
-        table[f'{tolerance.joint}_m'] = found.max_m
-        slopes.append(found.max_m[-1] / values[-1])
-        left.plot(values / DEGREE, 1e3 * found.max_m, color=colour, label=tolerance.joint)
+        result = sweep(study, tolerance, values)
+        table[f'{tolerance.joint}_m'] = result.max_m
+        slopes.append(result.max_m[-1] / values[-1])
+        left.plot(values / DEGREE, 1e3 * result.max_m, color=colour, label=tolerance.joint)
     label(left, 'Largest deviation', 'angle of the error [deg]', 'max D [mm]')
     legend(left)
     names = [str(t.joint) for t in offsets]

@@ -21,11 +21,11 @@ _GRID = 400
 def _scenarios(setting: Setting) -> tuple[Study, dict[str, Array]]:
     """Return the study, and D of every source, of all together and summed, shape (N,)."""
     study = next(iter(setting.studies.values()))
-    found = {k: np.linalg.norm(v, axis=1) for k, v in scenario_deviations(study).items()}
-    found['sum of the single ones'] = sum(
-        (v for k, v in found.items() if k != 'combined'), np.zeros(study.samples)
+    result = {k: np.linalg.norm(v, axis=1) for k, v in scenario_deviations(study).items()}
+    result['sum of the single ones'] = sum(
+        (v for k, v in result.items() if k != 'combined'), np.zeros(study.samples)
     )
-    return study, found
+    return study, result
 
 
 def _style(name: str) -> dict[str, Any]:
@@ -38,19 +38,19 @@ def _style(name: str) -> dict[str, Any]:
 
 def combined(setting: Setting) -> Drawing:
     """Draw D of every source, of all together, and the sum of the single ones."""
-    study, found = _scenarios(setting)
+    study, result = _scenarios(setting)
     figure, (left, right) = panels(2, width_ratios=(3, 2))
-    for colour, (name, value) in zip(COLOURS, found.items(), strict=False):
+    for colour, (name, value) in zip(COLOURS, result.items(), strict=False):
         left.plot(1e3 * study.s, 1e3 * value, label=name, **{'color': colour, **_style(name)})
     from_zero(left, 1.35)
     label(left, 'Deviation of each source and together', 'arc length [mm]', 'D [mm]')
     legend(left, ncols=2, loc='upper left')
-    ratio = found['combined'] / found['sum of the single ones']
+    ratio = result['combined'] / result['sum of the single ones']
     right.plot(1e3 * study.s, ratio, color='#000000')
     right.axhline(1.0, color=COLOURS[1], lw=1.0, ls='--')
     right.set_ylim(0.0, 1.1)
     label(right, 'Combined over the sum', 'arc length [mm]', 'ratio')
-    table = {'s_m': study.s, **{f'{k.replace(" ", "_")}_m': v for k, v in found.items()}}
+    table = {'s_m': study.s, **{f'{k.replace(" ", "_")}_m': v for k, v in result.items()}}
     caption = (
         'All errors together stay below the sum of the single ones: deviations are vectors and '
         f'partly cancel; here the ratio is at most {ratio.max():.2f}.'
@@ -60,12 +60,12 @@ def combined(setting: Setting) -> Drawing:
 
 def drift(setting: Setting) -> Drawing:
     """Draw D_cum of every scenario over path length, at equal steps of arc length."""
-    study, found = _scenarios(setting)
+    study, result = _scenarios(setting)
     order = np.argsort(study.s, kind='stable')
     grid = np.linspace(0.0, float(study.s.max()), _GRID)
     table: dict[str, Array] = {'path_m': grid}
     figure, (left, right) = panels(2)
-    for colour, (name, value) in zip(COLOURS, found.items(), strict=False):
+    for colour, (name, value) in zip(COLOURS, result.items(), strict=False):
         even = np.interp(grid, study.s[order], value[order])
         total = cumulative(even[:, None])
         power = _power(grid, total)

@@ -51,22 +51,22 @@ def run(args: argparse.Namespace) -> int:
     seen = observations(entries)
     day = instant(args.since).timestamp() / DAY if args.since else None
     everything = changed(entries, seen)
-    found = since(everything, day)
-    ahead = [forecast(change, seen, everything, limits) for change in found]
+    result = since(everything, day)
+    ahead = [forecast(change, seen, everything, limits) for change in result]
     if args.json:
         rows = [
-            {**as_dict(change), 'forecast': told}
-            for change, told in zip(found, ahead, strict=True)
+            {**as_dict(change), 'forecast': reported}
+            for change, reported in zip(result, ahead, strict=True)
         ]
         print(json.dumps({'cell': args.cell, 'diagnoses': len(seen), 'changes': rows}, indent=2))
         return 0
-    if not found:
+    if not result:
         many = counted(len(seen), 'diagnosis', 'diagnoses')
         print(f'{args.cell}: nothing changed by more than chance in {many}')
-    for change, told in zip(found, ahead, strict=True):
+    for change, reported in zip(result, ahead, strict=True):
         print(f'{args.cell}: {sentence(change)}')
-        if told is not None:
-            print(f'{args.cell}: {forecast_sentence(change, told)}')
+        if reported is not None:
+            print(f'{args.cell}: {forecast_sentence(change, reported)}')
     return 0
 
 

@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _verified(found: list[Verified]) -> Table:
+def _verified(result: list[Verified]) -> Table:
     """Return what was measured after corrections, a row each."""
     from rich.table import Table
 
@@ -56,7 +56,7 @@ def _verified(found: list[Verified]) -> Table:
     from weld_twin_nodes.wording.words import cause
 
     table = Table('measured again', 'promise', 'promised', 'measured', 'did not go away', box=None)
-    for at, _, content in found:
+    for at, _, content in result:
         still = [
             cause(site['effect'], site['joint'])
             for item in content['causes']

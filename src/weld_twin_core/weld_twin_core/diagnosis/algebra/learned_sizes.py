@@ -1,0 +1,149 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How large errors of a kind are on this arm, learned from normal equations by the evidence.
+
+References
+----------
+.. [1] D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4, 1992.
+.. [2] M. E. Tipping, "Sparse Bayesian learning and the relevance vector machine", JMLR 1, 2001.
+
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...arrays import Array
+from ...errors import DataError
+from .definite import solved
+
+ROUNDS = 15
+"""Times that variances and noise are learned in turn; they settle within ten."""
+LEAST_VARIANCE = 1e-8
+"""Least variance of a group, in typical sizes: a ten thousandth of the usual error is none."""
+JITTER = (1e-12, 1e-9, 1e-6, 1e-3, 1.0)
+"""Shares added to a diagonal, the least that is enough: a few stations repeat their columns."""
+
+
+def learned_precision(
+    normal: Array,
+    right: Array,
+    rss: float,
+    rows: int,
+    labels: Array,
+    scales: Array,
+    believed: Array | None = None,
+) -> tuple[Array, float]:
+    """
+    Return the prior precision that maximises the evidence, shape (K,), and the freedom it leaves.
+
+    The freedom counts the coordinates that the data determine rather than the prior.
+
+    Parameters
+    ----------
+    normal, right, rss, rows
+        Normal equations of the coordinates with the nuisance frames projected out.
+    labels, scales : array, shape (K,)
+        As `groups` returns them.
+    believed : array, shape (K,), optional
+        Precision of machines at large: the spread learned of this one starts there and is never
+        wider, and what is fitted freely has it. Nothing is believed when left out.
+
+    """
+    if not scales.size:
+        return np.zeros(0), 0.0
+    # In units of the typical size, so that one variance serves a whole family.
+    normal = normal * np.outer(scales, scales)
+    right = right * scales
+    tied = labels >= 0
+    usual = _usual(scales, believed)
+    variance, most = _first_variances(labels, usual)
+    members, count = labels[tied], variance.size
+    learned_of = np.bincount(members, minlength=count) > 0
+    noise, room = 1.0, np.empty_like(normal)
+    for _ in range(ROUNDS):
+        precision = _precision(tied, variance, labels, usual)
+        mean, spread = _solved(normal, right, noise, precision, room)
+        determined = np.clip(1.0 - precision * spread, 0.0, 1.0)
+        left = rss - 2.0 * right @ mean + mean @ normal @ mean
+        noise = max(left / max(rows - determined.sum(), 1.0), 1e-6)
+        share = np.maximum(np.bincount(members, determined[tied], count), 1e-3)
+        learned = np.bincount(members, mean[tied] ** 2, count) / share
+        learned = np.minimum(np.maximum(learned, LEAST_VARIANCE), most)
+        variance = np.where(learned_of, learned, variance)
+    precision = _precision(tied, variance, labels, usual) / scales**2
+    # The fit works in whitened rows, so a prior counts against the noise actually there.
+    return precision * noise, float(determined.sum())
+
+
+def _usual(scales: Array, believed: Array | None) -> Array:
+    """Return the variance of machines at large in typical sizes, shape (K,); inf if unknown."""
+    usual = np.full(scales.size, np.inf)
+    if believed is not None:
+        known = believed > 0.0
+        usual[known] = 1.0 / (believed[known] * scales[known] ** 2)
+    return usual
+
+
+def _first_variances(labels: Array, usual: Array) -> tuple[Array, Array]:
+    """Return the variance that every group starts from, and the most that it may have, (G,)."""
+    # A group too small to be tied keeps its number, without a member.
+    variance = np.ones(labels.max(initial=-1) + 1)
+    most = np.full(variance.size, np.inf)
+    for k in np.unique(labels[labels >= 0]):
+        most[k] = usual[labels == k].mean()
+        if np.isfinite(most[k]):
+            variance[k] = most[k]
+    return variance, most
+
+
+def _solved(
+    normal: Array, right: Array, noise: float, precision: Array, room: Array
+) -> tuple[Array, Array]:
+    """
+    Return mean and variance of the coordinates under a prior about zero, shapes (K,).
+
+    ``room``, shape (K, K), is worked in. As much is put on the diagonal as columns that repeat need.
+    """
+    diagonal = room.reshape(-1)[:: len(room) + 1]
+    for more in JITTER:
+        np.divide(normal, noise, out=room)
+        diagonal += precision
+        size = np.abs(diagonal)
+        diagonal += more * (size + more * size.max(initial=1.0))
+        result = solved(room, right / noise)
+        if result is not None:
+            return result
+    raise DataError('the measurements say so little that no errors can be fitted together')
+
+
+def _precision(tied: NDArray[np.bool_], variance: Array, labels: Array, usual: Array) -> Array:
+    """Return the precision of every coordinate in units of its typical size, shape (K,)."""
+    if not variance.size:
+        return np.asarray(1.0 / usual)
+    return np.asarray(np.where(tied, 1.0 / variance[np.maximum(labels, 0)], 1.0 / usual))
+
+
+def projected(normal: Array, right: Array, rss: float, frames: int) -> tuple[Array, Array, float]:
+    """
+    Return normal equations with their leading columns projected out.
+
+    Parameters
+    ----------
+    normal, right : array, shapes (P, P) and (P,)
+    rss : float
+        Sum of squares of the residual.
+    frames : int
+        How many columns lead.
+
+    """
+    if not frames:
+        return normal, right, rss
+    cross = normal[:frames, frames:]
+    wanted = np.column_stack([cross, right[:frames]])
+    solved = np.linalg.lstsq(normal[:frames, :frames], wanted, rcond=1e-12)[0]
+    left = normal[frames:, frames:] - cross.T @ solved[:, :-1]
+    pull = right[frames:] - cross.T @ solved[:, -1]
+    return left, pull, rss - float(right[:frames] @ solved[:, -1])

@@ -1,0 +1,121 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What every arm is off by a little: zeros, links, bearings, wheels and springs of all joints.
+
+None is worth a name. Beside them a cause that hangs on how a joint moves is weighed. Else a formula
+with a number more takes that number for what they do: friction that is uneven trails, on a joint
+that never rests, by a constant, and so does a zero; play has no such number, and would be told as
+friction. They are Gaussian about zero, each moves the tool as far as the others, and how far that is
+on this arm is learned: at most as far as the noise does, for what moves it farther is a cause. Where
+nothing is left for them they are nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...arrays import Array
+from ...effects.effect import Effect
+from ...twin.features import Features
+from ..algebra.definite import EMPTY
+from ..algebra.fit import Fit, design, solve_scaled
+from ..algebra.learned_sizes import learned_precision, projected
+from ..algebra.problem import Problem, Scale
+from .library import plain_causes
+from .still_joints import hardly_moves, moved_most
+
+ON = ('constant', 'angle', 'load')
+"""What they depend on: on the posture alone. What hangs on how a joint moves is none of these."""
+
+
+@dataclass(frozen=True, eq=False)
+class UsualErrors:
+    """
+    Small errors everywhere, as far as one fit shows how large they are.
+
+    Attributes
+    ----------
+    columns : array, shape (P, rows)
+        Whitened, each as large as it usually is on this arm.
+    count : float
+        Number of rows that are independent beside them.
+
+    """
+
+    problem: Problem
+    scale: Scale
+    columns: Array
+    count: float
+
+    @classmethod
+    def beside(
+        cls, problem: Problem, scale: Scale, now: Fit, effective: Callable[[Fit], float]
+    ) -> UsualErrors:
+        """
+        Return those that a fit leaves room for, beside its frames and effects.
+
+        Parameters
+        ----------
+        problem, scale : Problem, Scale
+            That the fit is of.
+        now : Fit
+        effective : callable
+            Number of independent rows of a fit.
+
+        """
+        features = problem.features(now.model)
+        every = [problem.effect_columns(features, e, atoms=False) for e in _small(features, now)]
+        rows = [problem.whitened(each, scale) for each in every]
+        columns = np.concatenate([np.zeros((0, now.residual.size)), *rows])
+        free = cls(problem, scale, _sized(problem, scale, columns, now), 0.0)
+        # As long as they are missing what is left is theirs, and looks far from independent.
+        count = effective(replace(now, residual=free.beyond(now)[0]))
+        # A row counts as part of one, but how large they are is believed in full.
+        return cls(
+            problem, scale, free.columns * np.sqrt(min(count / now.residual.size, 1.0)), count
+        )
+
+    def left(self, result: Fit) -> float:
+        """Return what a fit leaves beside them, whitened squares, its own numbers fitted anew."""
+        return self.beyond(result)[1]
+
+    def beyond(self, result: Fit) -> tuple[Array, float]:
+        """Return the residual beside them, (rows,), and its squares with what their sizes cost."""
+        own, _ = design(self.problem, result.model, self.scale)
+        both = np.concatenate([own, self.columns])
+        normal, right = both @ both.T, both @ result.residual
+        normal[np.diag_indices_from(normal)] += np.arange(len(both)) >= len(own)
+        step = solve_scaled(normal, right, 0.0)
+        return result.residual - step @ both, result.rss - float(right @ step)
+
+
+def _sized(problem: Problem, scale: Scale, columns: Array, now: Fit) -> Array:
+    """Return columns as large as a fit shows them to be."""
+    own, _ = design(problem, now.model, scale)
+    both = np.concatenate([own, columns])
+    # What moved the tool by more than the noise would be a cause by itself.
+    most = 1.0 / np.sqrt(np.maximum((columns**2).mean(axis=1), EMPTY))
+    precision, _ = learned_precision(
+        *projected(both @ both.T, both @ now.residual, now.rss, len(own)),
+        now.residual.size - len(own),
+        np.zeros(len(columns), int),
+        most,
+        most**-2.0,
+    )
+    return np.asarray(columns / np.sqrt(precision)[:, None])
+
+
+def usual(kinds: Iterable[Effect | type[Effect]]) -> bool:
+    """Return whether effects are all of kinds that every arm has a little of."""
+    return all(kind.traits.depends_on in ON for kind in kinds)
+
+
+def _small(features: list[Features], now: Fit) -> list[Effect]:
+    """Return them at zero, but for those in the model and those that the data cannot show."""
+    have = {effect.key for effect in now.model.found}
+    every = plain_causes(now.model.robot, features[moved_most(features, None)].view, ON)
+    return [e for e in every if e.key not in have and not hardly_moves(features, e)]

@@ -1,0 +1,209 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Small steps of a diagnosis, each held against what can be said of it by hand."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from diagnosis_cells import tiny
+from scipy.spatial.transform import Rotation
+
+from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.frames.in_turn import chord
+from weld_twin_core.diagnosis.frames.open_directions import shown
+from weld_twin_core.diagnosis.levels.groups import _curved, smooth_field
+from weld_twin_core.diagnosis.levels.placed import _tilt
+from weld_twin_core.diagnosis.predicting.leftover import _middle, _shared
+from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, weighed
+from weld_twin_core.diagnosis.soundness import base_change
+from weld_twin_core.diagnosis.soundness.computed import _noise, _paired
+from weld_twin_core.diagnosis.soundness.efforts import _Loads
+from weld_twin_core.diagnosis.soundness.lag import lag
+from weld_twin_core.diagnosis.soundness.mixups import _base, _fixture
+from weld_twin_core.diagnosis.soundness.slips import _Seen
+from weld_twin_core.diagnosis.unseen.leftover_structure import _motion, _padded
+from weld_twin_core.recording import JointMotion, Measurements, Recording
+
+
+def test_a_recording_of_one_station_is_a_block_of_its_own():
+    problem, _ = tiny(count=60, turned=False)
+    (whole,) = problem.recordings
+    one = Recording(
+        'one',
+        JointMotion(whole.joints.t[:1], whole.joints.q[:1], static=True),
+        whole.measured.take(np.arange(60) < 1),
+    )
+    labels = Problem((one, whole, replace(one, name='another')), frozenset()).block_labels(6)
+    assert not set(labels[:3]) & set(labels[3:])
+    assert not set(labels[-3:]) & set(labels[:-3])
+
+
+def test_what_settles_begins_at_one_and_has_fallen_by_its_constant():
+    shapes = base_change.smooth_shapes(np.array([0.0, 0.5, 1.0]))
+    for constant, shape in zip(base_change.CONSTANTS, shapes, strict=False):
+        assert shape == pytest.approx([1.0, np.exp(-0.5 / constant), np.exp(-1.0 / constant)])
+
+
+@pytest.mark.parametrize(
+    ('turn', 'told'),
+    [
+        ([90.0, 0.0, 0.0], 'by 90 degrees about its x'),
+        ([0.0, -45.0, 0.0], 'by -45 degrees about its y'),
+    ],
+)
+def test_a_turned_base_is_told_by_its_axis(ur5, turn, told):
+    matrix = Rotation.from_rotvec(turn, degrees=True).as_matrix()
+    assert told in _base(ur5, matrix, 'nothing is left').sentence
+
+
+def test_a_base_turned_about_no_axis_is_told_by_all_three(ur5):
+    matrix = Rotation.from_rotvec([40.0, 40.0, 0.0], degrees=True).as_matrix()
+    assert 'about its axis (+1, +1, +0)' in _base(ur5, matrix, 'nothing is left').sentence
+
+
+def test_the_side_of_stations_stands_where_paths_have_their_direction(ur5):
+    t = np.linspace(0.0, 10.0, 500)
+    view = SimpleNamespace(static=False, t=t, qd=0.3 * np.cos(t)[:, None])
+    path = _motion(SimpleNamespace(run=SimpleNamespace(view=view)), 0)
+    sides = np.array([[1.0, -1.0, 1.0]])
+    (row,) = np.flatnonzero(_padded(sides, len(path)).any(axis=1))
+    away = np.abs(view.qd[:, 0]) > 0.1
+    assert path[row][away] == pytest.approx(np.sign(view.qd[away, 0]), abs=1e-6)
+
+
+def test_a_tool_turned_by_its_last_joint_alone_is_not_tilted():
+    problem, model = tiny(count=30)
+    (whole,) = problem.recordings
+    q = np.tile(whole.joints.q[0], (30, 1))
+    q[:, -1] = np.linspace(-1.0, 1.0, 30)
+    turned = replace(whole, joints=JointMotion(whole.joints.t, q, static=True))
+    assert _tilt(Problem((turned,), frozenset()), model) == pytest.approx(0.0, abs=1e-9)
+    assert _tilt(problem, model) > 0.5
+
+
+def test_a_computed_pose_is_held_against_the_joints_before_and_after_it():
+    t = np.arange(5.0)
+    joints = JointMotion(t, 0.1 * t[:, None] * np.ones(6))
+    seen = Measurements(np.array([1.25, 2.5]), np.zeros((2, 3)))
+    case = SimpleNamespace(
+        recordings=[Recording('poses', joints, seen)], motions=[joints.at(seen.t)[0]]
+    )
+    at, before, after = (each.joints.q[:, 0] for each in _paired(case, 0))
+    assert at == pytest.approx([0.125, 0.25])
+    assert before == pytest.approx([0.1, 0.2])
+    assert after == pytest.approx([0.2, 0.3])
+
+
+def test_turns_of_the_tool_are_open_where_its_point_alone_was_measured():
+    problem, model = tiny(count=30, align=('tool',), turned=False)
+    names, _, strength, _ = shown(problem, model)
+    assert len(names) == 6
+    assert (strength[:3] < 1e-6 * strength[3:].min()).all()
+    assert [name.partition('.')[2] for name in shown(problem, model, moving=True)[0]] == [
+        '0',
+        '1',
+        '2',
+    ]
+
+
+@pytest.mark.parametrize(('count', 'knots'), [(60, 7), (450, 21)])
+def test_fine_curves_of_an_angle_take_many_measurements(count, knots):
+    problem, model = tiny(count=count, static=False)
+    groups = _curved(problem.features(model), model)
+    angles = [curves for at, on, curves in groups if (at, on) == ('elbow_joint', 'angle')]
+    found = {len(curves[0].knots) for curves in angles if len(curves) == 1}
+    assert max(found) == knots
+
+
+def test_a_fixture_is_told_by_how_far_it_lies_and_is_turned(ur5):
+    base = np.eye(4)
+    base[:3, :3] = Rotation.from_rotvec([0.0, 0.0, 30.0], degrees=True).as_matrix()
+    base[:3, 3] = [0.0, 0.0, 0.25]
+    told = _fixture(ur5, [np.eye(4), base], 'nothing is left').sentence
+    assert 'of recording 2' in told
+    assert 'lies 250' in told
+    assert 'turned by 30.0 degrees' in told
+
+
+def test_the_noise_of_a_joint_is_what_a_smooth_path_lacks():
+    t = np.linspace(0.0, 20.0, 4000)
+    noise = np.random.default_rng(1).normal(scale=[1e-5, 3e-5], size=(4000, 2))
+    assert _noise(np.sin(t)[:, None] + noise) == pytest.approx([1e-5, 3e-5], rel=0.05)
+
+
+@pytest.mark.parametrize('late', [0.15, -0.1])
+def test_measurements_that_go_on_after_the_joints_still_tell_how_late_they_are(late):
+    joints, t = np.linspace(0.0, 10.0, 1001), np.linspace(-0.4, 10.4, 1081)
+
+    def at(t):
+        return np.stack([np.sin(t), np.cos(1.7 * t), np.sin(0.6 * t)], axis=1)
+
+    found = lag(joints, at(joints), t, at(t - late))
+    assert (found.late, found.rate) == (
+        pytest.approx(late, abs=1e-4),
+        pytest.approx(0.0, abs=1e-4),
+    )
+    assert found.after < 0.01 * found.before
+
+
+@pytest.mark.parametrize('of_gears', [True, False])
+def test_what_is_left_is_the_tools_where_it_is_even_and_the_gears_where_it_grows_with_their_lever(
+    of_gears,
+):
+    rng = np.random.default_rng(2)
+    arm = rng.uniform(0.1, 1.0, (4000, 1)) * np.array([1.0, 0.0, 0.0])
+    errors = arm * rng.normal(scale=2e-4, size=(4000, 1)) + 1e-9 * rng.normal(size=(4000, 3))
+    if not of_gears:
+        errors = rng.normal(scale=3e-5, size=(4000, 3))
+    levers = arm[:, :, None] * arm[:, None, :]
+    position, gear, _ = _shared(errors, np.zeros((4000, 3, 3)), levers)
+    if of_gears:
+        # Gears err along their lever alone, and the size is that of errors in all directions.
+        assert position < 1.5e-5
+        assert 1e-4 < gear < 2e-4
+    else:
+        assert (position, gear) == (pytest.approx(3e-5, rel=0.05), pytest.approx(0.0, abs=1e-5))
+
+
+def test_of_two_errors_that_look_alike_the_sum_is_known_and_neither_part():
+    rng = np.random.default_rng(3)
+    x, y, noise = rng.normal(size=(3, 500))
+    rows = Rows(np.stack([x, x + 0.02 * y]), 3.0 * x + noise, 1.0)
+    prior = Prior(np.zeros(2), np.full(2, 2.0), np.zeros(2, int), np.zeros(1, bool))
+    found = weighed(rows, prior, 1.0)
+    assert found.mean.sum() == pytest.approx(3.0, abs=0.2)
+    assert found.covariance.sum() < 0.01 * np.trace(found.covariance)
+
+
+@pytest.mark.parametrize(('factor', 'alike'), [(3.0, 1.0), (-0.2, -1.0)])
+def test_loads_are_alike_whatever_their_unit_and_their_middle(ur5, factor, alike):
+    load = np.random.default_rng(4).normal(size=(6, 40))
+    none = np.zeros((0, 6, 40))
+    seen = _Loads(ur5, load, factor * load + 7.0, none, none, none)
+    assert seen.correlation() == pytest.approx(alike)
+
+
+def test_the_age_of_a_sample_goes_from_none_to_all_of_its_recording():
+    stamps = SimpleNamespace(seen=SimpleNamespace(t=np.array([5.0, 6.0, 9.0])))
+    seen = SimpleNamespace(problem=SimpleNamespace(recordings=[stamps]))
+    assert _Seen._age(seen, 0) == pytest.approx([0.0, 0.25, 1.0])
+
+
+def test_a_smooth_field_has_slopes_and_bends_of_all_three_coordinates():
+    problem, model = tiny(count=60, turned=False)
+    (maker,) = problem.features(model)
+    columns = smooth_field(problem, 0, maker).reshape(27, -1)
+    assert np.linalg.matrix_rank(columns) == 27
+
+
+@pytest.mark.parametrize(('part', 'way'), [(0.0, 0.0), (0.5, 0.5), (1.0, 1.0), (2.0, 1.0)])
+def test_the_way_to_the_middle_is_the_part_of_it_that_unseen_regions_miss(part, way):
+    shifts, labels = np.random.default_rng(5).normal(size=800), np.repeat(np.arange(8), 100)
+    assert _middle(part * shifts, shifts, labels) == pytest.approx(way, abs=1e-9)
+
+
+def test_turns_are_as_far_apart_as_the_ends_of_two_pointers():
+    turned = Rotation.from_rotvec([0.0, 0.0, 60.0], degrees=True).as_matrix()
+    assert chord(np.eye(3), turned) == pytest.approx(2.0 * np.sin(np.radians(30.0)))

@@ -94,7 +94,7 @@ def test_each_node_runs_as_installed_with_the_parameter_file(workspace, sourced,
     config = installed / 'share/weld_twin_nodes/config/demo.yaml'
     with Cell(tmp_path / 'cell') as cell:
         own = {k: v for k, v in os.environ.items() if k.startswith('ROS_')}
-        started = {}
+        deviations, started = cell.collect('/deviation'), {}
         for name in NODES:
             command = [
                 str(installed / 'lib/weld_twin_nodes' / name),
@@ -109,7 +109,6 @@ def test_each_node_runs_as_installed_with_the_parameter_file(workspace, sourced,
         cell.wait(
             lambda: set(NODES) <= set(cell.node.get_node_names()), 'the installed nodes', 30.0
         )
-        deviations = cell.collect('/deviation')
         cell.wait(lambda: len(deviations) > 0, 'a deviation', 30.0)
         for process in started.values():
             process.interrupt()

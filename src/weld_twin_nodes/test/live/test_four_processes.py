@@ -48,6 +48,7 @@ def run_cell(folder, plan, robot, effects, seed=7):
         cell.start('forward_kinematics_twin', wait_for_subscribers=2, **sure)
         cell.start('error_injector', effects=effects, seed=seed, wait_for_subscribers=2, **sure)
         metrics = cell.collect('/deviation/metrics')
+        cell.meet()  # the motion is over before an analyzer that met this process late tells anything
         cell.start(
             'trajectory_generator',
             path='line',

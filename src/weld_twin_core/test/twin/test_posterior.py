@@ -257,3 +257,18 @@ def test_what_may_be_the_arms_instead_of_the_instruments_is_no_less_the_arms():
     allowed = posterior(robot, what, np.diag([1e-16, 1e-16]), np.array([scale, short]))
     for told, off in ((allowed, 0.0), (allowed.of_the_arm(), short)):
         np.testing.assert_allclose(told.drawn(seen)[0, :, 0].mean(), off, atol=1e-7)
+
+
+def test_the_size_of_one_of_two_that_take_each_other_s_place_is_known_given_the_other():
+    robot = load('ur5')
+    joint = robot.joint_names[2]
+    zero, tilt = REGISTRY['joint_offset'](joint, 8e-4), REGISTRY['axis_parallelism'](joint, 0.0)
+    what = Directions((), 1, (zero, tilt))
+    rng = np.random.default_rng(0)
+    # Models that hold the one or the other, or shares of both: their sum alone is measured.
+    share, total = rng.uniform(size=4000), 8e-4 + 3e-5 * rng.normal(size=4000)
+    steps = np.stack([share * total - 8e-4, (1.0 - share) * total], axis=1)
+    known = posterior(robot, what, np.cov(steps.T), steps.mean(axis=0))
+    assert known.doubt(zero)[0] > 3e-4
+    assert known.doubt(zero, {('axis_parallelism', joint)})[0] == pytest.approx(3e-5, rel=0.3)
+    assert known.doubt(zero, {('link_twist', joint)}) == known.doubt(zero)

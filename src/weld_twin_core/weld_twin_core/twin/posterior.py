@@ -13,7 +13,7 @@ was recorded.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -341,19 +341,42 @@ class Posterior:
         moved = np.tensordot(ways, self._columns(features, setup), axes=(0, 0))
         return moved, self.discrepancy.covariance(*self._levers(features))
 
-    def doubt(self, effect: Effect) -> Array:
+    def doubt(self, effect: Effect, instead: Collection[tuple[str, str]] = ()) -> Array:
         """
         Return how far the coordinates of a fitted effect may be off, as standard deviations, (K,).
 
         Zero where the models differ by other coordinates than its own, as waves of a joint do.
+
+        Parameters
+        ----------
+        effect : Effect
+            Of the fitted model.
+        instead : collection of (str, str), optional
+            Names and joints of effects that may be at work in its place. Its size is told for the
+            case that it is the one and they are not, so it is that given theirs (conditional
+            covariance of a normal vector, e.g. Bishop 2006, eq. 2.82).
+
         """
-        own = effect.fit.coordinates()
-        variance = np.diag(self.covariance) + self.mean**2
-        for mine, here in zip(self.directions.effects, self.directions.own, strict=True):
-            same = mine.key == effect.key and variance[here].shape == own.shape
-            if same and effect.traits.waves is None:
-                return np.sqrt(variance[here])
-        return np.zeros_like(own)
+        what = self.directions
+        for mine, here in zip(what.effects, what.own, strict=True):
+            if mine.key != effect.key or effect.traits.waves is not None:
+                continue
+            if here.stop - here.start != effect.fit.coordinates().size:
+                continue
+            others = [
+                np.arange(there.start, there.stop)
+                for other, there in zip(what.effects, what.own, strict=True)
+                if other is not mine and other.key[:2] in instead
+            ]
+            square = self.covariance + np.outer(self.mean, self.mean)
+            size = np.sqrt(np.diag(square)) + np.finfo(float).tiny  # units differ by millions
+            square /= np.outer(size, size)
+            given = np.concatenate([np.zeros(0, dtype=int), *others])
+            shared = square[here, given]
+            known = shared @ np.linalg.pinv(square[np.ix_(given, given)], hermitian=True)
+            variance = np.diag(square[here, here] - known @ shared.T)
+            return size[here] * np.sqrt(np.maximum(variance, 0.0))
+        return np.zeros(effect.fit.coordinates().size)
 
     def of_the_arm(self) -> Posterior:
         """

@@ -72,7 +72,7 @@ def named_effects(
         return (), replace(verdict, sets=()), tuple(replace(c, effect=None) for c in causes)
     share = max(result.effective(result.small) / result.small.residual.size, LEAST_SHARE)
     fitted = result.problem, model, result.scale, result.precision
-    errors = standard_errors(*fitted, share, posterior)
+    errors = standard_errors(*fitted, share, posterior, verdict.sets)
     effects = tuple(Found(model.found[member], errors[member]) for member, _ in reported)
     at = {group: k for k, (_, group) in enumerate(reported)}
     return (
@@ -104,6 +104,7 @@ def standard_errors(
     precision: Array,
     share: float,
     posterior: Posterior | None = None,
+    sets: Sequence[tuple[Site, ...]] = (),
 ) -> list[dict[str, Any]]:
     """
     Return the standard errors of every found effect, in the shape of its parameters.
@@ -120,6 +121,8 @@ def standard_errors(
         Of the rows that count as independent.
     posterior : Posterior, optional
         The models that the recordings allow; without, the one that was fitted alone counts.
+    sets : sequence of tuple of Site
+        Effects of which one is at work or another: an error holds for the case that it is this one.
 
     """
     if not model.found:
@@ -133,9 +136,16 @@ def standard_errors(
         own = np.maximum(own, _elsewhere(problem, model, scale, k, share))
         own = np.hypot(own, idealised(effect))
         if posterior is not None:
-            own = np.maximum(own, posterior.doubt(effect))
+            own = np.maximum(own, posterior.doubt(effect, _instead(effect, sets)))
         out.append(effect.fit.errors(own))
     return out
+
+
+def _instead(effect: Effect, sets: Sequence[tuple[Site, ...]]) -> set[tuple[str, str]]:
+    """Return names and joints of those that may be at work in an effect's place."""
+    mine = Site(effect.name, effect.site)
+    named = {site for group in sets if mine in group for site in group} - {mine}
+    return {(site.effect, site.joint or '') for site in named}
 
 
 def covariance(

@@ -409,6 +409,11 @@ class Recording:
                 )
 
     @property
+    def load_of_effort(self) -> float:
+        """Return the load torque for each N m of effort; 0 where no effort was measured."""
+        return 0.0 if self.effort is None else -1.0 if self.effort_holds else 1.0
+
+    @property
     def sides(self) -> tuple[Signal | None, Signal | None, JointSignal | None]:
         """Return wrench, temperature and effort."""
         return self.wrench, self.temperature, self.effort

@@ -123,9 +123,9 @@ class TwinHooks(Hooks):
         return True
 
     @property
-    def by_effort(self) -> bool:
-        """Return whether it takes the joints' measured effort in the place of the statics."""
-        return False
+    def by_effort(self) -> float:
+        """Return what load torque it takes for each N m of measured effort; 0 where statics tell."""
+        return 0.0
 
     def slope(self, view: View) -> Shift:
         """Return d displacement / d own joint position, per ('q', i) channel; empty when none."""

@@ -44,9 +44,9 @@ class _Twin(TwinHooks):
         return self.effect.statics == 'equilibrium'
 
     @property
-    def by_effort(self) -> bool:
-        """Return whether it takes the joints' measured effort in the place of the statics."""
-        return self.effect.statics in LOAD_OF_EFFORT
+    def by_effort(self) -> float:
+        """Return what load torque it takes for each N m of measured effort; 0 where statics tell."""
+        return LOAD_OF_EFFORT.get(self.effect.statics, 0.0)
 
 
 class _Search(SearchHooks):
@@ -130,7 +130,7 @@ class JointCompliance(Effect):
                 f'(statics: {self.statics}), and none was recorded here; record it in '
                 'JointState.effort, or diagnose without --use-effort for a model that needs none'
             )
-        return {('q', i): LOAD_OF_EFFORT[self.statics] * view.effort[..., i]}
+        return {('q', i): self.twin.by_effort * view.effort[..., i]}
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:

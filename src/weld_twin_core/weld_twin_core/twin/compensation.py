@@ -18,13 +18,13 @@ import numpy as np
 
 from ..arm.chain import frames
 from ..arm.robot import Robot
-from ..arm.rotation import angle_between, rotation_matrix
+from ..arm.rotation import rotation_matrix, transform
 from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect
 from ..motion.inverse.newton import chain_jacobian, least_step
 from ..recording import JointMotion, Recording
 from .commandable import commandable
-from .poses import Poses
+from .poses import missing
 from .twin import Twin
 
 _CLOSED = 1e-12
@@ -116,29 +116,29 @@ def compensate(
     """
     acting = tuple(e for e in effects if commandable(e))
     real = Twin(robot, acting)
-    wanted, first = Twin(robot).poses(recording), real.poses(recording)
-    before = _missing(wanted, first)
+    wanted, first = Twin(robot).poses(recording).matrices, real.poses(recording).matrices
+    before = missing(wanted, first)
     goal = wanted if trust is None else _part_way(first, before, trust)
     q = _solved(real, recording, goal, rounds)
     motion = _commands(recording.joints, q)
-    after = _missing(wanted, real.poses(replace(recording, joints=motion)))
+    after = missing(wanted, real.poses(replace(recording, joints=motion)).matrices)
     left_out = tuple(e for e in effects if not commandable(e))
     return Compensation(motion, -before, -after, left_out)
 
 
-def _solved(real: Twin, recording: Recording, goal: Poses, rounds: int) -> Array:
+def _solved(real: Twin, recording: Recording, goal: Array, rounds: int) -> Array:
     """Return the joint positions, shape (N, n), that put the real tool where it is to be."""
     motion = recording.joints
     coupled = any(isinstance(effect, MemoryEffect) for effect in real.effects)
     q, share = motion.q, np.ones((motion.t.size, 1))
-    error = _missing(goal, real.poses(recording))
+    error = missing(goal, real.poses(recording).matrices)
     for _ in range(rounds):
         live = (np.abs(error).max(axis=1, keepdims=True) > _CLOSED) & (share > _LEAST_SHARE)
         if not live.any():
             break
         step = least_step(chain_jacobian(real.robot, frames(real.robot, q)), error, _SINGULAR)
         trial = replace(recording, joints=_commands(motion, q + share * step))
-        remaining = _missing(goal, real.poses(trial))
+        remaining = missing(goal, real.poses(trial).matrices)
         helps = np.linalg.norm(remaining, axis=1) < np.linalg.norm(error, axis=1)
         if coupled:
             helps[:] = _rms(remaining) < _rms(error)
@@ -148,10 +148,11 @@ def _solved(real: Twin, recording: Recording, goal: Poses, rounds: int) -> Array
     return np.asarray(q)
 
 
-def _part_way(start: Poses, missing: Array, share: Array) -> Poses:
+def _part_way(start: Array, gap: Array, share: Array) -> Array:
     """Return the poses a share of the way towards those that are wanted."""
-    step = missing * share[:, None]
-    return Poses(start.position + step[:, :3], rotation_matrix(step[:, 3:]) @ start.rotation)
+    step = gap * share[:, None]
+    turned = rotation_matrix(step[:, 3:]) @ start[:, :3, :3]
+    return transform(turned, start[:, :3, 3] + step[:, :3])
 
 
 def _commands(nominal: JointMotion, q: Array) -> JointMotion:
@@ -159,11 +160,6 @@ def _commands(nominal: JointMotion, q: Array) -> JointMotion:
     if nominal.static or nominal.qd is None or nominal.t.size < 2:
         return JointMotion(nominal.t, q, None, nominal.static)
     return JointMotion(nominal.t, q, nominal.qd + np.gradient(q - nominal.q, nominal.t, axis=0))
-
-
-def _missing(wanted: Poses, got: Poses) -> Array:
-    turn = angle_between(wanted.rotation, got.rotation)
-    return np.concatenate([wanted.position - got.position, turn], axis=-1)
 
 
 def _rms(error: Array) -> float:

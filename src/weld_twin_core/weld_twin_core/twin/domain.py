@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -42,6 +42,10 @@ WARM_MARGIN = 2.0
 FADES = 4.0
 """Margins beyond what was recorded, after the first, over which doubt sets in: commands must not
 jump where a joint crosses a border."""
+
+
+_Look = tuple[NDArray[np.bool_], Callable[[slice], str]]
+"""Which samples lie outside what was recorded, and why those of a stretch do."""
 
 
 class Outside(NamedTuple):
@@ -175,90 +179,77 @@ class Domain:
         temperature : array, shape (M,), optional [degC]
 
         """
+        looks = [*self._postures(q)]
+        if qd is not None:
+            looks.append(self._speeds(np.abs(qd)))
+        if wrench is not None:
+            looks += self._loads(wrench)
+        if temperature is not None and self.temperature is not None:
+            looks.append(self._warmth(temperature, *self.temperature))
+        return sorted(
+            Outside(first, last, why(slice(first, last + 1)))
+            for beyond, why in looks
+            for first, last in runs(beyond)
+        )
+
+    def _postures(self, q: Array) -> Iterator[_Look]:
         away = self.beyond(q)
-        out: list[Outside] = []
         for i, name in enumerate(self.joints):
-            unit = 'rad' if self.turns[i] else 'm'
-            for first, last in runs(away[:, i] > self.margins[i]):
-                most = float(away[first : last + 1, i].max())
-                out.append(
-                    Outside(first, last, f'{name} is {most:.2g} {unit} beyond what was recorded')
-                )
-        out += self._too_far(q)
-        out += self._too_fast(qd) + self._too_loaded(wrench) + self._too_warm(temperature)
-        return sorted(out)
-
-    def _too_far(self, q: Array) -> list[Outside]:
-        if self.spots is None:
-            return []
-        away, reach = self.spots.away(q), self.spots.reach
-        return [
-            Outside(
-                first,
-                last,
-                f'the tool is {away[first : last + 1].max():.2g} m from the nearest place that '
-                f'was touched, and the model was tested to {reach:.2g} m',
+            yield (
+                away[:, i] > self.margins[i],
+                lambda part, i=i, name=name: (
+                    f'{name} is {away[part, i].max():.2g} {self._unit(i)} beyond what was recorded'
+                ),
             )
-            for first, last in runs(away > reach)
-        ]
+        if self.spots is not None:
+            far, reach = self.spots.away(q), self.spots.reach
+            yield (
+                far > reach,
+                lambda part: (
+                    f'the tool is {far[part].max():.2g} m from the nearest place that was touched, '
+                    f'and the model was tested to {reach:.2g} m'
+                ),
+            )
 
-    def _too_fast(self, qd: Array | None) -> list[Outside]:
-        if qd is None:
-            return []
+    def _unit(self, i: int) -> str:
+        return 'rad' if self.turns[i] else 'm'
+
+    def _speeds(self, speed: Array) -> _Look:
         known = np.zeros(len(self.joints)) if self.speeds is None else np.array(self.speeds)
         limit = SPEED_MARGIN[0] * known + SPEED_MARGIN[1]
-        speed = np.abs(qd)
-        out = []
-        for first, last in runs(np.asarray((speed > limit).any(axis=1))):
-            part = speed[first : last + 1]
-            i = int((part / limit).max(axis=0).argmax())
-            unit = 'rad/s' if self.turns[i] else 'm/s'
+
+        def why(part: slice) -> str:
+            i = int((speed[part] / limit).max(axis=0).argmax())
+            unit = f'{self._unit(i)}/s'
+            recorded = f'at most {known[i]:.2g} {unit} was recorded'
             if self.speeds is None:
-                why = (
-                    f'{self.joints[i]} moves at up to {part[:, i].max():.2g} {unit}, only '
-                    'stations at rest were recorded'
-                )
-            else:
-                why = (
-                    f'{self.joints[i]} moves at up to {part[:, i].max():.2g} {unit}, at most '
-                    f'{known[i]:.2g} {unit} was recorded'
-                )
-            out.append(Outside(first, last, why))
-        return out
+                recorded = 'only stations at rest were recorded'
+            return f'{self.joints[i]} moves at up to {speed[part, i].max():.2g} {unit}, {recorded}'
 
-    def _too_loaded(self, wrench: Array | None) -> list[Outside]:
-        if wrench is None:
-            return []
-        out = []
-        for k, (name, unit) in enumerate((('force', 'N'), ('torque', 'N m'))):
-            size = np.linalg.norm(wrench[:, 3 * k : 3 * k + 3], axis=1)
-            known = 0.0 if self.load is None else self.load[k]
-            for first, last in runs(size > LOAD_MARGIN[0] * known + LOAD_MARGIN[1]):
-                most = size[first : last + 1].max()
-                out.append(
-                    Outside(
-                        first,
-                        last,
-                        f'the {name} on the tool is up to {most:.3g} {unit}, at most {known:.3g} '
-                        f'{unit} was recorded',
-                    )
-                )
-        return out
+        return np.asarray((speed > limit).any(axis=1)), why
 
-    def _too_warm(self, temperature: Array | None) -> list[Outside]:
-        if temperature is None or self.temperature is None:
-            return []
-        low, high = self.temperature
-        off = np.maximum(low - temperature, temperature - high)
-        return [
-            Outside(
-                first,
-                last,
-                f'it is {off[first : last + 1].max():.2g} K beyond the {low:.1f} to {high:.1f} '
-                'degC that were recorded',
+    def _loads(self, wrench: Array) -> Iterator[_Look]:
+        sizes = np.linalg.norm(wrench.reshape(-1, 2, 3), axis=2).T
+        for size, known, name, unit in zip(
+            sizes, self.load or (0.0, 0.0), ('force', 'torque'), ('N', 'N m'), strict=True
+        ):
+            yield (
+                size > LOAD_MARGIN[0] * known + LOAD_MARGIN[1],
+                lambda part, size=size, known=known, name=name, unit=unit: (
+                    f'the {name} on the tool is up to {size[part].max():.3g} {unit}, at most '
+                    f'{known:.3g} {unit} was recorded'
+                ),
             )
-            for first, last in runs(off > WARM_MARGIN)
-        ]
+
+    def _warmth(self, temperature: Array, low: float, high: float) -> _Look:
+        off = np.maximum(low - temperature, temperature - high)
+        return (
+            off > WARM_MARGIN,
+            lambda part: (
+                f'it is {off[part].max():.2g} K beyond the {low:.1f} to {high:.1f} degC that were '
+                'recorded'
+            ),
+        )
 
     def sentences(self) -> list[str]:
         """Return the joint ranges as people read them, one sentence for each joint."""

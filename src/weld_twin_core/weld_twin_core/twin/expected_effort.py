@@ -14,7 +14,7 @@ from .stages import load_torque
 from .twin import Twin
 
 
-def with_expected_effort(recording: Recording, robot: Robot, like: Recording) -> Recording:
+def with_expected_effort(recording: Recording, robot: Robot, load_of_effort: float) -> Recording:
     """
     Return a motion with the effort that the model's statics expect, where efforts are measured.
 
@@ -24,13 +24,13 @@ def with_expected_effort(recording: Recording, robot: Robot, like: Recording) ->
         A motion that is thought of: a measurement to come, postures elsewhere.
     robot : Robot
         Links without masses weigh nothing.
-    like : Recording
-        Of the same controller; without efforts the motion stays as it is.
+    load_of_effort : float
+        Load torque for each N m of effort, 1 or -1; of 0 the motion stays as it is.
 
     """
-    if like.effort is None:
+    if not load_of_effort:
         return recording
     load = load_torque(Twin(robot).joint_view(recording))
     each = np.stack([load['tau', i] for i in range(robot.n)], axis=-1)
-    effort = JointSignal(recording.joints.t, -each if like.effort_holds else each)
-    return replace(recording, effort=effort, effort_holds=like.effort_holds)
+    effort = JointSignal(recording.joints.t, load_of_effort * each)
+    return replace(recording, effort=effort, effort_holds=load_of_effort < 0.0)

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arm.chain import forward
-from ..arm.rotation import rotation_vector
 from ..arrays import Array
 from ..effects.effect import Effect, Stage
 from ..errors import DataError
@@ -28,10 +27,11 @@ from .compensation import compensate
 from .drawn import Drawn
 from .features import Features
 from .goal_motion import Course, Goal, course, fine_times
+from .poses import missing
 from .posterior import pose_covariances
 from .program_accuracy import accuracy
 from .program_correction import BETTER, NOTHING
-from .program_model import ProgramModel, missing
+from .program_model import ProgramModel
 from .reversals import approached, is_play, play_steps, spread
 from .turns import just_turned
 from .twin import Twin
@@ -344,10 +344,7 @@ class _Work:
 
     def _missing(self, way: Course) -> Array:
         """Return what is missing to the real tool on a course, shape (K, 6) [m, rad]."""
-        recording = self._approached(way)
-        position, rotation = self.real.poses(recording)
-        real = np.zeros((way.t.size, 4, 4))
-        real[:, :3, 3], real[:, :3, :3] = position[-way.t.size :], rotation[-way.t.size :]
+        real = self.real.poses(self._approached(way)).matrices[-way.t.size :]
         return missing(forward(self.model.robot, self.meant.q), real)
 
     def _covariances(self) -> Array | None:
@@ -387,9 +384,7 @@ class _Work:
 
     def _added(self, result: Goal, at: Array) -> Array:
         """Return what a corrected goal adds to the pose at stamps, shape (N, 6), seen from the base."""
-        old, new = (forward(self.bare, course(g, at).q) for g in (self.goal, result))
-        turn = rotation_vector(new[:, :3, :3] @ np.swapaxes(old[:, :3, :3], -1, -2))
-        return np.concatenate([new[:, :3, 3] - old[:, :3, 3], turn], axis=1)
+        return missing(*(forward(self.bare, course(g, at).q) for g in (result, self.goal)))
 
     def _waits(self, result: Goal) -> float:
         """Return how much later the goal has to begin [s] for its correction to set in smoothly."""
@@ -422,9 +417,8 @@ class _Work:
         return self._near and (begins_at_rest or not self.start.moving)
 
     def _between(self, here: Array, there: Array) -> Array:
-        chain = forward(self.bare, np.stack([here, there]))
-        turn = rotation_vector(chain[1, :3, :3] @ chain[0, :3, :3].T)
-        return np.concatenate([chain[1, :3, 3] - chain[0, :3, 3], turn])[None]
+        old, new = forward(self.bare, np.stack([here, there]))
+        return missing(new, old)[None]
 
     # Reasons to refuse -----------------------------------------------------------------------
 

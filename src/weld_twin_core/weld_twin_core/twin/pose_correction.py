@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arm.chain import forward
-from ..arm.rotation import angle_between, rotation_matrix
+from ..arm.rotation import rotation_matrix
 from ..arrays import Array
 from ..effects.effect import MemoryEffect
 from ..errors import DataError
@@ -24,6 +24,7 @@ from ..kernels.single_turn import turn_between, turn_matrix
 from ..motion.inverse.newton import least_step
 from ..recording import JointMotion
 from .goal_correction import GoalLimits, not_corrected, too_large
+from .poses import missing
 from .posterior import pose_covariances
 from .program_correction import SINGULAR
 from .program_model import ProgramModel
@@ -246,10 +247,9 @@ class PoseCorrection:
         return self._single(q)
 
     def _real_poses(self, q: Array) -> Array:
-        position, rotation = self._twin.poses(self._still.recording(_standing(q)))
-        out = np.zeros((len(q), 4, 4))
-        out[:, :3, :3], out[:, :3, 3], out[:, 3, 3] = rotation, position, 1.0
-        return np.asarray(self._back @ out)
+        return np.asarray(
+            self._back @ self._twin.poses(self._still.recording(_standing(q))).matrices
+        )
 
 
 def _rise(poses: Array) -> Array:
@@ -288,8 +288,7 @@ def between(start: Array, end: Array) -> Array:
     if start.ndim == end.ndim == 2:
         turned = turn_between(end[:3, :3], start[:3, :3])
         return np.array([*(end[:3, 3] - start[:3, 3]).tolist(), *turned])
-    turn = angle_between(end[..., :3, :3], start[..., :3, :3])
-    return np.concatenate([end[..., :3, 3] - start[..., :3, 3], turn], axis=-1)
+    return missing(end, start)
 
 
 def moved(pose: Array, twist: Array) -> Array:

@@ -493,6 +493,27 @@ class Posterior:
             + everywhere[:, None, :3] * own
         )
 
+    def at_rest(self, twin: Twin, q: Array) -> Recording:
+        """
+        Return stations as warm as what was recorded, with nothing on the tool.
+
+        Springs that go by measured efforts are told those that the model's statics expect.
+
+        Parameters
+        ----------
+        q : array, shape (M, n)
+
+        """
+        t, warm = np.arange(float(len(q))), self.domain.temperature
+        stations = Recording(
+            'stations',
+            JointMotion(t, q, None, True),
+            wrench=None if self.domain.load is None else Signal(t[:1], np.zeros((1, 6))),
+            temperature=None if warm is None else Signal(t[:1], np.array([np.mean(warm)])),
+        )
+        springs = (effect.twin.by_effort for effect in twin.effects if effect.twin.by_effort)
+        return with_expected_effort(stations, twin.robot, next(springs, 0.0))
+
     def _columns(self, features: Features, setup: int, *, framed: bool = True) -> Array:
         if 'base' in self.directions.frames and not 0 <= setup < self.directions.setups:
             raise ModelError(f'the posterior has no base frame {setup}')
@@ -543,29 +564,19 @@ def _pieces(at: Array) -> Iterator[Array]:
         yield at[start : start + CHUNK]
 
 
-def usual_sigma(posterior: Posterior, twin: Twin, like: Recording, q: Array) -> float:
+def usual_sigma(posterior: Posterior, twin: Twin, q: Array) -> float:
     """
     Return the median of `largest_sigma` over postures at rest [m].
 
     Parameters
     ----------
-    like : Recording
-        Gives the temperature; the tool is not loaded.
     q : array, shape (M, n)
 
     """
-    t = np.arange(float(q.shape[0]))
-    warm = like.temperature
-    still = Recording(
-        'postures',
-        JointMotion(t, q, None, True),
-        None,
-        None if like.wrench is None else Signal(t[:1], np.zeros((1, 6))),
-        like.wrench_frame,
-        None if warm is None else Signal(t[:1], np.array([float(np.median(warm.value))])),
+    still = posterior.at_rest(twin, q)
+    return float(
+        np.median(largest_sigma(pose_covariances(posterior, twin, still, still.joints.t)))
     )
-    still = with_expected_effort(still, twin.robot, like)
-    return float(np.median(largest_sigma(pose_covariances(posterior, twin, still, t))))
 
 
 def postures_within_limits(robot: Robot, count: int) -> Array:

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arm.chain import frames
+from ..arm.chain import forward, frames
 from ..arm.rotation import rotation_matrix, rotation_vector
 from ..arrays import Array
 from ..errors import DataError, PathError
@@ -30,8 +30,9 @@ from ..motion.programs import MoveProgram, Piece, Travel, Use, travel
 from ..motion.programs.repeated import repeated, unrelenting
 from ..recording import JointMotion
 from .drawn import Drawn
+from .poses import missing
 from .posterior import largest_sigma
-from .program_model import ProgramModel, missing
+from .program_model import ProgramModel
 
 ROUNDS = 5
 """Rounds of moving points; effects are small, each takes away all but some thousandths."""
@@ -300,13 +301,8 @@ class _Work(NamedTuple):
         """
         old, new = self.program.place(use), moved.place(use)
         if old.ndim == 1:
-            arm = self.model.arm(tool)
-            chain = frames(arm, np.stack([old, new]))
-            shift = chain.position[1] - chain.position[0]
-            turn = rotation_vector(chain.rotation[1] @ chain.rotation[0].T)
-        else:
-            shift = new[:3, 3] - old[:3, 3]
-            turn = rotation_vector(new[:3, :3] @ old[:3, :3].T)
+            old, new = forward(self.model.arm(tool), np.stack([old, new]))
+        shift, turn = np.split(missing(new, old), 2)
         return float(np.linalg.norm(shift)), float(np.linalg.norm(turn))
 
     def _trust(self, piece: Piece) -> Array | None:

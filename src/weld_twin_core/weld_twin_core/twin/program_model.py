@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from ..arm.chain import forward
 from ..arm.robot import Robot
-from ..arm.rotation import angle_between
 from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect
 from ..motion.programs import Move, Piece
@@ -108,10 +107,7 @@ class ProgramModel:
         recording = self.recording(motion)
 
         def poses(tool: Array) -> Array:
-            position, rotation = self.twin(tool, whole=whole).poses(recording)
-            out = np.zeros((motion.t.size, 4, 4))
-            out[:, :3, :3], out[:, :3, 3], out[:, 3, 3] = rotation, position, 1.0
-            return np.asarray(back @ out)
+            return np.asarray(back @ self.twin(tool, whole=whole).poses(recording).matrices)
 
         return self._by_tool(piece, poses)
 
@@ -186,9 +182,3 @@ class ProgramModel:
 
 def _tool(moves: tuple[Move, ...], keys: list[bytes], key: bytes) -> Array:
     return moves[keys.index(key)].tool
-
-
-def missing(wanted: Array, real: Array) -> Array:
-    """Return what is missing to poses, shape (N, 6) [m, rad], linear part first."""
-    turn = angle_between(wanted[..., :3, :3], real[..., :3, :3])
-    return np.concatenate([wanted[..., :3, 3] - real[..., :3, 3], turn], axis=-1)

@@ -90,7 +90,7 @@ def small_errors(robot: Robot, rng: np.random.Generator, part: float = 1.0) -> l
     for effect in plausible_arm.directions(robot, ()):
         if effect.of not in ('joint', 'link') or effect.traits.waves is not None:
             continue
-        size = plausible_arm.widths(robot, [effect]) * rng.standard_normal(effect.vector().size)
+        size = plausible_arm.sizes(robot, effect) * rng.standard_normal(effect.vector().size)
         if effect.name == 'joint_compliance':
             if robot.mass is None:
                 continue

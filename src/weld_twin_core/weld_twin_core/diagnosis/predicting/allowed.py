@@ -37,9 +37,6 @@ from .sizes import Prior, Rows, weighed, with_prior
 
 ROWS = 9000
 """Rows looked at; more show the same directions."""
-FRAME_WIDTHS = (0.05, 0.05)
-"""Standard deviation of an aligned frame about the fitted one before the data [m, rad]: a guess at
-a flange or a tripod is good to some centimetres and degrees."""
 POSTURES = 200
 """Enough for a median to be good to some per cent."""
 LEAST = 1e-6
@@ -121,12 +118,11 @@ def _with_usual_sigma(posterior: Posterior, model: Model, problem: Problem) -> P
     seen = np.concatenate([_joints(r) for r in problem.recordings])
     spread = np.linspace(0, seen.shape[0] - 1, min(seen.shape[0], POSTURES)).round().astype(int)
     twin = Twin(model.twin(0).robot, of_the_robot(model.known + model.found))
-    like = problem.recordings[0]
     anywhere = postures_within_limits(model.robot, POSTURES)
     return replace(
         posterior,
-        recorded_m=usual_sigma(posterior, twin, like, seen[spread]),
-        anywhere_m=usual_sigma(posterior, twin, like, anywhere),
+        recorded_m=usual_sigma(posterior, twin, seen[spread]),
+        anywhere_m=usual_sigma(posterior, twin, anywhere),
     )
 
 
@@ -210,16 +206,9 @@ def _prior(what: Directions, model: Model) -> Prior:
     fine = sum(sizes)
     curves = gears.size + np.repeat(np.arange(len(sizes)), sizes)
     tied = plausible_arm.middles(effects, model.found)
-    widths = plausible_arm.widths(model.robot, effects)
     return Prior(
         np.concatenate([np.zeros(frames), tied, np.zeros(fine)]),
-        np.concatenate(
-            [
-                np.tile(np.repeat(FRAME_WIDTHS, 3), frames // 6),
-                widths,
-                np.full(fine, plausible_arm.FINE),
-            ]
-        ),
+        plausible_arm.widths(model.robot, what),
         np.concatenate([np.full(frames, -1), group, curves]).astype(int),
         np.concatenate([gears, np.ones(len(sizes), bool)]),
     )

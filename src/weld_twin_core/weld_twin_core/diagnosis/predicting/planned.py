@@ -30,11 +30,11 @@ from ...motion.paths import default_seam
 from ...motion.planned_motion import plan
 from ...recording import JointMotion, Recording
 from ...sequences import halton
+from ...twin.domain import Domain
 from ...twin.features import Features
-from ...twin.posterior import Directions, Posterior
+from ...twin.posterior import Directions, Discrepancy, Posterior
 from ...twin.twin import Twin
 from . import plausible_arm
-from .allowed import FRAME_WIDTHS
 
 SPREAD = np.radians(75.0)
 """Half the range of every joint about the posture of a usual seam [rad]: wide enough to show every
@@ -119,14 +119,19 @@ def plan_stations(
             f'only {len(clear)} postures about a usual seam of {robot.name} are clear of floor and '
             'column; give a smaller --spread'
         )
-    judged, offered = clear[:JUDGED], clear[JUDGED : JUDGED + max(CANDIDATES, count)]
+    region = clear[:JUDGED], clear[JUDGED : JUDGED + max(CANDIDATES, count)]
+    before = _before_any(robot, region[1])
+    return _planned(before, Twin(robot), region, count, Wanted(tolerance, noise), CHOICE)
+
+
+def _before_any(robot: Robot, q: Array) -> Posterior:
+    """Return how sure an arm is before anything is measured of it, its frames not known."""
     effects = plausible_arm.directions(robot, ())
-    what = Directions(('base', 'tool'), 1, effects, plausible_arm.fine_knots([offered]))
-    columns = _columns(Twin(robot), np.concatenate([judged, offered]), what)
-    seen = columns * _widths(robot, what)
-    region = _Region(seen[:JUDGED], seen[JUDGED:], tolerance, noise**2 * np.eye(3))
-    taken, sigma, within = _chosen(region, count)
-    return MeasurementPlan(offered[taken], sigma, within)
+    what = Directions(('base', 'tool'), 1, effects, plausible_arm.fine_knots([q]))
+    none = Discrepancy(0.0, 0.0, np.zeros(robot.n), np.zeros(robot.n), 1.0)
+    covariance = np.diag(plausible_arm.widths(robot, what) ** 2)
+    stations = Recording('stations', JointMotion(np.arange(float(len(q))), q, static=True))
+    return Posterior(what, np.zeros(what.count), covariance, none, Domain.of([stations], robot))
 
 
 def plan_more(
@@ -153,24 +158,31 @@ def plan_more(
         A number means nothing.
 
     """
-    judged, offered = region
-    if not (
-        0.0 < given.tolerance < 1.0 and 0.0 < given.noise < 0.1 and 0 <= count <= len(offered)
-    ):
+    offered = len(region[1])
+    if not (0.0 < given.tolerance < 1.0 and 0.0 < given.noise < 0.1 and 0 <= count <= offered):
         raise DataError(
             f'a plan in a region needs a tolerance and a noise above zero, and at most the '
-            f'{len(offered)} stations that there are'
+            f'{offered} stations that there are'
         )
-    q = np.concatenate([judged, offered])
-    t = np.arange(float(len(q)))
-    still = Recording('stations', JointMotion(t, q, static=True))
-    ways, rest = posterior.position_ways(Features(twin, still, t))
-    noise = rest[len(judged) :] + given.noise**2 * np.eye(3)
-    parts = _Region(
-        ways[: len(judged)], ways[len(judged) :], given.tolerance, noise, rest[: len(judged)], 0.0
-    )
-    taken, sigma, within = _chosen(parts, count)
-    return MeasurementPlan(offered[taken], sigma, within)
+    return _planned(posterior, twin, region, count, given, 0.0)
+
+
+def _planned(
+    posterior: Posterior,
+    twin: Twin,
+    region: tuple[Array, Array],
+    count: int,
+    given: Wanted,
+    choice: float,
+) -> MeasurementPlan:
+    """Return the plan after a posterior; ``choice`` is as `CHOICE`."""
+    judged = len(region[0])
+    still = posterior.at_rest(twin, np.concatenate(region))
+    ways, rest = posterior.position_ways(Features(twin, still, still.joints.t))
+    noise = rest[judged:] + given.noise**2 * np.eye(3)
+    seen = _Region(ways[:judged], ways[judged:], given.tolerance, noise, rest[:judged], choice)
+    taken, sigma, within = _chosen(seen, count)
+    return MeasurementPlan(region[1][taken], sigma, within)
 
 
 def clear_postures(robot: Robot, spread: float) -> Array:
@@ -206,26 +218,12 @@ def _room(robot: Robot, q: Array) -> tuple[Array, Array]:
     return heights, np.linalg.norm(points[..., :2], axis=-1).min(axis=1)
 
 
-def _columns(twin: Twin, q: Array, what: Directions) -> Array:
-    """Return d position / d coordinate at postures at rest, shape (K, 3, P)."""
-    t = np.arange(float(len(q)))
-    still = Recording('stations', JointMotion(t, q, static=True))
-    return np.asarray(what.columns(Features(twin, still, t), 0)[:, :3].transpose(2, 1, 0))
-
-
-def _widths(robot: Robot, what: Directions) -> Array:
-    fine = sum(knots.size for knots in what.knots)
-    frames_ = np.tile(np.repeat(FRAME_WIDTHS, 3), what.frame_count // 6)
-    own = plausible_arm.widths(robot, what.effects)
-    return np.concatenate([frames_, own, np.full(fine, plausible_arm.FINE)])
-
-
 class _Region(NamedTuple):
     """
     Postures of a region.
 
     ``judged`` (K, 3, P) and ``offered`` (C, 3, P) are the ways in which the tool may be off there, each
-    of unit size before the first station; ``noise`` (3, 3) or (C, 3, 3) [m^2] is that of a station,
+    of unit size before the first station; ``noise`` (C, 3, 3) [m^2] is that of a station,
     ``rest`` (K, 3, 3) what no station takes away, ``choice`` as `CHOICE`.
     """
 
@@ -233,8 +231,8 @@ class _Region(NamedTuple):
     offered: Array
     tolerance: float
     noise: Array
-    rest: Array | float = 0.0
-    choice: float = CHOICE
+    rest: Array
+    choice: float
 
 
 def _chosen(region: _Region, count: int) -> tuple[list[int], Array, Array]:

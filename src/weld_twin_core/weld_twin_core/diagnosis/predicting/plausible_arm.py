@@ -16,9 +16,12 @@ from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...effects.registry import REGISTRY
 from ...twin.features import joints_of
-from ...twin.posterior import Discrepancy
+from ...twin.posterior import Directions, Discrepancy
 from .leftover import Rest
 
+FRAME_WIDTHS = (0.05, 0.05)
+"""Standard deviation of an aligned frame about the fitted one before the data [m, rad]: a guess at
+a flange or a tripod is good to some centimetres and degrees."""
 ORDERS = np.arange(1.0, 5.0)
 """Ripple orders [1/rev] that bend a joint's whole range; finer ones are part of what is left over,
 for they are as large inside as outside what was recorded."""
@@ -110,15 +113,19 @@ def groups(effects: Sequence[Effect]) -> tuple[Array, NDArray[np.bool_]]:
     return numbers, np.array(list(gears.values()), dtype=bool)
 
 
-def widths(robot: Robot, effects: Sequence[Effect]) -> Array:
-    """Return the standard deviation of every coordinate before the data, shape (K,)."""
-    sizes = [np.zeros(0)]
-    for effect in effects:
-        size = spreads(robot, effect)
-        # What the table knows nothing of is as far from the fit as that is from nothing.
-        unknown = np.maximum(np.abs(effect.fit.coordinates()), effect.fit.coordinate_scales())
-        sizes.append(np.where(np.isfinite(size), size, unknown))
-    return np.concatenate(sizes)
+def widths(robot: Robot, what: Directions) -> Array:
+    """Return the standard deviation of every coordinate before the data, shape (P,)."""
+    frames = np.tile(np.repeat(FRAME_WIDTHS, 3), what.frame_count // 6)
+    fine = np.full(sum(knots.size for knots in what.knots), FINE)
+    return np.concatenate([frames, *(sizes(robot, effect) for effect in what.effects), fine])
+
+
+def sizes(robot: Robot, effect: Effect) -> Array:
+    """Return how large the coordinates of an effect are on machines, shape (K,)."""
+    size = spreads(robot, effect)
+    # What the table knows nothing of is as far from the fit as that is from nothing.
+    unknown = np.maximum(np.abs(effect.fit.coordinates()), effect.fit.coordinate_scales())
+    return np.where(np.isfinite(size), size, unknown)
 
 
 def fine_knots(motions: Sequence[Array]) -> tuple[Array, ...]:

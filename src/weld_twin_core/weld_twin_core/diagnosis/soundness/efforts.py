@@ -198,10 +198,10 @@ def _loads(recordings: Sequence[Recording], robot: Robot) -> _Loads:
 def _of_one(recording: Recording, robot: Robot) -> tuple[Array, ...]:
     """Return statics, measured load, what payload and links add, and what else may, by rows."""
     motion = recording.joints
-    expected = with_expected_effort(recording, robot, recording).effort
+    expected = with_expected_effort(recording, robot, recording.load_of_effort).effort
     assert expected is not None and recording.effort is not None
     at = np.unique(np.linspace(0, motion.t.size - 1, ROWS).round().astype(int))
-    sign = -1.0 if recording.effort_holds else 1.0
+    sign = recording.load_of_effort
     measured = sign * recording.effort.at(motion.t[at]).T
     chain = frames(robot, motion.q[at])
     centred = payload_torque(robot, chain, 1.0, np.zeros(3))

@@ -206,7 +206,7 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
             limits=_limits(args),
             progress=tell,
         )
-    return result if judged is None else _in_region(result, args.region, judged, fitted[0])
+    return result if judged is None else _in_region(result, args.region, judged)
 
 
 def _read(
@@ -231,7 +231,7 @@ def _read(
     return out
 
 
-def _in_region(result: Diagnosis, reported: str, judged: Array, recording: Recording) -> Diagnosis:
+def _in_region(result: Diagnosis, reported: str, judged: Array) -> Diagnosis:
     """Return the diagnosis with what to expect in a region that was asked for."""
     from weld_twin_core.effects.setup_motion import of_the_robot
     from weld_twin_core.twin.posterior import usual_sigma
@@ -240,7 +240,7 @@ def _in_region(result: Diagnosis, reported: str, judged: Array, recording: Recor
     if result.posterior is None:
         return result
     twin = Twin(result.model.twin(0).robot, of_the_robot(result.model.known + result.model.found))
-    sigma = usual_sigma(result.posterior, twin, recording, judged)
+    sigma = usual_sigma(result.posterior, twin, judged)
     return replace(result, posterior=replace(result.posterior, region=(reported, sigma)))
 
 

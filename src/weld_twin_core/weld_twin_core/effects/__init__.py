@@ -24,9 +24,9 @@ from .backlash import Backlash
 from .bearing_tilt import BearingTilt
 from .cartesian_compliance import CartesianCompliance
 from .clock_rate import ClockRate
-from .dated import InstrumentKnock, JointSlip, ToolSlip
+from .dated import InstrumentKnock, JointSlip, SetupSettling, SetupStep, ToolSlip
 from .drift import Drift
-from .effect import Effect, MemoryEffect
+from .effect import Effect, LinearEffect, MemoryEffect
 from .frame_curve import FrameCurve
 from .frame_errors import BasePose, ToolPose
 from .friction import Friction
@@ -51,8 +51,6 @@ from .refraction import Refraction
 from .registry import REGISTRY, effect_from_mapping, effects_from_list, register
 from .root_pose import RootPose
 from .servo_lag import ServoLag
-from .setup_settling import SetupSettling
-from .setup_step import SetupStep
 from .thermal_growth import ThermalGrowth
 from .time_delay import TimeDelay
 from .transmission_ripple import TransmissionRipple
@@ -84,6 +82,7 @@ __all__ = [
     'JointCurve',
     'JointOffset',
     'JointSlip',
+    'LinearEffect',
     'LinkLength',
     'LinkOffset',
     'LinkTwist',

@@ -46,8 +46,6 @@ RV = (
 
 
 class _Search(SearchHooks):
-    """What the search asks of it."""
-
     kind: type[Backlash]
 
     def small(self, view: View, joint: str | None, most: int) -> list[Backlash]:
@@ -56,8 +54,6 @@ class _Search(SearchHooks):
 
 
 class _Fit(FitHooks):
-    """What the fit asks of it."""
-
     effect: Backlash
 
     def turned(self) -> Backlash:
@@ -170,12 +166,7 @@ class Backlash(MemoryEffect):
         """Return the displacement per unit of width."""
         return [{key: value / self.width for key, value in self.displace(view).items()}]
 
-    def from_atoms(self, coefficients: Array) -> Backlash:
-        """Return the gap whose width is the coefficient, never negative."""
-        return Backlash(self.joint, max(float(coefficients[0]), 0.0), self.form)
-
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         play = self._travelled(robot, self._plain('width'))
         if self.form == 'coast':
             return (

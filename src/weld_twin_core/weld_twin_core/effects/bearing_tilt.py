@@ -31,8 +31,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .base_leans import base_leans
-from .carriage import summed
-from .effect import Effect
+from .effect import LinearEffect
 from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -40,8 +39,6 @@ from .wording import turn
 
 
 class _Search(SearchHooks):
-    """What the search asks of it."""
-
     effect: BearingTilt
     kind: type[BearingTilt]
 
@@ -62,7 +59,7 @@ class _Search(SearchHooks):
 
 @register
 @dataclass(frozen=True, eq=False)
-class BearingTilt(Effect):
+class BearingTilt(LinearEffect):
     """
     The axis turns about x by lean[0] cos q + lean[1] sin q, and about y by the other two.
 
@@ -141,14 +138,8 @@ class BearingTilt(Effect):
             for wave in waves
         ]
 
-    def displace(self, view: View) -> Shift:
-        """Return the lean of the frame before the joint."""
-        waves = list(self._waves())
-        values = [self.number(name, k) for name, _ in waves for k in range(4)]
-        return summed(values, [part for _, n in waves for part in self._parts(view, n)])
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return the waves."""
+    def per_unit(self, view: View) -> list[Shift]:
+        """Return the leans of the frame before the joint, each a wave."""
         return [part for _, times in self._waves() for part in self._parts(view, times)]
 
     @classmethod
@@ -163,7 +154,6 @@ class BearingTilt(Effect):
         return out if np.size(self.second) else {k: v for k, v in out.items() if k != 'second'}
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         lean = float(np.linalg.norm(np.asarray(self.lean)))
         return (
             f'Look at the bearing of {self.site}: its axis leans by {turn(lean)} once per turn; '

@@ -4,28 +4,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from ..arm.channels import Channel, Shift
+from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arm.vectors import components, cross, pad
 from ..arrays import Array
-from .effect import Effect
+from .effect import LinearEffect
 from .hooks import Hooked, SearchHooks, Traits
 from .view import View
 
 
 class _Search(SearchHooks):
-    """What the search asks of it."""
-
     def fits(self, robot: Robot, joint: str | None) -> bool:
         """Return whether the joint slides."""
         return joint is not None and bool(robot.prismatic[robot.index(joint)])
 
 
-class GuideError(Effect):
+class GuideError(LinearEffect):
     """An error of a guide; its carriage leaves the straight line by the posture of one joint."""
 
     of = 'joint'
@@ -68,12 +64,3 @@ def carried(view: View, i: int, slide: Array | None, turn: Array | None) -> Shif
     moved = cross(turn, tip - origin)
     parts = np.broadcast_arrays(*moved, *turn)
     return {('pose', k): way * part for k, part in enumerate(parts)}
-
-
-def summed(values: Sequence[Array], parts: Sequence[Shift]) -> Shift:
-    """Return a sum of displacements of the same channels, each times a value."""
-    out: dict[Channel, Array] = {}
-    for value, part in zip(values, parts, strict=True):
-        for channel, share in part.items():
-            out[channel] = out.get(channel, 0.0) + value * share
-    return out

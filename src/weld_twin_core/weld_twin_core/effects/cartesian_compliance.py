@@ -11,8 +11,7 @@ import numpy as np
 from ..arm.channels import Shift
 from ..arm.dynamics import wrench_rotation
 from ..arm.robot import Robot
-from ..arrays import Array
-from .effect import Effect
+from .effect import LinearEffect
 from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -21,7 +20,7 @@ from .wording import number
 
 @register
 @dataclass(frozen=True, eq=False)
-class CartesianCompliance(Effect):
+class CartesianCompliance(LinearEffect):
     """One compliance along each axis of the tool frame, whatever frame the wrench comes in."""
 
     compliance: Value = (0.0, 0.0, 0.0)
@@ -49,33 +48,22 @@ class CartesianCompliance(Effect):
     )
     needs = frozenset({'wrench'})
 
-    def _axis_forces(self, view: View) -> list[Array]:
-        """Return for each axis the force along it as a world vector, shape (..., N, 3)."""
+    def per_unit(self, view: View) -> list[Shift]:
+        """Return the force along each axis, as a vector of the world."""
         if view.wrench is None:
-            return [np.zeros(view.q.shape[:-1] + (3,))] * 3
+            still: Shift = {('pose', j): np.zeros(view.q.shape[:-1]) for j in range(3)}
+            return [still] * 3
         chain = view.frames
         force = view.wrench[..., :3]
         if view.wrench_frame == 'base':
             world = (wrench_rotation(view.robot, chain, 'base') @ force[..., None])[..., 0]
             force = (np.swapaxes(chain.rotation, -1, -2) @ world[..., None])[..., 0]
-        return [chain.rotation[..., :, k] * force[..., k, None] for k in range(3)]
-
-    def displace(self, view: View) -> Shift:
-        """Return the deflection on the pose."""
-        x, y, z = (
-            np.asarray(self.number('compliance', k))[..., None] * force
-            for k, force in enumerate(self._axis_forces(view))
-        )
-        total = x + y + z
-        return {('pose', j): total[..., j] for j in range(3)}
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return the force along each axis."""
-        forces = self._axis_forces(view)
-        return [{('pose', j): force[..., j] for j in range(3)} for force in forces]
+        return [
+            {('pose', j): chain.rotation[..., j, k] * force[..., k] for j in range(3)}
+            for k in range(3)
+        ]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         values = np.asarray(self.compliance) * 1e5
         each = ', '.join(number(float(v)) for v in values)
         return f'Compensate the yielding of the tool: ({each}) mm per 100 N along its x, y, z.'

@@ -65,7 +65,6 @@ class ClockRate(Effect):
         return [{('q', i): -view.qd[..., i] * shown for i in range(view.robot.n)}]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         ppm = self._plain('rate') * 1e6
         way = 'fast' if ppm > 0.0 else 'slow'
         return (

@@ -47,11 +47,13 @@ class ChannelError(Effect):
         return [single((self.channel, view.robot.index(str(self.site))), np.ones(()), view)]
 
 
-def frame_parameters(xyz: Plausible, rotvec: Plausible) -> tuple[Parameter, ...]:
+def frame_parameters(
+    xyz: Plausible, rotvec: Plausible, typical: tuple[float, float] = (5e-4, 1e-3)
+) -> tuple[Parameter, ...]:
     """Return the parameters of an error of a frame, with how large each may be."""
     return (
-        Parameter('xyz', 'm', size=3, typical=5e-4, range=xyz),
-        Parameter('rotvec', 'rad', size=3, typical=1e-3, range=rotvec),
+        Parameter('xyz', 'm', size=3, typical=typical[0], range=xyz),
+        Parameter('rotvec', 'rad', size=3, typical=typical[1], range=rotvec),
     )
 
 

@@ -1,16 +1,20 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Effects that are nothing before an instant and constant from then on.
+Constant errors that come or go with the time.
 
 A belt or a coupling jumps; the tool slips in its holder, or the reflector in its nest; the
-instrument or the base of the robot is knocked.
+instrument or the base of the robot is knocked. The set-up's own motion is no cause: it is moved
+once, or creeps to its place while the cell warms up. It belongs to the frames that an alignment
+fits, and is not carried over to another set-up.
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -25,52 +29,60 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import base_frame, frame, radians
 
-S = TypeVar('S', bound='Sudden')
+TIMES = 40
+"""Instants of a moved set-up that a search tries, evenly over the recording."""
+
+T = TypeVar('T', bound='Timed')
 
 
-class Sudden(Effect):
+class Timed(Effect):
+    """A constant error times a share that hangs on the time, counted from the recording's epoch."""
+
+    since: ClassVar[str] = 'time'
+    """The option that is an instant [s]."""
+    options: ClassVar[tuple[str, ...]] = ('time',)
+    needs = frozenset({'time'})
+
+    @abstractmethod
+    def share(self, view: View) -> Array:
+        """Return how much of the error there is, shape as the view's stamps."""
+
+    def recounted(self: T, later: float) -> T:
+        """Return the same with its instant counted from an epoch that is later by so much [s]."""
+        return replace(self, **{self.since: getattr(self, self.since) - later})
+
+    def displace(self, view: View) -> Shift:
+        """Return the share of the constant displacement."""
+        share = self.share(view)
+        whole = super().displace(view)  # type: ignore[safe-super]
+        return {channel: value * share for channel, value in whole.items()}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return the share of the constant derivatives."""
+        share = self.share(view)
+        return [
+            None if shift is None else {channel: value * share for channel, value in shift.items()}
+            for shift in super().gradient(view)
+        ]
+
+
+class Sudden(Timed):
     """
-    What sets in at ``time`` [s], counted from the recording's epoch.
+    What sets in at ``time`` [s].
 
     A search takes it in only where the checks of the data found the instant: a step fits any
     slow change halfway.
     """
 
+    time: float
     traits = Traits(depends_on='time', dated=True, common=False)
-    options = ('time',)
-    needs = frozenset({'time'})
 
-    @property
-    def instant(self) -> float:
-        """Return when it sets in [s]."""
-        return float(self.time)  # type: ignore[attr-defined]
-
-    def recounted(self: S, later: float) -> S:
-        """Return the same with its instant counted from an epoch that is later by so much [s]."""
-        return replace(self, time=self.instant - later)  # type: ignore[call-arg]
-
-    def after(self, view: View) -> Array:
-        """Return one from the instant on and zero before, shape as the view's stamps."""
-        return (view.t >= self.instant).astype(np.float64)
-
-    def displace(self, view: View) -> Shift:
-        """Return the constant displacement from the instant on."""
-        after = self.after(view)
-        whole = super().displace(view)  # type: ignore[safe-super]
-        return {channel: value * after for channel, value in whole.items()}
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return the constant derivatives from the instant on."""
-        after = self.after(view)
-        return [
-            None if shift is None else {channel: value * after for channel, value in shift.items()}
-            for shift in super().gradient(view)
-        ]
+    def share(self, view: View) -> Array:
+        """Return one from the instant on and zero before."""
+        return (view.t >= self.time).astype(np.float64)
 
 
 class _Twin(TwinHooks):
-    """What the twin asks of it."""
-
     effect: JointSlip
 
     def lasting(self) -> JointOffset:
@@ -113,7 +125,6 @@ class JointSlip(Sudden, ChannelError):
     twin = Hooked(_Twin)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         at = robot.index(str(self.site))
         size = self._plain('offset')
         far = f'{size * 1e3:+.3g} mm' if robot.prismatic[at] else radians(size)
@@ -153,7 +164,6 @@ class ToolSlip(SuddenFrame):
     )
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Fasten the tool or the reflector: it moved by '
             f'{frame(self.vector()[:6], "of the flange", "of the tool")} at '
@@ -185,8 +195,89 @@ class InstrumentKnock(SuddenFrame):
     )
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Fasten the instrument and the base: one moved by {base_frame(self.vector()[:6])} at '
             f't = {self._plain("time"):.4g}; measure what came before and after apart.'
+        )
+
+
+class SetupMotion(Timed, FrameError):
+    """The set-up's own motion: nuisance, never a cause."""
+
+    traits = Traits(depends_on='time', place='base', cause=False, of_setup=True)
+    channel = 'base'
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class SetupStep(SetupMotion):
+    """Displacement and turn of the base before the instant ``time`` [s]; then it is as aligned."""
+
+    xyz: Value = (0.0, 0.0, 0.0)
+    rotvec: Value = (0.0, 0.0, 0.0)
+    time: float = 0.0
+
+    name = 'setup_step'
+    traits = replace(SetupMotion.traits, title='moved set-up', entered='base')
+    parameters = frame_parameters(
+        Plausible.even(5e-3, 0.1, 'derived: a knock'),
+        Plausible.even(5e-3, 0.1, 'derived: a knock'),
+        typical=(1e-4, 1e-4),
+    )
+
+    def share(self, view: View) -> Array:
+        """Return one before the step."""
+        return (view.t < self.time).astype(np.float64)
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
+        """Yield steps at evenly spread samples, none at the very ends."""
+        index = np.linspace(0, view.t.size - 1, TIMES + 2).round().astype(int)[1:-1]
+        for k in np.unique(index):
+            if k > 0:
+                yield cls(time=float(0.5 * (view.t[k - 1] + view.t[k])))
+
+    def remedy(self, robot: Robot) -> str:
+        return (
+            f'Fasten the set-up: it moved by {base_frame(-self.vector()[:6])} at '
+            f'{self._plain("time"):.4g} s; measure what came before and after apart.'
+        )
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class SetupSettling(SetupMotion):
+    """Displacement and turn of the base at ``start`` [s], gone with ``time_constant`` [s]."""
+
+    xyz: Value = (0.0, 0.0, 0.0)
+    rotvec: Value = (0.0, 0.0, 0.0)
+    time_constant: float = 600.0
+    start: float = 0.0
+
+    name = 'setup_settling'
+    traits = replace(SetupMotion.traits, title='settling set-up', entered='how the set-up is held')
+    parameters = frame_parameters(
+        Plausible.even(1e-3, 2e-2, 'derived: what a stand creeps while it warms'),
+        Plausible.even(1e-3, 2e-2, 'derived: a millimetre on a metre'),
+        typical=(1e-4, 1e-4),
+    )
+    options = ('time_constant', 'start')
+    since = 'start'
+
+    def share(self, view: View) -> Array:
+        """Return the share still to go."""
+        return np.exp(-np.maximum(view.t - self.start, 0.0) / self.time_constant)
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
+        """Yield time constants from a twentieth to half of the recording."""
+        span = float(view.elapsed[-1])
+        if span > 0.0:
+            for share in (0.05, 0.12, 0.25, 0.5):
+                yield cls(time_constant=share * span, start=float(view.t[0]))
+
+    def remedy(self, robot: Robot) -> str:
+        return (
+            f'Let the set-up settle before measuring: it started {base_frame(self.vector()[:6])} from '
+            'where it ended.'
         )

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
-from .effect import Effect
+from .effect import LinearEffect
 from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -17,7 +17,7 @@ from .wording import number
 
 @register
 @dataclass(frozen=True, eq=False)
-class Drift(Effect):
+class Drift(LinearEffect):
     """A creeping fixture, instrument or pedestal."""
 
     xyz_rate: Value = (0.0, 0.0, 0.0)
@@ -49,16 +49,11 @@ class Drift(Effect):
     )
     needs = frozenset({'time'})
 
-    def displace(self, view: View) -> Shift:
-        """Return rate times elapsed time on the pose."""
-        return {('pose', k): self.number('xyz_rate', k) * view.elapsed for k in range(3)}
-
-    def gradient(self, view: View) -> list[Shift | None]:
+    def per_unit(self, view: View) -> list[Shift]:
         """Return elapsed time along each axis."""
         return [{('pose', k): view.elapsed} for k in range(3)]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         rate = np.asarray(self.xyz_rate) * 3.6e6
         each = ', '.join(number(float(v)) for v in rate)
         return (

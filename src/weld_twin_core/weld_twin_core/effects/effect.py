@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
-from ..arm.channels import Shift
+from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
@@ -26,7 +26,7 @@ from .parametric import Parametric
 from .view import Parameter, Stage, Value, View
 from .wording import travel
 
-__all__ = ['Effect', 'MemoryEffect', 'Parameter', 'Stage', 'Value', 'View']
+__all__ = ['Effect', 'LinearEffect', 'MemoryEffect', 'Parameter', 'Stage', 'Value', 'View']
 
 RELATIVE_STEP = 1e-5
 """Step of numerical derivatives, in typical magnitudes of the parameter."""
@@ -160,9 +160,17 @@ class Effect(Parametric, ABC):
         return [shift for shift in self.gradient(view) if shift is not None]
 
     def from_atoms(self: E, coefficients: Array) -> E:
-        """Return the instance that a combination of `atoms` stands for, inside its bounds."""
-        low, high = np.array([(p.lower, p.upper) for p, _ in self.components()]).T
-        return self.with_vector(np.clip(np.asarray(coefficients, dtype=np.float64), low, high))
+        """
+        Return the instance that a combination of `atoms` stands for, inside its bounds.
+
+        Unless an effect says otherwise, the atoms are those of its first components; the others
+        stay as they are.
+        """
+        vector = np.array(self.vector())
+        first = min(len(coefficients), vector.size)
+        bounds = [(p.lower, p.upper) for p, _ in self.components()[:first]]
+        vector[:first] = np.clip(np.asarray(coefficients, float)[:first], *np.array(bounds).T)
+        return self.with_vector(vector)
 
     def gradient(self, view: View) -> list[Shift | None]:
         """
@@ -245,6 +253,28 @@ class Effect(Parametric, ABC):
         lacking = self.traits.lacking
         if lacking and not self.search.fits(robot, self.site):
             raise ModelError(f'{self.name} {lacking.format(site=self.site, robot=robot.name)}')
+
+
+class LinearEffect(Effect):
+    """An effect that is proportional to each of its components."""
+
+    @abstractmethod
+    def per_unit(self, view: View) -> list[Shift]:
+        """Return for each component what it displaces where it is one."""
+
+    def displace(self, view: View) -> Shift:
+        """Return the sum of all components' displacements."""
+        out: dict[Channel, Array] = {}
+        for (parameter, k), part in zip(self.components(), self.per_unit(view), strict=True):
+            value = self.number(parameter.name, k)
+            for channel, each in part.items():
+                own = value * each
+                out[channel] = out[channel] + own if channel in out else own
+        return out
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return what each component displaces where it is one."""
+        return list(self.per_unit(view))
 
 
 class MemoryEffect(Effect):

@@ -90,7 +90,6 @@ class FrameCurve(Effect):
         return [{(self.frame, axis): row} for axis in range(6) for row in weights]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Look at the {self.at}: it moves over the {self.on} in a way that no known effect '
             'gives.'

@@ -42,7 +42,6 @@ class BasePose(FrameError):
     )
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         if robot.behind:
             return self._on_the_workpiece(robot)
         moved = base_frame(_of_the_origin(self.vector(), robot))
@@ -100,7 +99,6 @@ class ToolPose(FrameError):
     )
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         flange = controller_frames(robot).flange[:3, :3]
         step = np.concatenate([flange.T @ self.vector()[:3], self.vector()[3:]])
         moved = frame(step, 'of the flange', 'of the tool')

@@ -42,8 +42,6 @@ A_LITTLE = 1e-9
 
 
 class _Fit(FitHooks):
-    """What the fit asks of it."""
-
     effect: Friction
 
     def fitted(self) -> list[int]:
@@ -236,7 +234,6 @@ class Friction(MemoryEffect):
         return Friction(self.joint, windup, asymmetry, self.travel, self.release)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Give the controller of {self.site} feed-forward against friction, and see to its '
             f'lubrication: in motion it trails by {self._travelled(robot, self._plain("windup"))}.'

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
-from .effect import Effect
+from .effect import LinearEffect
 from .hooks import Hooked, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View, single
@@ -16,8 +16,6 @@ from .wording import number
 
 
 class _Twin(TwinHooks):
-    """What the twin asks of it."""
-
     effect: GearRatio
 
     def slope(self, view: View) -> Shift:
@@ -29,7 +27,7 @@ class _Twin(TwinHooks):
 
 @register
 @dataclass(frozen=True, eq=False)
-class GearRatio(Effect):
+class GearRatio(LinearEffect):
     """A wrong transmission or encoder scale: the error grows with the joint's angle."""
 
     joint: str
@@ -62,18 +60,12 @@ class GearRatio(Effect):
     )
     twin = Hooked(_Twin)
 
-    def displace(self, view: View) -> Shift:
-        """Return scale * theta on the joint."""
-        i = view.robot.index(self.joint)
-        return {('q', i): self.number('scale') * view.joint(i)}
-
-    def gradient(self, view: View) -> list[Shift | None]:
+    def per_unit(self, view: View) -> list[Shift]:
         """Return theta."""
         i = view.robot.index(self.joint)
         return [{('q', i): view.joint(i)}]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         scale = self._plain('scale')
         if self.on_slide(robot):
             return (

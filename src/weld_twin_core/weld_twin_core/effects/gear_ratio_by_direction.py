@@ -135,10 +135,6 @@ class GearRatioByDirection(MemoryEffect):
         i = view.robot.index(self.joint)
         return [{('q', i): 0.5 * self._way(view.joint(i))[0] * view.joint(i)}]
 
-    def from_atoms(self, coefficients: Array) -> GearRatioByDirection:
-        """Return the ratio whose difference is the coefficient."""
-        return GearRatioByDirection(self.joint, float(coefficients[0]), self.travel)
-
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield a quick and a slow change of flanks where the joint went both ways over its angle."""
@@ -155,7 +151,6 @@ class GearRatioByDirection(MemoryEffect):
                 yield made
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         difference = self._plain('difference')
         more, less = ('up', 'down') if difference > 0.0 else ('down', 'up')
         return (

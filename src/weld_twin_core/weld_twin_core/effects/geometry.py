@@ -64,7 +64,6 @@ class JointOffset(ChannelError):
     )
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         joint, offset = str(self.site), self._plain('offset')
         sliding = bool(robot.prismatic[robot.index(joint)])
         return f'{stands(joint, offset, sliding=sliding)} {to_mend(offset, sliding=sliding)}'

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
-from .carriage import GuideError, carriage_axes, carried, summed
+from .carriage import GuideError, carriage_axes, carried
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
@@ -52,23 +52,14 @@ class GuideBend(GuideError):
         ),
     )
 
-    def displace(self, view: View) -> Shift:
+    def per_unit(self, view: View) -> list[Shift]:
         """Return how the tool moves with the carriage."""
-        values = [self.number('curvature', k) for k in range(2)]
-        return summed(values, self._parts(view))
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return the same for a curvature of one along each axis."""
-        return list(self._parts(view))
-
-    def _parts(self, view: View) -> list[Shift]:
         i = view.robot.index(self.joint)
         x, y, _ = carriage_axes(view, i)
         bow = 0.5 * view.joint(i) ** 2
         return [carried(view, i, bow * axis, None) for axis in (x, y)]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         x, y = np.asarray(self.curvature) * 0.125e3
         return (
             f'Align the guide of {self.site}: over a metre it is bent by {size(float(x))} mm along x '

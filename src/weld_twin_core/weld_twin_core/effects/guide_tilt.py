@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
-from .carriage import GuideError, carriage_axes, carried, summed
+from .carriage import GuideError, carriage_axes, carried
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
@@ -49,22 +49,13 @@ class GuideTilt(GuideError):
         ),
     )
 
-    def displace(self, view: View) -> Shift:
+    def per_unit(self, view: View) -> list[Shift]:
         """Return how the tool moves with the carriage."""
-        values = [self.number('rate', k) for k in range(3)]
-        return summed(values, self._parts(view))
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return the same for a rate of one about each axis."""
-        return list(self._parts(view))
-
-    def _parts(self, view: View) -> list[Shift]:
         i = view.robot.index(self.joint)
         axes = carriage_axes(view, i)
         return [carried(view, i, None, view.joint(i) * axis) for axis in axes]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         each = ', '.join(number(float(np.degrees(v))) for v in np.asarray(self.rate))
         return (
             f'Level the guide of {self.site}: its carriage turns by ({each}) deg about x, y, z of '

@@ -95,7 +95,6 @@ class HosePull(Effect):
         return [{('tau', i): part[i] for i in range(view.robot.n)} for part in parts]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         x, y, z = (float(part) for part in np.asarray(self.force))
         return (
             f'Lead the hose package so that it hangs free: it pulls the flange by ({number(x)}, '

@@ -42,8 +42,6 @@ SLIDING = 0.1
 
 
 class _Fit(FitHooks):
-    """What the fit asks of it."""
-
     effect: Hysteresis
 
     def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
@@ -166,12 +164,7 @@ class Hysteresis(MemoryEffect):
         i = view.robot.index(self.joint)
         return [{('q', i): -self._loop(view.joint(i), None)[0]}]
 
-    def from_atoms(self, coefficients: Array) -> Hysteresis:
-        """Return the loop whose amplitude is the coefficient, never negative."""
-        return Hysteresis(self.joint, max(float(coefficients[0]), 0.0), self.travel)
-
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Compensate the lost motion of {self.site}, or approach seams from one side: it trails '
             f'by {self._travelled(robot, self._plain("amplitude"))} once it has moved '

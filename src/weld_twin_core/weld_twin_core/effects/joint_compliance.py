@@ -22,7 +22,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError
-from .effect import Effect
+from .effect import Effect, LinearEffect
 from .hooks import Hooked, SearchHooks, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -34,8 +34,6 @@ STATICS = ('equilibrium', 'first_order', *LOAD_OF_EFFORT)
 
 
 class _Twin(TwinHooks):
-    """What the twin asks of it."""
-
     effect: JointCompliance
 
     @property
@@ -50,8 +48,6 @@ class _Twin(TwinHooks):
 
 
 class _Search(SearchHooks):
-    """What the search asks of it."""
-
     effect: JointCompliance
 
     @property
@@ -62,8 +58,8 @@ class _Search(SearchHooks):
 
 @register
 @dataclass(frozen=True, eq=False)
-class JointCompliance(Effect):
-    """The joint yields to the load torque of links, payload and tool wrench."""
+class JointCompliance(LinearEffect):
+    """The joint yields to the load torque of links, payload and tool wrench; above zero it sags."""
 
     joint: str
     compliance: Value = 0.0
@@ -109,28 +105,18 @@ class JointCompliance(Effect):
                 f'joint_compliance: statics must be one of {STATICS}, got {self.statics!r}'
             )
 
-    def displace(self, view: View) -> Shift:
-        """Return compliance times load torque; a positive compliance sags."""
-        return {
-            channel: self.number('compliance') * load for channel, load in self._load(view).items()
-        }
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return the load torque."""
-        return [self._load(view)]
-
-    def _load(self, view: View) -> Shift:
+    def per_unit(self, view: View) -> list[Shift]:
         """Return the load torque, by the model's statics or as it was measured."""
         i = view.robot.index(self.joint)
         if not self.twin.by_effort:
-            return {('q', i): view.shift[('tau', i)]}
+            return [{('q', i): view.shift[('tau', i)]}]
         if view.effort is None:
             raise DataError(
                 f'joint_compliance of {self.joint} takes the measured effort of the joints '
                 f'(statics: {self.statics}), and none was recorded here; record it in '
                 'JointState.effort, or diagnose without --use-effort for a model that needs none'
             )
-        return {('q', i): self.twin.by_effort * view.effort[..., i]}
+        return [{('q', i): self.twin.by_effort * view.effort[..., i]}]
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
@@ -146,7 +132,6 @@ class JointCompliance(Effect):
             yield cls(str(joint), statics='effort' if view.effort_holds else 'effort_reversed')
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         compliance = self._plain('compliance')
         slides = self.on_slide(robot)
         stiffness = (

@@ -11,7 +11,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
-from .effect import Effect
+from .effect import Effect, LinearEffect
 from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -19,8 +19,6 @@ from .wording import number
 
 
 class _Search(SearchHooks):
-    """What the search asks of it."""
-
     effect: JointCoupling
 
     @property
@@ -31,7 +29,7 @@ class _Search(SearchHooks):
 
 @register
 @dataclass(frozen=True, eq=False)
-class JointCoupling(Effect):
+class JointCoupling(LinearEffect):
     """Motion of one joint leaks into another."""
 
     joint: str
@@ -74,12 +72,7 @@ class JointCoupling(Effect):
         if self.source == self.joint:
             raise ModelError('joint_coupling: source and joint are the same; use gear_ratio')
 
-    def displace(self, view: View) -> Shift:
-        """Return ratio times the source's angle on the joint."""
-        source = view.joint(view.robot.index(self.source))
-        return {('q', view.robot.index(self.joint)): self.number('ratio') * source}
-
-    def gradient(self, view: View) -> list[Shift | None]:
+    def per_unit(self, view: View) -> list[Shift]:
         """Return the source's angle."""
         return [{('q', view.robot.index(self.joint)): view.joint(view.robot.index(self.source))}]
 
@@ -92,7 +85,6 @@ class JointCoupling(Effect):
                 yield cls(str(joint), view.robot.joint_names[k], 0.0)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         source = self.source
         ratio = self._plain('ratio')
         return (

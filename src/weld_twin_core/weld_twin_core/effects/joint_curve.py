@@ -27,8 +27,6 @@ LEAST_KNOTS, MOST_KNOTS = 2, 8
 
 
 class _Search(SearchHooks):
-    """What the search asks of it."""
-
     kind: type[JointCurve]
 
     def bend(self, joint: str, angles: Array) -> JointCurve | None:
@@ -43,8 +41,6 @@ class _Search(SearchHooks):
 
 
 class _Fit(FitHooks):
-    """What the fit asks of it."""
-
     effect: JointCurve
 
     def alike(self) -> list[tuple[str, ...]]:
@@ -53,8 +49,6 @@ class _Fit(FitHooks):
 
 
 class _Twin(TwinHooks):
-    """What the twin asks of it."""
-
     effect: JointCurve
 
     def off_outside(self) -> float:
@@ -135,7 +129,6 @@ class JointCurve(Effect):
         return [{self._site(view): row} for row in self._basis(view)]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Look at {self.site}: it is off by a curve over the {self.on} that no known effect '
             'gives.'

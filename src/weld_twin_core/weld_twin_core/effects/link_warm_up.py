@@ -34,8 +34,6 @@ EVEN = 1e-6
 
 
 class _Fit(FitHooks):
-    """What the fit asks of it."""
-
     effect: LinkWarmUp
 
     def fitted(self) -> list[int]:
@@ -146,12 +144,6 @@ class LinkWarmUp(Effect):
         """Return the growth for a strain of one."""
         return [self._grown(view, self._warmth(view))]
 
-    def from_atoms(self, coefficients: Array) -> LinkWarmUp:
-        """Return the warm-up whose strain is the coefficient."""
-        return LinkWarmUp(
-            self.joint, float(coefficients[0]), float(np.asarray(self.warming_time)), self.follows
-        )
-
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
         """Return why the data cannot show it: stations that are only counted tell no time."""
@@ -172,7 +164,6 @@ class LinkWarmUp(Effect):
             yield cls(str(joint), 0.0, span, (float(np.min(view.temperature)), rise))
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         grown = self._plain('strain') * 1e3
         return (
             f'Warm {self.site} up before welding, or compensate its link while it warms: it grows by '

@@ -20,7 +20,7 @@ from ..arrays import Array
 from ..errors import ModelError
 from .backlash import RV
 from .curve import load
-from .effect import Effect
+from .effect import Effect, LinearEffect
 from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -33,8 +33,6 @@ CHANGED = 0.3
 
 
 class _Search(SearchHooks):
-    """What the search asks of it."""
-
     kind: type[LoadedPlay]
 
     def constants(self, view: View, joint: str | None) -> Iterable[Effect]:
@@ -47,7 +45,7 @@ class _Search(SearchHooks):
 
 @register
 @dataclass(frozen=True, eq=False)
-class LoadedPlay(Effect):
+class LoadedPlay(LinearEffect):
     """Play of full ``width`` whose side the load decides; ``torque`` [N m] is what friction holds."""
 
     joint: str
@@ -87,19 +85,11 @@ class LoadedPlay(Effect):
         if not float(self.torque) > 0.0:
             raise ModelError(f'loaded_play: torque must be above zero, got {self.torque!r}')
 
-    def _side(self, view: View) -> Shift:
-        """Return the displacement for each radian of width."""
+    def per_unit(self, view: View) -> list[Shift]:
+        """Return half of one, to the side that the load pulls to."""
         i = view.robot.index(self.joint)
         pull = load(view, i)
-        return {('q', i): 0.5 * pull / np.hypot(pull, self.torque)}
-
-    def displace(self, view: View) -> Shift:
-        """Return half the width to the side that the load pulls to."""
-        return {channel: self.number('width') * side for channel, side in self._side(view).items()}
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return the side."""
-        return [self._side(view)]
+        return [{('q', i): 0.5 * pull / np.hypot(pull, self.torque)}]
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
@@ -112,7 +102,6 @@ class LoadedPlay(Effect):
                 yield cls(str(joint), 0.0, share * most)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Service or preload the gear of {self.site}: its load lays it on one flank or the other '
             f'of {self._travelled(robot, self._plain("width"))} of play.'

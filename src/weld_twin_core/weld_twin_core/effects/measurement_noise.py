@@ -35,7 +35,6 @@ class MeasurementNoise(Effect):
         return {}
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return None."""
         return [None]
 
     def draw(self, samples: int, rng: np.random.Generator) -> Array:

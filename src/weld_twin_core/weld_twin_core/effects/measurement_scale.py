@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
-from .effect import Effect
+from .effect import LinearEffect
 from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -15,7 +15,7 @@ from .wording import number
 
 @register
 @dataclass(frozen=True, eq=False)
-class MeasurementScale(Effect):
+class MeasurementScale(LinearEffect):
     """A wrong unit of length of the measuring system, about the origin of its frame."""
 
     scale: Value = 0.0
@@ -45,18 +45,12 @@ class MeasurementScale(Effect):
         ),
     )
 
-    def displace(self, view: View) -> Shift:
-        """Return scale times position on the pose."""
-        position = view.frames.position
-        return {('pose', k): self.number('scale') * position[..., k] for k in range(3)}
-
-    def gradient(self, view: View) -> list[Shift | None]:
+    def per_unit(self, view: View) -> list[Shift]:
         """Return the position."""
         position = view.frames.position
         return [{('pose', k): position[..., k] for k in range(3)}]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             'Have the instrument calibrated, or correct for air temperature: lengths read '
             f'{number(self._plain("scale") * 1e3)} mm per m too long.'

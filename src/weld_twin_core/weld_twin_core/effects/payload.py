@@ -37,8 +37,6 @@ def mass_range(robot: Robot) -> tuple[float, float]:
 
 
 class _Twin(TwinHooks):
-    """What the twin asks of it."""
-
     effect: Payload
 
     def load_slope(self, view: View) -> Array:
@@ -114,7 +112,6 @@ class Payload(Effect):
         return out
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         extra = self._plain('mass')
         com = np.asarray(self.com) * 1e3
         where = ', '.join(number(float(v)) for v in com)

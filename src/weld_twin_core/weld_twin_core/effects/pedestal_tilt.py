@@ -17,13 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arm.channels import Channel, Shift
+from ..arm.channels import Shift
 from ..arm.dynamics import base_moment, wrench_rotation
 from ..arm.robot import Robot
 from ..arm.vectors import components, dot, pad
 from ..arrays import Array
 from .base_leans import base_leans
-from .effect import Effect
+from .effect import LinearEffect
 from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -35,7 +35,7 @@ CHANGED = 0.2
 
 @register
 @dataclass(frozen=True, eq=False)
-class PedestalTilt(Effect):
+class PedestalTilt(LinearEffect):
     """The base leans about its x and its y by ``compliance`` times the moment about each."""
 
     compliance: Value = (0.0, 0.0)
@@ -69,17 +69,13 @@ class PedestalTilt(Effect):
     )
     needs = frozenset({'load'})
 
-    def displace(self, view: View) -> Shift:
-        """Return the lean of the base; a positive compliance sags."""
-        x, y = (
-            {channel: self.number('compliance', k) * share for channel, share in part.items()}
-            for k, part in enumerate(_leans(view))
-        )
-        return {channel: x[channel] + y[channel] for channel in x}
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return the moment about each axis, as a turn of the base in the world."""
-        return list(_leans(view))
+    def per_unit(self, view: View) -> list[Shift]:
+        """Return the moment about each axis, as a turn of the base in the world; it sags."""
+        axes = view.robot.T_base_foot[:3, :2].T
+        return [
+            {channel: share * moment for channel, share in lean.items()}
+            for lean, moment in zip(base_leans(view.robot, axes), _moments(view), strict=True)
+        ]
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
@@ -94,7 +90,6 @@ class PedestalTilt(Effect):
         return None
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         x, y = np.asarray(self.compliance) * 1e2
         return (
             'Stiffen the pedestal or its anchors: under 100 N m it leans by '
@@ -108,15 +103,4 @@ def _moments(view: View) -> tuple[Array, Array]:
     moment = base_moment(view.robot, view.frames, view.wrench, view.wrench_frame)
     axes = wrench_rotation(view.robot, view.frames, 'base')
     x, y = (dot(pad(components(axes[..., k]), moment.ndim - 1), moment) for k in range(2))
-    return x, y
-
-
-def _leans(view: View) -> tuple[dict[Channel, Array], dict[Channel, Array]]:
-    """Return the turn of the base in the world for a compliance of one about its x, and its y."""
-    robot = view.robot
-    axes = robot.T_base_foot[:3, :2].T
-    x, y = (
-        {channel: share * moment for channel, share in lean.items()}
-        for lean, moment in zip(base_leans(robot, axes), _moments(view), strict=True)
-    )
     return x, y

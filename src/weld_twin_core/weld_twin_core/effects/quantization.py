@@ -33,8 +33,6 @@ MOST = 2000
 
 
 class _Search(SearchHooks):
-    """What the search asks of it."""
-
     def trials(self, view: View, joint: str | None) -> float:
         """Return how many steps the spectrum tells apart."""
         travel = float(np.ptp(view.joint(view.robot.index(str(joint)))))
@@ -42,8 +40,6 @@ class _Search(SearchHooks):
 
 
 class _Fit(FitHooks):
-    """What the fit asks of it."""
-
     effect: Quantization
 
     def starts(self, view: View, zoom: int) -> tuple[list[Effect], Array] | None:
@@ -159,7 +155,6 @@ class Quantization(Effect):
         return self
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Read {self.site} with a finer encoder or more digits: it is rounded to '
             f'{self._travelled(robot, self._plain("step"))}.'

@@ -25,9 +25,8 @@ import numpy as np
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
-from ..arrays import Array
 from ..errors import ModelError
-from .effect import Effect
+from .effect import LinearEffect
 from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -44,7 +43,7 @@ the origin is not the instrument's. The bundled arms reach 0.5 to 3 m from their
 
 @register
 @dataclass(frozen=True, eq=False)
-class Refraction(Effect):
+class Refraction(LinearEffect):
     """
     Air that warms by ``warming`` [K/m] along each axis of the measuring frame bends the sight.
 
@@ -94,27 +93,15 @@ class Refraction(Effect):
         ):
             raise ModelError(f'refraction: instrument must be three numbers in m, got {place!r}')
 
-    def displace(self, view: View) -> Shift:
-        """Return how far off the target seems, on the pose."""
-        x, y, z = (
-            np.asarray(self.number('warming', k))[..., None] * seen
-            for k, seen in enumerate(self._seen(view))
-        )
-        total = x + y + z
-        return {('pose', j): total[..., j] for j in range(3)}
-
-    def gradient(self, view: View) -> list[Shift | None]:
+    def per_unit(self, view: View) -> list[Shift]:
         """Return how far off the target seems for one kelvin a metre along each axis."""
-        return [{('pose', j): seen[..., j] for j in range(3)} for seen in self._seen(view)]
-
-    def _seen(self, view: View) -> list[Array]:
-        """Return the shift for a gradient of one along each axis, each (..., N, 3) [m]."""
         sight = view.frames.position - (0.0 if self.instrument is None else self.instrument)
         across = 0.5 * (sight**2).sum(axis=-1)
-        return [
+        seen = (
             BEND * (across[..., None] * axis - sight[..., k, None] * sight)
             for k, axis in enumerate(np.eye(3))
-        ]
+        )
+        return [{('pose', j): each[..., j] for j in range(3)} for each in seen]
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
@@ -128,7 +115,6 @@ class Refraction(Effect):
         return super().applicable(view, joint)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         each = ', '.join(number(float(v)) for v in np.asarray(self.warming))
         return (
             'Stir the air along the line of sight, shield it from heat or stand the instrument '

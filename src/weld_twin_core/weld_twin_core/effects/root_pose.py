@@ -19,8 +19,6 @@ from .wording import frame, placed
 
 
 class _Search(SearchHooks):
-    """What the search asks of it."""
-
     def fits(self, robot: Robot, joint: str | None) -> bool:
         """Return whether there is a positioner."""
         return robot.behind > 0
@@ -74,7 +72,6 @@ class RootPose(FrameError):
         return np.asarray(there @ now), np.asarray(there @ new)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         rows = robot.T_base_foot
         step = (self.vector().reshape(2, 3) @ rows[:3, :3]).ravel()
         now, new = self.stands(robot, rows)

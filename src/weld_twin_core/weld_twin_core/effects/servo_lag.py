@@ -42,8 +42,6 @@ SHORTEST = 1e-9
 
 
 class _Fit(FitHooks):
-    """What the fit asks of it."""
-
     effect: ServoLag
 
     @property
@@ -219,12 +217,7 @@ class ServoLag(MemoryEffect):
         """Return the displacement per second of time constant."""
         return [{key: value / self.time_constant for key, value in self.displace(view).items()}]
 
-    def from_atoms(self, coefficients: Array) -> ServoLag:
-        """Return the lag whose time constant is the coefficient, never negative."""
-        return ServoLag(self.joint, max(float(coefficients[0]), 0.0), self.damping)
-
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Give the controller of {self.site} more feed-forward, or record measured in place of '
             f'commanded joints: it lags by {size(self._plain("time_constant") * 1e3)} ms.'

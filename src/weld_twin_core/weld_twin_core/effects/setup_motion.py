@@ -5,13 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from ..recording import Recording
-from .dated import Sudden
+from .dated import Timed
 from .effect import Effect
-from .setup_settling import SetupSettling
-from .setup_step import SetupStep
 
 
 def of_the_robot(effects: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -37,14 +34,4 @@ def seen_from(
     if last < span_ns[0] or first > span_ns[1]:
         return of_the_robot(effects)
     later = (other.epoch_ns - epoch_ns) * 1e-9
-    return tuple(_recounted(effect, later) for effect in effects)
-
-
-def _recounted(effect: Effect, later: float) -> Effect:
-    if isinstance(effect, SetupSettling):
-        return replace(effect, start=effect.start - later)
-    if isinstance(effect, SetupStep):
-        return replace(effect, time=effect.time - later)
-    if isinstance(effect, Sudden):
-        return effect.recounted(later)
-    return effect
+    return tuple(e.recounted(later) if isinstance(e, Timed) else e for e in effects)

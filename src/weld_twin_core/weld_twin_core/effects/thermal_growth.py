@@ -14,7 +14,7 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError
-from .effect import Effect
+from .effect import LinearEffect
 from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -23,7 +23,7 @@ from .wording import number
 
 @register
 @dataclass(frozen=True, eq=False)
-class ThermalGrowth(Effect):
+class ThermalGrowth(LinearEffect):
     """
     Links grow with temperature against ``reference`` [degC].
 
@@ -113,18 +113,12 @@ class ThermalGrowth(Effect):
         lengths = [((key, i), float(getattr(robot, key)[i])) for i in rows for key in ('a', 'd')]
         return [(channel, length) for channel, length in lengths if length != 0.0]
 
-    def displace(self, view: View) -> Shift:
-        """Return the growth of every length; travel of a prismatic joint does not grow."""
-        growth = self.number('coefficient') * self.rise(view)
-        return {channel: length * growth for channel, length in self._lengths(view)}
-
-    def gradient(self, view: View) -> list[Shift | None]:
-        """Return length times temperature rise."""
+    def per_unit(self, view: View) -> list[Shift]:
+        """Return length times temperature rise; travel of a joint that slides does not grow."""
         rise = self.rise(view)
         return [{channel: length * rise for channel, length in self._lengths(view)}]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         links = self.links or ('all links',)
         return (
             'Warm the arm up before welding, or compensate '

@@ -55,7 +55,6 @@ class TimeDelay(Effect):
         return [{('q', i): -view.qd[..., i] for i in range(view.robot.n)}]
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         delay = self._plain('delay')
         order = 'late' if delay > 0.0 else 'early'
         return (

@@ -35,8 +35,6 @@ many powers as orders there may be: a sine takes as long as some five products."
 
 
 class _Twin(TwinHooks):
-    """What the twin asks of it."""
-
     effect: TransmissionRipple
 
     def slope(self, view: View) -> Shift:
@@ -46,8 +44,6 @@ class _Twin(TwinHooks):
 
 
 class _Search(SearchHooks):
-    """What the search asks of it."""
-
     effect: TransmissionRipple
     kind: type[TransmissionRipple]
 
@@ -82,8 +78,6 @@ class _Search(SearchHooks):
 
 
 class _Fit(FitHooks):
-    """What the fit asks of it."""
-
     effect: TransmissionRipple
 
     def alike(self) -> list[tuple[str, ...]]:
@@ -254,7 +248,6 @@ class TransmissionRipple(Effect):
         return TransmissionRipple(self.joint, amplitude, self.order, phase)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         amplitude = np.atleast_1d(np.asarray(self.amplitude))
         order = np.atleast_1d(np.asarray(self.order))
         strongest = np.argsort(-np.abs(amplitude))[:3]

@@ -33,8 +33,6 @@ HIGHEST = 0.4
 
 
 class _Fit(FitHooks):
-    """What the fit asks of it."""
-
     effect: Vibration
 
     def starts(self, view: View, zoom: int) -> tuple[list[Effect], Array] | None:
@@ -203,7 +201,6 @@ class Vibration(MemoryEffect):
         return Vibration(self.joint, self.frequency, self.damping, float(coefficients[0]))
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         return (
             f'Limit the jerk of {self.site}, or shape its motion for '
             f'{self._plain("frequency"):.3g} Hz (damping {self._plain("damping"):.2g}); look '

@@ -90,10 +90,6 @@ class Wear(Effect):
         """Return what is worn off for a rate of one."""
         return [_shorter(view, view.elapsed * _slowed(self.number('slowing') * view.elapsed)[0])]
 
-    def from_atoms(self, coefficients: Array) -> 'Wear':
-        """Return the wear whose rate is the coefficient."""
-        return Wear(float(coefficients[0]), self.slowing)
-
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield a tip that wears evenly, and one that has slowed down by the end."""
@@ -102,7 +98,6 @@ class Wear(Effect):
             yield cls(0.0, slowed / span)
 
     def remedy(self, robot: Robot) -> str:
-        """Return what to mend, in words; see `Effect.remedy`."""
         hour = self._plain('rate') * 3.6e6
         return (
             f'Renew or measure the tip of the tool: along its axis it draws back by {number(hour)} mm '

@@ -18,6 +18,9 @@ def readonly(
     """
     Copy a value into a read-only float64 array and check it.
 
+    Raises DataError: not numeric, wrong shape, or not finite; the message names the first bad
+    index.
+
     Parameters
     ----------
     value : array_like
@@ -28,11 +31,6 @@ def readonly(
         How the message names the value.
     finite : bool
         Refuse NaN and infinity.
-
-    Raises
-    ------
-    DataError
-        Not numeric, wrong shape, or not finite; the message names the first bad index.
 
     """
     try:
@@ -59,11 +57,7 @@ def increasing(t: ArrayLike, name: str) -> Array:
     """
     Return stamps, shape (n,) [s], checked to be strictly increasing.
 
-    Raises
-    ------
-    DataError
-        A stamp repeats or goes back; the message names the sample.
-
+    Raises DataError: a stamp repeats or goes back; the message names the sample.
     """
     stamps = readonly(t, (None,), name)
     steps = np.diff(stamps)

@@ -73,29 +73,19 @@ SHOWN = 1.0
 
 
 class Adjusted(NamedTuple):
-    """
-    What images tell.
-
-    Attributes
-    ----------
-    measured : Measurements
-        The first body on the tool in the first on the world, at every stamp.
-    lenses : tuple of Lens
-        As the images have them.
-    off : array, shape (C, 9)
-        How far each lens is from the given one, in spreads of `FOCAL` and the others.
-    pixel : float [px]
-        Noise of a pixel's coordinate that is left.
-    known : tuple of float [m]
-        How well the points of each target turned out to be known.
-
-    """
+    """What images tell."""
 
     measured: Measurements
+    """The first body on the tool in the first on the world, at every stamp."""
     lenses: tuple[Lens, ...]
+    """As the images have them."""
     off: Array
+    """How far each lens is from the given one, in spreads of `FOCAL` and the others, shape (C,
+    9)."""
     pixel: float
+    """Noise of a pixel's coordinate that is left [px]."""
     known: tuple[float, ...]
+    """How well the points of each target turned out to be known [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,11 +283,8 @@ def adjusted(seen: Sightings) -> Adjusted:
     """
     Return the poses that images tell.
 
-    Raises
-    ------
-    DataError
-        Images show too little of targets, or cameras and targets do not hang together.
-
+    Raises DataError: images show too little of targets, or cameras and targets do not hang
+    together.
     """
     start = bodies(seen)
     seen = seen.take(start.rows)
@@ -352,11 +339,8 @@ def seen_by(recording: Recording, seen: Sightings) -> Recording:
     """
     Return a recording with the poses that images tell, and what the images say of the lenses.
 
-    Raises
-    ------
-    DataError
-        Images show too little of targets, or cameras and targets do not hang together.
-
+    Raises DataError: images show too little of targets, or cameras and targets do not hang
+    together.
     """
     seen, said = _upright(seen)
     result = adjusted(seen)

@@ -31,25 +31,16 @@ SOONEST = 0.05
 
 
 class Bursts(NamedTuple):
-    """
-    What the stamps of a stream look like that was sent in bursts.
-
-    Attributes
-    ----------
-    every : float [s]
-        Median time from burst to burst.
-    first, step : float [s]
-        Stamps as of an even clock, which the last sample of each burst keeps nearly.
-    lost : array of int
-        Samples before which one is missing; twice where two are.
-
-    """
+    """What the stamps of a stream look like that was sent in bursts."""
 
     number: int
     every: float
+    """Median time from burst to burst [s]."""
     first: float
     step: float
+    """Stamps as of an even clock, which the last sample of each burst keeps nearly [s]."""
     lost: NDArray[np.int_]
+    """Samples before which one is missing; twice where two are."""
 
     @property
     def rate(self) -> float:

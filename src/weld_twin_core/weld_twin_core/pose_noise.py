@@ -23,17 +23,6 @@ class PoseNoise:
     """
     Noise of measured poses or points, told with them.
 
-    Attributes
-    ----------
-    root : array, shape (M, c, c)
-        Makes independent rows of an error (c, M): shift [m], then turn about the axes outside
-        [rad], where poses were measured. Shifts among each other are equally sure then, and so
-        are turns; which of the two are surer, a fit finds out.
-    typical : array, shape (c,) [m, rad]
-        Standard deviation of each row, if the noise is as told.
-    sigma : array, shape (M,) [m]
-        Of a coordinate of each position, all three joined by their mean square.
-
     Examples
     --------
     >>> import numpy as np
@@ -45,8 +34,13 @@ class PoseNoise:
     """
 
     root: Array
+    """Makes independent rows of an error (c, M): shift [m], then turn about the axes outside
+    [rad], where poses were measured, shape (M, c, c). Shifts among each other are equally sure
+    then, and so are turns; which of the two are surer, a fit finds out."""
     typical: Array
+    """Standard deviation of each row, if the noise is as told, shape (c,) [m, rad]."""
     sigma: Array
+    """Of a coordinate of each position, all three joined by their mean square, shape (M,) [m]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'root', readonly(self.root, (None, None, None), 'root'))
@@ -100,20 +94,13 @@ class PoseNoise:
 
 @dataclass(frozen=True, eq=False)
 class Common:
-    """
-    Errors that all samples of an instrument share, such as that of a camera's focal length.
-
-    Attributes
-    ----------
-    change : array, shape (M, c, K) [m, rad]
-        What one standard deviation of each makes measured poses too large by.
-    mean : array, shape (K,)
-        How large they are believed to be, in standard deviations.
-
-    """
+    """Errors that all samples of an instrument share, such as that of a camera's focal length."""
 
     change: Array
+    """What one standard deviation of each makes measured poses too large by, shape (M, c, K) [m,
+    rad]."""
     mean: Array
+    """How large they are believed to be, in standard deviations, shape (K,)."""
 
     def __post_init__(self) -> None:
         mean = readonly(self.mean, (None,), 'common errors')

@@ -285,6 +285,8 @@ def column(robot: Robot, chain: Frames, channel: Channel, shift: Shift = NO_SHIF
     Screw columns as in Everett, Driels and Mooring (1987); 'base' and 'tool' turns use the left
     Jacobian of the rotation vector, so the derivative is exact at any displacement.
 
+    Raises KeyError: the channel has no direct column ('tau' reaches the tool through a spring).
+
     Parameters
     ----------
     robot : Robot
@@ -294,11 +296,6 @@ def column(robot: Robot, chain: Frames, channel: Channel, shift: Shift = NO_SHIF
         Name and index of one channel, such as ``('q', 2)`` or ``('tool', 5)``.
     shift : mapping, optional
         The displacement that ``chain`` was made with.
-
-    Raises
-    ------
-    KeyError
-        The channel has no direct column ('tau' reaches the tool through a spring).
 
     """
     name, i = channel

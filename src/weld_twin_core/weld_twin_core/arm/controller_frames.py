@@ -28,19 +28,6 @@ class ControllerFrames:
     """
     Where a controller has its base and its flange.
 
-    Attributes
-    ----------
-    base : array, shape (4, 4) [m]
-        The controller's base, which positions of programs count from, in the base frame of the rows.
-    flange : array, shape (4, 4) [m]
-        The controller's flange in the frame at the end of the last row.
-    foot : array, shape (4, 4) [m], optional
-        The link that the arm stands in, in the base frame of the rows: deviations, wrenches and
-        places of the base speak of it. Left out, it is the controller's base; they differ for
-        arms as Universal Robots', whose `base` is turned against `base_link`.
-    base_link, flange_link : str
-        What a URDF calls them; empty where there is none.
-
     Raises
     ------
     DataError
@@ -49,10 +36,17 @@ class ControllerFrames:
     """
 
     base: Array = field(default_factory=lambda: np.eye(4))
+    """The controller's base, which positions of programs count from, in the base frame of the
+    rows, shape (4, 4) [m]."""
     flange: Array = field(default_factory=lambda: np.eye(4))
+    """The controller's flange in the frame at the end of the last row, shape (4, 4) [m]."""
     foot: Array | None = None
+    """The link that the arm stands in, in the base frame of the rows: deviations, wrenches and
+    places of the base speak of it, shape (4, 4) [m]. Left out, it is the controller's base; they
+    differ for arms as Universal Robots', whose `base` is turned against `base_link`."""
     base_link: str = ''
     flange_link: str = ''
+    """What a URDF calls them; empty where there is none."""
 
     def __post_init__(self) -> None:
         for key in ('base', 'flange', 'foot'):
@@ -107,11 +101,7 @@ def frame_of(value: Any, name: str) -> Array:
     """
     Return the frame (4, 4) of a mapping with ``xyz`` [m] and ``quat_xyzw``; of None the identity.
 
-    Raises
-    ------
-    DataError
-        A number is missing or not finite, or the quaternion is not of length 1.
-
+    Raises DataError: a number is missing or not finite, or the quaternion is not of length 1.
     """
     if value is None:
         return np.eye(4)

@@ -34,37 +34,25 @@ class View(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """
-    A start for everything that is not known.
-
-    Attributes
-    ----------
-    poses : array, shape (B, 4, 4)
-        Of cameras, then targets, each in the frame of its mount: that of the first body there.
-    free : tuple of int
-        The bodies that are not the first of their mount.
-    tool : array, shape (M, 4, 4)
-        The first body on the tool in the first of the world, at every stamp.
-    rows : array of bool, shape (N,)
-        Which sightings are of a stamp with a start.
-
-    """
+    """A start for everything that is not known."""
 
     poses: Array
+    """Of cameras, then targets, each in the frame of its mount: that of the first body there,
+    shape (B, 4, 4)."""
     free: tuple[int, ...]
+    """The bodies that are not the first of their mount."""
     tool: Array
+    """The first body on the tool in the first of the world, at every stamp, shape (M, 4, 4)."""
     rows: NDArray[np.bool_]
+    """Which sightings are of a stamp with a start, shape (N,)."""
 
 
 def bodies(seen: Sightings) -> Bodies:
     """
     Return a start from what every image shows by itself.
 
-    Raises
-    ------
-    DataError
-        No image shows enough of a target, or nothing joins a camera or a target with the others.
-
+    Raises DataError: no image shows enough of a target, or nothing joins a camera or a target with
+    the others.
     """
     views = _views(seen)
     if not views:

@@ -38,13 +38,6 @@ class Lens:
     """
     Intrinsics of a camera.
 
-    Attributes
-    ----------
-    focal, centre : array, shape (2,) [px]
-        fx and fy; cx and cy.
-    distortion : array, shape (8,)
-        k1 k2 p1 p2 k3 k4 k5 k6, in the order of OpenCV; fewer are filled with zeros.
-
     Raises
     ------
     DataError
@@ -61,7 +54,9 @@ class Lens:
 
     focal: Array
     centre: Array
+    """fx and fy, shape (2,) [px]; cx and cy."""
     distortion: Array
+    """k1 k2 p1 p2 k3 k4 k5 k6, in the order of OpenCV, shape (8,); fewer are filled with zeros."""
 
     def __post_init__(self) -> None:
         for name in ('focal', 'centre'):

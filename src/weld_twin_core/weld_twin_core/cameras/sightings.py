@@ -23,24 +23,15 @@ PLACED = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """
-    A camera.
-
-    Attributes
-    ----------
-    lens : Lens
-        As it was calibrated; the diagnosis takes how far that may be off into account.
-    mount : str
-        'world' or 'tool'.
-    size : tuple of int [px], optional
-        Width and height of the image that the lens was calibrated with.
-
-    """
+    """A camera."""
 
     name: str
     lens: Lens
+    """As it was calibrated; the diagnosis takes how far that may be off into account."""
     mount: str = 'world'
+    """'world' or 'tool'."""
     size: tuple[int, int] | None = None
+    """Width and height of the image that the lens was calibrated with [px]."""
 
     def __post_init__(self) -> None:
         _mounted(f'camera {self.name!r}', self.mount)
@@ -63,19 +54,6 @@ class Target:
     """
     Points that a camera can find, such as the corners of a board.
 
-    Attributes
-    ----------
-    labels : tuple of str
-        One for every point.
-    points : array, shape (P, 3) [m]
-        In the target's own frame.
-    mount : str
-        'world' or 'tool'.
-    sigma : float [m]
-        Uncertainty of every coordinate.
-    facing : bool
-        Whether its third axis points away from whoever sees it, as that of boards of OpenCV does.
-
     Raises
     ------
     DataError
@@ -85,10 +63,16 @@ class Target:
 
     name: str
     labels: tuple[str, ...]
+    """One for every point."""
     points: Array
+    """In the target's own frame, shape (P, 3) [m]."""
     mount: str = 'tool'
+    """'world' or 'tool'."""
     sigma: float = PLACED
+    """Uncertainty of every coordinate [m]."""
     facing: bool = False
+    """Whether its third axis points away from whoever sees it, as that of boards of OpenCV
+    does."""
 
     def __post_init__(self) -> None:
         _mounted(f'target {self.name!r}', self.mount)
@@ -115,38 +99,19 @@ def _mounted(what: str, mount: str) -> None:
 
 
 class Fitted(NamedTuple):
-    """
-    What images say of themselves.
-
-    Attributes
-    ----------
-    pixel : float [px]
-        Noise of a pixel's coordinate.
-    off : array, shape (C, 9)
-        How far each lens is from the given one, in spreads between calibrations of one lens.
-
-    """
+    """What images say of themselves."""
 
     pixel: float
+    """Noise of a pixel's coordinate [px]."""
     off: Array
+    """How far each lens is from the given one, in spreads between calibrations of one lens, shape
+    (C, 9)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
     """
     Points seen, one row each.
-
-    Attributes
-    ----------
-    t : array, shape (M,) [s]
-        Stamps of the images, strictly increasing; images of several cameras share a stamp.
-    image, camera, target, point : array of int, shape (N,)
-        Which stamp, camera, target and point of the target each row is of.
-    pixel : array, shape (N, 2) [px]
-    sigma : array, shape (N,) [px], optional
-        Standard deviation of each coordinate, where the detector tells it.
-    fitted : Fitted, optional
-        What was found of lenses when poses were made of them.
 
     Raises
     ------
@@ -158,13 +123,19 @@ class Sightings:
     cameras: tuple[Camera, ...]
     targets: tuple[Target, ...]
     t: Array
+    """Stamps of the images, strictly increasing, shape (M,) [s]; images of several cameras share a
+    stamp."""
     image: NDArray[np.intp]
     camera: NDArray[np.intp]
     target: NDArray[np.intp]
     point: NDArray[np.intp]
+    """Which stamp, camera, target and point of the target each row is of, shape (N,)."""
     pixel: Array
+    """Shape (N, 2) [px]."""
     sigma: Array | None = None
+    """Standard deviation of each coordinate, where the detector tells it, shape (N,) [px]."""
     fitted: Fitted | None = None
+    """What was found of lenses when poses were made of them."""
 
     def __post_init__(self) -> None:
         count = len(self.image)
@@ -207,11 +178,7 @@ def described(entry: Mapping[str, Any]) -> tuple[tuple[Camera, ...], tuple[Targe
     """
     Return the cameras and targets that `Sightings.as_mapping` gave.
 
-    Raises
-    ------
-    DataError
-        Something in it cannot be understood.
-
+    Raises DataError: something in it cannot be understood.
     """
     try:
         cameras = tuple(

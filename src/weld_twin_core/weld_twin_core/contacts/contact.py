@@ -27,20 +27,6 @@ class Contact:
     """
     One thing that the tool point touches in many postures.
 
-    Attributes
-    ----------
-    kind : str
-        'point', 'length' (distance from a centre), 'sphere', 'line' or 'plane'.
-    radius : float, optional [m]
-        Of a sphere, from its centre to the tool point; unknown when left out.
-    at : tuple of 3 float, optional [m]
-        Where it is, in the frame that the base stands in: the point, the centre, or a point of the
-        face or the edge. Not known when left out.
-    axis : tuple of 3 float, optional
-        Normal of a plane or direction of a line that is known.
-    sigma : float [m]
-        Uncertainty of a known place.
-
     Raises
     ------
     DataError
@@ -50,10 +36,16 @@ class Contact:
 
     label: str
     kind: str = 'point'
+    """'point', 'length' (distance from a centre), 'sphere', 'line' or 'plane'."""
     radius: float | None = None
+    """Of a sphere, from its centre to the tool point [m]; unknown when left out."""
     at: tuple[float, float, float] | None = None
+    """Where it is, in the frame that the base stands in: the point, the centre, or a point of the
+    face or the edge [m]. Not known when left out."""
     axis: tuple[float, float, float] | None = None
+    """Normal of a plane or direction of a line that is known."""
     sigma: float = LOOSE
+    """Uncertainty of a known place [m]."""
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -94,22 +86,13 @@ class Contact:
 
 @dataclass(frozen=True)
 class Tie:
-    """
-    What is known between two contacts.
-
-    Attributes
-    ----------
-    between : tuple of str
-        Two labels.
-    value, sigma : float
-        Distance [m] of two points, centres or parallel planes, or angle [rad] of two planes, 0 of
-        parallel ones; its uncertainty.
-    kind : str
-        'distance' or 'angle'.
-
-    """
+    """What is known between two contacts."""
 
     between: tuple[str, str]
+    """Two labels."""
     value: float
     sigma: float = LOOSE
+    """Distance [m] of two points, centres or parallel planes, or angle [rad] of two planes, 0 of
+    parallel ones; its uncertainty."""
     kind: str = 'distance'
+    """'distance' or 'angle'."""

@@ -19,15 +19,6 @@ class Contacts:
     """
     Contacts of the tool point, one for every posture.
 
-    Attributes
-    ----------
-    labels : tuple of str
-        What each posture touched.
-    value : array, shape (M,) [m], optional
-        Measured distance from the centre, for contacts of kind 'length'; else ignored.
-    sigma : array, shape (M,) [m], optional
-        Standard deviation of each contact, where known.
-
     Raises
     ------
     DataError
@@ -37,8 +28,12 @@ class Contacts:
 
     artefact: Artefact
     labels: tuple[str, ...]
+    """What each posture touched."""
     value: Array | None = None
+    """Measured distance from the centre, for contacts of kind 'length', shape (M,) [m]; else
+    ignored."""
     sigma: Array | None = None
+    """Standard deviation of each contact, where known, shape (M,) [m]."""
 
     def __post_init__(self) -> None:
         for label in dict.fromkeys(self.labels):

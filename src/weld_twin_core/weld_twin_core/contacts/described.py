@@ -29,11 +29,7 @@ def described(entry: Mapping[str, Any]) -> tuple[tuple[Contact, ...], tuple[Tie,
     """
     Return the contacts and ties of an artefact file; see `Artefact.from_mapping`.
 
-    Raises
-    ------
-    DataError
-        Something in it cannot be understood; the message says what.
-
+    Raises DataError: something in it cannot be understood; the message says what.
     """
     if not isinstance(entry, Mapping) or not set(entry) <= set(ENTRIES):
         result = ', '.join(map(str, entry)) if isinstance(entry, Mapping) else 'no mapping'

@@ -28,20 +28,12 @@ unknowns are taken out."""
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """
-    Contacts where tool points put them.
-
-    Attributes
-    ----------
-    contacts : Contacts
-        Of one place: all of them with the same number of rows.
-    surfaces : tuple of Surface
-        In the order of the artefact.
-
-    """
+    """Contacts where tool points put them."""
 
     contacts: Contacts
+    """Of one place: all of them with the same number of rows."""
     surfaces: tuple[Surface, ...]
+    """In the order of the artefact."""
 
     def rows(self, points: Array) -> tuple[Array, Array, Array]:
         """

@@ -23,24 +23,15 @@ LEAST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """
-    A contact at the place where it is believed to be.
-
-    Attributes
-    ----------
-    point : array, shape (3,) [m]
-        The point, the centre, or a point of the plane or the line.
-    axis : array, shape (3,)
-        Normal of a plane or direction of a line; unit length.
-    radius : float [m]
-        Of a sphere.
-
-    """
+    """A contact at the place where it is believed to be."""
 
     contact: Contact
     point: Array
+    """The point, the centre, or a point of the plane or the line, shape (3,) [m]."""
     axis: Array
+    """Normal of a plane or direction of a line, shape (3,); unit length."""
     radius: float = 0.0
+    """Of a sphere [m]."""
 
     @classmethod
     def start(cls, contact: Contact, p: Array, value: Array | None) -> Surface:

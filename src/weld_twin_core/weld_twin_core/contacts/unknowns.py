@@ -32,23 +32,15 @@ RANK = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """
-    What one place has of unknowns, at one set of tool points.
-
-    Attributes
-    ----------
-    seen : array, shape (M, c, 3)
-        What each row sees of a displacement of the tool point.
-    free : array, shape (M, c, Z)
-        Change of each row with the unknowns.
-    ties : array, shape (T, Z)
-        Change of every known length and place with the unknowns, over its uncertainty [1/m].
-
-    """
+    """What one place has of unknowns, at one set of tool points."""
 
     seen: Array
+    """What each row sees of a displacement of the tool point, shape (M, c, 3)."""
     free: Array
+    """Change of each row with the unknowns, shape (M, c, Z)."""
     ties: Array
+    """Change of every known length and place with the unknowns, over its uncertainty [1/m], shape
+    (T, Z)."""
 
     def eliminated(self, unit: Array) -> tuple[Array, Array]:
         """

@@ -56,11 +56,7 @@ def temperature(view: View, index: int) -> Array:
     """
     Return the recorded temperature, shape (N,) [degC].
 
-    Raises
-    ------
-    DataError
-        None was recorded.
-
+    Raises DataError: none was recorded.
     """
     if view.temperature is None:
         raise DataError('a curve over temperature needs one: record /temperature')
@@ -126,6 +122,9 @@ def check_knots(name: str, over: str, knots: Sequence[float], count: int) -> Non
     """
     Refuse a curve that is none.
 
+    Raises ModelError: it runs over something unknown, or knots do not increase, or not each has a
+    value.
+
     Parameters
     ----------
     name : str
@@ -136,11 +135,6 @@ def check_knots(name: str, over: str, knots: Sequence[float], count: int) -> Non
         Where it has values, in the unit of that quantity.
     count : int
         How many values it has.
-
-    Raises
-    ------
-    ModelError
-        It runs over something unknown, or knots do not increase, or not each has a value.
 
     """
     if over not in QUANTITIES:

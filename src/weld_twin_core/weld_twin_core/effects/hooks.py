@@ -28,20 +28,12 @@ JOINT_STEP = 1e-5
 
 @dataclass(frozen=True)
 class Waves:
-    """
-    Which orders of waves in its joint's angle an effect is searched for.
-
-    Attributes
-    ----------
-    dense : int
-        A fit of many small errors takes all orders up to this one along, in cycles per turn.
-    highest : int
-        Single lines are looked for up to this order.
-
-    """
+    """Which orders of waves in its joint's angle an effect is searched for."""
 
     dense: int
+    """A fit of many small errors takes all orders up to this one along, in cycles per turn."""
     highest: int
+    """Single lines are looked for up to this order."""
 
 
 @dataclass(frozen=True)

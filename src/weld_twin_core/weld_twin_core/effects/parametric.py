@@ -54,11 +54,7 @@ class Parametric:
         """
         Refuse parameters without physical meaning; they are looked at once.
 
-        Raises
-        ------
-        ModelError
-            Wrong length, not a number, or outside the bounds.
-
+        Raises ModelError: wrong length, not a number, or outside the bounds.
         """
         if '_sound' in self.__dict__:
             return

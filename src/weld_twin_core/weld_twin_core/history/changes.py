@@ -65,39 +65,25 @@ class Shape(NamedTuple):
 
 @dataclass(frozen=True)
 class Change:
-    """
-    A change of one coordinate.
-
-    Attributes
-    ----------
-    name : str
-        The coordinate.
-    kind : str
-        'step', 'trend' or 'season'.
-    day : float
-        Of the first diagnosis that shows a step; where a trend begins.
-    between : tuple of float
-        Earliest and latest day that explain it as well (95 %); of a step, the last day before.
-    size, std : float
-        Height of a step, rise of a trend in a day, half the swing of a season; SI units.
-    nats : float
-        By how much it is more likely than no change.
-    alike : tuple of str
-        Other coordinates whose change would explain the same.
-    since : float, optional
-        Of a step: earliest day from which a trend explains it as well; None where none does.
-
-    """
+    """A change of one coordinate."""
 
     name: str
+    """The coordinate."""
     kind: str
+    """'step', 'trend' or 'season'."""
     day: float
+    """Of the first diagnosis that shows a step; where a trend begins."""
     between: tuple[float, float]
+    """Earliest and latest day that explain it as well (95 %); of a step, the last day before."""
     size: float
     std: float
+    """Height of a step, rise of a trend in a day, half the swing of a season; SI units."""
     nats: float
+    """By how much it is more likely than no change."""
     alike: tuple[str, ...] = ()
+    """Other coordinates whose change would explain the same."""
     since: float | None = None
+    """Of a step: earliest day from which a trend explains it as well; None where none does."""
 
 
 class Found(NamedTuple):
@@ -117,6 +103,8 @@ def changes(
     """
     Return what changed, the surest first.
 
+    Raises DataError: there is no observation, or two are of the same instant.
+
     Parameters
     ----------
     named : collection of str
@@ -126,11 +114,6 @@ def changes(
         Coordinates that knocks, wear, service or warmth can change; they come before the others, too.
     alarms : float
         False alarms allowed in this look.
-
-    Raises
-    ------
-    DataError
-        There is no observation, or two are of the same instant.
 
     """
     series = series_of(observations)
@@ -163,21 +146,14 @@ def changes(
 
 
 class _Look(NamedTuple):
-    """
-    What is tried in one look, and how much each has to explain.
-
-    Attributes
-    ----------
-    bar : array, shape (shapes, P)
-    sooner : array, shape (P,)
-        Nats by which a coordinate goes before others that explain as much.
-
-    """
+    """What is tried in one look, and how much each has to explain."""
 
     series: Series
     shapes: list[Shape]
     bar: Array
+    """Shape (shapes, P)."""
     sooner: Array
+    """Nats by which a coordinate goes before others that explain as much, shape (P,)."""
 
     def next(self, result: Sequence[Found]) -> tuple[Found, Change] | None:
         """Return what explains most beside what was found, None if it is no more than chance."""

@@ -22,19 +22,12 @@ NEVER = float('inf')
 
 
 class Outlook(NamedTuple):
-    """
-    Where a coordinate is at the last diagnosis, and how fast it moves.
-
-    Attributes
-    ----------
-    value : array, shape (2,)
-        Value [SI], and rise in a day.
-    covariance : array, shape (2, 2)
-
-    """
+    """Where a coordinate is at the last diagnosis, and how fast it moves."""
 
     value: Array
+    """Value [SI], and rise in a day, shape (2,)."""
     covariance: Array
+    """Shape (2, 2)."""
 
 
 def outlook(
@@ -62,6 +55,8 @@ def reaches(limit: float, now: Outlook) -> tuple[float, float, float]:
     """
     Return in how many days a value reaches a limit: the median and a 90 % interval, ends included.
 
+    Raises DataError: the limit is not positive.
+
     Parameters
     ----------
     limit : float
@@ -71,11 +66,6 @@ def reaches(limit: float, now: Outlook) -> tuple[float, float, float]:
     -------
     tuple of float
         5 %, 50 % and 95 % of the days; 0 where it is beyond already, infinity where it never is.
-
-    Raises
-    ------
-    DataError
-        The limit is not positive.
 
     """
     if not limit > 0.0:

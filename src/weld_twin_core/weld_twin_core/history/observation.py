@@ -26,18 +26,6 @@ class Observation:
     """
     One diagnosis: values of coordinates, and how sure they are.
 
-    Attributes
-    ----------
-    day : float
-        When it was recorded [days]; the zero is the same for all.
-    names : tuple of str
-        Of the coordinates, such as 'joint_offset elbow_joint 0'; unique.
-    value : array, shape (P,)
-        SI units, counted from the model that was given.
-    covariance : array, shape (P, P)
-    prior_std : array, shape (P,)
-        What was believed of each before the data, about zero.
-
     Raises
     ------
     DataError
@@ -46,10 +34,15 @@ class Observation:
     """
 
     day: float
+    """When it was recorded [days]; the zero is the same for all."""
     names: tuple[str, ...]
+    """Of the coordinates, such as 'joint_offset elbow_joint 0'; unique."""
     value: Array
+    """SI units, counted from the model that was given, shape (P,)."""
     covariance: Array
+    """Shape (P, P)."""
     prior_std: Array
+    """What was believed of each before the data, about zero, shape (P,)."""
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -87,25 +80,17 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """
-    Observations over the same coordinates, in the order of time.
-
-    Attributes
-    ----------
-    days : array, shape (W,)
-    precision : array, shape (W, P, P)
-    told : array, shape (W, P)
-        Precision times value.
-    prior : array, shape (P,)
-        Precision of what was believed before any of them.
-
-    """
+    """Observations over the same coordinates, in the order of time."""
 
     days: Array
+    """Shape (W,)."""
     names: tuple[str, ...]
     precision: Array
+    """Shape (W, P, P)."""
     told: Array
+    """Precision times value, shape (W, P)."""
     prior: Array
+    """Precision of what was believed before any of them, shape (P,)."""
 
 
 def series_of(observations: Sequence[Observation]) -> Series:
@@ -115,11 +100,7 @@ def series_of(observations: Sequence[Observation]) -> Series:
     An effect that only some diagnoses name is taken to be zero in the others, as surely as three
     standard errors of those that name it.
 
-    Raises
-    ------
-    DataError
-        There are none, or two are of the same instant.
-
+    Raises DataError: there are none, or two are of the same instant.
     """
     if not observations:
         raise DataError('there is no diagnosis yet; add some first')

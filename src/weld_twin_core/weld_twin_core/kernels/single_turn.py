@@ -30,11 +30,8 @@ def quaternion_matrix(x: float, y: float, z: float, w: float, name: str) -> Arra
     """
     Return the rotation matrix, shape (3, 3), of a quaternion.
 
-    Raises
-    ------
-    DataError
-        It is not finite or its length is not 1 within 1 %; ``name`` says whose it is.
-
+    Raises DataError: it is not finite or its length is not 1 within 1 %; ``name`` says whose it
+    is.
     """
     square = x * x + y * y + z * z + w * w
     if not UNIT[0] < square < UNIT[1]:

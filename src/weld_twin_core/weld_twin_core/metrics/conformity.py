@@ -14,23 +14,14 @@ SURE = 0.95
 
 @dataclass(frozen=True)
 class Rule:
-    """
-    A tolerance and how well deviations are known.
-
-    Attributes
-    ----------
-    tolerance_m : float or None
-        Largest deviation allowed; None where nobody has said.
-    uncertainty_m : float
-        Standard uncertainty of one measured deviation.
-    readings : int
-        Readings of which the largest is judged.
-
-    """
+    """A tolerance and how well deviations are known."""
 
     tolerance_m: float | None
+    """Largest deviation allowed; None where nobody has said."""
     uncertainty_m: float
+    """Standard uncertainty of one measured deviation."""
     readings: int = 1
+    """Readings of which the largest is judged."""
 
     @property
     def to_pass(self) -> float:

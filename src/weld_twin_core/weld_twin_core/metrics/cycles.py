@@ -36,62 +36,42 @@ END = 0.1
 
 
 class Stop(NamedTuple):
-    """
-    What was measured while the arm stood.
-
-    Attributes
-    ----------
-    t : float [s]
-    q : array, shape (n,)
-        Where the joints were commanded to be.
-    position : array, shape (3,) [m]
-    rotation : array, shape (3, 3), or None
-
-    """
+    """What was measured while the arm stood."""
 
     t: float
+    """[s]"""
     q: Array
+    """Where the joints were commanded to be, shape (n,)."""
     position: Array
+    """Shape (3,) [m]."""
     rotation: Array | None
+    """Shape (3, 3), or None."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseCycles:
-    """
-    The stops at one commanded pose.
-
-    Attributes
-    ----------
-    q : array, shape (n,)
-        The commanded joint positions of the first of them.
-    command : array, shape (4, 4)
-        The pose the robot should then have.
-    t : array, shape (cycles,) [s]
-    attained : array, shape (cycles, 3) [m]
-        Measured positions, each less what its own command differs from that of the first.
-    rotation : array, shape (cycles, 3, 3), or None
-    came_from : tuple of int
-        Number of the pose that the arm stood at before; -1 for the first stop of all.
-
-    """
+    """The stops at one commanded pose."""
 
     q: Array
+    """The commanded joint positions of the first of them, shape (n,)."""
     command: Array
+    """The pose the robot should then have, shape (4, 4)."""
     t: Array
+    """Shape (cycles,) [s]."""
     attained: Array
+    """Measured positions, each less what its own command differs from that of the first, shape
+    (cycles, 3) [m]."""
     rotation: Array | None
+    """Shape (cycles, 3, 3), or None."""
     came_from: tuple[int, ...]
+    """Number of the pose that the arm stood at before; -1 for the first stop of all."""
 
 
 def measured_of(recording: Recording) -> Measurements:
     """
     Return the measurements of a recording.
 
-    Raises
-    ------
-    DataError
-        It has none.
-
+    Raises DataError: it has none.
     """
     if recording.measured is None or recording.measured.t.size == 0:
         raise DataError(f'{recording.name} holds no measured poses or points')
@@ -102,15 +82,12 @@ def stops(recording: Recording) -> list[Stop]:
     """
     Return where the arm stood and was measured, in order of time.
 
+    Raises DataError: nothing was measured.
+
     Parameters
     ----------
     recording : Recording
         Static, or of a motion in which the arm stands now and then.
-
-    Raises
-    ------
-    DataError
-        Nothing was measured.
 
     """
     measured, joints = measured_of(recording), recording.joints

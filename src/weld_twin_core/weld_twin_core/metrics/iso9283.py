@@ -230,6 +230,8 @@ def normal_plane_crossings(
 
     Of several passes the one nearest to the command point counts.
 
+    Raises DataError: the path never passes one of the planes.
+
     Parameters
     ----------
     path : array_like, shape (K, 3) [m]
@@ -239,11 +241,6 @@ def normal_plane_crossings(
         Direction of the command path there; its length does not matter.
     name : str
         How the message names the path.
-
-    Raises
-    ------
-    DataError
-        The path never passes one of the planes.
 
     """
     points = readonly(path, (None, 3), 'attained path')

@@ -55,38 +55,28 @@ class Span(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PathCycles:
-    """
-    The cycles of one commanded path.
-
-    Attributes
-    ----------
-    arc : array, shape (m,) [m]
-        Length of the path to each point of evaluation.
-    command : array, shape (m, 3) [m]
-    crossed : array, shape (cycles, m, 3) [m]
-        Where each cycle passed the plane square to the path at each point.
-
-    """
+    """The cycles of one commanded path."""
 
     spans: tuple[Span, ...]
     arc: Array
+    """Length of the path to each point of evaluation, shape (m,) [m]."""
     command: Array
+    """Shape (m, 3) [m]."""
     crossed: Array
+    """Where each cycle passed the plane square to the path at each point, shape (cycles, m, 3)
+    [m]."""
 
 
 def path_cycles(recording: Recording, robot: Robot) -> PathCycles | None:
     """
     Return the cycles of the path that is repeated for most of the time; None where none is.
 
+    Raises DataError: nothing was measured.
+
     Parameters
     ----------
     robot : Robot
         Tells where a commanded joint position should have brought the tool.
-
-    Raises
-    ------
-    DataError
-        Nothing was measured.
 
     """
     measured, joints = measured_of(recording), recording.joints

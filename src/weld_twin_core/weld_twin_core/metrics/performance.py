@@ -35,31 +35,21 @@ HOUR = 3600.0
 
 @dataclass(frozen=True, eq=False)
 class PoseTest:
-    """
-    One commanded pose and its criteria.
-
-    Attributes
-    ----------
-    q : array, shape (n,)
-    command : array, shape (3,) [m]
-    variation_m : float [m], optional
-        vAP: how far apart the pose is reached from different poses before it.
-    approaches : int
-        How many poses it was reached from, twice or more each.
-    drift : DriftPerformance, optional
-        dAP and dRP over groups of `DRIFT_CYCLES` cycles.
-    hours : float
-        From the first cycle to the last.
-
-    """
+    """One commanded pose and its criteria."""
 
     q: Array
+    """Shape (n,)."""
     command: Array
+    """Shape (3,) [m]."""
     performance: PosePerformance
     variation_m: float | None
+    """vAP: how far apart the pose is reached from different poses before it [m]."""
     approaches: int
+    """How many poses it was reached from, twice or more each."""
     drift: DriftPerformance | None
+    """dAP and dRP over groups of `DRIFT_CYCLES` cycles."""
     hours: float
+    """From the first cycle to the last."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers."""
@@ -76,23 +66,15 @@ class PoseTest:
 
 @dataclass(frozen=True, eq=False)
 class PathTest:
-    """
-    One commanded path and its criteria.
-
-    Attributes
-    ----------
-    arc, at, rt : array, shape (m,) [m]
-        Length of the path to each point, and accuracy and repeatability there.
-    seconds : float
-        From leaving the start of a cycle to being back near it, the median of them.
-
-    """
+    """One commanded path and its criteria."""
 
     performance: PathPerformance
     arc: Array
     at: Array
     rt: Array
+    """Length of the path to each point, and accuracy and repeatability there, shape (m,) [m]."""
     seconds: float
+    """From leaving the start of a cycle to being back near it, the median of them."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers."""
@@ -110,21 +92,13 @@ class PathTest:
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """
-    What a recording tells by the standard.
-
-    Attributes
-    ----------
-    poses : tuple of PoseTest
-        Those with two cycles or more.
-    lacking : tuple of str
-        What the standard asks for and the recording does not have, in sentences.
-
-    """
+    """What a recording tells by the standard."""
 
     poses: tuple[PoseTest, ...]
+    """Those with two cycles or more."""
     path: PathTest | None
     lacking: tuple[str, ...]
+    """What the standard asks for and the recording does not have, in sentences."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers; the worst pose counts for all, as in the standard."""
@@ -142,17 +116,14 @@ def performance_of(recording: Recording, robot: Robot) -> Performance:
     """
     Return pose and path criteria of the cycles found in a recording.
 
+    Raises DataError: nothing was measured, or neither a pose nor a path is repeated.
+
     Parameters
     ----------
     recording : Recording
         Measured in the frame that the robot is placed in.
     robot : Robot
         Tells where each command should have brought the tool [m].
-
-    Raises
-    ------
-    DataError
-        Nothing was measured, or neither a pose nor a path is repeated.
 
     """
     groups = pose_cycles(stops(recording), robot)

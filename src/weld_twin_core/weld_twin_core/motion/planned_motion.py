@@ -28,34 +28,23 @@ _DIFFERENCE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class PlanReport:
-    """
-    What a plan asks of the robot.
-
-    Attributes
-    ----------
-    duration : float [s]
-    slowed : float
-        How much longer the motion takes than the profile wanted; 1 if as wanted.
-    velocity_use, acceleration_use : array, shape (n,)
-        Largest joint velocity and acceleration as part of the limit.
-    residual : float [m or rad]
-        Largest error of closure.
-    condition, manipulability, limit_margin : float
-        Worst along the seam; see `inverse.PathSolution`.
-    method : str
-        How the inverse kinematics was solved.
-
-    """
+    """What a plan asks of the robot."""
 
     duration: float
+    """[s]"""
     slowed: float
+    """How much longer the motion takes than the profile wanted; 1 if as wanted."""
     velocity_use: Array
     acceleration_use: Array
+    """Largest joint velocity and acceleration as part of the limit, shape (n,)."""
     residual: float
+    """Largest error of closure [m or rad]."""
     condition: float
     manipulability: float
     limit_margin: float
+    """Worst along the seam; see `inverse.PathSolution`."""
     method: str
+    """How the inverse kinematics was solved."""
 
 
 @dataclass(frozen=True, eq=False)

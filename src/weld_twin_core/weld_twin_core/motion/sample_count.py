@@ -17,14 +17,11 @@ def refuse_endless(duration: float, dt: float, most: int = MOST_SAMPLES) -> None
     """
     Refuse a motion of more samples than make sense.
 
+    Raises PathError: it would have more samples than that.
+
     Parameters
     ----------
     duration, dt : float [s]
-
-    Raises
-    ------
-    PathError
-        It would have more samples than that.
 
     """
     if not duration <= most * dt:

@@ -30,11 +30,7 @@ def path_tangents(position: ArrayLike) -> Array:
     The chord between the neighbours of each sample; at rest, the last direction of travel (at a
     rest before the start, the first).
 
-    Raises
-    ------
-    DataError
-        The positions do not move.
-
+    Raises DataError: the positions do not move.
     """
     points = readonly(position, (None, 3), 'path positions')
     index = np.arange(len(points))
@@ -53,15 +49,12 @@ def seam_axes(tangent: ArrayLike, normal: ArrayLike) -> Array:
     """
     Return seam axes as rows along, across, normal, shape (..., 3, 3).
 
+    Raises DataError: a tangent is zero, or a normal lies along its tangent.
+
     Parameters
     ----------
     tangent, normal : array_like, shape (..., 3)
         Of any length; the normal is made square to the tangent.
-
-    Raises
-    ------
-    DataError
-        A tangent is zero, or a normal lies along its tangent.
 
     """
     along, normal = np.broadcast_arrays(
@@ -79,17 +72,14 @@ def seam_components(deviation: ArrayLike, tangent: ArrayLike, normal: ArrayLike)
     """
     Return deviations as components along, across and normal to a seam, shape (..., 3) [m].
 
+    Raises DataError: a tangent is zero, or a normal lies along its tangent.
+
     Parameters
     ----------
     deviation : array_like, shape (..., 3) [m]
         In the world frame.
     tangent, normal : array_like, shape (3,) or (..., 3)
         Directions of the travel and out of the work; their lengths do not matter.
-
-    Raises
-    ------
-    DataError
-        A tangent is zero, or a normal lies along its tangent.
 
     """
     vector = np.asarray(deviation, dtype=np.float64)

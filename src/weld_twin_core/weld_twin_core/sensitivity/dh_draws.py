@@ -31,21 +31,12 @@ VALUES = {
 
 @dataclass(frozen=True, eq=False)
 class DhStudy:
-    """
-    A study whose tolerances are all of DH values.
-
-    Attributes
-    ----------
-    study : Study
-    tolerances : tuple of Tolerance
-    seam : SeamDraws
-        The nominal robot at the samples of the study.
-
-    """
+    """A study whose tolerances are all of DH values."""
 
     study: Study
     tolerances: tuple[Tolerance, ...]
     seam: SeamDraws
+    """The nominal robot at the samples of the study."""
 
     def deviations(self, draws: Array) -> Array:
         """

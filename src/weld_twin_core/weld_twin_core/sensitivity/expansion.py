@@ -39,35 +39,21 @@ _RANK = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """
-    The study around its nominal motion.
-
-    Attributes
-    ----------
-    study : Study
-    tolerances : tuple of Tolerance
-    scale : array, shape (P,)
-        Errors are counted in units of these.
-    products : pair of arrays, shape (F,)
-        Which two errors every quadratic feature multiplies.
-    weights : array, shape (P + F, R)
-        From features to strengths of the shapes.
-    shapes : array, shape (3, R, N) [m]
-        Along, across and normal.
-    memory : tuple of Remembered
-    moved : array, shape (joints with memory, 3, N)
-        How far the tool goes with each joint.
-
-    """
+    """The study around its nominal motion."""
 
     study: Study
     tolerances: tuple[Tolerance, ...]
     scale: Array
+    """Errors are counted in units of these, shape (P,)."""
     products: Pairs
+    """Which two errors every quadratic feature multiplies, shape (F,)."""
     weights: Array
+    """From features to strengths of the shapes, shape (P + F, R)."""
     shapes: Array
+    """Along, across and normal, shape (3, R, N) [m]."""
     memory: tuple[Remembered, ...]
     moved: Array
+    """How far the tool goes with each joint, shape (joints with memory, 3, N)."""
 
     def deviations(self, draws: Array) -> Array:
         """Return deviations along, across and normal, shape (3, D, N) [m], of draws (D, P)."""

@@ -61,27 +61,15 @@ class Rest(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Remembered:
-    """
-    The memory of one joint.
-
-    Attributes
-    ----------
-    study : Study
-    joint : int
-    columns : tuple of int
-        Which tolerances of the study are its own, M of them.
-    tolerances : tuple of Tolerance
-        These.
-    slope : array, shape (M, N)
-        Displacement per unit of each at its typical size.
-
-    """
+    """The memory of one joint."""
 
     study: Study
     joint: int
     columns: tuple[int, ...]
+    """Which tolerances of the study are its own, M of them."""
     tolerances: tuple[Tolerance, ...]
     slope: Array
+    """Displacement per unit of each at its typical size, shape (M, N)."""
 
     def left(self, own: Array) -> Array:
         """Return what the slope leaves of the displacements by draws (D, M), shape (D, N)."""

@@ -63,11 +63,7 @@ def refuse_unfinite(values: Array, what: str) -> None:
     """
     Refuse model results that are not numbers.
 
-    Raises
-    ------
-    DataError
-        Says how many there are and which run is the first.
-
+    Raises DataError: says how many there are and which run is the first.
     """
     bad = ~np.isfinite(values)
     if bad.any():

@@ -114,11 +114,7 @@ class BackgroundBag:
         """
         Write what waits and finish the bag.
 
-        Raises
-        ------
-        TwinError
-            It could not all be written.
-
+        Raises TwinError: it could not all be written.
         """
         self.end()
         self._thread.join(CLOSED_WITHIN)

@@ -40,18 +40,15 @@ def blocks(reader: Reader, topics: Mapping[int, str]) -> Iterator[tuple[str, np.
     """
     Yield topic and messages, shape (N, size), in the order in which each topic was recorded.
 
+    Raises Unusual: messages of a topic differ in size, were not recorded in order, or lie where
+    the index does not tell.
+
     Parameters
     ----------
     reader : Reader
         Open, of one storage file.
     topics : mapping of int to str
         Names by the number that connections have in it.
-
-    Raises
-    ------
-    Unusual
-        Messages of a topic differ in size, were not recorded in order, or lie where the index
-        does not tell.
 
     """
     storage: Any = reader.storage
@@ -137,11 +134,7 @@ def _checked(
     """
     Return the sizes of the records of each channel.
 
-    Raises
-    ------
-    Unusual
-        The index does not name every message of the chunk, or names what is none.
-
+    Raises Unusual: the index does not name every message of the chunk, or names what is none.
     """
     sizes = {}
     for number, begin in at.items():

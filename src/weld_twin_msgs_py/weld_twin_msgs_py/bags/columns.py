@@ -56,11 +56,7 @@ class Stream:
         """
         Count a message that gives no sample, by what is wrong with it.
 
-        Raises
-        ------
-        DataError
-            Its stamp is so far behind that the clock was set.
-
+        Raises DataError: its stamp is so far behind that the clock was set.
         """
         if isinstance(error, Unstamped):
             self._unstamped += 1
@@ -85,11 +81,7 @@ class Stream:
         """
         Return the samples.
 
-        Raises
-        ------
-        DataError
-            There are none; the message says what all of its messages lack.
-
+        Raises DataError: there are none; the message says what all of its messages lack.
         """
         if not len(self):
             for _, sentence in self._other.values():

@@ -33,12 +33,8 @@ def marks(bag: BagReader, names: TopicNames) -> list[Mark]:
     """
     Return the contacts of a bag, in the order of their stamps; none where it holds none.
 
-    Raises
-    ------
-    DataError
-        A contact has no label or no stamp, two have the same stamp, or the topic is of another
-        type.
-
+    Raises DataError: a contact has no label or no stamp, two have the same stamp, or the topic is
+    of another type.
     """
     kind, count = bag.topics.get(names.contact, ('', 0))
     if not count:
@@ -70,6 +66,8 @@ def touching(recording: Recording, each: list[Mark], made: Mapping[str, Any]) ->
     """
     Return the recording as stations, one for every contact.
 
+    Raises DataError: a contact lies outside the joint states, or is not in the artefact.
+
     Parameters
     ----------
     recording : Recording
@@ -77,11 +75,6 @@ def touching(recording: Recording, each: list[Mark], made: Mapping[str, Any]) ->
     made : mapping
         How the bag was made; may hold the artefact. Without one every label is a point, or a
         length where the messages hold one.
-
-    Raises
-    ------
-    DataError
-        A contact lies outside the joint states, or is not in the artefact.
 
     """
     ns = np.array([mark.ns for mark in each])

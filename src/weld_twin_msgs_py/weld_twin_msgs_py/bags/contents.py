@@ -32,44 +32,31 @@ from .reader import BagReader
 
 @dataclass(frozen=True)
 class TopicInfo:
-    """
-    One topic of a bag.
-
-    Attributes
-    ----------
-    start_ns, end_ns : int, optional [ns]
-        Earliest and latest stamp.
-    rate_hz : float, optional
-        From the median step; where they come in bursts the rate underneath; None with fewer than two
-        messages.
-    gaps : int
-        Steps longer than `GAP` median steps.
-    longest_gap_s : float [s]
-    unordered, repeated, unstamped : int
-        Messages that go back in time, repeat the stamp before, or have none.
-    header : bool
-        The stamps are those of headers, not of the recorder's clock.
-    sent : Bursts, optional
-        How they come, where that is in bursts.
-    use : str
-        What a diagnosis takes it for; empty for a topic it does not know.
-
-    """
+    """One topic of a bag."""
 
     name: str
     type: str
     count: int
     use: str = ''
+    """What a diagnosis takes it for; empty for a topic it does not know."""
     start_ns: int | None = None
     end_ns: int | None = None
+    """Earliest and latest stamp [ns]."""
     rate_hz: float | None = None
+    """From the median step; where they come in bursts the rate underneath; None with fewer than
+    two messages."""
     gaps: int = 0
+    """Steps longer than `GAP` median steps."""
     longest_gap_s: float = 0.0
+    """[s]"""
     unordered: int = 0
     repeated: int = 0
     unstamped: int = 0
+    """Messages that go back in time, repeat the stamp before, or have none."""
     header: bool = False
+    """The stamps are those of headers, not of the recorder's clock."""
     sent: Bursts | None = None
+    """How they come, where that is in bursts."""
 
 
 @dataclass(frozen=True)

@@ -70,11 +70,7 @@ class GrowingBag:
         """
         Start the bag.
 
-        Raises
-        ------
-        DataError
-            Something of that name exists, or the place cannot be written.
-
+        Raises DataError: something of that name exists, or the place cannot be written.
         """
         self._refuse_existing()
         with clear_write_errors(self.path):
@@ -89,11 +85,7 @@ class GrowingBag:
         """
         Add to the provenance of the open bag, or change it.
 
-        Raises
-        ------
-        DataError
-            The disk refuses.
-
+        Raises DataError: the disk refuses.
         """
         self._provenance[key] = value
         with self._clear_errors():
@@ -107,11 +99,7 @@ class GrowingBag:
         """
         Write a serialised message, as a raw subscription receives it.
 
-        Raises
-        ------
-        DataError
-            The bag is not open, or the disk refuses.
-
+        Raises DataError: the bag is not open, or the disk refuses.
         """
         segments = self._opened()
         with self._clear_errors():
@@ -124,11 +112,7 @@ class GrowingBag:
         """
         Put what was written on the disk, where it outlives this process and a power cut.
 
-        Raises
-        ------
-        DataError
-            The bag is not open, or the disk refuses.
-
+        Raises DataError: the bag is not open, or the disk refuses.
         """
         segments = self._opened()
         with self._clear_errors():
@@ -138,11 +122,7 @@ class GrowingBag:
         """
         Finish the bag and give it its name; what cannot be finished stays as it is.
 
-        Raises
-        ------
-        DataError
-            Something of that name has appeared meanwhile, or the disk refuses.
-
+        Raises DataError: something of that name has appeared meanwhile, or the disk refuses.
         """
         if self._segments is None:
             return
@@ -216,11 +196,7 @@ def lock(folder: Path) -> int:
     """
     Return a descriptor that holds a directory; the end of the process lets go of it.
 
-    Raises
-    ------
-    DataError
-        Another process holds it.
-
+    Raises DataError: another process holds it.
     """
     descriptor = os.open(folder, os.O_RDONLY)
     try:

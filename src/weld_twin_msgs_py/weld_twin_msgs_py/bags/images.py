@@ -33,11 +33,7 @@ def images(bag: BagReader, names: TopicNames) -> list[Image]:
     """
     Return the images of a bag, in the order of their stamps; none where it holds none.
 
-    Raises
-    ------
-    DataError
-        The topic is of another type, or a message has no stamp or no such fields.
-
+    Raises DataError: the topic is of another type, or a message has no stamp or no such fields.
     """
     kind, count = bag.topics.get(names.images, ('', 0))
     if not count:
@@ -62,6 +58,8 @@ def looking(
     """
     Return the recording with poses that its images tell.
 
+    Raises DataError: a camera, a target or a point is not described, or the images tell no poses.
+
     Parameters
     ----------
     recording : Recording
@@ -70,11 +68,6 @@ def looking(
         May describe cameras and targets.
     made : mapping
         How the bag was made; may describe them too.
-
-    Raises
-    ------
-    DataError
-        A camera, a target or a point is not described, or the images tell no poses.
 
     """
     cameras, targets = _described(names, made)

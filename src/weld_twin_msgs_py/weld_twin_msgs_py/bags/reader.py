@@ -69,11 +69,7 @@ class BagReader:
         """
         Open the storage.
 
-        Raises
-        ------
-        DataError
-            Nothing is there, it is no bag, or it is damaged.
-
+        Raises DataError: nothing is there, it is no bag, or it is damaged.
         """
         try:
             with clear_errors(self.path):
@@ -101,11 +97,7 @@ class BagReader:
         """
         Yield the messages of some topics, in the order of recording.
 
-        Raises
-        ------
-        DataError
-            The bag turns out to be damaged on the way.
-
+        Raises DataError: the bag turns out to be damaged on the way.
         """
         with clear_errors(self.path):
             for topic, kind, log_ns, data in self.raw(topics):
@@ -115,11 +107,7 @@ class BagReader:
         """
         Return a message by the definition of Jazzy, or by that of the bag where Jazzy has none.
 
-        Raises
-        ------
-        DataError
-            Nobody says what such a message is.
-
+        Raises DataError: nobody says what such a message is.
         """
         if kind in TYPES.fielddefs:
             return decode(data, kind)
@@ -130,11 +118,7 @@ class BagReader:
         """
         Yield topic, type, time of recording [ns] and serialised message of some topics.
 
-        Raises
-        ------
-        DataError
-            The bag turns out to be damaged on the way.
-
+        Raises DataError: the bag turns out to be damaged on the way.
         """
         with clear_errors(self.path):
             for reader in self._readers:
@@ -155,11 +139,7 @@ class BagReader:
 
         A message without a header, or of an unknown type, gives the time of its recording.
 
-        Raises
-        ------
-        DataError
-            The bag turns out to be damaged on the way.
-
+        Raises DataError: the bag turns out to be damaged on the way.
         """
         with clear_errors(self.path):
             for reader in self._readers:

@@ -32,24 +32,15 @@ _SCRATCH = '.recovering'
 
 @dataclass(frozen=True)
 class Recovery:
-    """
-    What was recovered.
-
-    Attributes
-    ----------
-    source, path : Path
-        Where from, and the new bag.
-    messages : dict
-        How many of each topic.
-    damage : tuple of str
-        What was wrong, a sentence each.
-
-    """
+    """What was recovered."""
 
     source: Path
     path: Path
+    """Where from, and the new bag."""
     messages: dict[str, int]
+    """How many of each topic."""
     damage: tuple[str, ...]
+    """What was wrong, a sentence each."""
 
 
 def recover(path: Path | str, out: Path | str | None = None) -> Recovery:

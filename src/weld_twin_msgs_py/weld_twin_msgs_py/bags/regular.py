@@ -40,11 +40,7 @@ class _Topic:
         """
         Take messages, shape (N, size).
 
-        Raises
-        ------
-        Unusual
-            One of them has to be looked at by itself.
-
+        Raises Unusual: one of them has to be looked at by itself.
         """
         first = self._first(block, bag, intake) if self._layout is None else None
         if self._layout is None or block.shape[1] != self._layout.size:

@@ -125,23 +125,15 @@ class _Writer(Writer):
 
 
 class Channel(NamedTuple):
-    """
-    What the messages of one topic are.
-
-    Attributes
-    ----------
-    definition : str
-        Text of a message definition that Jazzy does not know, with its hash; else empty.
-    qos : tuple
-        As offered; empty for what the table of topics says.
-
-    """
+    """What the messages of one topic are."""
 
     topic: str
     type: str
     definition: str = ''
+    """Text of a message definition that Jazzy does not know, with its hash; else empty."""
     digest: str = ''
     qos: tuple[Qos, ...] = ()
+    """As offered; empty for what the table of topics says."""
 
 
 class Segment:
@@ -185,11 +177,7 @@ class Segment:
         """
         Return the connection of a channel, made when it is new.
 
-        Raises
-        ------
-        DataError
-            Nobody knows its type.
-
+        Raises DataError: nobody knows its type.
         """
         known = self._connections.get(channel[:2])
         if known is None:
@@ -307,11 +295,7 @@ def check_storage(storage: str) -> str:
     """
     Return the name of a storage.
 
-    Raises
-    ------
-    DataError
-        There is no such storage.
-
+    Raises DataError: there is no such storage.
     """
     if storage not in STORAGES:
         raise DataError(f'storage must be one of {", ".join(STORAGES)}, got {storage!r}')

@@ -26,36 +26,22 @@ _Loader: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
 class Bag(NamedTuple):
-    """
-    Where a bag lies.
-
-    Attributes
-    ----------
-    files : list of Path
-        Storage files, in the order they were written.
-    custom : dict
-        The ``custom_data`` of its metadata.
-    packed : bool
-        Messages are compressed one by one.
-
-    """
+    """Where a bag lies."""
 
     files: list[Path]
+    """Storage files, in the order they were written."""
     custom: dict[str, str]
+    """The ``custom_data`` of its metadata."""
     packed: bool = False
+    """Messages are compressed one by one."""
 
 
 def look(path: Path) -> Bag:
     """
     Return what a path to a bag stands for.
 
-    Raises
-    ------
-    DataError
-        Nothing is there, it is no bag, or it is not finished.
-    ValueError, KeyError, TypeError, OSError, yaml.YAMLError
-        Its metadata is damaged.
-
+    Raises DataError: nothing is there, it is no bag, or it is not finished. Raises ValueError,
+    KeyError, TypeError, OSError, yaml.YAMLError: its metadata is damaged.
     """
     refuse_unfinished(path)
     if path.suffix == '.bag' and not path.is_dir():
@@ -84,11 +70,7 @@ def refuse_unfinished(path: Path) -> None:
     """
     Refuse what is not there, and say so if it is there under the name of a growing bag.
 
-    Raises
-    ------
-    DataError
-        There is no bag, or it is not finished.
-
+    Raises DataError: there is no bag, or it is not finished.
     """
     growing = path if is_growing(path) else unfinished(path)
     named = growing.with_name(growing.name.removesuffix(UNFINISHED))

@@ -42,15 +42,12 @@ def unzstd(data: bytes, size: int | None = None) -> bytes:
     """
     Return the content of a zstd frame.
 
+    Raises DataError: it is larger than declared or than can be meant.
+
     Parameters
     ----------
     size : int, optional
         What is declared beside it.
-
-    Raises
-    ------
-    DataError
-        It is larger than declared or than can be meant.
 
     """
     limit = _limit(data, size)
@@ -67,11 +64,7 @@ def unpack_file(packed: Path, out: Path) -> None:
     """
     Unpack a zstd file.
 
-    Raises
-    ------
-    DataError
-        It holds more than can be meant, or than there is room for.
-
+    Raises DataError: it holds more than can be meant, or than there is room for.
     """
     most = max(SMALL, RATIO * packed.stat().st_size)
     free = shutil.disk_usage(out.parent).free

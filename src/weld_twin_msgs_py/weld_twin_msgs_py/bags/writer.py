@@ -63,11 +63,7 @@ class BagWriter:
         """
         Start the bag.
 
-        Raises
-        ------
-        DataError
-            Something of that name exists, or the place cannot be written.
-
+        Raises DataError: something of that name exists, or the place cannot be written.
         """
         self._refuse_existing()
         with self._clear_errors():
@@ -94,11 +90,7 @@ class BagWriter:
         """
         Write a serialised message, as a raw subscription receives it.
 
-        Raises
-        ------
-        DataError
-            The bag is not open, or the disk refuses.
-
+        Raises DataError: the bag is not open, or the disk refuses.
         """
         segment = self._opened()
         with self._clear_errors():
@@ -108,11 +100,7 @@ class BagWriter:
         """
         Write many messages: time of recording [ns], topic, type and serialised message of each.
 
-        Raises
-        ------
-        DataError
-            The bag is not open, or the disk refuses.
-
+        Raises DataError: the bag is not open, or the disk refuses.
         """
         segment = self._opened()
         channels: dict[tuple[str, str], Channel] = {}
@@ -133,11 +121,7 @@ class BagWriter:
         """
         Finish the bag and put it in its place.
 
-        Raises
-        ------
-        DataError
-            Something of that name has appeared meanwhile, or the disk refuses.
-
+        Raises DataError: something of that name has appeared meanwhile, or the disk refuses.
         """
         if self._segment is None or self._scratch is None:
             return

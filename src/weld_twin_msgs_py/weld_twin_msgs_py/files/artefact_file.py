@@ -16,11 +16,7 @@ def read_artefact(path: Path | str) -> Artefact:
     """
     Return the artefact that a YAML file describes; see `Artefact.from_mapping`.
 
-    Raises
-    ------
-    ModelError
-        The file cannot be read or understood; the message names the file.
-
+    Raises ModelError: the file cannot be read or understood; the message names the file.
     """
     entry = read_yaml(path, 'artefact file')
     try:

@@ -33,11 +33,7 @@ def read_diagnosis(path: Path | str) -> dict[str, Any]:
     """
     Return the content of a diagnosis file.
 
-    Raises
-    ------
-    ModelError
-        The file cannot be read, is no JSON, or is no diagnosis.
-
+    Raises ModelError: the file cannot be read, is no JSON, or is no diagnosis.
     """
     try:
         with Path(path).open('rb') as file:
@@ -62,11 +58,8 @@ def read_model(robot: Robot, path: Path | str) -> Model:
     """
     Return the model of a diagnosis file, on the robot it was made for.
 
-    Raises
-    ------
-    ModelError
-        The file is no diagnosis, holds no model, or its effects do not fit the robot.
-
+    Raises ModelError: the file is no diagnosis, holds no model, or its effects do not fit the
+    robot.
     """
     content = read_diagnosis(path)
     model = content.get('model')
@@ -164,6 +157,8 @@ def mended_source(
     Where something was measured, the measurements tell whether it needs that: a source that was
     put right meanwhile is left as it is.
 
+    Raises ModelError: the file's corrections do not fit the recording.
+
     Parameters
     ----------
     model : Model
@@ -178,11 +173,6 @@ def mended_source(
     recording : Recording
     told : str
         A sentence; empty where nothing had to be mended.
-
-    Raises
-    ------
-    ModelError
-        The file's corrections do not fit the recording.
 
     """
     if not model.mends:
@@ -213,6 +203,8 @@ def load_model(robot: Robot, path: Path | str, setup: int = 0) -> Twin:
     """
     Return the twin of a diagnosis file: fitted frames, effects given and effects found.
 
+    Raises ModelError: the file holds no usable model, or has no such set-up.
+
     Parameters
     ----------
     robot : Robot
@@ -222,11 +214,6 @@ def load_model(robot: Robot, path: Path | str, setup: int = 0) -> Twin:
     setup : int
         Which recording's base frame, in the order of the diagnosis; they differ where the
         set-up moved between recordings.
-
-    Raises
-    ------
-    ModelError
-        The file holds no usable model, or has no such set-up.
 
     """
     model = read_model(robot, path)

@@ -31,11 +31,7 @@ def hashed(use: str, path: Path | str) -> InputFile:
     """
     Return an input with its hash; of a directory, over names and contents of its files in order.
 
-    Raises
-    ------
-    DataError
-        It cannot be read.
-
+    Raises DataError: it cannot be read.
     """
     place = Path(path)
     digest = hashlib.sha256()

@@ -22,23 +22,15 @@ _TOLD = re.compile(
 
 
 class Instrument(NamedTuple):
-    """
-    Largest permissible error of a coordinate.
-
-    Attributes
-    ----------
-    least : float [m]
-    per_metre : float [m/m]
-        What comes on top for every metre between instrument and point.
-    away : float [m], optional
-        How far away the points are; left out, from the origin of the measuring frame.
-
-    """
+    """Largest permissible error of a coordinate."""
 
     least: float
+    """[m]"""
     per_metre: float
+    """What comes on top for every metre between instrument and point [m/m]."""
     source: str
     away: float | None = None
+    """How far away the points are [m]; left out, from the origin of the measuring frame."""
 
 
 _ISO = 'transverse error by ISO 10360-10'
@@ -56,16 +48,13 @@ def instrument(given: str) -> Instrument:
     """
     Return an instrument by name, or by what its certificate says.
 
+    Raises DataError: it is neither.
+
     Parameters
     ----------
     given : str
         A name of `INSTRUMENTS`, or the largest permissible error such as ``0.015+0.006/m`` [mm];
         ``@3`` behind either says that the points are 3 m away.
-
-    Raises
-    ------
-    DataError
-        It is neither.
 
     """
     name, _, away = given.partition('@')
@@ -89,15 +78,12 @@ def measured_by(recording: Recording, what: Instrument, *, own_frame: bool) -> R
     """
     Return a recording whose measurements are as sure as an instrument's.
 
+    Raises DataError: nothing says how far away the points were.
+
     Parameters
     ----------
     own_frame : bool
         Whether the measuring frame is the instrument's own.
-
-    Raises
-    ------
-    DataError
-        Nothing says how far away the points were.
 
     """
     seen = recording.measured

@@ -57,11 +57,7 @@ def read_joint_motion(path: Path | str, robot: Robot) -> tuple[Array, Array, boo
 
     None where the file holds a seam.
 
-    Raises
-    ------
-    DataError
-        It is not one of this robot, or not a motion.
-
+    Raises DataError: it is not one of this robot, or not a motion.
     """
     if Path(path).suffix.lower() not in ('.yaml', '.yml'):
         return None
@@ -91,17 +87,14 @@ def through_stations(robot: Robot, t: Array, q: Array, rate: float) -> JointMoti
     """
     Return the motion from station to station, at rest at each for a while.
 
+    Raises PathError: it would have more samples than make sense.
+
     Parameters
     ----------
     t : array, shape (K,) [s]
         When each is to be measured; the arm is late where the way or the stay takes longer.
     q : array, shape (K, n)
     rate : float [1/s]
-
-    Raises
-    ------
-    PathError
-        It would have more samples than make sense.
 
     """
     leave, arrive = [], [0.0]

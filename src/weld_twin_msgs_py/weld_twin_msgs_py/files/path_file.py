@@ -25,13 +25,7 @@ def read_path(path: FilePath | str) -> tuple[Path, Torch]:
 
     A CSV file has the columns x, y, z [m] with a header line.
 
-    Raises
-    ------
-    ModelError
-        The file cannot be read.
-    PathError
-        It does not describe a seam.
-
+    Raises ModelError: the file cannot be read. Raises PathError: it does not describe a seam.
     """
     try:
         if FilePath(path).suffix.lower() == '.csv':
@@ -50,14 +44,11 @@ def read_external(path: FilePath | str, robot: Robot) -> Array | None:
     ``external`` names joints of a positioner or a track, each with one position or with as many
     as the others, spread evenly along the seam. Joints of the chain before them stand at zero.
 
+    Raises PathError: it names no such joint, or its positions are none.
+
     Parameters
     ----------
     path : Path or str
-
-    Raises
-    ------
-    PathError
-        It names no such joint, or its positions are none.
 
     """
     data = None if FilePath(path).suffix.lower() == '.csv' else read_yaml(path, 'path file')

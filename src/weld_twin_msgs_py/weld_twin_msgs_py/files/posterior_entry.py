@@ -25,11 +25,7 @@ def read_posterior(robot: Robot, path: Path | str) -> Posterior | None:
     """
     Return the posterior of a diagnosis file; None where it was written without one.
 
-    Raises
-    ------
-    ModelError
-        The file is no diagnosis, or its posterior cannot be used with the robot.
-
+    Raises ModelError: the file is no diagnosis, or its posterior cannot be used with the robot.
     """
     entry = read_diagnosis(path).get('posterior')
     if entry is None:

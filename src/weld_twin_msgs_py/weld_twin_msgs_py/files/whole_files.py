@@ -28,11 +28,7 @@ def write_bytes(path: Path | str, content: bytes, *, overwrite: bool = False) ->
     """
     Write a file beside its place, then move it there; a link is followed.
 
-    Raises
-    ------
-    DataError
-        The file exists and ``overwrite`` is not set, or the place cannot be written.
-
+    Raises DataError: the file exists and ``overwrite`` is not set, or the place cannot be written.
     """
     target = followed(path)
     if target.exists() and not overwrite:

@@ -78,11 +78,8 @@ def read_text(path: Path | str, kind: str) -> str:
     """
     Return the text of a small file.
 
-    Raises
-    ------
-    ModelError
-        There is no such file, it is too large, or it is no text; ``kind`` names what was wanted.
-
+    Raises ModelError: there is no such file, it is too large, or it is no text; ``kind`` names
+    what was wanted.
     """
     try:
         data = _small(Path(path), kind)
@@ -105,11 +102,7 @@ def read_yaml(path: Path | str, kind: str) -> Any:
     """
     Return the data of a YAML file.
 
-    Raises
-    ------
-    ModelError
-        The file cannot be read or is malformed; the message names file and line.
-
+    Raises ModelError: the file cannot be read or is malformed; the message names file and line.
     """
     return parse_yaml(read_text(path, kind), f"{kind} '{path}'")
 
@@ -118,11 +111,7 @@ def parse_yaml(text: str, what: str) -> Any:
     """
     Return the data of YAML text; ``what`` names it in messages.
 
-    Raises
-    ------
-    ModelError
-        It is malformed; the message names the line.
-
+    Raises ModelError: it is malformed; the message names the line.
     """
     try:
         return yaml.load(text, Loader=_Loader)

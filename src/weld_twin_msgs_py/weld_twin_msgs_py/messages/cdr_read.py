@@ -125,11 +125,7 @@ class JointStateDecoder:
         """
         Return the joint state.
 
-        Raises
-        ------
-        DataError
-            The bytes are none.
-
+        Raises DataError: the bytes are none.
         """
         for head, (frame, name, body, at, end, reported) in self._known.items():
             if data.startswith(head, _STAMP_END) and 0 <= len(data) - end < _MORE:
@@ -244,11 +240,7 @@ def decoded(kind: str, read: Callable[[_Cursor], Any], data: bytes) -> Any:
     """
     Return what a reader makes of a serialised message.
 
-    Raises
-    ------
-    DataError
-        The bytes are no message of the type.
-
+    Raises DataError: the bytes are no message of the type.
     """
     try:
         return read(_Cursor(data))

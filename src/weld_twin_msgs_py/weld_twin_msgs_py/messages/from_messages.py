@@ -37,11 +37,7 @@ def stamp_ns(message: Any) -> int:
     """
     Return the header stamp [ns].
 
-    Raises
-    ------
-    Unstamped
-        The stamp was never set, or is not a time.
-
+    Raises Unstamped: the stamp was never set, or is not a time.
     """
     stamp = message.header.stamp
     ns = int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
@@ -79,12 +75,8 @@ def joint_positions(message: Any, joint_names: Sequence[str]) -> Array:
 
     Order does not matter and further joints are left out.
 
-    Raises
-    ------
-    DataError
-        A joint is missing (the message names it and those present), there are fewer positions
-        than names, or a position is not finite.
-
+    Raises DataError: a joint is missing (the message names it and those present), there are fewer
+    positions than names, or a position is not finite.
     """
     index = _indices(tuple(message.name), tuple(joint_names))
     values = message.position
@@ -105,11 +97,7 @@ def joint_velocities(message: Any, joint_names: Sequence[str]) -> Array | None:
     joint_state_broadcaster writes NaN for a joint without a velocity interface, so NaN means
     unknown here; an infinite velocity is refused.
 
-    Raises
-    ------
-    DataError
-        A velocity is infinite.
-
+    Raises DataError: a velocity is infinite.
     """
     values = message.velocity
     if len(values) != len(message.name):
@@ -126,11 +114,7 @@ def joint_efforts(message: Any, joint_names: Sequence[str]) -> Array:
     """
     Return the measured efforts of the joints, shape (n,) [N m, or N of a slide].
 
-    Raises
-    ------
-    DataError
-        None is told, there are fewer efforts than names, or one is not finite.
-
+    Raises DataError: none is told, there are fewer efforts than names, or one is not finite.
     """
     values = getattr(message, 'effort', ())
     if not len(values):
@@ -168,11 +152,7 @@ def pose(message: Any) -> tuple[Array, Array]:
     """
     Return position (3,) [m] and rotation (3, 3) of a PoseStamped or PoseWithCovarianceStamped.
 
-    Raises
-    ------
-    DataError
-        A number is not finite, or the quaternion is not of length 1.
-
+    Raises DataError: a number is not finite, or the quaternion is not of length 1.
     """
     inner = message.pose
     inner = getattr(inner, 'pose', inner)
@@ -185,11 +165,7 @@ def point(message: Any) -> Array:
     """
     Return the point of a PointStamped, shape (3,) [m].
 
-    Raises
-    ------
-    DataError
-        A coordinate is not finite.
-
+    Raises DataError: a coordinate is not finite.
     """
     return _xyz(message.point, 'the point')
 
@@ -198,11 +174,7 @@ def vector3(message: Any) -> Array:
     """
     Return the vector of a Vector3Stamped, shape (3,).
 
-    Raises
-    ------
-    DataError
-        A component is not finite.
-
+    Raises DataError: a component is not finite.
     """
     return _xyz(message.vector, 'the vector')
 
@@ -211,11 +183,7 @@ def wrench(message: Any) -> Array:
     """
     Return force and torque of a WrenchStamped, shape (6,) [N, N m].
 
-    Raises
-    ------
-    DataError
-        A component is not finite.
-
+    Raises DataError: a component is not finite.
     """
     inner = message.wrench
     return np.concatenate([_xyz(inner.force, 'the force'), _xyz(inner.torque, 'the torque')])
@@ -225,11 +193,8 @@ def temperature(message: Any) -> float:
     """
     Return the temperature of a Temperature message [degC].
 
-    Raises
-    ------
-    DataError
-        It is not finite, or below absolute zero, or so high that it must be in kelvin.
-
+    Raises DataError: it is not finite, or below absolute zero, or so high that it must be in
+    kelvin.
     """
     value = float(message.temperature)
     if not isfinite(value) or value < COLDEST:
@@ -248,11 +213,7 @@ def position_sigma(message: Any) -> float | None:
 
     None where the covariance is left at zero. Axes are joined by their root mean square.
 
-    Raises
-    ------
-    DataError
-        A variance is negative or not finite.
-
+    Raises DataError: a variance is negative or not finite.
     """
     diagonal = readonly(np.asarray(message.pose.covariance)[list(VARIANCES)], (3,), 'covariance')
     if (diagonal < 0.0).any():
@@ -266,12 +227,8 @@ def joint_trajectory(message: Any, joint_names: Sequence[str]) -> JointMotion:
 
     Velocities are kept where every point has them.
 
-    Raises
-    ------
-    DataError
-        A joint is missing, there are fewer than two points, a point has not one position per
-        name, a number is not finite, or the times do not increase.
-
+    Raises DataError: a joint is missing, there are fewer than two points, a point has not one
+    position per name, a number is not finite, or the times do not increase.
     """
     index = list(_indices(tuple(message.joint_names), tuple(joint_names)))
     count, points = len(message.joint_names), message.points
@@ -293,11 +250,7 @@ def path_points(message: Any) -> Array:
     """
     Return the positions of a Path, shape (N, 3) [m].
 
-    Raises
-    ------
-    DataError
-        There are fewer than two poses, or a coordinate is not finite.
-
+    Raises DataError: there are fewer than two poses, or a coordinate is not finite.
     """
     if len(message.poses) < 2:
         raise DataError(f'the path has {len(message.poses)} poses; a seam needs two')

@@ -20,18 +20,11 @@ RATES = ('velocities', 'accelerations')
 
 
 class GoalPoints(NamedTuple):
-    """
-    The robot's part of a joint trajectory.
-
-    Attributes
-    ----------
-    columns : tuple of int
-        Where the joints of the robot stand in every point.
-
-    """
+    """The robot's part of a joint trajectory."""
 
     goal: Goal
     columns: tuple[int, ...]
+    """Where the joints of the robot stand in every point."""
 
 
 def read_goal(trajectory: Any, joint_names: Sequence[str]) -> GoalPoints:
@@ -40,11 +33,8 @@ def read_goal(trajectory: Any, joint_names: Sequence[str]) -> GoalPoints:
 
     Further joints, such as those of a track, are left as they are. One prefix is taken off.
 
-    Raises
-    ------
-    DataError
-        A joint is missing or named twice, or points do not hold the numbers they should.
-
+    Raises DataError: a joint is missing or named twice, or points do not hold the numbers they
+    should.
     """
     names = list(trajectory.joint_names)
     columns = _columns(names, joint_names)

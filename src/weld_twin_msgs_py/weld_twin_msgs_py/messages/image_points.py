@@ -23,11 +23,7 @@ def points(message: Any) -> Array:
     """
     Return the rows of a PointCloud2, shape (N, 4): target, point, u and v [px].
 
-    Raises
-    ------
-    DataError
-        A field is missing, or the data are shorter than they should be.
-
+    Raises DataError: a field is missing, or the data are shorter than they should be.
     """
     fields = {field.name: field for field in message.fields}
     for name in FIELDS:

@@ -43,24 +43,15 @@ _STAMP = slice(HEADER, HEADER + 8)
 
 @dataclass(frozen=True)
 class Layout:
-    """
-    Where in the messages of one kind the numbers are, and what is the same in all of them.
-
-    Attributes
-    ----------
-    size : int
-        Bytes of a message.
-    same : tuple of (int, bytes)
-        What every message holds, and from which byte on. Padding is not among it: some senders
-        leave there what was in memory.
-    doubles : tuple of (int, int)
-        Where runs of doubles begin, and how many they are.
-
-    """
+    """Where in the messages of one kind the numbers are, and what is the same in all of them."""
 
     size: int
+    """Bytes of a message."""
     same: tuple[tuple[int, bytes], ...]
+    """What every message holds, and from which byte on. Padding is not among it: some senders
+    leave there what was in memory."""
     doubles: tuple[tuple[int, int], ...]
+    """Where runs of doubles begin, and how many they are."""
 
     def columns(self, block: np.ndarray) -> tuple[np.ndarray, list[Array]] | None:
         """

@@ -37,11 +37,7 @@ def corners(message: Any) -> Marks:
     """
     Return the corners of all tags in a message.
 
-    Raises
-    ------
-    DataError
-        A tag has not four corners, or one of them is no finite number.
-
+    Raises DataError: a tag has not four corners, or one of them is no finite number.
     """
     out: Marks = []
     for result in message.detections:

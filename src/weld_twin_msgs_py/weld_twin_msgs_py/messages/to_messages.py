@@ -300,25 +300,17 @@ class Status(NamedTuple):
 
 
 class Lines(NamedTuple):
-    """
-    A marker of lines.
-
-    Attributes
-    ----------
-    points : array, shape (N, 3) [m]
-    colors : array, shape (N, 3)
-        Red, green, blue of each point, 0 to 1.
-    width : float [m]
-    strip : bool
-        One line through all points, or one between each two.
-
-    """
+    """A marker of lines."""
 
     name: str
     points: Array
+    """Shape (N, 3) [m]."""
     colors: Array
+    """Red, green, blue of each point, 0 to 1, shape (N, 3)."""
     width: float
+    """[m]"""
     strip: bool
+    """One line through all points, or one between each two."""
 
 
 def quaternion(rotation: Array) -> list[float]:

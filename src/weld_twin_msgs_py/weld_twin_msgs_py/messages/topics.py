@@ -335,25 +335,7 @@ NO_TOPIC = {'topic': False}
 
 @dataclass(frozen=True)
 class TopicNames:
-    """
-    What the inputs are called; a recording made elsewhere has its own names.
-
-    Attributes
-    ----------
-    joints, pose, point, sigma, wrench, temperature, contact, images : str
-        Topics; a leading slash may be left out.
-    joint_prefix : str
-        What the joint states put before the names of the robot's joints.
-    joint_map : tuple of (str, str)
-        Joints of the robot and what the joint states call them, before the prefix.
-    measured_inverse : bool
-        Whether measured poses are those of something fixed seen from the arm, to be inverted.
-    use_effort : bool
-        Whether the measured efforts of the joints are read, and have to be there.
-    cameras, targets : tuple of Camera, Target
-        What is known of them, where points in images were measured.
-
-    """
+    """What the inputs are called; a recording made elsewhere has its own names."""
 
     joints: str = JOINT_STATES.name
     pose: str = MEASURED_POSE.name
@@ -363,12 +345,18 @@ class TopicNames:
     temperature: str = TEMPERATURE.name
     contact: str = CONTACT.name
     images: str = IMAGE_POINTS.name
+    """Topics; a leading slash may be left out."""
     joint_prefix: str = field(default='', metadata=NO_TOPIC)
+    """What the joint states put before the names of the robot's joints."""
     joint_map: tuple[tuple[str, str], ...] = field(default=(), metadata=NO_TOPIC)
+    """Joints of the robot and what the joint states call them, before the prefix."""
     measured_inverse: bool = field(default=False, metadata=NO_TOPIC)
+    """Whether measured poses are those of something fixed seen from the arm, to be inverted."""
     use_effort: bool = field(default=False, metadata=NO_TOPIC)
+    """Whether the measured efforts of the joints are read, and have to be there."""
     cameras: tuple[Camera, ...] = field(default=(), metadata=NO_TOPIC)
     targets: tuple[Target, ...] = field(default=(), metadata=NO_TOPIC)
+    """What is known of them, where points in images were measured."""
 
     @classmethod
     def topics(cls) -> tuple[str, ...]:

@@ -21,11 +21,7 @@ def types_with(kind: str, definition: str, idl: bool) -> Typestore:
     """
     Return a store of types that knows one more, as a bag defines it.
 
-    Raises
-    ------
-    DataError
-        There is no definition.
-
+    Raises DataError: there is no definition.
     """
     if not definition:
         raise DataError(

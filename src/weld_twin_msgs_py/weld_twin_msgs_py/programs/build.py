@@ -27,28 +27,19 @@ Suits = Callable[[Robot, Controller], Callable[[Array], Array]]
 
 
 class Point(NamedTuple):
-    """
-    A point of a program.
-
-    Attributes
-    ----------
-    name : str
-        As the program calls it; 'line 12' for one that stands in the move.
-    where : str
-        File and line.
-    value : array
-        A pose (4, 4) in its own base frame, or joint positions of the model (n,).
-    told : array, shape (m,), optional
-        External axes at a pose, as the first joints of the model; None where it does not say.
-
-    """
+    """A point of a program."""
 
     name: str
+    """As the program calls it; 'line 12' for one that stands in the move."""
     where: str
+    """File and line."""
     numbers: tuple[Number, ...]
     notation: Notation
     value: Array
+    """A pose (4, 4) in its own base frame, or joint positions of the model (n,)."""
     told: Array | None = None
+    """External axes at a pose, as the first joints of the model, shape (m,); None where it does
+    not say."""
 
 
 class Ref(NamedTuple):
@@ -89,31 +80,20 @@ class Step:
 
 @dataclass(eq=False)
 class Program:
-    """
-    A program that was read.
-
-    Attributes
-    ----------
-    sources : list of Source
-        The first is the program, the others belong to it.
-    pieces : list of list of Step
-        Routines; where one begins, nobody knows where the arm is.
-    held : dict of int to str
-        Points that must not be moved, with the reason.
-    notes : list of str
-        What a reader should know, in sentences.
-    one_seam : bool
-        The whole program is corrected together or not at all.
-
-    """
+    """A program that was read."""
 
     language: str
     sources: list[Source]
+    """The first is the program, the others belong to it."""
     points: list[Point] = field(default_factory=list)
     pieces: list[list[Step]] = field(default_factory=lambda: [[]])
+    """Routines; where one begins, nobody knows where the arm is."""
     held: dict[int, str] = field(default_factory=dict)
+    """Points that must not be moved, with the reason."""
     notes: list[str] = field(default_factory=list)
+    """What a reader should know, in sentences."""
     one_seam: bool = False
+    """The whole program is corrected together or not at all."""
 
     def add_point(
         self,
@@ -126,17 +106,14 @@ class Program:
         """
         Add a point and return its index.
 
+        Raises DataError: its numbers make no pose.
+
         Parameters
         ----------
         file : int
             Which of the sources they stand in.
         told : array, shape (m,), optional
             External axes at a pose.
-
-        Raises
-        ------
-        DataError
-            Its numbers make no pose.
 
         """
         where = self.sources[file].where(numbers[0].start)

@@ -18,19 +18,12 @@ from .source import Number
 
 
 class Context(NamedTuple):
-    """
-    The robot that runs a program.
-
-    Attributes
-    ----------
-    pulses_per_degree : array, shape (n,), optional
-        Of a Yaskawa arm whose points are in pulses.
-
-    """
+    """The robot that runs a program."""
 
     robot: Robot
     controller: Controller
     pulses_per_degree: Array | None = None
+    """Of a Yaskawa arm whose points are in pulses, shape (n,)."""
 
     @property
     def axes(self) -> int:

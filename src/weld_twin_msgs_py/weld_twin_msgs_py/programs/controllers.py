@@ -32,94 +32,60 @@ COUPLED = 'fanuc-ls'
 
 
 class Cell(NamedTuple):
-    """
-    What a user tells of the axes beside an arm.
-
-    Attributes
-    ----------
-    external : str
-        Which joint is which, as ``E1=rail,E2=-tilt``.
-    along : frozenset of str, optional
-        Names of bases that go along with a positioner, in lower case; None where it was not told.
-    world : array, shape (4, 4) [m], optional
-        Where the robot's rows begin in the world of the controller.
-
-    """
+    """What a user tells of the axes beside an arm."""
 
     external: str = ''
+    """Which joint is which, as ``E1=rail,E2=-tilt``."""
     along: frozenset[str] | None = None
+    """Names of bases that go along with a positioner, in lower case; None where it was not
+    told."""
     world: Array | None = None
+    """Where the robot's rows begin in the world of the controller, shape (4, 4) [m]."""
 
 
 class Frame(NamedTuple):
-    """
-    A tool or base frame as a program names it.
-
-    Attributes
-    ----------
-    value : array, shape (4, 4) [m], optional
-        None where the program has no numbers.
-    moving : bool or None
-        A base that goes along with a positioner; None where the program does not say.
-
-    """
+    """A tool or base frame as a program names it."""
 
     name: str
     value: Array | None = None
+    """Shape (4, 4) [m]; None where the program has no numbers."""
     moving: bool | None = False
+    """A base that goes along with a positioner; None where the program does not say."""
 
 
 @dataclass(frozen=True, eq=False)
 class Controller:
-    """
-    The frames of a controller on a robot.
-
-    Attributes
-    ----------
-    origin : array, shape (4, 4) [m]
-        ``T_base_origin``: the controller's robot frame in the base frame of the model.
-    flange : array, shape (4, 4) [m]
-        The controller's flange on the last frame of the model.
-    mix : array, shape (n, n)
-        Joints of the model from those of the controller.
-    own_tool : array, shape (4, 4) [m]
-        The tool of the robot's model.
-    tools, bases : mapping of str to array
-        Frames that were given, by the names of the program, in lower case.
-    notes : list of str
-        What was assumed, in sentences.
-    external : tuple of ExternalAxis
-        In the order of the robot's first joints, which they are.
-    along : frozenset of str, optional
-        Names of bases that go along with a positioner, in lower case; None where nobody told.
-    placed : bool
-        Where bases that stand still count from is known. It is not of an arm on a track, unless told.
-    positioner : bool
-        Some of the external axes move the workpiece.
-
-    """
+    """The frames of a controller on a robot."""
 
     origin: Array
+    """``T_base_origin``: the controller's robot frame in the base frame of the model, shape (4, 4)
+    [m]."""
     flange: Array
+    """The controller's flange on the last frame of the model, shape (4, 4) [m]."""
     mix: Array
+    """Joints of the model from those of the controller, shape (n, n)."""
     own_tool: Array
+    """The tool of the robot's model, shape (4, 4) [m]."""
     tools: Mapping[str, Array] = field(default_factory=dict)
     bases: Mapping[str, Array] = field(default_factory=dict)
+    """Frames that were given, by the names of the program, in lower case."""
     notes: list[str] = field(default_factory=list)
+    """What was assumed, in sentences."""
     external: tuple[ExternalAxis, ...] = ()
+    """In the order of the robot's first joints, which they are."""
     along: frozenset[str] | None = None
+    """Names of bases that go along with a positioner, in lower case; None where nobody told."""
     placed: bool = True
+    """Where bases that stand still count from is known. It is not of an arm on a track, unless
+    told."""
     positioner: bool = False
+    """Some of the external axes move the workpiece."""
 
     def tool(self, frame: Frame) -> Array:
         """
         Return ``T_flange_tool`` on the model.
 
-        Raises
-        ------
-        DataError
-            The program gives no numbers for it, nor does anybody else.
-
+        Raises DataError: the program gives no numbers for it, nor does anybody else.
         """
         given = self.tools.get(frame.name.lower())
         if given is not None or frame.value is not None:
@@ -143,11 +109,8 @@ class Controller:
         """
         Tell whether a base goes along with a positioner.
 
-        Raises
-        ------
-        DataError
-            Nothing tells it, or it stands still and nobody knows where it counts from.
-
+        Raises DataError: nothing tells it, or it stands still and nobody knows where it counts
+        from.
         """
         moving = frame.moving
         if moving and not self.positioner:
@@ -173,11 +136,7 @@ class Controller:
         """
         Return ``T_base_frame`` on the model; of one that goes along, on the positioner's flange.
 
-        Raises
-        ------
-        DataError
-            The program gives no numbers for it, nor does anybody else.
-
+        Raises DataError: the program gives no numbers for it, nor does anybody else.
         """
         given = self.bases.get(frame.name.lower())
         origin = np.eye(4) if self.goes_along(frame) else self.origin

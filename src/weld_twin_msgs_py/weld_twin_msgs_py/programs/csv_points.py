@@ -42,11 +42,7 @@ def read(sources: Sequence[Source], context: Context) -> Program:
     """
     Return the points of a table.
 
-    Raises
-    ------
-    DataError
-        Columns are missing, or a cell is broken; names file and line.
-
+    Raises DataError: columns are missing, or a cell is broken; names file and line.
     """
     source = sources[0]
     program = Program(NAME, [source])

@@ -32,23 +32,14 @@ ARM = 6
 
 
 class ExternalAxis(NamedTuple):
-    """
-    One external axis.
-
-    Attributes
-    ----------
-    label : str
-        As the controller calls it.
-    joint : int
-        Of the robot, counted from 0.
-    sign : float
-        -1 where it counts the other way round.
-
-    """
+    """One external axis."""
 
     label: str
+    """As the controller calls it."""
     joint: int
+    """Of the robot, counted from 0."""
     sign: float = 1.0
+    """-1 where it counts the other way round."""
 
 
 def carrying(robot: Robot) -> int:
@@ -63,15 +54,12 @@ def external_axes(given: str, robot: Robot, language: str) -> tuple[ExternalAxis
     """
     Return the external axes of a robot in the order of its joints.
 
+    Raises DataError: it is not told and has to be, the language has none, or it is told wrongly.
+
     Parameters
     ----------
     given : str
         Which is which, as ``E1=rail,E2=-tilt``; empty where it is not told.
-
-    Raises
-    ------
-    DataError
-        It is not told and has to be, the language has none, or it is told wrongly.
 
     """
     names = robot.joint_names[: carrying(robot)]

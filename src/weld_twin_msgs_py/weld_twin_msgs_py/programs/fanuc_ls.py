@@ -49,11 +49,7 @@ def read(sources: Sequence[Source], context: Context) -> Program:
     """
     Return what is understood of a program.
 
-    Raises
-    ------
-    DataError
-        A point is broken, not taught, or defined twice; names file and line.
-
+    Raises DataError: a point is broken, not taught, or defined twice; names file and line.
     """
     return _Reader(sources[0], context).read()
 

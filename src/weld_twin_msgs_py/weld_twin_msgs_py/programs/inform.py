@@ -48,11 +48,8 @@ def read(sources: Sequence[Source], context: Context) -> Program:
     """
     Return what is understood of a job.
 
-    Raises
-    ------
-    DataError
-        A point is broken, or in pulses that nobody can turn into degrees; names file and line.
-
+    Raises DataError: a point is broken, or in pulses that nobody can turn into degrees; names file
+    and line.
     """
     return _Reader(sources[0], context).read()
 

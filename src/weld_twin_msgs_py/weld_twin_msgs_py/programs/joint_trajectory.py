@@ -38,11 +38,7 @@ def read(sources: Sequence[Source], context: Context) -> Program:
     """
     Return what is understood of a trajectory.
 
-    Raises
-    ------
-    DataError
-        It names other joints than the robot's, or a position is broken.
-
+    Raises DataError: it names other joints than the robot's, or a position is broken.
     """
     source, robot = sources[0], context.robot
     program = Program(NAME, [source], one_seam=True)

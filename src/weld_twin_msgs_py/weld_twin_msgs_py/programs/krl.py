@@ -87,15 +87,12 @@ def read(sources: Sequence[Source], context: Context) -> Program:
     """
     Return what is understood of a program.
 
+    Raises DataError: a point is broken or declared twice; names file and line.
+
     Parameters
     ----------
     sources : sequence of Source
         The .src, then the .dat where there is one.
-
-    Raises
-    ------
-    DataError
-        A point is broken or declared twice; names file and line.
 
     """
     return _Reader(sources, context).read()

@@ -26,28 +26,18 @@ from .urscript import read as read_urscript
 
 
 class Language(NamedTuple):
-    """
-    One language.
-
-    Attributes
-    ----------
-    extensions : tuple of str
-        In lower case, with the point.
-    signs : str
-        A regular expression that only programs of this language hold.
-    pose : Notation
-        How it writes a pose.
-    beside : tuple of str
-        Extensions of files that belong to a program and lie beside it.
-
-    """
+    """One language."""
 
     maker: str
     extensions: tuple[str, ...]
+    """In lower case, with the point."""
     signs: str
+    """A regular expression that only programs of this language hold."""
     read: Callable[[Sequence[Source], Context], Program]
     pose: Notation
+    """How it writes a pose."""
     beside: tuple[str, ...] = ()
+    """Extensions of files that belong to a program and lie beside it."""
 
 
 LANGUAGES: dict[str, Language] = {
@@ -78,17 +68,14 @@ def language_of(source: Source, path: Path | str, controller: str = '') -> str:
     """
     Return the name of a program's language.
 
+    Raises DataError: there is no such language, or the file is of none that is known.
+
     Parameters
     ----------
     path : Path or str
         Where it was read.
     controller : str
         As the user named it; empty to let the file tell.
-
-    Raises
-    ------
-    DataError
-        There is no such language, or the file is of none that is known.
 
     """
     known = ', '.join(LANGUAGES)
@@ -113,16 +100,13 @@ def read_program(path: Path | str, context: Context, controller: str = '') -> Pr
     """
     Return a program with the files that belong to it.
 
+    Raises DataError: it cannot be read, tells no language, or a move in it is broken.
+
     Parameters
     ----------
     path : Path or str
     controller : str
         Its language; empty to let the file tell.
-
-    Raises
-    ------
-    DataError
-        It cannot be read, tells no language, or a move in it is broken.
 
     """
     source = read_source(path)

@@ -39,28 +39,18 @@ LENGTH = 0.02
 
 
 class Notation(NamedTuple):
-    """
-    One way of writing a target.
-
-    Attributes
-    ----------
-    joints : bool
-        The numbers are joint positions.
-    value : callable
-        Takes the numbers, returns a pose (4, 4) [m] or joint positions (n,) [rad].
-    numbers : callable
-        Takes a value and the numbers it replaces; returns the new numbers, as near the old ones
-        as the same value can be written.
-    decimals : int, int
-        Digits after the point that a length and an angle get at least.
-
-    """
+    """One way of writing a target."""
 
     name: str
     joints: bool
+    """The numbers are joint positions."""
     value: Callable[[Sequence[float]], Array]
+    """Takes the numbers, returns a pose (4, 4) [m] or joint positions (n,) [rad]."""
     numbers: Callable[[Array, Sequence[float]], list[float]]
+    """Takes a value and the numbers it replaces; returns the new numbers, as near the old ones as
+    the same value can be written."""
     decimals: tuple[int, int]
+    """Digits after the point that a length and an angle get at least."""
 
 
 def fixed_angles(rx: float, ry: float, rz: float) -> Array:

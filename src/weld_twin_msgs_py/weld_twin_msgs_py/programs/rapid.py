@@ -78,11 +78,7 @@ def read(sources: Sequence[Source], context: Context) -> Program:
     """
     Return what is understood of a module.
 
-    Raises
-    ------
-    DataError
-        A point is broken or declared twice; names file and line.
-
+    Raises DataError: a point is broken or declared twice; names file and line.
     """
     return _Reader(sources[0], context).read()
 

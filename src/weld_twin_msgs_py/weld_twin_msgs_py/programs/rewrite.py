@@ -82,17 +82,14 @@ def check_written(before: Program, after: Program, points: Sequence[Array]) -> N
     """
     Refuse a program that does not say what it was to say when it is read again.
 
+    Raises DataError: a move or a point differs.
+
     Parameters
     ----------
     before, after : Program
         As it was, and the new text read again.
     points : sequence of array
         What the new text is to say.
-
-    Raises
-    ------
-    DataError
-        A move or a point differs.
 
     """
     same = len(before.points) == len(after.points) and len(before.steps) == len(after.steps)

@@ -21,20 +21,12 @@ _ALONE = re.compile(rf'\s*({NUMBER})\s*\Z')
 
 @dataclass(frozen=True)
 class Source:
-    """
-    One file of a program.
-
-    Attributes
-    ----------
-    name : str
-        Without folders.
-    text : str
-        Every byte one character, so that what is not understood goes through unharmed.
-
-    """
+    """One file of a program."""
 
     name: str
+    """Without folders."""
     text: str
+    """Every byte one character, so that what is not understood goes through unharmed."""
 
     def line(self, place: int) -> int:
         """Return the number of the line, counted from 1, in which a character stands."""
@@ -65,11 +57,7 @@ def read_source(path: Path | str) -> Source:
     """
     Return the text of a file.
 
-    Raises
-    ------
-    DataError
-        It cannot be read, is empty, too large, or no text.
-
+    Raises DataError: it cannot be read, is empty, too large, or no text.
     """
     try:
         with Path(path).open('rb') as file:
@@ -91,6 +79,8 @@ def number_at(source: Source, start: int, end: int, what: str, file: int = 0) ->
     """
     Return the number that a piece of text is.
 
+    Raises DataError: the piece is not one number, or not a finite one.
+
     Parameters
     ----------
     start, end : int
@@ -99,11 +89,6 @@ def number_at(source: Source, start: int, end: int, what: str, file: int = 0) ->
         What the number is, for the message.
     file : int
         Which of the program's files.
-
-    Raises
-    ------
-    DataError
-        The piece is not one number, or not a finite one.
 
     """
     piece = source.text[start:end]
@@ -136,11 +121,7 @@ def closing(source: Source, text: str, opening: int) -> int:
     """
     Return the place of the bracket that closes the one at a place.
 
-    Raises
-    ------
-    DataError
-        None does.
-
+    Raises DataError: none does.
     """
     depth = 0
     for k in range(opening, len(text)):

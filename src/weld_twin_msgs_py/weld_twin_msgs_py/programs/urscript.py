@@ -64,11 +64,7 @@ def read(sources: Sequence[Source], context: Context) -> Program:
     """
     Return what is understood of a script.
 
-    Raises
-    ------
-    DataError
-        A target of a move is broken; names file and line.
-
+    Raises DataError: a target of a move is broken; names file and line.
     """
     return _Reader(sources[0], context).read()
 

@@ -90,17 +90,14 @@ def flange_link_of(
     """
     Return the link of the controller's flange, and where it is in the tip link.
 
+    Raises ModelError: the link asked for is not there, or not fixed to the last link that moves.
+
     Parameters
     ----------
     chain : sequence of Joint
         From base to tip.
     wanted : str or None
         The link that was asked for.
-
-    Raises
-    ------
-    ModelError
-        The link asked for is not there, or not fixed to the last link that moves.
 
     """
     moving = [joint for joint in chain if joint.kind in MOVABLE]

@@ -47,15 +47,12 @@ def own_robot(spec: str) -> Path | None:
     """
     Return the file of a robot of one's own, None where the name is none of theirs.
 
+    Raises ModelError: several robots have the name; none of them is taken for the other.
+
     Parameters
     ----------
     spec : str
         A name without a suffix, in capital or small letters.
-
-    Raises
-    ------
-    ModelError
-        Several robots have the name; none of them is taken for the other.
 
     """
     result = [str(file) for file in own_files() if file.stem.lower() == spec.lower()]

@@ -65,6 +65,9 @@ def write_urdf_like(
     is the controller's flange, or carries it, a link ``controller_flange`` keeps the flange where
     it is, and a fixed joint more holds the tool.
 
+    Raises DataError: the file exists and ``overwrite`` is not set, or the place cannot be written.
+    Raises ModelError: the given file cannot be read.
+
     Parameters
     ----------
     path : Path or str
@@ -73,13 +76,6 @@ def write_urdf_like(
         is not written.
     notes : sequence of str
         Comments at the top.
-
-    Raises
-    ------
-    DataError
-        The file exists and ``overwrite`` is not set, or the place cannot be written.
-    ModelError
-        The given file cannot be read.
 
     """
     chain = chain_of(*given[:3])

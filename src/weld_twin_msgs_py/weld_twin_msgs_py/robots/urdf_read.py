@@ -75,23 +75,15 @@ def parse_urdf(
 
 
 class Chain(NamedTuple):
-    """
-    The joints from base to tip, fixed ones too.
-
-    Attributes
-    ----------
-    up : list of Joint
-        Those of a positioner, from its foot to the base link; empty for a robot alone.
-    down : list of Joint
-        Those of the robot, from the link that both hang on to the tip.
-    start : array, shape (4, 4)
-        That link in the frame of reference: the base link, or itself beside a positioner.
-
-    """
+    """The joints from base to tip, fixed ones too."""
 
     up: list[Joint]
+    """Those of a positioner, from its foot to the base link; empty for a robot alone."""
     down: list[Joint]
+    """Those of the robot, from the link that both hang on to the tip."""
     start: Array
+    """That link in the frame of reference: the base link, or itself beside a positioner, shape (4,
+    4)."""
 
 
 def chain_of(path: Path | str, base_link: str | None = None, tip_link: str | None = None) -> Chain:

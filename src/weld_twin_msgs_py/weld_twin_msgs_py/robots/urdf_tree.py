@@ -94,11 +94,7 @@ def read_tree(path: Path | str) -> Tree:
     """
     Read a URDF.
 
-    Raises
-    ------
-    ModelError
-        The file cannot be read, is not well-formed, carries a DTD, or is no URDF.
-
+    Raises ModelError: the file cannot be read, is not well-formed, carries a DTD, or is no URDF.
     """
     return parse_tree(read_text(path, 'URDF'), path)
 
@@ -107,11 +103,7 @@ def parse_tree(text: str, path: Path | str) -> Tree:
     """
     Read the text of a URDF; ``path`` says in errors where it came from.
 
-    Raises
-    ------
-    ModelError
-        The text is not well-formed, carries a DTD, or is no URDF.
-
+    Raises ModelError: the text is not well-formed, carries a DTD, or is no URDF.
     """
     try:
         root = fromstring(text, forbid_dtd=True)

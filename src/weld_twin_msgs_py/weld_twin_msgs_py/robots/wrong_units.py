@@ -24,11 +24,7 @@ def refuse_wrong_units(robot: Robot) -> None:
     """
     Refuse a robot whose numbers look like degrees or millimetres.
 
-    Raises
-    ------
-    ModelError
-        Names the joint, the value and the unit wanted.
-
+    Raises ModelError: names the joint, the value and the unit wanted.
     """
     names, turning = robot.joint_names, ~robot.prismatic
     for key in ('alpha', 'theta', 'beta'):

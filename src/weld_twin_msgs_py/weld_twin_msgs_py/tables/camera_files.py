@@ -111,11 +111,7 @@ def read_board(path: Path | str) -> Mapping[str, Any]:
     """
     Return the numbers of a board: ``board``, ``squares``, ``square`` and what else the file has.
 
-    Raises
-    ------
-    DataError, ModelError
-        The file cannot be read, or a number is missing.
-
+    Raises DataError, ModelError: the file cannot be read, or a number is missing.
     """
     entry = read_yaml(path, 'board file')
     try:

@@ -29,34 +29,22 @@ from .words import parted, shortened
 
 @dataclass(frozen=True)
 class Cells:
-    """
-    The table as text.
-
-    Attributes
-    ----------
-    lines : list of int
-        Line number of each row in the file.
-    said : list of str
-        What was found out, one sentence each.
-
-    """
+    """The table as text."""
 
     path: Path
     header: list[str]
     rows: list[list[str]]
     lines: list[int]
+    """Line number of each row in the file."""
     decimal: str
     said: list[str]
+    """What was found out, one sentence each."""
 
     def column(self, name: str) -> list[str]:
         """
         Return a column as text.
 
-        Raises
-        ------
-        DataError
-            There is no such column; the message lists those there are.
-
+        Raises DataError: there is no such column; the message lists those there are.
         """
         if name not in self.header:
             raise DataError(
@@ -70,11 +58,7 @@ class Cells:
         """
         Return a column as numbers, shape (rows,); NaN where a cell is empty.
 
-        Raises
-        ------
-        DataError
-            A cell is no number; the message names line and column.
-
+        Raises DataError: a cell is no number; the message names line and column.
         """
         column = self.column(name)
         if self.decimal != ',':
@@ -105,6 +89,9 @@ def read_cells(
     """
     Read a delimited text file with a header line, or a log or export in a form that is known.
 
+    Raises DataError: no such file, no table, ragged rows, or a delimiter or decimal sign that is
+    not clear.
+
     Parameters
     ----------
     path : Path or str
@@ -112,11 +99,6 @@ def read_cells(
         Left out, they are found.
     marker : str, optional
         What is meant, where an export holds several things that were tracked.
-
-    Raises
-    ------
-    DataError
-        No such file, no table, ragged rows, or a delimiter or decimal sign that is not clear.
 
     """
     path = Path(path)

@@ -34,11 +34,7 @@ def read_positions(path: Path, text: str) -> Read:
     """
     Return the joints of the arm, a row for each time that they were fetched.
 
-    Raises
-    ------
-    DataError
-        A position lacks joints that another one has.
-
+    Raises DataError: a position lacks joints that another one has.
     """
     rows, lines = list[list[str]](), list[int]()
     starts = [result.start() for result in _MARK.finditer(text)]

@@ -25,46 +25,30 @@ _HEAD = 40
 
 @dataclass(frozen=True)
 class Format:
-    """
-    One kind of file.
-
-    Attributes
-    ----------
-    name : str
-        For people.
-    mark : str
-        Pattern that the top of such a file matches, and no other.
-    header : str
-        Pattern of the line that names the columns.
-    names : tuple of (str, str)
-        Pattern of a joined name and what it is called; ``{unit}`` is the file's unit of length.
-        A group ``what`` is the marker or body that a column belongs to.
-    delimiter : str
-        Blank for any white space.
-    above, below : int
-        Lines over the header that belong to it, and lines under it that are no rows.
-    unit : str
-        Pattern with the unit of length as its group; empty where ``names`` say it.
-    rate : str
-        Pattern with the frames per second as its group, where there is no column of times.
-    named_by : str
-        Pattern with a list of names, three columns each, where there is no header.
-    gap : str
-        What stands for a coordinate that was not seen.
-
-    """
+    """One kind of file."""
 
     name: str
+    """For people."""
     mark: str
+    """Pattern that the top of such a file matches, and no other."""
     header: str
+    """Pattern of the line that names the columns."""
     names: tuple[tuple[str, str], ...]
+    """Pattern of a joined name and what it is called; ``{unit}`` is the file's unit of length. A
+    group ``what`` is the marker or body that a column belongs to."""
     delimiter: str = ','
+    """Blank for any white space."""
     above: int = 0
     below: int = 0
+    """Lines over the header that belong to it, and lines under it that are no rows."""
     unit: str = ''
+    """Pattern with the unit of length as its group; empty where ``names`` say it."""
     rate: str = ''
+    """Pattern with the frames per second as its group, where there is no column of times."""
     named_by: str = ''
+    """Pattern with a list of names, three columns each, where there is no header."""
     gap: str = ''
+    """What stands for a coordinate that was not seen."""
 
 
 class Read(NamedTuple):
@@ -140,15 +124,12 @@ def read(known: Format, text: str, marker: str | None) -> Read:
     """
     Return the columns of a known format that mean something here.
 
+    Raises DataError: it has several, and none was named.
+
     Parameters
     ----------
     marker : str, optional
         Marker or body that is meant, where the file has several.
-
-    Raises
-    ------
-    DataError
-        It has several, and none was named.
 
     """
     lines = text.splitlines()
@@ -244,11 +225,7 @@ def one_of(names: list[str], marker: str | None) -> str:
     """
     Return the thing that is meant.
 
-    Raises
-    ------
-    DataError
-        Several were tracked and none was named, or there is none of the name.
-
+    Raises DataError: several were tracked and none was named, or there is none of the name.
     """
     if marker in names:
         return str(marker)

@@ -80,12 +80,8 @@ def find_columns(header: Sequence[str], robot: Robot, options: TableOptions) -> 
     """
     Return the columns by use.
 
-    Raises
-    ------
-    DataError
-        A use that is needed has no column, or more than one; the message names the option that
-        decides.
-
+    Raises DataError: a use that is needed has no column, or more than one; the message names the
+    option that decides.
     """
     parts = [_taken_apart(name) for name in header]
     out = Columns(units={part.name: part.unit for part in parts})
@@ -115,11 +111,8 @@ def joint_columns(header: Sequence[str], robot: Robot, options: TableOptions) ->
     """
     Return the joint columns alone, in the robot's order.
 
-    Raises
-    ------
-    DataError
-        There are none, or more than one set; the message names the option that decides.
-
+    Raises DataError: there are none, or more than one set; the message names the option that
+    decides.
     """
     return options.joint_columns or _joints([_taken_apart(name) for name in header], robot)
 

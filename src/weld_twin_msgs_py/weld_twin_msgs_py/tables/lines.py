@@ -40,6 +40,9 @@ def split_lines(path: Path, text: str, delimiter: str | None, said: list[str]) -
     """
     Return the header and the rows of a text, and say how they were found.
 
+    Raises DataError: there is no table, the delimiter is not clear, rows are ragged, or a
+    quotation mark is not closed.
+
     Parameters
     ----------
     path : Path
@@ -48,12 +51,6 @@ def split_lines(path: Path, text: str, delimiter: str | None, said: list[str]) -
         Left out, it is found.
     said : list of str
         Sentences are added to it.
-
-    Raises
-    ------
-    DataError
-        There is no table, the delimiter is not clear, rows are ragged, or a quotation mark is
-        not closed.
 
     """
     lines = _without_comments(re.split(r'\r\n|\r|\n', text))

@@ -31,15 +31,12 @@ def number(text: str, decimal: str) -> float:
     """
     Return a cell as a number.
 
+    Raises ValueError: it is none.
+
     Parameters
     ----------
     decimal : str
         '.' or ','.
-
-    Raises
-    ------
-    ValueError
-        It is none.
 
     """
     plain = _GAP.sub('', text).replace('\N{MINUS SIGN}', '-')
@@ -56,17 +53,15 @@ def decimal_sign(path: Path, rows: Iterable[list[str]], delimiter: str | None) -
     """
     Return the decimal sign of the numbers in some rows.
 
+    Raises DataError: some numbers have a comma and some a point, and no group of thousands tells
+    why.
+
     Parameters
     ----------
     path : Path
         For the message.
     delimiter : str, optional
         Between the cells; a comma there is no decimal sign.
-
-    Raises
-    ------
-    DataError
-        Some numbers have a comma and some a point, and no group of thousands tells why.
 
     """
     if delimiter == ',':
@@ -96,17 +91,14 @@ def without_units(
     """
     Return a table with units that stand behind every number of a column taken into its header.
 
+    Raises DataError: the header gives another unit than the cells.
+
     Parameters
     ----------
     path : Path
         For the message.
     unit_of_name : mapping
         Units that the header gives already.
-
-    Raises
-    ------
-    DataError
-        The header gives another unit than the cells.
 
     """
     first = rows[0] if rows else []

@@ -48,15 +48,12 @@ def read_point_list(text: str, marker: str | None) -> Read:
     """
     Return the points of a list; of nominal and measured points the measured ones.
 
+    Raises DataError: no point belongs to the group, or a line differs from the others.
+
     Parameters
     ----------
     marker : str, optional
         The group of points that is meant.
-
-    Raises
-    ------
-    DataError
-        No point belongs to the group, or a line differs from the others.
 
     """
     rows = _rows(text)

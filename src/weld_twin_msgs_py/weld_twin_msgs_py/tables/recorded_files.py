@@ -36,11 +36,8 @@ def read_c3d(path: Path, marker: str | None) -> Read:
     """
     Return time and place of one marker of a C3D file.
 
-    Raises
-    ------
-    DataError
-        The library for it is missing, the file is damaged, or several markers were tracked.
-
+    Raises DataError: the library for it is missing, the file is damaged, or several markers were
+    tracked.
     """
     try:
         import c3d
@@ -75,11 +72,8 @@ def read_trace(path: Path, text: str) -> Read:
     """
     Return the channels of a trace, those as long as its time.
 
-    Raises
-    ------
-    DataError
-        A file of values is missing or holds another number of them, or is of another type.
-
+    Raises DataError: a file of values is missing or holds another number of them, or is of another
+    type.
     """
     result = [
         dict(re.findall(r'^\s*(\d{3}),\s*(.*?)\s*$', block, re.M))

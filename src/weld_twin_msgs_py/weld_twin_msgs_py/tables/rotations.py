@@ -65,11 +65,7 @@ def find_convention(angles: Array, robot: Robot, q: Array) -> tuple[str, str]:
     """
     Return the convention of the angles and the sentence that says how it was found.
 
-    Raises
-    ------
-    DataError
-        None agrees with the arm, or several do.
-
+    Raises DataError: none agrees with the arm, or several do.
     """
     result = {
         name: disagreement(rotations(angles, name), robot, q)

@@ -32,6 +32,8 @@ def factor(known: Mapping[str, float], unit: str, column: str, what: str) -> flo
     """
     Return what a column is multiplied with.
 
+    Raises DataError: the unit is that of something else.
+
     Parameters
     ----------
     known : mapping
@@ -40,11 +42,6 @@ def factor(known: Mapping[str, float], unit: str, column: str, what: str) -> flo
         That the header or the user gives.
     column, what : str
         For people: the column, and what it is taken for.
-
-    Raises
-    ------
-    DataError
-        The unit is that of something else.
 
     """
     if unit not in known:

@@ -83,16 +83,13 @@ class BulkKernel:
         """
         Return tool poses ``T_world_tool``, shape (N, 4, 4), of joint positions (N, n).
 
+        Raises ModelError: ``q`` or ``out`` are of another shape, or ``out`` is not contiguous.
+
         Parameters
         ----------
         q : array, shape (N, n) [rad or m]
         out : array, shape (N, 4, 4), optional
             Where they are written to; contiguous.
-
-        Raises
-        ------
-        ModelError
-            ``q`` or ``out`` are of another shape, or ``out`` is not contiguous.
 
         """
         out = self._poses_like(q, out)
@@ -111,6 +108,9 @@ class BulkKernel:
         tool point along the axis of its screw: what `chain.column` gives for 'd' is rows 3 to 5
         of the screw of 'theta', and 'a' goes with 'alpha' likewise in standard rows.
 
+        Raises ModelError: ``q``, ``poses`` or ``out`` are of another shape, or ``poses`` is not
+        contiguous.
+
         Parameters
         ----------
         q : array, shape (N, n) [rad or m]
@@ -118,11 +118,6 @@ class BulkKernel:
             Where the poses are written to.
         out : array, shape (6, channels, N), optional
             Where the turns are written to; may be a view.
-
-        Raises
-        ------
-        ModelError
-            ``q``, ``poses`` or ``out`` are of another shape, or ``poses`` is not contiguous.
 
         """
         poses = self._poses_like(q, poses)

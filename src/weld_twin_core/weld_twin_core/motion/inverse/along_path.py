@@ -43,14 +43,6 @@ class PathSolution:
     """
     Joint positions along a path; how well the arm stands there is worked out when asked for.
 
-    Attributes
-    ----------
-    poses : array, shape (N, 4, 4)
-        What was asked for.
-    q : array, shape (N, n) [rad or m]
-    method : str
-        'followed' from a seed, the family of the closed form, or 'search'.
-
     References
     ----------
     .. [1] T. Yoshikawa, "Manipulability of robotic mechanisms", IJRR 4(2), 1985.
@@ -59,8 +51,11 @@ class PathSolution:
 
     robot: Robot
     poses: Array
+    """What was asked for, shape (N, 4, 4)."""
     q: Array
+    """Shape (N, n) [rad or m]."""
     method: str
+    """'followed' from a seed, the family of the closed form, or 'search'."""
 
     @cached_property
     def residual(self) -> Array:

@@ -32,11 +32,6 @@ class CarriedArm:
 
     Inverse kinematics is that of the arm behind them, with its base where they put it.
 
-    Attributes
-    ----------
-    count : int
-        Joints that are told: those of a positioner, and the first ones of the robot itself.
-
     Raises
     ------
     DataError
@@ -46,6 +41,7 @@ class CarriedArm:
 
     robot: Robot
     count: int
+    """Joints that are told: those of a positioner, and the first ones of the robot itself."""
 
     def __post_init__(self) -> None:
         if not self.robot.behind <= self.count < self.robot.n:

@@ -59,11 +59,7 @@ def unit(vector: ArrayLike, name: str) -> Array:
     """
     Return a vector of length 1, shape (3,).
 
-    Raises
-    ------
-    PathError
-        The vector has no length.
-
+    Raises PathError: the vector has no length.
     """
     value = readonly(vector, (3,), name)
     size = float(np.linalg.norm(value))
@@ -76,11 +72,7 @@ def positive(value: object, name: str) -> float:
     """
     Return a number that is positive and finite.
 
-    Raises
-    ------
-    PathError
-        It is not.
-
+    Raises PathError: it is not.
     """
     if not (isinstance(value, (int, float)) and np.isfinite(value) and value > 0.0):
         raise PathError(f'{name} must be a positive number, got {value!r}')
@@ -91,16 +83,13 @@ def frames_on(position: Array, tangent: Array, normal: Array) -> SeamFrames:
     """
     Return frames with the part of ``normal`` that is perpendicular to the travel.
 
+    Raises PathError: somewhere the normal lies along the seam.
+
     Parameters
     ----------
     position : array, shape (N, 3) [m]
     tangent : array, shape (N, 3), of length 1
     normal : array, shape (3,) or (N, 3)
-
-    Raises
-    ------
-    PathError
-        Somewhere the normal lies along the seam.
 
     """
     flat = normal - (normal * tangent).sum(axis=-1, keepdims=True) * tangent

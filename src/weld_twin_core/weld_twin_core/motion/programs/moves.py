@@ -21,73 +21,48 @@ class Use(NamedTuple):
 
     A point that is a pose is used as ``before @ point @ after``: the base frame stands before
     it, a shift in the tool's own frame after it. Joint positions are used as they are.
-
-    Attributes
-    ----------
-    point : int
-        Which of the program's points.
-    before, after : array, shape (4, 4) [m]
-    leads : bool
-        False for a place derived from the point, such as an approach above it: it goes along when
-        the point is moved and has no say in where to.
-
     """
 
     point: int
+    """Which of the program's points."""
     before: Array
     after: Array
+    """Shape (4, 4) [m]."""
     leads: bool = True
+    """False for a place derived from the point, such as an approach above it: it goes along when
+    the point is moved and has no say in where to."""
 
 
 class Move(NamedTuple):
-    """
-    One move.
-
-    Attributes
-    ----------
-    kind : str
-        'joint', 'linear', 'circular'; or 'unknown', after which nobody knows where the arm is.
-    end : Use or None
-        None for an unknown move. Joint positions of a linear move stand for the pose they make.
-    via : Use or None
-        A place on the arc of a circular move.
-    tool : array, shape (4, 4) [m]
-        ``T_flange_tool``, the flange that of the robot's model.
-    speed : float
-        Of the tool [m/s]; of a joint move the share of the joints' speeds.
-    stop : bool
-        The arm comes to rest at the end; else it goes on with the next move.
-    dwell : float [s]
-        How long it stays there.
-    duration : float [s]
-        How long it takes, where the program says so; else 0.
-    suits : callable, optional
-        Takes joint positions (K, n), says which of them are the posture the program asks for.
-    where : str
-        File and line, for messages.
-    seam : int
-        Moves of one number are corrected together or not at all.
-    why : str
-        Of an unknown move, why it is not understood.
-    along : bool
-        The frame that a linear or circular move is told in goes along with a positioner. Where it
-        stands still, the positioner must, too.
-
-    """
+    """One move."""
 
     kind: Kind
+    """'joint', 'linear', 'circular'; or 'unknown', after which nobody knows where the arm is."""
     end: Use | None
+    """None for an unknown move. Joint positions of a linear move stand for the pose they make."""
     tool: Array
+    """``T_flange_tool``, the flange that of the robot's model, shape (4, 4) [m]."""
     via: Use | None = None
+    """A place on the arc of a circular move."""
     speed: float = 0.1
+    """Of the tool [m/s]; of a joint move the share of the joints' speeds."""
     stop: bool = True
+    """The arm comes to rest at the end; else it goes on with the next move."""
     dwell: float = 0.0
+    """How long it stays there [s]."""
     duration: float = 0.0
+    """How long it takes, where the program says so [s]; else 0."""
     suits: Callable[[Array], Array] | None = None
+    """Takes joint positions (K, n), says which of them are the posture the program asks for."""
     where: str = ''
+    """File and line, for messages."""
     seam: int = 0
+    """Moves of one number are corrected together or not at all."""
     why: str = ''
+    """Of an unknown move, why it is not understood."""
     along: bool = True
+    """The frame that a linear or circular move is told in goes along with a positioner. Where it
+    stands still, the positioner must, too."""
 
     @property
     def uses(self) -> list[Use]:
@@ -97,24 +72,15 @@ class Move(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MoveProgram:
-    """
-    Points, and moves between them.
-
-    Attributes
-    ----------
-    points : tuple of array
-        A pose, shape (4, 4) [m], or joint positions, shape (n,) [rad or m].
-    pieces : tuple of tuple of Move
-        Moves that follow each other; where a piece begins, nobody knows where the arm is.
-    told : tuple of array, optional
-        Of every point the positions of the external axes, shape (m,) [rad or m]: the first joints of
-        the robot, those of a positioner among them. Left out, there are none.
-
-    """
+    """Points, and moves between them."""
 
     points: tuple[Array, ...]
+    """A pose, shape (4, 4) [m], or joint positions, shape (n,) [rad or m]."""
     pieces: tuple[tuple[Move, ...], ...]
+    """Moves that follow each other; where a piece begins, nobody knows where the arm is."""
     told: tuple[Array, ...] = ()
+    """Of every point the positions of the external axes, shape (m,) [rad or m]: the first joints
+    of the robot, those of a positioner among them. Left out, there are none."""
 
     def with_points(self, points: Sequence[Array]) -> MoveProgram:
         """Return the same moves between other points."""

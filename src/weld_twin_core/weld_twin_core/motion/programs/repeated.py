@@ -20,17 +20,14 @@ def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
     """
     Return the motion of a piece with the same samples between points that moved a little.
 
+    Raises ReachError: a pose is out of reach now.
+
     Parameters
     ----------
     program : MoveProgram
         With the points moved.
     piece : Piece
         As they were.
-
-    Raises
-    ------
-    ReachError
-        A pose is out of reach now.
 
     """
     q = np.array(piece.motion.q)

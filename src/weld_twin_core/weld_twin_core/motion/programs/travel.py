@@ -52,41 +52,26 @@ SLOW = 0.15
 
 
 class Piece(NamedTuple):
-    """
-    The motion of one piece of a program.
-
-    Attributes
-    ----------
-    move : array of int, shape (N,)
-        Which move each sample belongs to.
-    ends, vias : array of int, shape (M,)
-        Sample at which each move ends, and passes its place on the way; -1 where it has none.
-
-    """
+    """The motion of one piece of a program."""
 
     moves: tuple[Move, ...]
     motion: JointMotion
     move: np.ndarray
+    """Which move each sample belongs to, shape (N,)."""
     ends: np.ndarray
     vias: np.ndarray
+    """Sample at which each move ends, and passes its place on the way, shape (M,); -1 where it has
+    none."""
 
 
 class Travel(NamedTuple):
-    """
-    The motion of a program.
-
-    Attributes
-    ----------
-    lost : dict of int to str
-        Seams that could not be followed, with the reason.
-    assumed : tuple of str
-        Where the program names no posture and the only known one was taken: file and line.
-
-    """
+    """The motion of a program."""
 
     pieces: tuple[Piece, ...]
     lost: dict[int, str]
+    """Seams that could not be followed, with the reason."""
     assumed: tuple[str, ...] = ()
+    """Where the program names no posture and the only known one was taken: file and line."""
 
 
 Known = Callable[[Array], Array]
@@ -265,6 +250,8 @@ def tool_way(
     """
     Return the poses of a linear or circular move, shape (K, 4, 4), and the sample on its way.
 
+    Raises PathError: three places of an arc lie on a line.
+
     Parameters
     ----------
     arm : Robot
@@ -273,11 +260,6 @@ def tool_way(
         ``T_base_tool`` where it begins.
     count, at : int
         Samples, and which of them passes the place on the way; 0 to choose them.
-
-    Raises
-    ------
-    PathError
-        Three places of an arc lie on a line.
 
     """
     assert move.end is not None

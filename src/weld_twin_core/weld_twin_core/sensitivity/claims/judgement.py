@@ -24,30 +24,19 @@ class CaseName(NamedTuple):
 
 @dataclass(frozen=True)
 class Claim:
-    """
-    A claim with its verdict.
-
-    Attributes
-    ----------
-    key, statement, where : str
-    verdict : str
-        'holds', 'holds when ...' with the condition, or 'does not hold'.
-    reason : str
-    held : int; cases : int
-        On how many of the cases the claim holds as written.
-    measured : mapping
-        Least and largest value of every measurement behind it.
-
-    """
+    """A claim with its verdict."""
 
     key: str
     statement: str
     where: str
     verdict: str
+    """'holds', 'holds when ...' with the condition, or 'does not hold'."""
     reason: str
     held: int
+    """On how many of the cases the claim holds as written."""
     cases: int
     measured: dict[str, tuple[float, float]]
+    """Least and largest value of every measurement behind it."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers and strings."""
@@ -68,11 +57,7 @@ def judge(cases: Mapping[CaseName, Measured]) -> tuple[Claim, ...]:
     """
     Return a verdict on every claim from the measurements of every case.
 
-    Raises
-    ------
-    DataError
-        There are no cases.
-
+    Raises DataError: there are no cases.
     """
     if not cases:
         raise DataError('the claims need at least one robot on one seam')

@@ -30,31 +30,19 @@ class Range:
 
 @dataclass(frozen=True)
 class Rule:
-    """
-    A claim and how it is decided.
-
-    Attributes
-    ----------
-    key, statement, where : str
-        Name, what the paper says, and in which section.
-    holds : callable
-        Whether the claim as written holds on one case.
-    reason : callable
-        One line made of the ranges of the measurements.
-    shows : tuple of str
-        Measurements the table gives.
-    condition : str
-        Under which condition the claim holds where it does not hold as written.
-    holds_then : callable, optional
-        Whether it holds on one case under that condition.
-
-    """
+    """A claim and how it is decided."""
 
     key: str
     statement: str
     where: str
+    """Name, what the paper says, and in which section."""
     holds: Callable[[Measured], bool]
+    """Whether the claim as written holds on one case."""
     reason: Callable[[Mapping[str, Range]], str]
+    """One line made of the ranges of the measurements."""
     shows: tuple[str, ...]
+    """Measurements the table gives."""
     condition: str = ''
+    """Under which condition the claim holds where it does not hold as written."""
     holds_then: Callable[[Measured], bool] | None = None
+    """Whether it holds on one case under that condition."""

@@ -16,62 +16,40 @@ from ..external_axes import ExternalAxis
 
 
 class ExportMove(NamedTuple):
-    """
-    One move.
-
-    Attributes
-    ----------
-    kind : str
-        'joint' or 'linear'.
-    q : array, shape (n,)
-        Joint positions of the model at its end.
-    pose : array, shape (4, 4) [m]
-        The tool there, in the controller's robot frame.
-    speed : float [m/s]
-        Of the tool; of a joint move what its share of joint speed makes of it.
-    share : float
-        Of the joints' speeds.
-    dwell : float [s]
-    duration : float [s]
-        How long it takes.
-
-    """
+    """One move."""
 
     kind: Literal['joint', 'linear']
+    """'joint' or 'linear'."""
     q: Array
+    """Joint positions of the model at its end, shape (n,)."""
     pose: Array
+    """The tool there, in the controller's robot frame, shape (4, 4) [m]."""
     speed: float
+    """Of the tool [m/s]; of a joint move what its share of joint speed makes of it."""
     share: float
+    """Of the joints' speeds."""
     stop: bool = True
     dwell: float = 0.0
+    """[s]"""
     duration: float = 1.0
+    """How long it takes [s]."""
     comment: str = ''
 
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """
-    A program to write.
-
-    Attributes
-    ----------
-    name : str
-        Letters, digits and underscores, as all controllers take it.
-    tool : array, shape (4, 4) [m]
-        On the controller's flange.
-    trigger : int
-        Number of the digital output that tells the instrument when to measure.
-    stations : bool
-        The output is on while the arm stands; else from the first to the last move.
-
-    """
+    """A program to write."""
 
     name: str
+    """Letters, digits and underscores, as all controllers take it."""
     moves: tuple[ExportMove, ...]
     context: Context
     tool: Array
+    """On the controller's flange, shape (4, 4) [m]."""
     trigger: int
+    """Number of the digital output that tells the instrument when to measure."""
     stations: bool
+    """The output is on while the arm stands; else from the first to the last move."""
     comments: tuple[str, ...] = ()
 
     def joints(self, move: ExportMove) -> list[float]:

@@ -26,11 +26,7 @@ def written(program: Exported, language: str) -> str:
     """
     Return the text of a program.
 
-    Raises
-    ------
-    DataError
-        The language cannot say it, as INFORM without the pulses of every axis.
-
+    Raises DataError: the language cannot say it, as INFORM without the pulses of every axis.
     """
     return WRITERS[language](program)
 

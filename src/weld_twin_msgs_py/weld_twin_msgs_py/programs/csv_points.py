@@ -22,11 +22,9 @@ from weld_twin_core.motion.programs.moves import Kind
 
 from ..files.csv_text import unguarded
 from .build import Program, Ref, Step
-from .context import Context
 from .notation import Notation, joint_notation
-from .source import Source, number_at, split_outside, stripped
+from .reader import LEAST_SPEED, Reader, Span
 
-NAME = 'csv'
 POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
 _TURNS = {'': 1.0, '_rad': 1.0, ' [rad]': 1.0} | dict.fromkeys(
     ('_deg', ' [deg]', ' [\N{DEGREE SIGN}]'), np.pi / 180.0
@@ -38,86 +36,61 @@ SPEED = 0.1
 """m/s, and share of full speed, without a column."""
 
 
-def read(sources: Sequence[Source], context: Context) -> Program:
-    """
-    Return the points of a table.
+class CsvReader(Reader):
+    """Goes through a table line by line."""
 
-    Raises DataError: columns are missing, or a cell is broken; names file and line.
-    """
-    source = sources[0]
-    program = Program(NAME, [source])
-    head: list[str] | None = None
-    for place, line in source.lines():
-        if not line.strip() or line.lstrip().startswith('#'):
-            continue
-        parts = [
-            stripped(source.text, *part)
-            for part in split_outside(source.text, place, place + len(line), ',')
-        ]
-        if head is None:
-            head = [unguarded(source.text[slice(*part)].strip('"')) for part in parts]
-            columns, notation = _columns(source, place, head, context)
-            continue
-        if len(parts) != len(head):
-            where = source.where(place)
-            raise DataError(f'{where}: {len(head)} cells are needed, there are {len(parts)}')
-        cells = dict(zip(head, parts, strict=True))
-        numbers = [number_at(source, *cells[name], name) for name in columns]
-        point = program.add_point(f'line {source.line(place)}', numbers, notation)
-        program.add(_step(source, cells, point, notation.joints, source.where(place)))
-    return program
+    comments = ()
 
+    def read(self) -> Program:
+        head: list[str] = []
+        for place, line in self.source.lines():
+            if not line.strip() or line.lstrip().startswith('#'):
+                continue
+            parts, where = self.pieces(place, place + len(line)), self.source.where(place)
+            if not head:
+                head = [unguarded(self.source.text[slice(*part)].strip('"')) for part in parts]
+                columns, notation = self._columns(where, head)
+                continue
+            if len(parts) != len(head):
+                raise DataError(f'{where}: {len(head)} cells are needed, there are {len(parts)}')
+            cells = dict(zip(head, parts, strict=True))
+            numbers = [self.number(*cells[name], name) for name in columns]
+            point = self.program.add_point(f'line {self.source.line(place)}', numbers, notation)
+            self.program.add(self._step(cells, point, notation.joints, where))
+        return self.program
 
-def _columns(
-    source: Source, place: int, head: Sequence[str], context: Context
-) -> tuple[list[str], Notation]:
-    joints = context.robot.joint_names
-    if len(set(head)) != len(head):
-        raise DataError(f'{source.where(place)}: a column is named twice')
-    result = [
-        next(((joint + end, unit) for end, unit in ends.items() if joint + end in head), None)
-        for joint, ends in zip(
-            joints,
-            (_SLIDES if slides else _TURNS for slides in context.robot.prismatic),
-            strict=True,
+    def _columns(self, where: str, head: Sequence[str]) -> tuple[list[str], Notation]:
+        robot = self.context.robot
+        if len(set(head)) != len(head):
+            raise DataError(f'{where}: a column is named twice')
+        named = {}
+        for joint, slides in zip(robot.joint_names, robot.prismatic, strict=True):
+            ends = _SLIDES if slides else _TURNS
+            spelt = next((joint + end for end in ends if joint + end in head), None)
+            if spelt is not None:
+                named[spelt] = ends[spelt.removeprefix(joint)]
+        if len(named) == robot.n:
+            units = np.array(list(named.values()))
+            return list(named), joint_notation(units, np.eye(robot.n), 9, 'joints')
+        if all(name in head for name in POSE):
+            return list(POSE), CSV_POSE
+        raise DataError(
+            f'{where}: a column for every joint ({", ".join(robot.joint_names)}) or '
+            f'{" ".join(POSE)} is needed'
         )
-    ]
-    named = [item for item in result if item is not None]
-    if len(named) == len(joints):
-        units = np.array([unit for _, unit in named])
-        notation = joint_notation(units, np.eye(context.robot.n), 9, 'joints')
-        return [name for name, _ in named], notation
-    if all(name in head for name in POSE):
-        return list(POSE), CSV_POSE
-    raise DataError(
-        f'{source.where(place)}: a column for every joint ({", ".join(joints)}) or '
-        f'{" ".join(POSE)} is needed'
-    )
 
-
-def _step(
-    source: Source,
-    cells: dict[str, tuple[int, int]],
-    point: int,
-    joints: bool,
-    where: str,
-) -> Step:
-    kind: Kind = 'joint' if joints else 'linear'
-    if 'move' in cells:
-        word = source.text[slice(*cells['move'])].strip('"')
-        if word not in _KINDS:
-            raise DataError(f'{where}: move must be joint or linear, got {word!r}')
-        kind = _KINDS[word]
-    speed = number_at(source, *cells['speed'], 'speed').value if 'speed' in cells else SPEED
-    dwell = number_at(source, *cells['dwell'], 'dwell').value if 'dwell' in cells else 0.0
-    return Step(
-        kind,
-        where,
-        Ref(point),
-        speed=max(speed, 1e-4),
-        stop=dwell > 0.0 or 'dwell' not in cells,
-        dwell=max(dwell, 0.0),
-    )
+    def _step(self, cells: dict[str, Span], point: int, joints: bool, where: str) -> Step:
+        kind: Kind = 'joint' if joints else 'linear'
+        if 'move' in cells:
+            word = self.source.text[slice(*cells['move'])].strip('"')
+            if word not in _KINDS:
+                raise DataError(f'{where}: move must be joint or linear, got {word!r}')
+            kind = _KINDS[word]
+        speed = self.number(*cells['speed'], 'speed').value if 'speed' in cells else SPEED
+        dwell = self.number(*cells['dwell'], 'dwell').value if 'dwell' in cells else 0.0
+        stop = dwell > 0.0 or 'dwell' not in cells
+        speed = max(speed, LEAST_SPEED)
+        return Step(kind, where, Ref(point), speed=speed, stop=stop, dwell=max(dwell, 0.0))
 
 
 def _value(numbers: Sequence[float]) -> Array:

@@ -27,9 +27,9 @@ from .build import Program, Ref, Step
 from .context import Context
 from .controllers import Frame
 from .notation import FANUC_POSE, Notation
-from .source import NUMBER, Number, Source, closing, masked, number_at
+from .reader import LEAST_SPEED, Reader
+from .source import NUMBER, Number, Source, closing
 
-NAME = 'fanuc-ls'
 POSE_KEYS = ('X', 'Y', 'Z', 'W', 'P', 'R')
 _PART = re.compile(r'^/(MN|POS|END)\b', re.M)
 _POINT = re.compile(r'^[ \t]*P\[\s*(\d+)\s*(?::[^\]\r\n]*)?\]\s*(\{)', re.M)
@@ -45,22 +45,13 @@ SPEED = 0.1
 """m/s, and share of full speed, where a speed stands in a register."""
 
 
-def read(sources: Sequence[Source], context: Context) -> Program:
-    """
-    Return what is understood of a program.
-
-    Raises DataError: a point is broken, not taught, or defined twice; names file and line.
-    """
-    return _Reader(sources[0], context).read()
-
-
-class _Reader:
+class FanucReader(Reader):
     """Goes through a program once."""
 
-    def __init__(self, source: Source, context: Context) -> None:
-        self.source, self.context = source, context
-        self.program = Program(NAME, [source])
-        self.text = masked(source.text, (r'"[^"\r\n]*"',))
+    comments = (r'"[^"\r\n]*"',)
+
+    def __init__(self, sources: Sequence[Source], context: Context) -> None:
+        super().__init__(sources, context)
         self.points: dict[int, int] = {}
         self.frames: dict[int, tuple[Frame, Frame]] = {}
         self.untaught: dict[int, str] = {}
@@ -86,7 +77,7 @@ class _Reader:
     # Points ----------------------------------------------------------------------------------
 
     def _point(self, result: re.Match[str]) -> None:
-        index, where = int(result[1]), self.source.where(result.start())
+        index, where = int(result[1]), self.where(result)
         if index in self.points or index in self.untaught:
             raise DataError(f'{where}: P[{index}] is defined twice')
         end = closing(self.source, self.text, result.start(2))
@@ -135,7 +126,7 @@ class _Reader:
             if key in fields:
                 where = self.source.where(place[0])
                 raise DataError(f'{where}: {key} of P[{index}] is given twice')
-            fields[key] = number_at(self.source, *place, f'{key} of P[{index}]')
+            fields[key] = self.number(*place, f'{key} of P[{index}]')
         return fields
 
     def _form(
@@ -159,7 +150,7 @@ class _Reader:
     # Moves -----------------------------------------------------------------------------------
 
     def _statement(self, result: re.Match[str]) -> None:
-        text, where = result[2].strip(), self.source.where(result.start(2))
+        text, where = result[2].strip(), self.where(result, 2)
         wait = re.match(rf'WAIT\s+({NUMBER})\s*\(sec\)', text)
         if wait is not None:
             self.program.dwell(max(float(wait[1]), 0.0))
@@ -179,8 +170,7 @@ class _Reader:
         shift = _SHIFTING.search(tail)
         lost = point is None or (kind == 'circular' and via is None) or move[1] not in _KINDS
         if lost or shift is not None:
-            why = self._why(name, index, shift)
-            self.program.unknown(kind, where, why)
+            self.program.unknown(kind, where, self._why(name, index, shift))
             return
         self._add(kind, where, via, point, tail)
 
@@ -233,5 +223,5 @@ def _speed(kind: Kind, tail: str) -> float:
     except ValueError:
         return SPEED
     if kind == 'joint':
-        return max(value / 100.0, 1e-4) if result[2] == '%' else SPEED
-    return max(value * _UNITS[result[2]], 1e-4) if result[2] in _UNITS else SPEED
+        return max(value / 100.0, LEAST_SPEED) if result[2] == '%' else SPEED
+    return max(value * _UNITS[result[2]], LEAST_SPEED) if result[2] in _UNITS else SPEED

@@ -29,9 +29,9 @@ from .build import Program, Ref, Step
 from .context import Context
 from .controllers import Frame
 from .notation import YASKAWA_POSE, Notation, joint_notation
-from .source import Number, Source, masked, number_at, split_outside
+from .reader import LEAST_SPEED, Reader
+from .source import Number, Source
 
-NAME = 'inform'
 _HEAD = re.compile(r'^///(\w+)(?:[ \t]+([^\r\n]*))?', re.M)
 _POINT = re.compile(r'^(B?P|B?C|EC|EX)(\d+)[ \t]*=[ \t]*([^\r\n]*)', re.M)
 _MOVE = re.compile(r'^[ \t]*(MOV[JLCS]|IMOV|EIMOV[LC])\b[ \t]*([^\r\n]*)', re.M)
@@ -44,23 +44,13 @@ CM_PER_MIN = 0.01 / 60.0
 """m/s of a speed in cm/min, as ``V=50cm/min`` has it on arc welding controllers."""
 
 
-def read(sources: Sequence[Source], context: Context) -> Program:
-    """
-    Return what is understood of a job.
-
-    Raises DataError: a point is broken, or in pulses that nobody can turn into degrees; names file
-    and line.
-    """
-    return _Reader(sources[0], context).read()
-
-
-class _Reader:
+class InformReader(Reader):
     """Goes through a job once."""
 
-    def __init__(self, source: Source, context: Context) -> None:
-        self.source, self.context = source, context
-        self.program = Program(NAME, [source])
-        self.text = masked(source.text, (r"'[^\r\n]*",))
+    comments = (r"'[^\r\n]*",)
+
+    def __init__(self, sources: Sequence[Source], context: Context) -> None:
+        super().__init__(sources, context)
         self.points: dict[str, int] = {}
         self.frames: dict[int, tuple[Frame, Frame]] = {}
         self.tool, self.base, self.form = Frame(''), Frame('', np.eye(4)), 'PULSE'
@@ -71,21 +61,8 @@ class _Reader:
     def read(self) -> Program:
         result = re.search(r'^//INST\b', self.text, re.M)
         cut = len(self.text) if result is None else result.start()
-        head = [(m.start(), self._head, m) for m in _HEAD.finditer(self.text, 0, cut)]
-        head += [(m.start(), self._point, m) for m in _POINT.finditer(self.text, 0, cut)]
-        body = [
-            (m.start(), handle, m)
-            for pattern, handle in (
-                (_MOVE, self._move),
-                (_SHIFT, self._shift),
-                (_TIMER, self._timer),
-            )
-            for m in pattern.finditer(self.text, cut)
-        ]
-        for _, handle, match in sorted(head, key=lambda e: e[0]):
-            handle(match)
-        for _, handle, match in sorted(body, key=lambda e: e[0]):
-            handle(match)
+        self.in_order({_HEAD: self._head, _POINT: self._point}, 0, cut)
+        self.in_order({_MOVE: self._move, _SHIFT: self._shift, _TIMER: self._timer}, cut)
         self._close_arc()
         return self.program
 
@@ -103,12 +80,12 @@ class _Reader:
         if result[1] != 'C':
             return  # Variables and other axes: a move that uses them is not understood.
         name = f'C{int(result[2]):05d}'
-        where = self.source.where(result.start())
+        where = self.where(result)
         if name in self.points:
             raise DataError(f'{where}: {name} is defined twice')
-        parts = split_outside(self.text, *result.span(3))
+        parts = self.pieces(*result.span(3))
         notation = self._notation(where)
-        numbers = [number_at(self.source, *part, f'a coordinate of {name}') for part in parts]
+        numbers = [self.number(*part, f'a coordinate of {name}') for part in parts]
         count = self.context.robot.n if notation.joints else 6
         if len(numbers) < count:
             raise DataError(f'{where}: {name} needs {count} numbers, it has {len(numbers)}')
@@ -137,14 +114,11 @@ class _Reader:
 
     def _timer(self, result: re.Match[str]) -> None:
         self._close_arc()
-        try:
-            self.program.dwell(max(number_at(self.source, *result.span(1), 'a time').value, 0.0))
-        except DataError:
-            return  # A time in a variable; how long it is does not matter here.
+        self.dwell(result.span(1))
 
     def _shift(self, result: re.Match[str]) -> None:
         self._close_arc()
-        where = self.source.where(result.start())
+        where = self.where(result)
         if result[1] == 'SFTON':
             self.shifted = f'SFTON at {where} shifts it'
         elif result[1] == 'SFTOF':
@@ -152,7 +126,7 @@ class _Reader:
 
     def _move(self, result: re.Match[str]) -> None:
         word, rest = result[1], result[2]
-        where, kind = self.source.where(result.start()), _KINDS.get(result[1], 'linear')
+        where, kind = self.where(result), _KINDS.get(result[1], 'linear')
         if kind != 'circular':
             self._close_arc()
         named = re.match(r'C(\d+)\b', rest)
@@ -161,8 +135,7 @@ class _Reader:
         if word not in _KINDS or point is None or other or self.shifted:
             self._close_arc()
             what = rest.split()[0] if rest.split() else 'nothing'
-            why = self.shifted or f'{word} to {what!r} is not understood'
-            self.program.unknown(kind, where, why)
+            self.unknown(kind, result, self.shifted or f'{word} to {what!r} is not understood')
             return
         step = self._step(kind, where, point, rest)
         if kind == 'circular':
@@ -204,10 +177,10 @@ def _speed(kind: Kind, rest: str) -> float:
     straight = re.search(r'\bV=([\d.]+)(cm/min|mm/sec|cm/m)?', rest)
     try:
         if kind == 'joint':
-            return JOINT_SPEED if joint is None else max(float(joint[1]) / 100.0, 1e-4)
+            return JOINT_SPEED if joint is None else max(float(joint[1]) / 100.0, LEAST_SPEED)
         if straight is None:
             return SPEED
         unit = CM_PER_MIN if (straight[2] or '').startswith('cm') else 1e-3
-        return max(float(straight[1]) * unit, 1e-4)
+        return max(float(straight[1]) * unit, LEAST_SPEED)
     except ValueError:
         return SPEED

@@ -18,11 +18,10 @@ import numpy as np
 from weld_twin_core.errors import DataError
 
 from .build import Program, Ref, Step
-from .context import Context
 from .notation import joint_notation
-from .source import Number, Source, closing, masked, number_at, split_outside, stripped
+from .reader import Reader, Span
+from .source import closing, stripped
 
-NAME = 'joint-trajectory'
 _NAMES = re.compile(r'["\']?joint_names["\']?[ \t]*:[ \t]*')
 _POSITIONS = re.compile(r'["\']?\bpositions["\']?[ \t]*:[ \t]*')
 _ITEM = re.compile(r'\s*-[ \t]*([^\r\n]*)')
@@ -34,64 +33,56 @@ DIGITS = 9
 """Of a position in rad or m: messages carry doubles."""
 
 
-def read(sources: Sequence[Source], context: Context) -> Program:
-    """
-    Return what is understood of a trajectory.
+class TrajectoryReader(Reader):
+    """Goes through a trajectory once."""
 
-    Raises DataError: it names other joints than the robot's, or a position is broken.
-    """
-    source, robot = sources[0], context.robot
-    program = Program(NAME, [source], one_seam=True)
-    text = masked(source.text, (r'(?<![\w"\'])#[^\r\n]*',))
-    order = _order(source, text, robot.joint_names)
-    mix = np.eye(robot.n)[:, order]
-    notation = joint_notation(np.ones(robot.n), mix, DIGITS, 'positions')
-    places = [result.end() for result in _POSITIONS.finditer(text)]
-    times = _times(text, places)
-    for k, place in enumerate(places):
-        numbers = _numbers(source, text, place)
-        where = source.where(place)
-        if len(numbers) != robot.n:
-            raise DataError(f'{where}: {robot.n} positions are needed, there are {len(numbers)}')
-        point = program.add_point(f'point {k + 1}', numbers, notation)
-        duration = times[k] - times[k - 1] if k and times else 0.0
-        last = k == len(places) - 1
-        program.add(Step('joint', where, Ref(point), duration=max(duration, 0.0), stop=last))
-    return program
+    comments = (r'(?<![\w"\'])#[^\r\n]*',)
 
+    def read(self) -> Program:
+        robot, self.program.one_seam = self.context.robot, True
+        mix = np.eye(robot.n)[:, self._order(robot.joint_names)]
+        notation = joint_notation(np.ones(robot.n), mix, DIGITS, 'positions')
+        places = [result.end() for result in _POSITIONS.finditer(self.text)]
+        times = _times(self.text, places)
+        for k, place in enumerate(places):
+            numbers = [self.number(*part, 'a position') for part in self._items(place)]
+            where = self.source.where(place)
+            if len(numbers) != robot.n:
+                raise DataError(
+                    f'{where}: {robot.n} positions are needed, there are {len(numbers)}'
+                )
+            point = Ref(self.program.add_point(f'point {k + 1}', numbers, notation))
+            duration = max(times[k] - times[k - 1], 0.0) if k and times else 0.0
+            stop = k == len(places) - 1
+            self.program.add(Step('joint', where, point, duration=duration, stop=stop))
+        return self.program
 
-def _order(source: Source, text: str, joints: Sequence[str]) -> list[int]:
-    """Return which joint of the robot each position is."""
-    result = _NAMES.search(text)
-    if result is None:
-        raise DataError(f'{source.where(0)}: a trajectory needs joint_names')
-    names = [text[a:b].strip(' "\'') for a, b in _items(source, text, result.end())]
-    if sorted(names) != sorted(joints):
-        raise DataError(
-            f'{source.where(result.start())}: it moves {", ".join(names)}; the robot has '
-            + ', '.join(joints)
-        )
-    return [list(joints).index(name) for name in names]
+    def _order(self, joints: Sequence[str]) -> list[int]:
+        """Return which joint of the robot each position is."""
+        result = _NAMES.search(self.text)
+        if result is None:
+            raise DataError(f'{self.source.where(0)}: a trajectory needs joint_names')
+        names = [self.text[a:b].strip(' "\'') for a, b in self._items(result.end())]
+        if sorted(names) != sorted(joints):
+            raise DataError(
+                f'{self.where(result)}: it moves {", ".join(names)}; the robot has '
+                + ', '.join(joints)
+            )
+        return [list(joints).index(name) for name in names]
 
-
-def _items(source: Source, text: str, place: int) -> list[tuple[int, int]]:
-    """Return the parts of a list, ``[a, b]`` or a line each."""
-    if text.startswith('[', place):
-        end = closing(source, text, place)
-        parts = [stripped(text, *part) for part in split_outside(text, place + 1, end)]
-        return [part for part in parts if part[0] < part[1]]
-    out = []
-    result = _ITEM.match(text, place)
-    while result is not None:
-        out.append(stripped(text, *result.span(1)))
-        result = _ITEM.match(text, result.end())
-        if result is not None and ':' in result[1]:
-            break  # The next point begins, "- positions:".
-    return out
-
-
-def _numbers(source: Source, text: str, place: int) -> list[Number]:
-    return [number_at(source, *part, 'a position') for part in _items(source, text, place)]
+    def _items(self, place: int) -> list[Span]:
+        """Return the parts of a list, ``[a, b]`` or a line each."""
+        if self.text.startswith('[', place):
+            end = closing(self.source, self.text, place)
+            return [(a, b) for a, b in self.pieces(place + 1, end) if a < b]
+        out = []
+        result = _ITEM.match(self.text, place)
+        while result is not None:
+            out.append(stripped(self.text, *result.span(1)))
+            result = _ITEM.match(self.text, result.end())
+            if result is not None and ':' in result[1]:
+                break  # The next point begins, "- positions:".
+        return out
 
 
 def _times(text: str, places: Sequence[int]) -> list[float]:

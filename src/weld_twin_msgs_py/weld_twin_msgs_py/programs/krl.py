@@ -33,14 +33,13 @@ from .context import Context
 from .controllers import Frame
 from .notation import KUKA_POSE
 from .postures import turn_bits
-from .source import NUMBER, Number, Source, closing, masked, number_at, split_outside, stripped
+from .reader import LEAST_SPEED, Reader
+from .source import NUMBER, Number, Source, closing, number_at, split_outside, stripped
 
-NAME = 'krl'
 KINDS: dict[str, Kind] = {'PTP': 'joint', 'LIN': 'linear', 'CIRC': 'circular'}
 POSE_KEYS, EXTERNAL = ('X', 'Y', 'Z', 'A', 'B', 'C'), ('E1', 'E2', 'E3', 'E4', 'E5', 'E6')
 SPEED = 0.1
 """m/s while the program has not said."""
-_COMMENTS = (r';[^\r\n]*', r'"[^"\r\n]*"')
 _MOVE = re.compile(r'^[ \t]*S?(PTP|LIN|CIRC)(_REL)?\b', re.I | re.M)
 _OTHER = re.compile(r'^[ \t]*(SPL|SPTP_REL|ASYPTP)\b', re.I | re.M)
 _DECLARED = re.compile(
@@ -83,28 +82,13 @@ class _State:
     joint_speed: float = 0.1
 
 
-def read(sources: Sequence[Source], context: Context) -> Program:
-    """
-    Return what is understood of a program.
+class KrlReader(Reader):
+    """Goes through the files once: the .src, then the .dat where there is one."""
 
-    Raises DataError: a point is broken or declared twice; names file and line.
-
-    Parameters
-    ----------
-    sources : sequence of Source
-        The .src, then the .dat where there is one.
-
-    """
-    return _Reader(sources, context).read()
-
-
-class _Reader:
-    """Goes through the files once."""
+    comments = (r';[^\r\n]*', r'"[^"\r\n]*"')
 
     def __init__(self, sources: Sequence[Source], context: Context) -> None:
-        self.sources, self.context = list(sources), context
-        self.program = Program(NAME, self.sources)
-        self.texts = [masked(source.text, _COMMENTS) for source in sources]
+        super().__init__(sources, context)
         self.names: dict[str, int] = {}
         self.data: dict[str, Aggregate] = {}
         self.frames: dict[str, Array] = {}
@@ -118,20 +102,16 @@ class _Reader:
             for result in _DECLARED.finditer(self.texts[file]):
                 self._declaration(file, result)
         self._frame_tables()
-        events = [
-            (result.start(), handle, result)
-            for pattern, handle in (
-                (_MOVE, self._move),
-                (_OTHER, self._other),
-                (_SET, self._set),
-                (_BAS, self._bas),
-                (_WAIT, self._wait),
-                (_ROUTINE, self._routine),
-            )
-            for result in pattern.finditer(self.texts[0])
-        ]
-        for _, handle, result in sorted(events, key=lambda event: event[0]):
-            handle(result)
+        self.in_order(
+            {
+                _MOVE: self._move,
+                _OTHER: self._other,
+                _SET: self._set,
+                _BAS: self._bas,
+                _WAIT: lambda found: self.dwell(found.span(1)),
+                _ROUTINE: self.new_piece,
+            }
+        )
         hold_if_used_elsewhere(self.program, self.names, self.texts, self.used)
         return self.program
 
@@ -148,7 +128,7 @@ class _Reader:
         if kind in ('FDAT', 'LDAT', 'PDAT'):
             self.data[name] = content
         else:
-            point = self._point_of(file, content, result.start(3), result[2])
+            point = self._point_of(file, content, result[2])
             if point is None:
                 self.data[name] = content
             else:
@@ -189,7 +169,7 @@ class _Reader:
                 others[key] = piece.strip()
         return Aggregate(numbers, others)
 
-    def _point_of(self, file: int, content: Aggregate, start: int, name: str) -> int | None:
+    def _point_of(self, file: int, content: Aggregate, name: str) -> int | None:
         """Add a point of all its components; None where some are missing or worked out."""
         external = self.context.controller.external
         known = [axis.label for axis in external]
@@ -208,38 +188,24 @@ class _Reader:
                 if turn is not None and notation is KUKA_POSE:
                     self.suits[point] = turn_bits(int(turn.value))
                 return point
-        del start
         return None
 
     # Statements ------------------------------------------------------------------------------
 
-    def _routine(self, result: re.Match[str]) -> None:
-        del result
-        self.program.new_piece()
-
-    def _wait(self, result: re.Match[str]) -> None:
-        try:
-            self.program.dwell(
-                max(number_at(self.sources[0], *result.span(1), 'a time').value, 0.0)
-            )
-        except DataError:
-            return  # A computed time; how long it is does not matter here.
-
     def _other(self, result: re.Match[str]) -> None:
-        where = self.sources[0].where(result.start())
-        self.program.unknown('linear', where, f'{result[1].upper()} is not understood')
+        self.unknown('linear', result, f'{result[1].upper()} is not understood')
 
     def _set(self, result: re.Match[str]) -> None:
         what = result[1].upper()
-        start, end = stripped(self.texts[0], *result.span(2))
-        value = self.texts[0][start:end]
+        start, end = stripped(self.text, *result.span(2))
+        value = self.text[start:end]
         if what in ('$BASE', '$TOOL'):
             along = _ALONG.match(value) if what == '$BASE' else None
             if along is not None:
                 self._second_kinematic(along[1])
                 start += along.end()
                 end -= 1
-                value = self.texts[0][start:end].strip()
+                value = self.text[start:end].strip()
             frame = self._frame_at(0, start, end)
             unclear = along is None and re.match(r'EK\b', value, re.I)
             named = Frame(_bare(value) or value, frame, None if unclear else along is not None)
@@ -253,15 +219,15 @@ class _Reader:
             self.state.tool, self.state.base = self._frames_of(value)
         elif what == 'LDAT_ACT' and value.lower() in self.data:
             speed = self.data[value.lower()].numbers.get('VEL')
-            self.state.speed = self.state.speed if speed is None else max(speed.value, 1e-4)
+            self.state.speed = self.state.speed if speed is None else max(speed.value, LEAST_SPEED)
 
     def _bas(self, result: re.Match[str]) -> None:
         what = result[1].upper()
-        start, end = stripped(self.texts[0], *result.span(2))
+        start, end = stripped(self.text, *result.span(2))
         if what == 'EX_BASE':
-            self.state.base = Frame(self.texts[0][start:end], None, None)
+            self.state.base = Frame(self.text[start:end], None, None)
         elif what in ('TOOL', 'BASE'):
-            frame = self._numbered(what, self.texts[0][start:end])
+            frame = self._numbered(what, self.text[start:end])
             self.state.tool = frame if what == 'TOOL' else self.state.tool
             self.state.base = frame if what == 'BASE' else self.state.base
         elif what == 'VEL_CP':
@@ -313,51 +279,45 @@ class _Reader:
         self.kinematic = self.kinematic or index
         if index != self.kinematic:
             raise DataError(
-                f'{self.sources[0].name}: it works with the external kinematic systems '
+                f'{self.source.name}: it works with the external kinematic systems '
                 f'{self.kinematic} and {index}, and a robot file has one positioner; split it'
             )
 
     def _speed(self, start: int, end: int, default: float) -> float:
-        try:
-            return max(number_at(self.sources[0], start, end, 'a speed').value, 1e-4)
-        except DataError:
-            return default
+        return max(self.value((start, end), default), LEAST_SPEED)
 
     # Moves -----------------------------------------------------------------------------------
 
     def _move(self, result: re.Match[str]) -> None:
         word, kind = result[1].upper(), KINDS[result[1].upper()]
-        source, text = self.sources[0], self.texts[0]
-        where = source.where(result.start())
+        text = self.text
         end = _line_end(text, result.end())
         if result[2]:
-            self.program.unknown(kind, where, f'{word}_REL counts from where the arm stands')
+            self.unknown(kind, result, f'{word}_REL counts from where the arm stands')
             return
         wanted = 2 if kind == 'circular' else 1
         with_ = _WITH.search(text, result.end(), end)
         cut = end if with_ is None else with_.start()
         parts = self._parts(result.end(), cut)
         if len(parts) > wanted:
-            self.program.unknown(
-                kind, where, f'{word} with {len(parts)} arguments is not understood'
-            )
+            self.unknown(kind, result, f'{word} with {len(parts)} arguments is not understood')
             return
         frames = self._own_frames(text[cut:end].upper())
         if frames is None:
-            self.program.unknown(kind, where, f'{word} has a tool or base that is worked out')
+            self.unknown(kind, result, f'{word} has a tool or base that is worked out')
             return
         tail = text[parts[-1][1] : end].upper() if parts else ''
         refs = [self._ref(*part) for part in parts]
         if len(refs) < wanted or any(ref is None for ref in refs):
-            what = source.text[result.end() : end].strip() or 'nothing'
-            self.program.unknown(kind, where, f'{word} goes to {what!r}, which is not given here')
+            what = self.source.text[result.end() : end].strip() or 'nothing'
+            self.unknown(kind, result, f'{word} goes to {what!r}, which is not given here')
             return
         ends = [ref for ref in refs if ref is not None]
         joints = self.program.points[ends[-1]].value.ndim == 1
         if joints and kind != 'joint':
-            self.program.unknown(kind, where, f'{word} to axis positions is not understood')
+            self.unknown(kind, result, f'{word} to axis positions is not understood')
             return
-        self.program.add(self._step(kind, where, ends, frames, tail))
+        self.program.add(self._step(kind, self.where(result), ends, frames, tail))
 
     def _own_frames(self, settings: str) -> tuple[Frame, Frame] | None:
         """Return tool and base of a move, its own settings counted; None where they are open."""
@@ -382,19 +342,18 @@ class _Reader:
             Ref(ends[-1]),
             Ref(ends[0]) if kind == 'circular' else None,
             *frames,
-            speed if own is None else max(float(own[1].rstrip('.')), 1e-4),
+            speed if own is None else max(float(own[1].rstrip('.')), LEAST_SPEED),
             re.search(r'\bC_(DIS|PTP|VEL|ORI|SPL)\b', tail) is None,
             suits=self.suits.get(ends[-1]),
         )
 
     def _parts(self, start: int, end: int) -> list[tuple[int, int]]:
         """Return the targets of a move, without what follows them."""
-        text = self.texts[0]
+        text = self.text
         out = []
-        for first, last in split_outside(text, start, end):
-            first, last = stripped(text, first, last)
+        for first, last in self.pieces(start, end):
             if text.startswith('{', first):
-                last = closing(self.sources[0], text, first) + 1
+                last = closing(self.source, text, first) + 1
             else:
                 word = re.match(r'[^\s]+', text[first:last])
                 last = first + (word.end() if word else 0)
@@ -403,11 +362,10 @@ class _Reader:
         return out
 
     def _ref(self, start: int, end: int) -> int | None:
-        text = self.texts[0]
+        text = self.text
         if text.startswith('{', start):
             content = self._aggregate(0, start, end)
-            line = self.sources[0].line(start)
-            return self._point_of(0, content, start, f'line {line}')
+            return self._point_of(0, content, f'line {self.source.line(start)}')
         name = text[start:end].lower()
         if re.fullmatch(r'[a-z_]\w*', name):
             self.used[0].add(start)

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,16 +13,16 @@ from weld_twin_core.errors import DataError
 
 from .build import Program
 from .context import Context
-from .csv_points import CSV_POSE
-from .csv_points import read as read_csv
-from .fanuc_ls import read as read_fanuc
-from .inform import read as read_inform
-from .joint_trajectory import read as read_trajectory
-from .krl import read as read_krl
+from .csv_points import CSV_POSE, CsvReader
+from .fanuc_ls import FanucReader
+from .inform import InformReader
+from .joint_trajectory import TrajectoryReader
+from .krl import KrlReader
 from .notation import ABB_POSE, FANUC_POSE, KUKA_POSE, UR_POSE, YASKAWA_POSE, Notation
-from .rapid import read as read_rapid
+from .rapid import RapidReader
+from .reader import Reader
 from .source import Source, read_source
-from .urscript import read as read_urscript
+from .urscript import UrscriptReader
 
 
 class Language(NamedTuple):
@@ -33,7 +33,7 @@ class Language(NamedTuple):
     """In lower case, with the point."""
     signs: str
     """A regular expression that only programs of this language hold."""
-    read: Callable[[Sequence[Source], Context], Program]
+    reader: type[Reader]
     pose: Notation
     """How it writes a pose."""
     beside: tuple[str, ...] = ()
@@ -42,22 +42,27 @@ class Language(NamedTuple):
 
 LANGUAGES: dict[str, Language] = {
     'urscript': Language(
-        'Universal Robots', ('.script', '.urscript'), r'\bmove[jlpc]\s*\(', read_urscript, UR_POSE
+        'Universal Robots', ('.script', '.urscript'), r'\bmove[jlpc]\s*\(', UrscriptReader, UR_POSE
     ),
     'krl': Language(
-        'KUKA', ('.src',), r'(?im)^\s*(?:GLOBAL\s+)?DEF\s+\w+\s*\(', read_krl, KUKA_POSE, ('.dat',)
+        'KUKA',
+        ('.src',),
+        r'(?im)^\s*(?:GLOBAL\s+)?DEF\s+\w+\s*\(',
+        KrlReader,
+        KUKA_POSE,
+        ('.dat',),
     ),
-    'inform': Language('Yaskawa', ('.jbi',), r'(?m)^/JOB\b', read_inform, YASKAWA_POSE),
-    'fanuc-ls': Language('FANUC', ('.ls',), r'(?m)^/PROG\b', read_fanuc, FANUC_POSE),
+    'inform': Language('Yaskawa', ('.jbi',), r'(?m)^/JOB\b', InformReader, YASKAWA_POSE),
+    'fanuc-ls': Language('FANUC', ('.ls',), r'(?m)^/PROG\b', FanucReader, FANUC_POSE),
     'joint-trajectory': Language(
-        'ROS', ('.yaml', '.yml', '.json'), r'\bjoint_names\b', read_trajectory, CSV_POSE
+        'ROS', ('.yaml', '.yml', '.json'), r'\bjoint_names\b', TrajectoryReader, CSV_POSE
     ),
-    'csv': Language('any', ('.csv',), r'\A(?:\s*#[^\n]*\n)*[\w" \[\]]+,', read_csv, CSV_POSE),
+    'csv': Language('any', ('.csv',), r'\A(?:\s*#[^\n]*\n)*[\w" \[\]]+,', CsvReader, CSV_POSE),
     'rapid': Language(
         'ABB',
         ('.mod', '.prg', '.modx'),
         r'(?im)^\s*MODULE\s+\w+|^\s*PROC\s+\w+',
-        read_rapid,
+        RapidReader,
         ABB_POSE,
     ),
 }
@@ -124,7 +129,7 @@ def read_program(path: Path | str, context: Context, controller: str = '') -> Pr
 
 def read_sources(sources: Sequence[Source], context: Context, name: str) -> Program:
     """Return the program of texts in a language of the table."""
-    program = LANGUAGES[name].read(sources, context)
+    program = LANGUAGES[name].reader(sources, context).read()
     program.language = name
     return program
 

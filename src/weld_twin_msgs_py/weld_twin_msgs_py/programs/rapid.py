@@ -34,14 +34,13 @@ from .context import Context
 from .controllers import Frame
 from .notation import ABB_POSE
 from .postures import quadrants
-from .source import Number, Source, closing, masked, number_at, split_outside, stripped
+from .reader import LEAST_SPEED, Reader
+from .source import Number, Source, closing, split_outside, stripped
 
-NAME = 'rapid'
 NO_AXIS = 8.9e9
 """ABB writes 9E9 for an external axis that is not there."""
 SPEED = 0.1
 """m/s where the speed is not known."""
-_COMMENTS = (r'"[^"\r\n]*"', r'![^\r\n]*')
 _DECLARED = re.compile(
     r'\b(?:CONST|PERS|VAR)\s+(robtarget|jointtarget|tooldata|wobjdata|speeddata)\s+'
     r'([A-Za-z]\w*)\s*(\{[^}]*\})?\s*:=\s*',
@@ -74,22 +73,13 @@ class Leaf(NamedTuple):
 Tree = Leaf | list['Tree']
 
 
-def read(sources: Sequence[Source], context: Context) -> Program:
-    """
-    Return what is understood of a module.
-
-    Raises DataError: a point is broken or declared twice; names file and line.
-    """
-    return _Reader(sources[0], context).read()
-
-
-class _Reader:
+class RapidReader(Reader):
     """Goes through a module once."""
 
-    def __init__(self, source: Source, context: Context) -> None:
-        self.source, self.context = source, context
-        self.program = Program(NAME, [source])
-        self.text = masked(source.text, _COMMENTS)
+    comments = (r'"[^"\r\n]*"', r'![^\r\n]*')
+
+    def __init__(self, sources: Sequence[Source], context: Context) -> None:
+        super().__init__(sources, context)
         self.names: dict[str, int] = {}
         self.tools: dict[str, Frame] = {'tool0': Frame('', np.eye(4))}
         self.bases: dict[str, Frame] = {'wobj0': Frame('', np.eye(4))}
@@ -103,19 +93,15 @@ class _Reader:
     def read(self) -> Program:
         for result in _DECLARED.finditer(self.text):
             self._declaration(result)
-        events = [
-            (result.start(), handle, result)
-            for pattern, handle in (
-                (_MOVE, self._move),
-                (_OTHER, self._other),
-                (_WAIT, self._wait),
-                (_CONF, self._conf),
-                (_ROUTINE, self._routine),
-            )
-            for result in pattern.finditer(self.text)
-        ]
-        for _, handle, result in sorted(events, key=lambda event: event[0]):
-            handle(result)
+        self.in_order(
+            {
+                _MOVE: self._move,
+                _OTHER: self._other,
+                _WAIT: lambda found: self.dwell(found.span(2)),
+                _CONF: self._conf,
+                _ROUTINE: self.new_piece,
+            }
+        )
         hold_if_used_elsewhere(self.program, self.names, [self.text], [self.used])
         return self.program
 
@@ -123,7 +109,7 @@ class _Reader:
 
     def _declaration(self, result: re.Match[str]) -> None:
         kind, name = result[1].lower(), result[2].lower()
-        where = self.source.where(result.start(2))
+        where = self.where(result, 2)
         self.used.add(result.start(2))
         if result[3] or not self.text.startswith('[', result.end()):
             return  # An array, or a value that is worked out: moves to it are not understood.
@@ -140,7 +126,7 @@ class _Reader:
         elif kind == 'wobjdata':
             self.bases[name] = self._wobj(tree, result[2], result.end())
         elif isinstance(tree, list) and tree and isinstance(tree[0], Leaf):
-            speed = number_at(self.source, *tree[0], f'the speed of {result[2]}').value
+            speed = self.number(*tree[0], f'the speed of {result[2]}').value
             self.speeds[name] = max(speed, 0.1) * 1e-3
 
     def _tool(self, tree: Tree, name: str, at: int) -> Frame:
@@ -220,7 +206,7 @@ class _Reader:
             shape = ' and '.join(map(str, counts))
             raise DataError(f'{self.source.where(at)}: {name} needs {shape} numbers in brackets')
         return [
-            number_at(self.source, leaf.start, leaf.end, f'a coordinate of {name}')
+            self.number(leaf.start, leaf.end, f'a coordinate of {name}')
             for leaf in leaves
             if isinstance(leaf, Leaf)
         ]
@@ -236,33 +222,23 @@ class _Reader:
 
     # Statements ------------------------------------------------------------------------------
 
-    def _routine(self, result: re.Match[str]) -> None:
-        del result
-        self.program.new_piece()
-
     def _conf(self, result: re.Match[str]) -> None:
         self.config[result[1].lower()] = result[2].lower() == 'on'
 
-    def _wait(self, result: re.Match[str]) -> None:
-        try:
-            self.program.dwell(max(number_at(self.source, *result.span(2), 'a time').value, 0.0))
-        except DataError:
-            return  # A computed time; how long it is does not matter here.
-
     def _other(self, result: re.Match[str]) -> None:
-        where = self.source.where(result.start())
+        where = self.where(result)
         if result[1].lower().endswith('offsoff') or result[1].lower() == 'pdispoff':
             self.displaced = ''
         elif result[1].lower() in _DISPLACED:
             self.displaced = f'{result[1]} at {where} displaces it'
         else:
-            self.program.unknown('linear', where, f'{result[1]} is not understood')
+            self.unknown('linear', result, f'{result[1]} is not understood')
 
     # Moves -----------------------------------------------------------------------------------
 
     def _move(self, result: re.Match[str]) -> None:
         word = (result[1] or result[2] or result[3]).lower()
-        kind, where = _KINDS[word], self.source.where(result.start())
+        kind, where = _KINDS[word], self.where(result)
         end = self.text.find(';', result.end())
         if end < 0:
             raise DataError(f'{where}: the statement {result[0]} is not closed by ;')
@@ -274,7 +250,7 @@ class _Reader:
         if self.displaced or any(ref is None for ref in refs):
             text = self.source.text[slice(*parts[wanted - 1])].strip()
             why = self.displaced or f'{result[0]} goes to {text!r}, which is not given here'
-            self.program.unknown(kind, where, why)
+            self.unknown(kind, result, why)
             return
         places = [ref for ref in refs if ref is not None]
         tool, base = self._frames(*parts[-1])
@@ -288,8 +264,7 @@ class _Reader:
     def _arguments(self, start: int, end: int) -> list[tuple[int, int]]:
         """Return the arguments of a move, the switches before the first left out."""
         parts: list[tuple[int, int]] = []
-        for first, last in split_outside(self.text, start, end):
-            first, last = stripped(self.text, first, last)
+        for first, last in self.pieces(start, end):
             if not parts:
                 switch = re.match(r'(?:\\\w+\s*)+', self.text[first:last])
                 first += switch.end() if switch else 0
@@ -321,15 +296,13 @@ class _Reader:
     def _shifted(self, word: str, opening: int, end: int) -> Ref | None:
         if closing(self.source, self.text, opening) != end - 1:
             return None
-        parts = [
-            stripped(self.text, *part) for part in split_outside(self.text, opening + 1, end - 1)
-        ]
+        parts = self.pieces(opening + 1, end - 1)
         point = self._named(*parts[0])
         cut = self._before_switch(*parts[-1])
         turns = self._switches(cut, parts[-1][1])
         try:
             spans = [*parts[1:-1], (parts[-1][0], cut)]
-            shift = [number_at(self.source, *part, 'a shift').value * 1e-3 for part in spans]
+            shift = [self.number(*part, 'a shift').value * 1e-3 for part in spans]
         except DataError:
             return None
         if point is None or turns is None or len(shift) != 3:
@@ -349,11 +322,8 @@ class _Reader:
         text = self.text[start:end]
         for result in re.finditer(r'\\(\w+)\s*:=\s*([^\\]*)', text):
             place = start + result.start(2), start + result.end(2)
-            try:
-                out[result[1].lower()] = number_at(self.source, *place, 'an angle').value
-            except DataError:
-                return None
-        return out
+            out[result[1].lower()] = self.value(place, np.nan)
+        return None if np.isnan(list(out.values())).any() else out
 
     def _before_switch(self, start: int, end: int) -> int:
         """Return where an argument ends and its optional arguments begin."""
@@ -389,4 +359,4 @@ class _Reader:
         if kind == 'joint':
             # Of a joint move the speed is the tool's too; 1 m/s is near a tenth of full speed.
             value = float(np.clip(value / 10.0, 0.01, 1.0))
-        return max(value, 1e-4), zone == 'fine'
+        return max(value, LEAST_SPEED), zone == 'fine'

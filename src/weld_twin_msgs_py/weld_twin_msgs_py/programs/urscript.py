@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -30,9 +29,9 @@ from .context import Context
 from .controllers import Frame
 from .notation import UR_POSE, Notation
 from .postures import nearest
-from .source import Number, Source, closing, masked, number_at, split_outside, stripped
+from .reader import LEAST_SPEED, Reader
+from .source import Number, Source, closing, stripped
 
-NAME = 'urscript'
 MOVES: dict[str, tuple[Kind, tuple[str, ...]]] = {
     'movej': ('joint', ('q', 'a', 'v', 't', 'r')),
     'movel': ('linear', ('pose', 'a', 'v', 't', 'r')),
@@ -46,36 +45,19 @@ OTHER_MOTION = (
     'teach_mode|optimovej|optimovel|path_offset_enable|set_reference_frame|move_process'
 )
 """Functions that move the arm, or its frames, in another way."""
-_COMMENTS = (r'#[^\r\n]*', r'"[^"\r\n]*"')
 _WORD = re.compile(
     rf'\b(?:(?:(move[jlpc])|({OTHER_MOTION})|(set_tcp)|(sleep))\s*(\()|(?:def|thread)\s)'
 )
 _ASSIGNED = re.compile(r'^([ \t]*(?:global|local)?[ \t]*)([A-Za-z_]\w*)[ \t]*=(?!=)[ \t]*', re.M)
 
 
-class Assigned(NamedTuple):
-    """A variable that holds a pose or joint positions."""
-
-    point: int
-    place: int
-
-
-def read(sources: Sequence[Source], context: Context) -> Program:
-    """
-    Return what is understood of a script.
-
-    Raises DataError: a target of a move is broken; names file and line.
-    """
-    return _Reader(sources[0], context).read()
-
-
-class _Reader:
+class UrscriptReader(Reader):
     """Goes through a script once."""
 
-    def __init__(self, source: Source, context: Context) -> None:
-        self.source, self.context = source, context
-        self.program = Program(NAME, [source])
-        self.text = masked(source.text, _COMMENTS)
+    comments = (r'#[^\r\n]*', r'"[^"\r\n]*"')
+
+    def __init__(self, sources: Sequence[Source], context: Context) -> None:
+        super().__init__(sources, context)
         self.names: dict[str, int] = {}
         self.used: set[int] = set()
         self.tool = Frame('')
@@ -125,23 +107,16 @@ class _Reader:
         elif result[3]:
             self.tool = self._tool(opening + 1, end)
         else:
-            self._sleep(opening + 1, end)
-
-    def _sleep(self, start: int, end: int) -> None:
-        try:
-            self.program.dwell(max(number_at(self.source, start, end, 'sleep').value, 0.0))
-        except DataError:
-            return  # A computed time; how long it is does not matter here.
+            self.dwell((opening + 1, end))
 
     def _tool(self, start: int, end: int) -> Frame:
-        first = split_outside(self.text, start, end)[0]
+        first = self.pieces(start, end)[0]
         try:
-            numbers = self._numbers(*stripped(self.text, *first), 6)
+            numbers = self._numbers(*first, 6)
         except DataError:
             numbers = None
         if numbers is None:
-            text = self.source.text[first[0] : first[1]].strip()
-            return Frame(text or 'of set_tcp')
+            return Frame(self.source.text[slice(*first)] or 'of set_tcp')
         return Frame('', UR_POSE.value([n.value for n in numbers]))
 
     def _move(self, word: str, where: str, start: int, end: int) -> None:
@@ -159,41 +134,25 @@ class _Reader:
             return
         end_ref, suits = refs[-1] or (Ref(0), None)
         via = refs[0][0] if kind == 'circular' and refs[0] else None
-        speed = self._value(given.get('v'), DEFAULT_SPEED[kind])
+        speed = self.value(given.get('v'), DEFAULT_SPEED[kind])
         if kind == 'joint':
             speed = float(speed / np.max(self.context.robot.max_velocity))
-        step = Step(
-            kind,
-            where,
-            end_ref,
-            via,
-            self.tool,
-            Frame('', np.eye(4)),
-            max(speed, 1e-4),
-            self._value(given.get('r'), 0.0) <= 0.0,
-            suits=suits,
+        stop = self.value(given.get('r'), 0.0) <= 0.0
+        base, speed = Frame('', np.eye(4)), max(speed, LEAST_SPEED)
+        self.program.add(
+            Step(kind, where, end_ref, via, self.tool, base, speed, stop, suits=suits)
         )
-        self.program.add(step)
 
     def _arguments(self, order: Sequence[str], start: int, end: int) -> dict[str, tuple[int, int]]:
         """Return the piece of text of every argument by its name."""
         out: dict[str, tuple[int, int]] = {}
-        for k, (first, last) in enumerate(split_outside(self.text, start, end)):
-            first, last = stripped(self.text, first, last)
+        for k, (first, last) in enumerate(self.pieces(start, end)):
             named = re.match(r'([a-z_]\w*)\s*=(?!=)\s*', self.text[first:last])
             if named is not None:
                 out[named[1]] = (first + named.end(), last)
             elif k < len(order) and first < last:
                 out[order[k]] = (first, last)
         return out
-
-    def _value(self, piece: tuple[int, int] | None, default: float) -> float:
-        if piece is None:
-            return default
-        try:
-            return number_at(self.source, *piece, 'a number').value
-        except DataError:
-            return default
 
     def _ref(self, start: int, end: int) -> tuple[Ref, Suits | None] | None:
         """Return where a target leads, and the postures it allows; None where it is worked out."""
@@ -205,15 +164,12 @@ class _Reader:
         inside = closing(self.source, self.text, start + call.start(2))
         if stripped(self.text, inside + 1, end)[0] < end:
             return None
-        parts = [
-            stripped(self.text, *part)
-            for part in split_outside(self.text, start + call.end(), inside)
-        ]
+        parts = self.pieces(start + call.end(), inside)
         if call[1] == 'get_inverse_kin':
             return self._near(parts)
         if len(parts) != 2:
             return None
-        frame, point = self._constant(*parts[0]), self._point(*parts[1])
+        frame, point = self._frame(*parts[0]), self._point(*parts[1])
         if frame is None or point is None:
             return None
         # The frame counts as a base: the point itself leads, and is moved in that frame.
@@ -225,24 +181,20 @@ class _Reader:
             return None if point is None else (Ref(point), None)
         first, last = parts[1]
         named = re.match(r'qnear\s*=\s*', self.text[first:last])
-        near = self._constant_joints(first + (named.end() if named else 0), last)
+        near = self._constant(self._point(first + (named.end() if named else 0), last), 1)
         return (Ref(point), None) if near is None else (Ref(point), nearest(near))
 
-    def _constant(self, start: int, end: int) -> Array | None:
+    def _frame(self, start: int, end: int) -> Array | None:
         """Return a pose that stands there, or of a variable that is set once."""
         point = self._point(start, end)
-        if point is None:
-            return None
-        self.program.hold(point, 'it is a frame of other points')
-        value = self.program.points[point].value
-        return value if value.ndim == 2 else None
+        if point is not None:
+            self.program.hold(point, 'it is a frame of other points')
+        return self._constant(point, 2)
 
-    def _constant_joints(self, start: int, end: int) -> Array | None:
-        point = self._point(start, end)
-        if point is None:
-            return None
-        value = self.program.points[point].value
-        return value if value.ndim == 1 else None
+    def _constant(self, point: int | None, ndim: int) -> Array | None:
+        """Return a pose (2) or joint positions (1) of a point; None where it is something else."""
+        value = None if point is None else self.program.points[point].value
+        return value if value is not None and value.ndim == ndim else None
 
     def _point(self, start: int, end: int) -> int | None:
         """Return the point of a literal or a variable; None for anything worked out."""
@@ -269,15 +221,13 @@ class _Reader:
         last = closing(self.source, self.text, opening)
         if last != end - 1:
             return None
-        parts = [
-            stripped(self.text, *part) for part in split_outside(self.text, opening + 1, last)
-        ]
+        parts = self.pieces(opening + 1, last)
         if any(re.search(r'[A-Za-z_]|[-+*/]\s*[\w(]', self._bare(*part)) for part in parts):
             return None
         if len(parts) != count:
             where = self.source.where(start)
             raise DataError(f'{where}: {count} numbers are needed here, there are {len(parts)}')
-        return [number_at(self.source, *part, 'a coordinate') for part in parts]
+        return [self.number(*part, 'a coordinate') for part in parts]
 
     def _bare(self, start: int, end: int) -> str:
         """Return a coordinate without its sign and exponent, to see whether it is worked out."""

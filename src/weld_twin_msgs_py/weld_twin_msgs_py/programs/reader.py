@@ -1,0 +1,93 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the readers of all languages share: a text with its comments blanked out, gone through once."""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+from weld_twin_core.errors import DataError
+from weld_twin_core.motion.programs.moves import Kind
+
+from .build import Program
+from .context import Context
+from .source import Number, Source, masked, number_at, split_outside, stripped
+
+Span = tuple[int, int]
+"""Where a piece of text begins and ends."""
+Handler = Callable[[re.Match[str]], None]
+LEAST_SPEED = 1e-4
+"""Speed [m/s, or share of full speed] below which nothing moves."""
+
+
+class Reader(ABC):
+    """Reads a program of one language; the first source is the program, others belong to it."""
+
+    comments: ClassVar[tuple[str, ...]]
+    """Regular expressions of what is blanked out: comments and strings."""
+
+    def __init__(self, sources: Sequence[Source], context: Context) -> None:
+        self.sources, self.context = list(sources), context
+        self.source = self.sources[0]
+        self.texts = [masked(source.text, self.comments) for source in sources]
+        self.text = self.texts[0]
+        self.program = Program('', self.sources)
+
+    @abstractmethod
+    def read(self) -> Program:
+        """
+        Return what is understood of the program.
+
+        Raises DataError: a point or a move is broken, or said twice; names file and line.
+        """
+
+    def in_order(
+        self, handlers: dict[re.Pattern[str], Handler], start: int = 0, end: int | None = None
+    ) -> None:
+        """Hand what patterns find in the text to their handlers, as it stands there."""
+        stop = len(self.text) if end is None else end
+        matches = [
+            (match.start(), handle, match)
+            for pattern, handle in handlers.items()
+            for match in pattern.finditer(self.text, start, stop)
+        ]
+        for _, handle, match in sorted(matches, key=lambda each: each[0]):
+            handle(match)
+
+    def where(self, match: re.Match[str], group: int = 0) -> str:
+        """Return file and line of what was found."""
+        return self.source.where(match.start(group))
+
+    def number(self, start: int, end: int, what: str) -> Number:
+        """Return the number that a piece of the text is; see `number_at`."""
+        return number_at(self.source, start, end, what)
+
+    def value(self, span: Span | None, default: float) -> float:
+        """Return the number of a piece of text, the default where there is none, or one worked out."""
+        try:
+            return default if span is None else self.number(*span, 'a number').value
+        except DataError:
+            return default
+
+    def pieces(self, start: int, end: int, comma: str = ',') -> list[Span]:
+        """Return what stands between commas outside of brackets, without white space."""
+        return [stripped(self.text, *part) for part in split_outside(self.text, start, end, comma)]
+
+    def dwell(self, span: Span) -> None:
+        """Let the move before last longer; of a time that is worked out nobody knows how much."""
+        try:
+            self.program.dwell(max(self.number(*span, 'a time').value, 0.0))
+        except DataError:
+            return
+
+    def new_piece(self, match: re.Match[str]) -> None:
+        """Begin another routine."""
+        del match
+        self.program.new_piece()
+
+    def unknown(self, kind: Kind, match: re.Match[str], why: str) -> None:
+        """Add a move that is not understood."""
+        self.program.unknown(kind, self.where(match), why)

@@ -21,17 +21,10 @@ def readonly(
     Raises DataError: not numeric, wrong shape, or not finite; the message names the first bad
     index.
 
-    Parameters
-    ----------
-    value : array_like
-        What the caller gave.
-    shape : tuple
-        Wanted shape; ``None`` matches any length.
-    name : str
-        How the message names the value.
-    finite : bool
-        Refuse NaN and infinity.
-
+    value: what the caller gave.
+    shape: wanted shape; ``None`` matches any length.
+    name: how the message names the value.
+    finite: refuse NaN and infinity.
     """
     try:
         array = np.array(value, dtype=np.float64, order='C')  # messages are rows of bytes

@@ -60,10 +60,7 @@ def bursts(t: Array) -> Bursts | None:
     """
     Return the bursts of a stream; None where its stamps come one by one.
 
-    Parameters
-    ----------
-    t : array, shape (N,) [s]
-        Stamps, not decreasing.
+    t: stamps, not decreasing, shape (N,) [s].
 
     Examples
     --------
@@ -114,14 +111,9 @@ def evenly(first: float, step: float, lost: NDArray[np.int_], size: int, count: 
     """
     Return the stamps of an even clock, shape (size,) [s].
 
-    Parameters
-    ----------
-    first, step : float [s]
-    lost : array of int
-        As `Bursts` has it, counted in ``count`` samples.
-    size, count : int
-        How many stamps are wanted, of how many: evenly thinned where they are fewer.
-
+    first, step: [s]
+    lost: as `Bursts` has it, counted in ``count`` samples.
+    size, count: how many stamps are wanted, of how many: evenly thinned where they are fewer.
     """
     index = np.arange(size) * (count / size)
     return np.asarray(first + step * (index + np.searchsorted(lost, index, side='right')))

@@ -18,13 +18,9 @@ def hermite(x: Array, y: Array, slope: Array, at: Array) -> tuple[Array, Array]:
     """
     Return values and slopes of the cubic pieces with given values and slopes at their ends.
 
-    Parameters
-    ----------
-    x : array, shape (N,)
-        Strictly increasing.
-    y, slope : array, shape (N, n)
-    at : array, any shape
-        Within ``x``.
+    x: strictly increasing, shape (N,).
+    y, slope: shape (N, n).
+    at: within ``x``.
 
     Returns
     -------
@@ -47,14 +43,9 @@ def spline_slopes(x: Array, y: Array, *, natural: bool = False) -> Array:
 
     For few knots: the equations are solved as a full matrix.
 
-    Parameters
-    ----------
-    x : array, shape (N,)
-        Strictly increasing, four or more; two or more where ``natural``.
-    y : array, shape (N, n)
-    natural : bool
-        The curve is straight at its ends; else its first two and its last two pieces are one.
-
+    x: strictly increasing, four or more, shape (N,); two or more where ``natural``.
+    y: shape (N, n).
+    natural: the curve is straight at its ends; else its first two and its last two pieces are one.
     """
     h, count = np.diff(x), x.size
     chord = np.diff(y, axis=0) / h[:, None]
@@ -81,12 +72,8 @@ def slopes_of_many(x: Array, y: Array) -> Array:
     """
     Return what `spline_slopes` does, for thousands of knots: no row of the equations is stored whole.
 
-    Parameters
-    ----------
-    x : array, shape (N,)
-        Strictly increasing, four or more.
-    y : array, shape (N, n)
-
+    x: strictly increasing, four or more, shape (N,).
+    y: shape (N, n).
     """
     from scipy.linalg import solve_banded
 

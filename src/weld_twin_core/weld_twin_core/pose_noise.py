@@ -50,11 +50,7 @@ class PoseNoise:
         """
         Return the noise of covariances.
 
-        Parameters
-        ----------
-        covariance : array, shape (M, 3, 3) or (M, 6, 6) [m^2, rad^2]
-            Positive definite.
-
+        covariance: positive definite, shape (M, 3, 3) or (M, 6, 6) [m^2, rad^2].
         """
         variance = np.einsum('mii->mi', covariance)
         each = variance.reshape(len(variance), -1, 3).mean(axis=2)
@@ -81,11 +77,7 @@ class PoseNoise:
         """
         Return the noise of errors that became others.
 
-        Parameters
-        ----------
-        back : array, shape (M, c, c)
-            From the new errors to those of old.
-
+        back: from the new errors to those of old, shape (M, c, c).
         """
         root = self.root @ back
         spread = np.linalg.inv(root)[:, :3] * self.typical
@@ -142,11 +134,8 @@ def inverse_error(position: Array, rotation: Array) -> Array:
     """
     Return what errors of poses do to the inverse poses, shape (M, 6, 6).
 
-    Parameters
-    ----------
-    position, rotation : array, shapes (M, 3) [m] and (M, 3, 3)
-        The poses that are inverted; errors are shifts and turns about the axes outside.
-
+    position, rotation: the poses that are inverted [m] and (M, 3, 3); errors are shifts and turns
+    about the axes outside.
     """
     back = np.swapaxes(rotation, 1, 2)
     out = np.zeros((len(position), 6, 6))

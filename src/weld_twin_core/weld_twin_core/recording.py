@@ -24,11 +24,8 @@ def backward_rates(t: Array, values: Array) -> Array:
     """
     Return how fast values change since the sample before, zero at the first.
 
-    Parameters
-    ----------
-    t : array, shape (N,) [s]
-        Strictly increasing.
-    values : array, shape (..., N, n)
+    t: strictly increasing, shape (N,) [s].
+    values: shape (..., N, n).
 
     Returns
     -------

@@ -12,11 +12,7 @@ def apart(joints: tuple[float, float], measured: tuple[float, float]) -> str | N
     """
     Return that measurements and joint states have no time in common; None where they have.
 
-    Parameters
-    ----------
-    joints, measured : tuple of float [s]
-        First and last stamp of either.
-
+    joints, measured: first and last stamp of either [s].
     """
     gap = max(measured[0] - joints[1], joints[0] - measured[1])
     if gap <= 0.0:

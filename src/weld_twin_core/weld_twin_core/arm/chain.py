@@ -127,14 +127,8 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
     """
     Return the chain's frames.
 
-    Parameters
-    ----------
-    robot : Robot
-    q : array, shape (..., n) [rad or m]
-        Joint positions; leading axes are draws and samples.
-    shift : mapping
-        Displaced channels; each value broadcasts with ``q[..., 0]``.
-
+    q: joint positions, shape (..., n) [rad or m]; leading axes are draws and samples.
+    shift: displaced channels; each value broadcasts with ``q[..., 0]``.
     """
     base_rotation, base_point = base_frame(robot, shift)
     axes = max([q.ndim - 1, *(np.ndim(value) for value in shift.values())])
@@ -287,16 +281,9 @@ def column(robot: Robot, chain: Frames, channel: Channel, shift: Shift = NO_SHIF
 
     Raises KeyError: the channel has no direct column ('tau' reaches the tool through a spring).
 
-    Parameters
-    ----------
-    robot : Robot
-    chain : Frames
-        The chain at the samples; see `frames`.
-    channel : tuple of str and int
-        Name and index of one channel, such as ``('q', 2)`` or ``('tool', 5)``.
-    shift : mapping, optional
-        The displacement that ``chain`` was made with.
-
+    chain: the chain at the samples; see `frames`.
+    channel: name and index of one channel, such as ``('q', 2)`` or ``('tool', 5)``.
+    shift: the displacement that ``chain`` was made with.
     """
     name, i = channel
     if name == 'pose':

@@ -36,13 +36,8 @@ def row_factors(convention: str, *, without: str = '') -> list[tuple[str, ...]]:
     """
     Return the motions of a row, those about one axis together, from the base outward.
 
-    Parameters
-    ----------
-    convention : str
-        'standard' or 'modified'.
-    without : str, optional
-        A motion that is left out, as the beta of a row that has none.
-
+    convention: 'standard' or 'modified'.
+    without: a motion that is left out, as the beta of a row that has none.
     """
     order = (kind for kind in ROW_ORDER[convention] if kind != without)
     return [tuple(kinds) for _, kinds in groupby(order, AXIS.__getitem__)]

@@ -61,10 +61,7 @@ def body(robot: Robot, q: Array) -> Body:
     """
     Return the arm's capsules in the measuring frame.
 
-    Parameters
-    ----------
-    q : array, shape (..., n) [rad or m]
-
+    q: shape (..., n) [rad or m].
     """
     whole = _whole(robot, q)
     return whole.of(whole.long)
@@ -105,11 +102,7 @@ def clearances(shape: Body) -> Array:
 
     Negative where they overlap.
 
-    Parameters
-    ----------
-    shape : Body
-        As `body` returns it.
-
+    shape: as `body` returns it.
     """
     share = np.linspace(0.0, 1.0, PLACES)[:, None]
     along = shape.start[..., None, :] * (1.0 - share) + shape.end[..., None, :] * share
@@ -128,15 +121,11 @@ def free(robot: Robot, q: Array, seen: Array, box: Array | None = None) -> Array
     """
     Return which postures are free, shape (N,), bool.
 
-    Parameters
-    ----------
-    q : array, shape (N, n) [rad or m]
-    seen : array, shape (K, n) [rad or m]
-        Postures that the arm was in: whatever is near there is no collision, for the arm was there.
-    box : array, shape (2, 3), optional [m]
-        Corners, in the measuring frame, that the arm stays between. Without it an arm that stands
-        upright stays above its foot, or above the lowest place that it was at.
-
+    q: shape (N, n) [rad or m].
+    seen: postures that the arm was in: whatever is near there is no collision, for the arm was
+    there, shape (K, n) [rad or m].
+    box: corners, in the measuring frame, that the arm stays between, shape (2, 3) [m]. Without it
+    an arm that stands upright stays above its foot, or above the lowest place that it was at.
     """
     return Space(robot, seen, box).free(q)
 
@@ -145,11 +134,8 @@ class Space:
     """
     Where an arm has room, asked again and again; see `free`.
 
-    Parameters
-    ----------
-    seen : array, shape (K, n) [rad or m]
-    box : array, shape (2, 3), optional [m]
-
+    seen: shape (K, n) [rad or m].
+    box: shape (2, 3) [m].
     """
 
     def __init__(self, robot: Robot, seen: Array, box: Array | None = None) -> None:
@@ -167,10 +153,7 @@ class Space:
         """
         Return which postures are free, shape (N,), bool.
 
-        Parameters
-        ----------
-        q : array, shape (N, n) [rad or m]
-
+        q: shape (N, n) [rad or m].
         """
         whole = _whole(self._robot, q)
         long = np.logical_or(whole.long, self._known.long)

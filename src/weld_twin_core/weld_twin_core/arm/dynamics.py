@@ -29,16 +29,10 @@ def point_force_torque(
     """
     Return joint torques, shape (n, ...), of a force at a point carried by the tool.
 
-    Parameters
-    ----------
-    chain : Frames
-        The chain at the samples.
-    point, force : array, shape (3, ...) [m, N]
-        Components first, in the world frame.
-    contact : bool
-        The force comes from the workpiece, and pushes back on it; otherwise a positioner does not
-        feel it.
-
+    chain: the chain at the samples.
+    point, force: components first, in the world frame, shape (3, ...) [m, N].
+    contact: the force comes from the workpiece, and pushes back on it; otherwise a positioner does
+    not feel it.
     """
     axes = max(point.ndim, force.ndim, chain.position.ndim) - 1
     point, force = pad(point, axes), pad(force, axes)
@@ -62,14 +56,9 @@ def payload_torque(robot: Robot, chain: Frames, mass: Array | float, com: Array)
     """
     Return load torques, shape (n, ...) [N m], of a mass carried by the tool.
 
-    Parameters
-    ----------
-    chain : Frames
-        The chain at the samples.
-    mass : float, or array broadcasting with the samples [kg]
-    com : array, shape (..., 3) [m]
-        Centre of the mass in the tool frame.
-
+    chain: the chain at the samples.
+    mass: [kg]
+    com: centre of the mass in the tool frame, shape (..., 3) [m].
     """
     weight = mass * pad(gravity_direction(robot, chain), np.ndim(mass))
     return point_force_torque(robot, chain, _carried_point(chain, com), weight)
@@ -84,13 +73,8 @@ def wrench_rotation(robot: Robot, chain: Frames, frame: str) -> Array:
     """
     Return the axes of a wrench in the world, shape (..., 3, 3).
 
-    Parameters
-    ----------
-    chain : Frames
-        The chain at the samples.
-    frame : str
-        Where the wrench is expressed: 'tool', or 'base' for the link that the arm stands in.
-
+    chain: the chain at the samples.
+    frame: where the wrench is expressed: 'tool', or 'base' for the link that the arm stands in.
     """
     if frame == 'tool':
         return chain.rotation
@@ -110,15 +94,9 @@ def wrench_torque(robot: Robot, chain: Frames, wrench: Array, frame: str = 'tool
     """
     Return load torques, shape (n, ...) [N m], of a wrench on the tool: J^T w.
 
-    Parameters
-    ----------
-    chain : Frames
-        The chain at the samples.
-    wrench : array, shape (..., 6) [N, N m]
-        Force and torque; both act at the tool centre point.
-    frame : str
-        Where they are expressed: 'tool' or 'base'.
-
+    chain: the chain at the samples.
+    wrench: force and torque, shape (..., 6) [N, N m]; both act at the tool centre point.
+    frame: where they are expressed: 'tool' or 'base'.
     """
     force, moment = _wrench_in_world(robot, chain, wrench, frame)
     torque = point_force_torque(robot, chain, components(chain.position), force, contact=True)
@@ -209,15 +187,9 @@ def torque_slope(
     Of gravity it is minus the Hessian of the potential: what joint j sets in motion shifts the
     first moment that joint i carries. A wrench fixed to the tool turns along with it.
 
-    Parameters
-    ----------
-    chain : Frames
-        The chain at the samples.
-    wrench : array, shape (..., 6), optional [N, N m]
-        On the tool; see `wrench_torque`.
-    frame : str
-        Where the wrench is expressed: 'tool' or 'base'.
-
+    chain: the chain at the samples.
+    wrench: on the tool, shape (..., 6) [N, N m]; see `wrench_torque`.
+    frame: where the wrench is expressed: 'tool' or 'base'.
     """
     slope = _weight_slope(robot, chain, _carried(robot, chain))
     return slope if wrench is None else slope + _wrench_slope(robot, chain, wrench, frame)
@@ -227,10 +199,7 @@ def payload_slope(robot: Robot, chain: Frames, mass: Array | float, com: Array) 
     """
     Return how the load torques of a mass carried by the tool change with the joints.
 
-    Parameters
-    ----------
-    robot, chain, mass, com
-        As for `payload_torque`.
+    robot, chain, mass, com: as for `payload_torque`.
 
     Returns
     -------
@@ -288,15 +257,9 @@ def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
     """
     Return a point of a link in the world frame, components first, shape (3, ...) [m].
 
-    Parameters
-    ----------
-    chain : Frames
-        The chain at the samples.
-    i : int
-        Which link, counted from 0; its DH frame is at its far end.
-    point : array, shape (3,) [m]
-        In that DH frame.
-
+    chain: the chain at the samples.
+    i: which link, counted from 0; its DH frame is at its far end.
+    point: in that DH frame, shape (3,) [m].
     """
     if i < robot.behind:
         x, y, z, origin = chain.ends[i]
@@ -324,17 +287,10 @@ def base_moment(
 
     What a pedestal has to hold: weights of links and payload, and the wrench on the tool.
 
-    Parameters
-    ----------
-    robot : Robot
-        Links without masses weigh nothing.
-    chain : Frames
-        The chain at the samples.
-    wrench : array, shape (..., 6), optional [N, N m]
-        On the tool; see `wrench_torque`.
-    frame : str
-        Where the wrench is expressed: 'tool' or 'base'.
-
+    robot: links without masses weigh nothing.
+    chain: the chain at the samples.
+    wrench: on the tool, shape (..., 6) [N, N m]; see `wrench_torque`.
+    frame: where the wrench is expressed: 'tool' or 'base'.
     """
     samples = chain.position.shape[:-1]
     origin = pad(components(chain.root_point), len(samples))

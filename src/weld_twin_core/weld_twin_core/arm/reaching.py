@@ -25,12 +25,8 @@ def least_step(robot: Robot, q: Array, off: Array) -> Array:
     """
     Return the least joint step that moves the tool point, shape (M, n).
 
-    Parameters
-    ----------
-    q : array, shape (M, n) [rad or m]
-    off : array, shape (M, 3) [m]
-        The way that the tool point has to go.
-
+    q: shape (M, n) [rad or m].
+    off: the way that the tool point has to go, shape (M, 3) [m].
     """
     turn = jacobian(robot, q)[:, :3]
     inverse = np.linalg.inv(turn @ np.swapaxes(turn, 1, 2) + DAMPING * np.eye(3))
@@ -43,10 +39,8 @@ def reaching(robot: Robot, points: Array, start: Array) -> tuple[Array, NDArray[
 
     Limits of the joints are not looked at.
 
-    Parameters
-    ----------
-    points : array, shape (M, 3) [m]
-    start : array, shape (M, n) [rad or m]
+    points: shape (M, 3) [m].
+    start: shape (M, n) [rad or m].
 
     Returns
     -------

@@ -76,11 +76,7 @@ class Lens:
         """
         Return where points of the camera's frame appear, shape (N, 2) [px].
 
-        Parameters
-        ----------
-        points : array, shape (N, 3) [m]
-            z ahead, x to the right, y down.
-
+        points: z ahead, x to the right, y down, shape (N, 3) [m].
         """
         points = np.asarray(points, dtype=float)
         return self._bent(points[:, :2] / _depth(points))[0] * self.focal + self.centre
@@ -89,10 +85,7 @@ class Lens:
         """
         Return pixels (N, 2), and their change with the point (N, 2, 3) and with the lens (N, 2, 9).
 
-        Parameters
-        ----------
-        points : array, shape (N, 3) [m]
-
+        points: shape (N, 3) [m].
         """
         depth = _depth(points)
         flat = points[:, :2] / depth
@@ -127,13 +120,8 @@ class Lens:
         """
         Return the lens for images that were stored a quarter turn on.
 
-        Parameters
-        ----------
-        size : array, shape (2,) [px]
-            Width and height of the image that it was calibrated with.
-        clockwise : bool
-            Which way the stored image has to be turned to become that one.
-
+        size: width and height of the image that it was calibrated with, shape (2,) [px].
+        clockwise: which way the stored image has to be turned to become that one.
         """
         bent = self.distortion.copy()
         (wide, high), (x, y) = size, self.centre

@@ -40,12 +40,8 @@ def located(lens: Lens, points: Array, pixels: Array) -> Array | None:
     """
     Return the pose of a target in the camera's frame, shape (4, 4); None where nothing follows.
 
-    Parameters
-    ----------
-    points : array, shape (N, 3) [m]
-        In the target's frame.
-    pixels : array, shape (N, 2) [px]
-
+    points: in the target's frame, shape (N, 3) [m].
+    pixels: shape (N, 2) [px].
     """
     if len(points) < FEWEST:
         return None

@@ -39,10 +39,7 @@ class Places:
         """
         Return residual (M, c), what it sees (M, c, 3), and all unknowns (M, c, Z).
 
-        Parameters
-        ----------
-        points : array, shape (M, 3) [m]
-
+        points: shape (M, 3) [m].
         """
         count, c = self.contacts.size, self.contacts.rows
         total = sum(surface.freedom for surface in self.surfaces)
@@ -150,12 +147,8 @@ def places(contacts: Contacts, points: Array) -> Places:
 
     Least squares that gives gross outliers little weight; known distances and angles are met.
 
-    Parameters
-    ----------
-    contacts : Contacts
-        Of one place.
-    points : array, shape (M, 3) [m]
-
+    contacts: of one place.
+    points: shape (M, 3) [m].
     """
     surfaces = []
     for contact in contacts.artefact.contacts:

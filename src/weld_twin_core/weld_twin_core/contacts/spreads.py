@@ -31,10 +31,7 @@ def spreads(contacts: Contacts, points: Array) -> dict[str, Array]:
     mean of these distances is the usual spread. Known lengths are not used; a contact whose place
     is known stays there.
 
-    Parameters
-    ----------
-    points : array, shape (M, 3) [m]
-
+    points: shape (M, 3) [m].
     """
     out = {}
     for label in dict.fromkeys(contacts.labels):
@@ -53,10 +50,7 @@ def lengths(contacts: Contacts, points: Array) -> list[Length]:
     """
     Return what tool points make of the known distances and angles.
 
-    Parameters
-    ----------
-    points : array, shape (M, 3) [m]
-
+    points: shape (M, 3) [m].
     """
     out = []
     artefact = contacts.artefact

@@ -38,13 +38,8 @@ class Surface:
         """
         Return the contact where tool points put it at first sight.
 
-        Parameters
-        ----------
-        p : array, shape (m, 3) [m]
-            Tool points that touched it.
-        value : array, shape (m,) [m], optional
-            Measured distances, of kind 'length'.
-
+        p: tool points that touched it, shape (m, 3) [m].
+        value: measured distances, of kind 'length', shape (m,) [m].
         """
         if contact.at is not None:
             return cls._known(contact, p)
@@ -87,11 +82,8 @@ class Surface:
         """
         Return residual (m, c), what it sees of the tool point (m, c, 3), and its unknowns (m, c, z).
 
-        Parameters
-        ----------
-        p : array, shape (m, 3) [m]
-        value : array, shape (m,) [m], optional
-
+        p: shape (m, 3) [m].
+        value: shape (m,) [m].
         """
         count, away = len(p), p - self.point
         if self.contact.kind == 'point':

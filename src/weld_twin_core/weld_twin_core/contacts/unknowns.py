@@ -48,11 +48,7 @@ class Unknowns:
 
         Whitened rows lose ``(1 - left) * u (u' rows)`` along each direction u.
 
-        Parameters
-        ----------
-        unit : array, shape (M,)
-            What whitens each posture's rows, [1/m].
-
+        unit: what whitens each posture's rows, [1/m], shape (M,).
         """
         count = self.free.shape[0] * self.free.shape[1]
         columns = (unit[:, None, None] * self.free).reshape(count, -1)
@@ -74,12 +70,8 @@ def unknowns(contacts: Contacts, points: Array) -> Unknowns:
     """
     Return the unknowns of a place at tool points.
 
-    Parameters
-    ----------
-    contacts : Contacts
-        Of one place.
-    points : array, shape (M, 3) [m]
-
+    contacts: of one place.
+    points: shape (M, 3) [m].
     """
     here = places(contacts, points)
     _, seen, free = here.rows(points)

@@ -116,15 +116,9 @@ def bristle_tangent(
     """
     Return how a small change of the steps, or of the travel, comes out in `bristle` from rest.
 
-    Parameters
-    ----------
-    step, travel, leak
-        As for `bristle`.
-    z : array, shape (..., N)
-        What `bristle` returned, from rest.
-    change : array, shape (..., N)
-        Of step over travel, along the direction of the step.
-
+    step, travel, leak: as for `bristle`.
+    z: what `bristle` returned, from rest, shape (..., N).
+    change: of step over travel, along the direction of the step, shape (..., N).
     """
     bent = np.abs(step) / travel
     whole = bent + leak
@@ -149,12 +143,8 @@ def linear(gain: NDArray[Any], drive: NDArray[Any], start: NDArray[Any]) -> NDAr
     """
     Return y_k = gain_k y_{k-1} + drive_k; real or complex, |gain| <= 1.
 
-    Parameters
-    ----------
-    gain, drive : array, shape (..., N)
-    start : array, shape (...)
-        y before the first sample.
-
+    gain, drive: shape (..., N).
+    start: y before the first sample, shape (...).
     """
     factor, value = (np.array(part) for part in np.broadcast_arrays(gain, drive))
     value[..., 0] += factor[..., 0] * start

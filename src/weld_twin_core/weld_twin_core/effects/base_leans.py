@@ -18,11 +18,7 @@ def base_leans(robot: Robot, axes: Array) -> list[dict[Channel, float]]:
     Beside a positioner a lean of the arm is that of the positioner the other way round: the frames
     between the two are all that the chain has.
 
-    Parameters
-    ----------
-    axes : array, shape (K, 3)
-        In the base frame of the arm's rows.
-
+    axes: in the base frame of the arm's rows, shape (K, 3).
     """
     if not robot.behind:
         turned = axes @ robot.T_world_base[:3, :3].T

@@ -46,13 +46,9 @@ def carried(view: View, i: int, slide: Array | None, turn: Array | None) -> Shif
     """
     Return how the pose moves where the carriage of joint i is slid, or turned about itself.
 
-    Parameters
-    ----------
-    i : int
-        The joint, counted from 0.
-    slide, turn : array, shape (3, ...) [m, rad], optional
-        In the world, components first; what is carried moves so against the guide.
-
+    i: the joint, counted from 0.
+    slide, turn: in the world, components first, shape (3, ...) [m, rad]; what is carried moves so
+    against the guide.
     """
     way = -1.0 if i < view.robot.behind else 1.0
     if turn is None:

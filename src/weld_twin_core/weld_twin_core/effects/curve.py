@@ -88,12 +88,8 @@ def basis(knots: Sequence[float], x: Array) -> Array:
     Natural cubic splines through unit values, one for each knot; beyond the knots, where nothing
     is known, the value at the end stays.
 
-    Parameters
-    ----------
-    knots : sequence of float, length K
-        Increasing.
-    x : array, shape (...)
-
+    knots: increasing.
+    x: shape (...).
     """
     if len(knots) == 1:
         return np.ones((1, *np.shape(x)))
@@ -125,17 +121,10 @@ def check_knots(name: str, over: str, knots: Sequence[float], count: int) -> Non
     Raises ModelError: it runs over something unknown, or knots do not increase, or not each has a
     value.
 
-    Parameters
-    ----------
-    name : str
-        How the message names the curve.
-    over : str
-        The quantity that it runs over.
-    knots : sequence of float
-        Where it has values, in the unit of that quantity.
-    count : int
-        How many values it has.
-
+    name: how the message names the curve.
+    over: the quantity that it runs over.
+    knots: where it has values, in the unit of that quantity.
+    count: how many values it has.
     """
     if over not in QUANTITIES:
         raise ModelError(f'{name}: over must be one of {", ".join(QUANTITIES)}, got {over!r}')

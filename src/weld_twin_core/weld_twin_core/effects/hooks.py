@@ -187,11 +187,7 @@ class SearchHooks(Hooks):
         """
         Return the instances that a fit of many small errors takes along, of hardly any size.
 
-        Parameters
-        ----------
-        most : int
-            Pairs of coordinates that the measurements allow every joint.
-
+        most: pairs of coordinates that the measurements allow every joint.
         """
         return list(self.kind.seeds(view, joint))[:2]
 

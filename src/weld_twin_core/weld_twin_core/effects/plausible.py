@@ -42,10 +42,7 @@ def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = Non
     """
     Return spread and range of one parameter on a robot.
 
-    Parameters
-    ----------
-    joint : str, optional
-        Where the effect sits.
+    joint: where the effect sits.
 
     Returns
     -------

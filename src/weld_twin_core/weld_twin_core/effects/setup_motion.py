@@ -22,13 +22,9 @@ def seen_from(
     """
     Return effects for another recording: the set-up's motion at its right time, or left out.
 
-    Parameters
-    ----------
-    epoch_ns, span_ns : int, tuple of int
-        What the stamps of the recording whose set-up moved count from; its first and last stamp.
-    other : Recording
-        Where it does not overlap in time it is taken for another set-up.
-
+    epoch_ns, span_ns: what the stamps of the recording whose set-up moved count from; its first
+    and last stamp.
+    other: where it does not overlap in time it is taken for another set-up.
     """
     first, last = other.span_ns
     if last < span_ns[0] or first > span_ns[1]:

@@ -218,12 +218,8 @@ def single(channel: Channel, value: Array | float, view: View) -> Shift:
     """
     Return a shift of one channel, the same at every sample of a view.
 
-    Parameters
-    ----------
-    channel : tuple of str and int
-        Such as ``('q', 2)`` for the third joint.
-    value : float, or array broadcasting with the samples [rad or m]
-
+    channel: such as ``('q', 2)`` for the third joint.
+    value: [rad or m]
     """
     if np.ndim(value) == 0:
         return {channel: np.full(view.t.shape, value)}

@@ -64,12 +64,8 @@ def frame(step: Array, shifted: str, turned: str) -> str:
     """
     Return a displacement [m] and a turn [rad] of a frame, shape (6,), in mm and degrees.
 
-    Parameters
-    ----------
-    step : array, shape (6,) [m, rad]
-    shifted, turned : str
-        Whose axes they are along and about, such as 'of the measuring frame'.
-
+    step: shape (6,) [m, rad].
+    shifted, turned: whose axes they are along and about, such as 'of the measuring frame'.
     """
     moved = _axes(np.asarray(step[:3]) * 1e3, LEAST_MM, 'mm along', 3)
     about = _axes(np.degrees(step[3:]), LEAST_DEG, 'deg about', 4)
@@ -106,12 +102,8 @@ def further(offset: float, *, sliding: bool = False) -> str:
     """
     Return how much further than its reading a joint stands, to follow the reading in a sum.
 
-    Parameters
-    ----------
-    offset : float [rad or m]
-        The joint stands at reading + offset.
-    sliding : bool
-        Whether the joint slides; its offset is then in metres.
+    offset: the joint stands at reading + offset [rad or m].
+    sliding: whether the joint slides; its offset is then in metres.
 
     Returns
     -------

@@ -105,16 +105,11 @@ def changes(
 
     Raises DataError: there is no observation, or two are of the same instant.
 
-    Parameters
-    ----------
-    named : collection of str
-        Coordinates that a diagnosis has named as causes: of those that explain a change equally
-        well, they come first.
-    likely : collection of str
-        Coordinates that knocks, wear, service or warmth can change; they come before the others, too.
-    alarms : float
-        False alarms allowed in this look.
-
+    named: coordinates that a diagnosis has named as causes: of those that explain a change equally
+    well, they come first.
+    likely: coordinates that knocks, wear, service or warmth can change; they come before the
+    others, too.
+    alarms: false alarms allowed in this look.
     """
     series = series_of(observations)
     if series.days.size < 2:
@@ -185,11 +180,7 @@ def value_and_rise(
     """
     Return value and rise in a day of a coordinate at the last diagnosis, (2,), and covariance, (2, 2).
 
-    Parameters
-    ----------
-    result : sequence of Change
-        What `changes` returned for them.
-
+    result: what `changes` returned for them.
     """
     series = series_of(observations)
     shapes = {(each.kind, float(series.days[each.begin])): each for each in _shapes(series.days)}

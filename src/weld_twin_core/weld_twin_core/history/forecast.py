@@ -38,13 +38,8 @@ def outlook(
 
     All diagnoses are fitted together with what changed, so that value and rise have one covariance.
 
-    Parameters
-    ----------
-    result : sequence of Change
-        What `changes` returned for them.
-    name : str
-        The coordinate.
-
+    result: what `changes` returned for them.
+    name: the coordinate.
     """
     if not any(each.name == name and each.kind == 'trend' for each in result):
         return None
@@ -57,10 +52,7 @@ def reaches(limit: float, now: Outlook) -> tuple[float, float, float]:
 
     Raises DataError: the limit is not positive.
 
-    Parameters
-    ----------
-    limit : float
-        Size of the value that must not be passed, on the side it moves to.
+    limit: size of the value that must not be passed, on the side it moves to.
 
     Returns
     -------

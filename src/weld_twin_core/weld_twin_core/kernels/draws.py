@@ -68,13 +68,9 @@ class SeamDraws:
     """
     A robot of revolute joints at the samples of a seam, prepared for draws of its DH values.
 
-    Parameters
-    ----------
-    robot : Robot
-        The nominal robot, 'standard' convention, without Hayati angles.
-    q : array, shape (N, n) [rad]
-    smooth : bool
-        Look for samples that determine the others; False works on all samples.
+    robot: the nominal robot, 'standard' convention, without Hayati angles.
+    q: shape (N, n) [rad].
+    smooth: look for samples that determine the others; False works on all samples.
 
     Raises
     ------
@@ -141,10 +137,7 @@ class SeamDraws:
         """
         Return deviations of the tool point from the nominal one in the world, (D, N, 3) [m].
 
-        Parameters
-        ----------
-        draws : DhDraws, shape (D, n) each
-
+        draws: shape (D, n) each.
         """
         out = np.empty((len(draws.theta), self._count, 3))
         with unbuffered():

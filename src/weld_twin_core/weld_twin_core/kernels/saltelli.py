@@ -32,13 +32,8 @@ def base_pair(inputs: int, base: int, seed: int) -> tuple[Array, Array]:
     """
     Return probabilities of every input, two independent sets of shape (base, inputs).
 
-    Parameters
-    ----------
-    base : int
-        Samples of each set, a power of two.
-    seed : int
-        Of the scrambling.
-
+    base: samples of each set, a power of two.
+    seed: of the scrambling.
     """
     from scipy.stats import qmc  # half a second, for nothing but this
 
@@ -54,11 +49,7 @@ def mixed(first: Array, second: Array, groups: Sequence[str] | None = None) -> A
     run 1 + g is the first with the inputs of group g from the second. Every input is a group of
     its own unless ``groups`` names that of each; they count in order of appearance.
 
-    Parameters
-    ----------
-    first, second : array, shape (base, inputs)
-        Two independent sets of probabilities; see `base_pair`.
-
+    first, second: two independent sets of probabilities, shape (base, inputs); see `base_pair`.
     """
     base, inputs = first.shape
     names = list(range(inputs)) if groups is None else list(groups)
@@ -84,15 +75,9 @@ def sobol_half_widths(
     """
     Return half-widths of the intervals of both indices, shape (G,), by the bootstrap [2]_.
 
-    Parameters
-    ----------
-    results : array, shape (base, G + 2)
-        Model results in the order of `mixed`.
-    confidence : float
-        Such as 0.95.
-    rng : numpy Generator
-        Chooses the resamples.
-
+    results: model results in the order of `mixed`, shape (base, G + 2).
+    confidence: such as 0.95.
+    rng: chooses the resamples.
     """
     base = len(results)
     picks = rng.integers(base, size=(base, resamples)) + base * np.arange(resamples)

@@ -53,9 +53,7 @@ def circle_of(points: Array) -> Circle | None:
 
     Plane by principal directions, circle by Kasa's linear least squares [1]_.
 
-    Parameters
-    ----------
-    points : array, shape (N, 3) [m]
+    points: shape (N, 3) [m].
 
     References
     ----------

@@ -84,11 +84,7 @@ def stops(recording: Recording) -> list[Stop]:
 
     Raises DataError: nothing was measured.
 
-    Parameters
-    ----------
-    recording : Recording
-        Static, or of a motion in which the arm stands now and then.
-
+    recording: static, or of a motion in which the arm stands now and then.
     """
     measured, joints = measured_of(recording), recording.joints
     if joints.static:
@@ -114,11 +110,7 @@ def rests(joints: JointMotion) -> list[tuple[float, float]]:
     """
     Return start and end [s] of the stretches in which the arm stands for `DWELL` or longer.
 
-    Parameters
-    ----------
-    joints : JointMotion
-        Of a motion.
-
+    joints: of a motion.
     """
     t = np.arange(joints.t[0], joints.t[-1], LOOK)
     if t.size < 2:
@@ -152,11 +144,7 @@ def pose_cycles(result: list[Stop], robot: Robot) -> list[PoseCycles]:
     """
     Return the stops by commanded pose, in the order in which the poses first came.
 
-    Parameters
-    ----------
-    robot : Robot
-        Tells where a commanded joint position should have brought the tool.
-
+    robot: tells where a commanded joint position should have brought the tool.
     """
     if not result:
         return []

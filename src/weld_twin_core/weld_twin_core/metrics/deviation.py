@@ -80,11 +80,7 @@ def deviation(deviations: ArrayLike) -> Array:
     """
     Return D, shape (...) [m]: how far the tool is off.
 
-    Parameters
-    ----------
-    deviations : array_like, shape (..., 3) [m]
-        Actual minus nominal position.
-
+    deviations: actual minus nominal position, shape (..., 3) [m].
     """
     size: Array = np.linalg.norm(np.asarray(deviations, dtype=np.float64), axis=-1)
     return size

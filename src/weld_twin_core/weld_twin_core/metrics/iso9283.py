@@ -197,12 +197,8 @@ def crossing_performance(crossed: Array, command: Array) -> PathPerformance:
     """
     Return accuracy and repeatability of a path from where each cycle passed its points.
 
-    Parameters
-    ----------
-    crossed : array, shape (cycles, m, 3) [m]
-        As `normal_plane_crossings` gives them.
-    command : array, shape (m, 3) [m]
-
+    crossed: as `normal_plane_crossings` gives them, shape (cycles, m, 3) [m].
+    command: shape (m, 3) [m].
     """
     off, spread = along_path(crossed, command)
     worst, loosest = int(off.argmax()), int(spread.argmax())
@@ -213,11 +209,8 @@ def along_path(crossed: Array, command: Array) -> tuple[Array, Array]:
     """
     Return accuracy and repeatability [m] at every point of a path, shape (m,) each.
 
-    Parameters
-    ----------
-    crossed : array, shape (cycles, m, 3) [m]
-    command : array, shape (m, 3) [m]
-
+    crossed: shape (cycles, m, 3) [m].
+    command: shape (m, 3) [m].
     """
     return np.linalg.norm(crossed.mean(axis=0) - command, axis=-1), _repeatability(crossed)
 
@@ -232,16 +225,10 @@ def normal_plane_crossings(
 
     Raises DataError: the path never passes one of the planes.
 
-    Parameters
-    ----------
-    path : array_like, shape (K, 3) [m]
-    command : array_like, shape (m, 3) [m]
-        Points of the command path.
-    tangent : array_like, shape (m, 3)
-        Direction of the command path there; its length does not matter.
-    name : str
-        How the message names the path.
-
+    path: shape (K, 3) [m].
+    command: points of the command path, shape (m, 3) [m].
+    tangent: direction of the command path there, shape (m, 3); its length does not matter.
+    name: how the message names the path.
     """
     points = readonly(path, (None, 3), 'attained path')
     goal = readonly(command, (None, 3), 'command path')
@@ -262,12 +249,8 @@ def nearest_pass(points: Array, centre: Array, normal: Array) -> Array | None:
     """
     Return where a path passes a plane in the direction of its normal, nearest to its centre.
 
-    Parameters
-    ----------
-    points : array, shape (K, 3) [m]
-        Rows that are not numbers are gaps, over which nothing passes.
-    centre, normal : array, shape (3,)
-        Of the plane; the length of the normal does not matter.
+    points: rows that are not numbers are gaps, over which nothing passes, shape (K, 3) [m].
+    centre, normal: of the plane, shape (3,); the length of the normal does not matter.
 
     Returns
     -------

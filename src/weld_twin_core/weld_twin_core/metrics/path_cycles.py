@@ -73,11 +73,7 @@ def path_cycles(recording: Recording, robot: Robot) -> PathCycles | None:
 
     Raises DataError: nothing was measured.
 
-    Parameters
-    ----------
-    robot : Robot
-        Tells where a commanded joint position should have brought the tool.
-
+    robot: tells where a commanded joint position should have brought the tool.
     """
     measured, joints = measured_of(recording), recording.joints
     if joints.static or joints.t.size < 3:
@@ -93,10 +89,7 @@ def spans(joints: JointMotion, anchor: Array) -> list[Span]:
     """
     Return the stretches of a motion from leaving a joint position to coming back to it.
 
-    Parameters
-    ----------
-    anchor : array, shape (n,)
-
+    anchor: shape (n,).
     """
     a, step = joints.q[:-1], np.diff(joints.q, axis=0)
     length = np.maximum((step**2).sum(axis=1), 1e-30)

@@ -118,13 +118,8 @@ def performance_of(recording: Recording, robot: Robot) -> Performance:
 
     Raises DataError: nothing was measured, or neither a pose nor a path is repeated.
 
-    Parameters
-    ----------
-    recording : Recording
-        Measured in the frame that the robot is placed in.
-    robot : Robot
-        Tells where each command should have brought the tool [m].
-
+    recording: measured in the frame that the robot is placed in.
+    robot: tells where each command should have brought the tool [m].
     """
     groups = pose_cycles(stops(recording), robot)
     poses = tuple(_pose_test(group) for group in groups if group.t.size > 1)

@@ -19,10 +19,7 @@ def refuse_endless(duration: float, dt: float, most: int = MOST_SAMPLES) -> None
 
     Raises PathError: it would have more samples than that.
 
-    Parameters
-    ----------
-    duration, dt : float [s]
-
+    duration, dt: [s]
     """
     if not duration <= most * dt:
         raise PathError(

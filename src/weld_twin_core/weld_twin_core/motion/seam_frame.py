@@ -51,11 +51,7 @@ def seam_axes(tangent: ArrayLike, normal: ArrayLike) -> Array:
 
     Raises DataError: a tangent is zero, or a normal lies along its tangent.
 
-    Parameters
-    ----------
-    tangent, normal : array_like, shape (..., 3)
-        Of any length; the normal is made square to the tangent.
-
+    tangent, normal: of any length, shape (..., 3); the normal is made square to the tangent.
     """
     along, normal = np.broadcast_arrays(
         np.asarray(tangent, dtype=np.float64), np.asarray(normal, dtype=np.float64)
@@ -74,13 +70,9 @@ def seam_components(deviation: ArrayLike, tangent: ArrayLike, normal: ArrayLike)
 
     Raises DataError: a tangent is zero, or a normal lies along its tangent.
 
-    Parameters
-    ----------
-    deviation : array_like, shape (..., 3) [m]
-        In the world frame.
-    tangent, normal : array_like, shape (3,) or (..., 3)
-        Directions of the travel and out of the work; their lengths do not matter.
-
+    deviation: in the world frame, shape (..., 3) [m].
+    tangent, normal: directions of the travel and out of the work, shape (3,) or (..., 3); their
+    lengths do not matter.
     """
     vector = np.asarray(deviation, dtype=np.float64)
     components: Array = (seam_axes(tangent, normal) @ vector[..., None])[..., 0]

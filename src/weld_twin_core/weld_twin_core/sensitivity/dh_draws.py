@@ -42,11 +42,7 @@ class DhStudy:
         """
         Return the deviations of draws in seam axes, shape (3, D, N) [m].
 
-        Parameters
-        ----------
-        draws : array, shape (D, P)
-            In the units of the tolerances.
-
+        draws: in the units of the tolerances, shape (D, P).
         """
         robot = self.study.robot
         values = {
@@ -61,15 +57,7 @@ class DhStudy:
 
 
 def dh_study(study: Study, tolerances: Sequence[Tolerance]) -> DhStudy | None:
-    """
-    Return the fast form of a study, or None where something else than DH values counts.
-
-    Parameters
-    ----------
-    study : Study
-    tolerances : sequence of Tolerance
-
-    """
+    """Return the fast form of a study, or None where something else than DH values counts."""
     if study.known or any((t.effect, t.parameter) not in VALUES for t in tolerances):
         return None
     joints = study.recording.joints

@@ -174,13 +174,7 @@ def remembered(
     """
     Return the memory of every joint that has tolerances of it.
 
-    Parameters
-    ----------
-    study : Study
-    tolerances : sequence of Tolerance, length P
-    scale : array, shape (P,)
-        Typical size of each, in its unit; slopes are taken at it.
-
+    scale: typical size of each, in its unit, shape (P,); slopes are taken at it.
     """
     columns: dict[int, list[int]] = {}
     for k, tolerance in enumerate(tolerances):
@@ -199,16 +193,9 @@ def displacement(study: Study, joint: int, tolerances: Sequence[Tolerance], draw
     """
     Return displacements of a joint, shape (D, N) [rad or m], beyond those of the known effects.
 
-    Parameters
-    ----------
-    study : Study
-    joint : int
-        Counted from 0.
-    tolerances : sequence of Tolerance, length M
-        Of effects with memory on that joint.
-    draws : array, shape (D, M)
-        In the units of the tolerances.
-
+    joint: counted from 0.
+    tolerances: of effects with memory on that joint.
+    draws: in the units of the tolerances, shape (D, M).
     """
     name = study.robot.joint_names[joint]
     known = tuple(e for e in study.known if e.stage in MEMORY and e.site == name)

@@ -337,16 +337,9 @@ class _Search:
         """
         Return the best placement found with some of the values free.
 
-        Parameters
-        ----------
-        label : str
-            What the result is called.
-        free : list of int
-            Which of torch rotation, base x, base y and base yaw may change.
-        tries, seed : int
-        start : PlacementResult
-            What the values that are not free stay at.
-
+        label: what the result is called.
+        free: which of torch rotation, base x, base y and base yaw may change.
+        start: what the values that are not free stay at.
         """
         # Both bring most of scipy along, and whoever asks for no placement needs neither.
         from scipy.optimize import minimize

@@ -35,14 +35,9 @@ class BackgroundBag:
     """
     Writes in a thread of its own; what does not fit into the queue is dropped and counted.
 
-    Parameters
-    ----------
-    bag : GrowingBag
-        This opens and closes it.
-    flush_every : float [s]
-        Longest time a message is only in memory while the disk keeps up.
-    most_bytes : int
-        Memory the queue may take.
+    bag: this opens and closes it.
+    flush_every: longest time a message is only in memory while the disk keeps up [s].
+    most_bytes: memory the queue may take.
 
     Attributes
     ----------

@@ -43,13 +43,8 @@ def blocks(reader: Reader, topics: Mapping[int, str]) -> Iterator[tuple[str, np.
     Raises Unusual: messages of a topic differ in size, were not recorded in order, or lie where
     the index does not tell.
 
-    Parameters
-    ----------
-    reader : Reader
-        Open, of one storage file.
-    topics : mapping of int to str
-        Names by the number that connections have in it.
-
+    reader: open, of one storage file.
+    topics: names by the number that connections have in it.
     """
     storage: Any = reader.storage
     if not isinstance(storage, McapReader | Sqlite3Reader):

@@ -68,14 +68,9 @@ def touching(recording: Recording, each: list[Mark], made: Mapping[str, Any]) ->
 
     Raises DataError: a contact lies outside the joint states, or is not in the artefact.
 
-    Parameters
-    ----------
-    recording : Recording
-        With the joint states, as they came.
-    made : mapping
-        How the bag was made; may hold the artefact. Without one every label is a point, or a
-        length where the messages hold one.
-
+    recording: with the joint states, as they came.
+    made: how the bag was made; may hold the artefact. Without one every label is a point, or a
+    length where the messages hold one.
     """
     ns = np.array([mark.ns for mark in each])
     t = (ns - recording.epoch_ns) * 1e-9

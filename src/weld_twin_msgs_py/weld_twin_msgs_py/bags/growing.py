@@ -32,19 +32,11 @@ class GrowingBag:
     """
     A bag being recorded.
 
-    Parameters
-    ----------
-    path : Path or str
-        Must not exist yet, and neither must the unfinished bag of that name.
-    storage : str
-        'mcap' or 'sqlite3'.
-    split_bytes : int
-        About how large a file may become; 0 is without limit.
-    split_ns : int [ns]
-        What time a file may span; 0 is without limit.
-    provenance : mapping, optional
-        As of `BagWriter`.
-
+    path: must not exist yet, and neither must the unfinished bag of that name.
+    storage: 'mcap' or 'sqlite3'.
+    split_bytes: about how large a file may become; 0 is without limit.
+    split_ns: what time a file may span [ns]; 0 is without limit.
+    provenance: as of `BagWriter`.
     """
 
     def __init__(

@@ -60,15 +60,9 @@ def looking(
 
     Raises DataError: a camera, a target or a point is not described, or the images tell no poses.
 
-    Parameters
-    ----------
-    recording : Recording
-        With the joint states.
-    names : TopicNames
-        May describe cameras and targets.
-    made : mapping
-        How the bag was made; may describe them too.
-
+    recording: with the joint states.
+    names: may describe cameras and targets.
+    made: how the bag was made; may describe them too.
     """
     cameras, targets = _described(names, made)
     stamps = sorted({ns for ns, _, _ in each})

@@ -19,13 +19,8 @@ def recover_command(path: Path, growing: Path | None = None) -> str:
     """
     Return ``weld-twin bag recover`` for a recording, onto another disk where its own has no room.
 
-    Parameters
-    ----------
-    path : Path
-        What the recorder was told to write.
-    growing : Path, optional
-        The directory it grew in; it is copied.
-
+    path: what the recorder was told to write.
+    growing: the directory it grew in; it is copied.
     """
     command = ['weld-twin', 'bag', 'recover', str(path)]
     needed = _size(path if growing is None else growing) + SPARE

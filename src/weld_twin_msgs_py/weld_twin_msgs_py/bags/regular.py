@@ -86,12 +86,8 @@ def fill_regular(
     """
     Fill the columns of some topics, if all of them are as usual.
 
-    Parameters
-    ----------
-    bag : BagReader
-        Open.
-    streams : mapping of Role to Stream
-        Empty; to be thrown away, with the intake, where this fails.
+    bag: open.
+    streams: empty; to be thrown away, with the intake, where this fails.
 
     Returns
     -------

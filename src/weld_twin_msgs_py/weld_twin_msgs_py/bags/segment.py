@@ -140,12 +140,8 @@ class Segment:
     """
     A storage file being written.
 
-    Parameters
-    ----------
-    folder : Path
-        Directory to make for it; the file in it has the same name and the storage's suffix.
-    storage : str
-        'mcap' or 'sqlite3'.
+    folder: directory to make for it; the file in it has the same name and the storage's suffix.
+    storage: 'mcap' or 'sqlite3'.
 
     Attributes
     ----------
@@ -276,13 +272,8 @@ def clear_write_errors(path: Path, remaining: Callable[[], str] = str) -> Iterat
     """
     Turn what a full or missing disk makes the storages raise into one sentence.
 
-    Parameters
-    ----------
-    path : Path
-        The bag that is written.
-    remaining : callable
-        Returns what is to be said behind it, by the time that it happens.
-
+    path: the bag that is written.
+    remaining: returns what is to be said behind it, by the time that it happens.
     """
     try:
         yield

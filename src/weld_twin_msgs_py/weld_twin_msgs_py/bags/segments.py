@@ -23,13 +23,8 @@ class Segments:
 
     The one that grows lies in a directory of its own and joins the others when it is complete.
 
-    Parameters
-    ----------
-    folder : Path
-        Directory of the bag; exists.
-    name : str
-        What the files are called.
-
+    folder: directory of the bag; exists.
+    name: what the files are called.
     """
 
     def __init__(self, folder: Path, name: str, storage: str) -> None:

@@ -44,11 +44,7 @@ def unzstd(data: bytes, size: int | None = None) -> bytes:
 
     Raises DataError: it is larger than declared or than can be meant.
 
-    Parameters
-    ----------
-    size : int, optional
-        What is declared beside it.
-
+    size: what is declared beside it.
     """
     limit = _limit(data, size)
     return _whole(zstd.ZstdDecompressor().decompress(data, limit + 1), limit)

@@ -30,18 +30,11 @@ class BagWriter:
 
     Leaving the block by an exception discards everything.
 
-    Parameters
-    ----------
-    path : Path or str
-        Must not exist yet. A link that leads nowhere yet is followed.
-    storage : str
-        'mcap' or 'sqlite3'.
-    provenance : mapping, optional
-        How the bag came about (robot, effects, seed, version); plain JSON values, kept in the
-        bag's ``custom_data`` and read back by `provenance`.
-    beside : mapping, optional
-        Texts that lie in the bag's directory, by name of the file.
-
+    path: must not exist yet. A link that leads nowhere yet is followed.
+    storage: 'mcap' or 'sqlite3'.
+    provenance: how the bag came about (robot, effects, seed, version); plain JSON values, kept in
+    the bag's ``custom_data`` and read back by `provenance`.
+    beside: texts that lie in the bag's directory, by name of the file.
     """
 
     def __init__(
@@ -75,12 +68,7 @@ class BagWriter:
         """
         Write a message made by `bag_messages`.
 
-        Parameters
-        ----------
-        message : rosbags message
-        log_ns : int, optional [ns]
-            When it was recorded; left out, its header stamp.
-
+        log_ns: when it was recorded [ns]; left out, its header stamp.
         """
         kind = message.__msgtype__
         when = stamp_ns(message) if log_ns is None else log_ns

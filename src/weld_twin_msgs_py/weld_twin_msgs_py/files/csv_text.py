@@ -19,11 +19,7 @@ def csv_text(header: Sequence[Any], rows: Iterable[Sequence[Any]]) -> str:
     """
     Return a table as text; floats read back exactly.
 
-    Parameters
-    ----------
-    rows : iterable of sequence
-        Of texts and numbers.
-
+    rows: of texts and numbers.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator='\n')

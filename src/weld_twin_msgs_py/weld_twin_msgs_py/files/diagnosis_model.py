@@ -159,14 +159,9 @@ def mended_source(
 
     Raises ModelError: the file's corrections do not fit the recording.
 
-    Parameters
-    ----------
-    model : Model
-        As `read_model` returns it.
-    nominal : Robot
-        The robot that was given.
-    setup : int
-        Which recording of the diagnosis it is, counted from 0.
+    model: as `read_model` returns it.
+    nominal: the robot that was given.
+    setup: which recording of the diagnosis it is, counted from 0.
 
     Returns
     -------
@@ -205,16 +200,10 @@ def load_model(robot: Robot, path: Path | str, setup: int = 0) -> Twin:
 
     Raises ModelError: the file holds no usable model, or has no such set-up.
 
-    Parameters
-    ----------
-    robot : Robot
-        The nominal robot that was diagnosed.
-    path : Path or str
-        diagnosis.json.
-    setup : int
-        Which recording's base frame, in the order of the diagnosis; they differ where the
-        set-up moved between recordings.
-
+    robot: the nominal robot that was diagnosed.
+    path: diagnosis.json.
+    setup: which recording's base frame, in the order of the diagnosis; they differ where the
+    set-up moved between recordings.
     """
     model = read_model(robot, path)
     if not 0 <= setup < len(model.bases):

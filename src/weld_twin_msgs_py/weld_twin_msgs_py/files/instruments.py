@@ -50,12 +50,8 @@ def instrument(given: str) -> Instrument:
 
     Raises DataError: it is neither.
 
-    Parameters
-    ----------
-    given : str
-        A name of `INSTRUMENTS`, or the largest permissible error such as ``0.015+0.006/m`` [mm];
-        ``@3`` behind either says that the points are 3 m away.
-
+    given: a name of `INSTRUMENTS`, or the largest permissible error such as ``0.015+0.006/m``
+    [mm]; ``@3`` behind either says that the points are 3 m away.
     """
     name, _, away = given.partition('@')
     known = INSTRUMENTS.get(name.lower())
@@ -80,11 +76,7 @@ def measured_by(recording: Recording, what: Instrument, *, own_frame: bool) -> R
 
     Raises DataError: nothing says how far away the points were.
 
-    Parameters
-    ----------
-    own_frame : bool
-        Whether the measuring frame is the instrument's own.
-
+    own_frame: whether the measuring frame is the instrument's own.
     """
     seen = recording.measured
     if seen is None:

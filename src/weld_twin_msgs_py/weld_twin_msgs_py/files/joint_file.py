@@ -33,14 +33,9 @@ def write_joint_motion(path: Path, motion: Mapping[str, Any], comment: str) -> N
     """
     Write a motion as a path file of kind 'joints'.
 
-    Parameters
-    ----------
-    motion : mapping
-        'static', 'joint_names', 't' [s] and 'q' [rad, m]; static is stations, each measured at
-        rest, ``t`` when.
-    comment : str
-        One line, what it is for.
-
+    motion: 'static', 'joint_names', 't' [s] and 'q' [rad, m]; static is stations, each measured at
+    rest, ``t`` when.
+    comment: one line, what it is for.
     """
     content = {
         'kind': KIND,
@@ -89,13 +84,10 @@ def through_stations(robot: Robot, t: Array, q: Array, rate: float) -> JointMoti
 
     Raises PathError: it would have more samples than make sense.
 
-    Parameters
-    ----------
-    t : array, shape (K,) [s]
-        When each is to be measured; the arm is late where the way or the stay takes longer.
-    q : array, shape (K, n)
-    rate : float [1/s]
-
+    t: when each is to be measured, shape (K,) [s]; the arm is late where the way or the stay takes
+    longer.
+    q: shape (K, n).
+    rate: [1/s]
     """
     leave, arrive = [], [0.0]
     for k, step in enumerate(np.abs(np.diff(q, axis=0))):

@@ -45,11 +45,6 @@ def read_external(path: FilePath | str, robot: Robot) -> Array | None:
     as the others, spread evenly along the seam. Joints of the chain before them stand at zero.
 
     Raises PathError: it names no such joint, or its positions are none.
-
-    Parameters
-    ----------
-    path : Path or str
-
     """
     data = None if FilePath(path).suffix.lower() == '.csv' else read_yaml(path, 'path file')
     given = data.get('external') if isinstance(data, dict) else None

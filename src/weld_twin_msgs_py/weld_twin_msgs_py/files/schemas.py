@@ -242,10 +242,6 @@ def schema(name: str) -> Schema:
     """
     Return the JSON Schema of a kind of file.
 
-    Parameters
-    ----------
-    name : str
-        One of `NAMES`.
-
+    name: one of `NAMES`.
     """
     return {'$schema': DRAFT, 'title': f'weld_twin {name} file', **_MADE[name]()}

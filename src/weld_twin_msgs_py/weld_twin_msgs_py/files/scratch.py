@@ -29,14 +29,9 @@ class Scratch:
     """
     A new hidden directory; a context manager that yields its path, or `close` by hand.
 
-    Parameters
-    ----------
-    parent : Path
-        Made if it is not there.
-    prefix : str
-        Of the name, which is drawn. What killed processes left of this prefix is swept first.
-    rescue : callable, optional
-        Told every directory that is swept, before it goes.
+    parent: made if it is not there.
+    prefix: of the name, which is drawn. What killed processes left of this prefix is swept first.
+    rescue: told every directory that is swept, before it goes.
 
     Raises
     ------

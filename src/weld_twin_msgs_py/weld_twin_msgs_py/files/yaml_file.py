@@ -164,10 +164,7 @@ def numbers_text(key: str, values: Array) -> str:
 
     A motion has tens of thousands; a general emitter looks at each of them, for a second or two.
 
-    Parameters
-    ----------
-    values : array, shape (N,) or (N, n), not empty
-
+    values: shape (N,) or (N, n), not empty.
     """
     if values.ndim == 1:
         return f'{key}: {_wrapped([_number(v) for v in values.tolist()], len(key) + 2)}\n'

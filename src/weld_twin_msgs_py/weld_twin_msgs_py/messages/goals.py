@@ -77,15 +77,9 @@ def corrected_trajectory(trajectory: Any, columns: Sequence[int], goal: Goal, wa
     """
     Return a copy of a JointTrajectory with the robot's joints at other points.
 
-    Parameters
-    ----------
-    columns : sequence of int
-        As `read_goal` returns them.
-    goal : Goal
-        As many points as the trajectory has.
-    waits : float [s]
-        By how much all points are later.
-
+    columns: as `read_goal` returns them.
+    goal: as many points as the trajectory has.
+    waits: by how much all points are later [s].
     """
     out = deepcopy(trajectory)
     late = round(waits * NANOSECONDS)
@@ -109,16 +103,10 @@ def beyond_tolerance(
     """
     Return which joint a correction takes beyond what a goal tolerates; empty for none.
 
-    Parameters
-    ----------
-    tolerances : sequence of JointTolerance
-        Positions that are not positive tolerate what the controller does.
-    names : sequence of str
-        Of the trajectory.
-    columns : sequence of int
-        As `read_goal` returns them.
-    moved : array, shape (N, n) [rad or m]
-
+    tolerances: positions that are not positive tolerate what the controller does.
+    names: of the trajectory.
+    columns: as `read_goal` returns them.
+    moved: shape (N, n) [rad or m].
     """
     most = dict(zip((names[c] for c in columns), np.abs(moved).max(axis=0), strict=True))
     for one in tolerances:

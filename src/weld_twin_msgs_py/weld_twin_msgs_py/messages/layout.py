@@ -57,10 +57,7 @@ class Layout:
         """
         Return stamps [ns], shape (N,), and each run of doubles, shape (N, count).
 
-        Parameters
-        ----------
-        block : array of uint8, shape (N, size)
-            Messages, a row each.
+        block: messages, a row each, shape (N, size).
 
         Returns
         -------
@@ -83,13 +80,9 @@ class Layout:
         """
         Return messages like one of this layout, with other stamps and numbers.
 
-        Parameters
-        ----------
-        data : bytes, length size
-            The message to repeat.
-        ns : array of int, shape (N,) [ns]
-        runs : sequence of arrays, shapes (N, count)
-            One for each run of doubles.
+        data: the message to repeat.
+        ns: shape (N,) [ns].
+        runs: one for each run of doubles.
 
         Returns
         -------
@@ -142,12 +135,8 @@ def layout_of(kind: str, data: bytes) -> Layout | None:
     """
     Return the layout of a message that can be decoded; None for types and senders without one.
 
-    Parameters
-    ----------
-    data : bytes
-        The message; one run of doubles follows its header, or, of a joint state, positions,
-        velocities and efforts.
-
+    data: the message; one run of doubles follows its header, or, of a joint state, positions,
+    velocities and efforts.
     """
     if data[:2] != _LITTLE_ENDIAN or (kind != JOINT_STATE and kind not in NUMBERS):
         return None

@@ -95,13 +95,10 @@ class Messages:
         """
         Return a PoseWithCovarianceStamped.
 
-        Parameters
-        ----------
-        position : array, shape (3,) [m]
-        rotation : array, shape (3, 3)
-        covariance : array, shape (6, 6)
-            Position first [m^2], then turns about the fixed axes of the frame [rad^2].
-
+        position: shape (3,) [m].
+        rotation: shape (3, 3).
+        covariance: position first [m^2], then turns about the fixed axes of the frame [rad^2],
+        shape (6, 6).
         """
         inner = self._make(
             'geometry_msgs/msg/PoseWithCovariance',

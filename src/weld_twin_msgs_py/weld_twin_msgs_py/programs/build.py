@@ -108,13 +108,8 @@ class Program:
 
         Raises DataError: its numbers make no pose.
 
-        Parameters
-        ----------
-        file : int
-            Which of the sources they stand in.
-        told : array, shape (m,), optional
-            External axes at a pose.
-
+        file: which of the sources they stand in.
+        told: external axes at a pose, shape (m,).
         """
         where = self.sources[file].where(numbers[0].start)
         try:
@@ -161,15 +156,9 @@ def hold_if_used_elsewhere(
 
     A point that is assigned, computed with or handed on may come to mean something else.
 
-    Parameters
-    ----------
-    names : dict of str to int
-        Points by name, in lower case where the language does not care.
-    texts : sequence of str
-        The files, comments and strings blanked out.
-    used : sequence of set of int
-        For every file, the places of names that are understood.
-
+    names: points by name, in lower case where the language does not care.
+    texts: the files, comments and strings blanked out.
+    used: for every file, the places of names that are understood.
     """
     for file, text in enumerate(texts):
         for result in re.finditer(r'[A-Za-z_$][\w$]*', text):
@@ -185,11 +174,7 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
 
     Moves from one joint move to the next make a seam, together with the point it begins at.
 
-    Parameters
-    ----------
-    controller : Controller
-        Where the controller's frames are on this robot, and the frames that were given.
-
+    controller: where the controller's frames are on this robot, and the frames that were given.
     """
     count = len(controller.external)
     carried = CarriedArm(robot.with_frames(base=np.eye(4)), count)

@@ -34,11 +34,7 @@ class Context(NamedTuple):
         """
         Return the external axes of a point as joints of the model; None where one is missing.
 
-        Parameters
-        ----------
-        numbers : sequence of Number or None
-            Degrees or mm, in the order of ``controller.external``.
-
+        numbers: degrees or mm, in the order of ``controller.external``.
         """
         values = [number.value for number in numbers if number is not None]
         if len(values) < len(numbers):

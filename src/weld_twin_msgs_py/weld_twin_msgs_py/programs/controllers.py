@@ -166,15 +166,10 @@ def controller_of(
     """
     Return the frames of the controller that runs a language on a robot.
 
-    Parameters
-    ----------
-    language : str
-        Each maker's controller runs its own, on its own robots; on others nothing is assumed.
-    tools, bases : mapping of str to array, optional
-        Frames that were given, shape (4, 4) [m].
-    cell : Cell, optional
-        What was told of external axes.
-
+    language: each maker's controller runs its own, on its own robots; on others nothing is
+    assumed.
+    tools, bases: frames that were given, shape (4, 4) [m].
+    cell: what was told of external axes.
     """
     reported = cell or Cell()
     axes = external_axes(reported.external, robot, language)

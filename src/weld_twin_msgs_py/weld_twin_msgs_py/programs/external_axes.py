@@ -56,11 +56,7 @@ def external_axes(given: str, robot: Robot, language: str) -> tuple[ExternalAxis
 
     Raises DataError: it is not told and has to be, the language has none, or it is told wrongly.
 
-    Parameters
-    ----------
-    given : str
-        Which is which, as ``E1=rail,E2=-tilt``; empty where it is not told.
-
+    given: which is which, as ``E1=rail,E2=-tilt``; empty where it is not told.
     """
     names = robot.joint_names[: carrying(robot)]
     listed = ', '.join(names)

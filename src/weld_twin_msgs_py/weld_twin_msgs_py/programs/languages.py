@@ -75,13 +75,8 @@ def language_of(source: Source, path: Path | str, controller: str = '') -> str:
 
     Raises DataError: there is no such language, or the file is of none that is known.
 
-    Parameters
-    ----------
-    path : Path or str
-        Where it was read.
-    controller : str
-        As the user named it; empty to let the file tell.
-
+    path: where it was read.
+    controller: as the user named it; empty to let the file tell.
     """
     known = ', '.join(LANGUAGES)
     if controller:
@@ -107,12 +102,7 @@ def read_program(path: Path | str, context: Context, controller: str = '') -> Pr
 
     Raises DataError: it cannot be read, tells no language, or a move in it is broken.
 
-    Parameters
-    ----------
-    path : Path or str
-    controller : str
-        Its language; empty to let the file tell.
-
+    controller: its language; empty to let the file tell.
     """
     source = read_source(path)
     name = language_of(source, path, controller)

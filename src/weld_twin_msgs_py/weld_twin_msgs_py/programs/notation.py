@@ -63,10 +63,7 @@ def angles_fixed(rotation: Array, near: Sequence[float]) -> list[float]:
     """
     Return the angles about the fixed x, y and z of a rotation that are nearest given ones [rad].
 
-    Parameters
-    ----------
-    rotation : array, shape (3, 3)
-
+    rotation: shape (3, 3).
     """
     cosine = float(np.hypot(rotation[0, 0], rotation[1, 0]))
     pitch = float(np.arctan2(-rotation[2, 0], cosine))
@@ -149,13 +146,9 @@ def joint_notation(per_unit: Array, mix: Array, decimals: int, name: str) -> Not
     """
     Return a notation of joint positions.
 
-    Parameters
-    ----------
-    per_unit : array, shape (n,)
-        Model units [rad or m] of one unit as written.
-    mix : array, shape (n, n)
-        Makes the joints of the model from those of the controller, where they are coupled.
-
+    per_unit: model units [rad or m] of one unit as written, shape (n,).
+    mix: makes the joints of the model from those of the controller, where they are coupled, shape
+    (n, n).
     """
     back = np.linalg.inv(mix)
 

@@ -24,11 +24,7 @@ def turn_bits(turn: int) -> Suits:
     """
     Return what takes the postures whose axes have the signs of T.
 
-    Parameters
-    ----------
-    turn : int
-        Bit k is set where axis k + 1 is below zero.
-
+    turn: bit k is set where axis k + 1 is below zero.
     """
 
     def suits(robot: object, controller: Controller) -> Any:
@@ -50,11 +46,7 @@ def quadrants(conf: Sequence[int]) -> Suits:
     """
     Return what takes the postures whose axes 1, 4 and 6 are in the quadrants of a confdata.
 
-    Parameters
-    ----------
-    conf : sequence of int
-        cf1, cf4, cf6 and cfx, which is left out: its meaning depends on the arm.
-
+    conf: cf1, cf4, cf6 and cfx, which is left out: its meaning depends on the arm.
     """
 
     def suits(robot: object, controller: Controller) -> Any:
@@ -79,10 +71,7 @@ def nearest(near: Array) -> Suits:
     """
     Return what takes the posture nearest given joint positions, as qnear does.
 
-    Parameters
-    ----------
-    near : array, shape (n,)
-
+    near: shape (n,).
     """
 
     def suits(robot: object, controller: Controller) -> object:

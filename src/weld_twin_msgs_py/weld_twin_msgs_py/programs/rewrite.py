@@ -26,13 +26,8 @@ def rewritten(program: Program, points: Sequence[Array], moved: Collection[int])
     """
     Return the texts of the files with some points moved.
 
-    Parameters
-    ----------
-    points : sequence of array
-        Values of all points.
-    moved : collection of int
-        Those whose numbers are written anew.
-
+    points: values of all points.
+    moved: those whose numbers are written anew.
     """
     edits: list[tuple[int, int, int, str]] = []
     for k in sorted(moved):
@@ -59,13 +54,8 @@ def numeral(value: float, old: str, least: int) -> str:
     """
     Return a number as text, with as many digits after the point as the old one has.
 
-    Parameters
-    ----------
-    old : str
-        The number that it replaces; a sign before a positive one is kept.
-    least : int
-        Digits after the point at least; 0 writes whole numbers.
-
+    old: the number that it replaces; a sign before a positive one is kept.
+    least: digits after the point at least; 0 writes whole numbers.
     """
     text = f'{value:.{max(least, _decimals(old)) if least else 0}f}'
     if re.fullmatch(r'-0(\.0*)?', text):
@@ -84,13 +74,8 @@ def check_written(before: Program, after: Program, points: Sequence[Array]) -> N
 
     Raises DataError: a move or a point differs.
 
-    Parameters
-    ----------
-    before, after : Program
-        As it was, and the new text read again.
-    points : sequence of array
-        What the new text is to say.
-
+    before, after: as it was, and the new text read again.
+    points: what the new text is to say.
     """
     same = len(before.points) == len(after.points) and len(before.steps) == len(after.steps)
     if same:

@@ -81,15 +81,9 @@ def number_at(source: Source, start: int, end: int, what: str, file: int = 0) ->
 
     Raises DataError: the piece is not one number, or not a finite one.
 
-    Parameters
-    ----------
-    start, end : int
-        The piece.
-    what : str
-        What the number is, for the message.
-    file : int
-        Which of the program's files.
-
+    start, end: the piece.
+    what: what the number is, for the message.
+    file: which of the program's files.
     """
     piece = source.text[start:end]
     match = _ALONE.match(piece)

@@ -60,12 +60,8 @@ def dh_rows(axes: list[Axis], T_base_tip: Array) -> tuple[Array, list[Row], list
     """
     Return the rows that have the given axes.
 
-    Parameters
-    ----------
-    axes : list of Axis
-        In chain order.
-    T_base_tip : array, shape (4, 4)
-        At joint position zero.
+    axes: in chain order.
+    T_base_tip: at joint position zero, shape (4, 4).
 
     Returns
     -------

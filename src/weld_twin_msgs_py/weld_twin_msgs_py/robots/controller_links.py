@@ -60,15 +60,9 @@ def foot_of(
     """
     Return the link that the arm stands in and the controller's base, placed in the first link.
 
-    Parameters
-    ----------
-    base : str
-        The first link of the chain.
-    chain : sequence of Joint
-        From base to tip.
-    wanted : str or None
-        The link that was asked for with --base-link; it is both.
-
+    base: the first link of the chain.
+    chain: from base to tip.
+    wanted: the link that was asked for with --base-link; it is both.
     """
     if wanted is not None:
         return Placed(base, np.eye(4), 0), Placed(base, np.eye(4), 0)
@@ -92,13 +86,8 @@ def flange_link_of(
 
     Raises ModelError: the link asked for is not there, or not fixed to the last link that moves.
 
-    Parameters
-    ----------
-    chain : sequence of Joint
-        From base to tip.
-    wanted : str or None
-        The link that was asked for.
-
+    chain: from base to tip.
+    wanted: the link that was asked for.
     """
     moving = [joint for joint in chain if joint.kind in MOVABLE]
     last = moving[-1].child
@@ -136,13 +125,8 @@ def _rank(link: str, fixed: bool, carries: bool) -> int:
     """
     Return how surely a link is the flange, 0 most.
 
-    Parameters
-    ----------
-    fixed : bool
-        It hangs on the last link that moves, and is not that.
-    carries : bool
-        The tip hangs on it.
-
+    fixed: it hangs on the last link that moves, and is not that.
+    carries: the tip hangs on it.
     """
     name = link.lower()
     words = f'_{name}'

@@ -49,11 +49,7 @@ def own_robot(spec: str) -> Path | None:
 
     Raises ModelError: several robots have the name; none of them is taken for the other.
 
-    Parameters
-    ----------
-    spec : str
-        A name without a suffix, in capital or small letters.
-
+    spec: a name without a suffix, in capital or small letters.
     """
     result = [str(file) for file in own_files() if file.stem.lower() == spec.lower()]
     if result and spec.lower() in catalog.names():

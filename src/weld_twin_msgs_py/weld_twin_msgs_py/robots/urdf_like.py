@@ -68,15 +68,9 @@ def write_urdf_like(
     Raises DataError: the file exists and ``overwrite`` is not set, or the place cannot be written.
     Raises ModelError: the given file cannot be read.
 
-    Parameters
-    ----------
-    path : Path or str
-    robot : Robot
-        The corrected one, with the joints of the given file; where its base stands in the world
-        is not written.
-    notes : sequence of str
-        Comments at the top.
-
+    robot: the corrected one, with the joints of the given file; where its base stands in the world
+    is not written.
+    notes: comments at the top.
     """
     chain = chain_of(*given[:3])
     nominal, arm = read_urdf(*given), robot

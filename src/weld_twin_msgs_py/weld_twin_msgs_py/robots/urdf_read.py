@@ -90,11 +90,7 @@ def chain_of(path: Path | str, base_link: str | None = None, tip_link: str | Non
     """
     Return the joints from base to tip.
 
-    Parameters
-    ----------
-    path, base_link, tip_link
-        As for `read_urdf`.
-
+    path, base_link, tip_link: as for `read_urdf`.
     """
     tree = read_tree(path)
     base = _base(tree, base_link)

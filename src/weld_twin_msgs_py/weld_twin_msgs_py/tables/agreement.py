@@ -34,11 +34,8 @@ def misfit(robot: Robot, q: Array, position: Array) -> Array:
 
     Measuring frame and tool point are fitted, in turns: a rigid fit (Kabsch), then a linear one.
 
-    Parameters
-    ----------
-    q : array, shape (M, n)
-    position : array, shape (M, 3) [m]
-
+    q: shape (M, n).
+    position: shape (M, 3) [m].
     """
     T = forward(robot, q)
     flange, turn = T[:, :3, 3], T[:, :3, :3]

@@ -133,13 +133,9 @@ def board_points(entry: Mapping[str, Any]) -> dict[str, Array]:
 
     Inner corners have the numbers that OpenCV gives them, corners of tags those of `label`.
 
-    Parameters
-    ----------
-    entry : mapping
-        ``board`` (charuco or chessboard), ``squares`` (columns and rows of squares) and
-        ``square`` (their side [m]); or ``board: tags``, ``tags`` (the middle of each by its
-        number [m], or a single number) and ``size`` (side of the black square [m]).
-
+    entry: ``board`` (charuco or chessboard), ``squares`` (columns and rows of squares) and
+    ``square`` (their side [m]); or ``board: tags``, ``tags`` (the middle of each by its number
+    [m], or a single number) and ``size`` (side of the black square [m]).
     """
     if entry['board'] not in BOARDS:
         raise DataError(f'board is {entry["board"]!r}; a board is {" or ".join(BOARDS)}')

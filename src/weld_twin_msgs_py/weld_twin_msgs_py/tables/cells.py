@@ -92,14 +92,8 @@ def read_cells(
     Raises DataError: no such file, no table, ragged rows, or a delimiter or decimal sign that is
     not clear.
 
-    Parameters
-    ----------
-    path : Path or str
-    delimiter, decimal : str, optional
-        Left out, they are found.
-    marker : str, optional
-        What is meant, where an export holds several things that were tracked.
-
+    delimiter, decimal: left out, they are found.
+    marker: what is meant, where an export holds several things that were tracked.
     """
     path = Path(path)
     said: list[str] = []

@@ -126,11 +126,7 @@ def read(known: Format, text: str, marker: str | None) -> Read:
 
     Raises DataError: it has several, and none was named.
 
-    Parameters
-    ----------
-    marker : str, optional
-        Marker or body that is meant, where the file has several.
-
+    marker: marker or body that is meant, where the file has several.
     """
     lines = text.splitlines()
     at = next((k for k, line in enumerate(lines) if re.search(known.header, line)), -1)

@@ -54,15 +54,9 @@ def joint_angles(
     """
     Return the joint columns of a table, shape (M, n) [rad or m], and say how they were read.
 
-    Parameters
-    ----------
-    names : tuple of str
-        The columns, in the robot's order.
-    said : list of str
-        Sentences are added to it.
-    units : Units, optional
-        Of columns that name none; left out, they are told by the size of the numbers.
-
+    names: the columns, in the robot's order.
+    said: sentences are added to it.
+    units: of columns that name none; left out, they are told by the size of the numbers.
     """
     q = cells.stack(names)
     if units is None:
@@ -85,13 +79,8 @@ def joint_units(
     """
     Return the units of the columns without one of their own.
 
-    Parameters
-    ----------
-    q : array, shape (M, n)
-        As the table has it.
-    robot, names, options, said, judge
-        As for `joint_angles`.
-
+    q: as the table has it, shape (M, n).
+    robot, names, options, said, judge: as for `joint_angles`.
     """
     turning, sliding = ~robot.prismatic, robot.prismatic
     reported = [_told(names, kind, given) for kind, given in _kinds(robot, options)]

@@ -43,15 +43,9 @@ def split_lines(path: Path, text: str, delimiter: str | None, said: list[str]) -
     Raises DataError: there is no table, the delimiter is not clear, rows are ragged, or a
     quotation mark is not closed.
 
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    delimiter : str, optional
-        Left out, it is found.
-    said : list of str
-        Sentences are added to it.
-
+    path: for messages.
+    delimiter: left out, it is found.
+    said: sentences are added to it.
     """
     lines = _without_comments(re.split(r'\r\n|\r|\n', text))
     if sum(1 for line in lines if line.strip()) < 2:

@@ -33,11 +33,7 @@ def number(text: str, decimal: str) -> float:
 
     Raises ValueError: it is none.
 
-    Parameters
-    ----------
-    decimal : str
-        '.' or ','.
-
+    decimal: '.' or ','.
     """
     plain = _GAP.sub('', text).replace('\N{MINUS SIGN}', '-')
     if _GROUPED[decimal].match(plain):
@@ -56,13 +52,8 @@ def decimal_sign(path: Path, rows: Iterable[list[str]], delimiter: str | None) -
     Raises DataError: some numbers have a comma and some a point, and no group of thousands tells
     why.
 
-    Parameters
-    ----------
-    path : Path
-        For the message.
-    delimiter : str, optional
-        Between the cells; a comma there is no decimal sign.
-
+    path: for the message.
+    delimiter: between the cells; a comma there is no decimal sign.
     """
     if delimiter == ',':
         return '.'
@@ -93,13 +84,8 @@ def without_units(
 
     Raises DataError: the header gives another unit than the cells.
 
-    Parameters
-    ----------
-    path : Path
-        For the message.
-    unit_of_name : mapping
-        Units that the header gives already.
-
+    path: for the message.
+    unit_of_name: units that the header gives already.
     """
     first = rows[0] if rows else []
     marked = [k for k, cell in enumerate(first) if _WITH_UNIT.match(cell)]

@@ -50,11 +50,7 @@ def read_point_list(text: str, marker: str | None) -> Read:
 
     Raises DataError: no point belongs to the group, or a line differs from the others.
 
-    Parameters
-    ----------
-    marker : str, optional
-        The group of points that is meant.
-
+    marker: the group of points that is meant.
     """
     rows = _rows(text)
     layout = _layout(rows[:_LOOK])

@@ -32,13 +32,8 @@ def rotations(angles: Array, convention: str) -> Array:
     """
     Return rotation matrices, shape (M, 3, 3).
 
-    Parameters
-    ----------
-    angles : array, shape (M, 3) [rad]
-        About x, y, z, in that order of columns.
-    convention : str
-        'XYZ' means Rx Ry Rz and so on; or 'rotvec'.
-
+    angles: about x, y, z, in that order of columns, shape (M, 3) [rad].
+    convention: 'XYZ' means Rx Ry Rz and so on; or 'rotvec'.
     """
     if convention == ROTATION_VECTOR:
         return np.asarray(Rotation.from_rotvec(angles).as_matrix())

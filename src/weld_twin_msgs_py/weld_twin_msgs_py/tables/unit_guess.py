@@ -34,15 +34,9 @@ def factor(known: Mapping[str, float], unit: str, column: str, what: str) -> flo
 
     Raises DataError: the unit is that of something else.
 
-    Parameters
-    ----------
-    known : mapping
-        Units that fit, and what they are in SI.
-    unit : str
-        That the header or the user gives.
-    column, what : str
-        For people: the column, and what it is taken for.
-
+    known: units that fit, and what they are in SI.
+    unit: that the header or the user gives.
+    column, what: for people: the column, and what it is taken for.
     """
     if unit not in known:
         raise DataError(

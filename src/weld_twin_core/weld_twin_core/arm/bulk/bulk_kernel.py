@@ -40,14 +40,10 @@ class BulkKernel:
     """
     The chain of one robot, prepared for many joint positions.
 
-    Parameters
-    ----------
-    channels : sequence of Channel
-        DH values whose screws `screws` gives: 'theta', 'alpha', 'beta' and 'a' are turns about
-        the axis that 'theta' and 'd', 'alpha', 'beta' and 'a' act on. Quickest in the order in
-        which they come along the chain.
-    block : int
-        Poses worked on at once; a multiple of 8 is best.
+    channels: DH values whose screws `screws` gives: 'theta', 'alpha', 'beta' and 'a' are turns
+    about the axis that 'theta' and 'd', 'alpha', 'beta' and 'a' act on. Quickest in the order in
+    which they come along the chain.
+    block: poses worked on at once; a multiple of 8 is best.
 
     Notes
     -----
@@ -85,12 +81,8 @@ class BulkKernel:
 
         Raises ModelError: ``q`` or ``out`` are of another shape, or ``out`` is not contiguous.
 
-        Parameters
-        ----------
-        q : array, shape (N, n) [rad or m]
-        out : array, shape (N, 4, 4), optional
-            Where they are written to; contiguous.
-
+        q: shape (N, n) [rad or m].
+        out: where they are written to, shape (N, 4, 4); contiguous.
         """
         out = self._poses_like(q, out)
         with unbuffered():
@@ -111,14 +103,9 @@ class BulkKernel:
         Raises ModelError: ``q``, ``poses`` or ``out`` are of another shape, or ``poses`` is not
         contiguous.
 
-        Parameters
-        ----------
-        q : array, shape (N, n) [rad or m]
-        poses : array, shape (N, 4, 4), optional
-            Where the poses are written to.
-        out : array, shape (6, channels, N), optional
-            Where the turns are written to; may be a view.
-
+        q: shape (N, n) [rad or m].
+        poses: where the poses are written to, shape (N, 4, 4).
+        out: where the turns are written to, shape (6, channels, N); may be a view.
         """
         poses = self._poses_like(q, poses)
         shape = 6, len(self.channels), len(q)

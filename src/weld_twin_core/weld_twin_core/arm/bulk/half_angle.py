@@ -69,15 +69,10 @@ class HalfAngle:
     """
     Takes the features (u, v) of many angles, in memory of its own.
 
-    Parameters
-    ----------
-    *shape : int
-        Shape of the angles.
-    powers : array, shape (DEGREE + 1, size), optional
-    own : array, shape (3, size), optional
-        Memory that is free during a call and may be used otherwise between calls. Of the second
-        the result is part.
-
+    *shape: shape of the angles.
+    powers: shape (DEGREE + 1, size).
+    own: memory that is free during a call and may be used otherwise between calls, shape (3,
+    size). Of the second the result is part.
     """
 
     def __init__(

@@ -55,10 +55,7 @@ class Division:
     """
     A robot's chain of factors, divided in two pieces at one of its joints.
 
-    Parameters
-    ----------
-    channels : sequence of Channel
-        What is asked for.
+    channels: what is asked for.
 
     Attributes
     ----------

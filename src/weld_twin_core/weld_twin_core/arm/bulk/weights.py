@@ -114,11 +114,7 @@ class Piece:
     """
     A run of factors with what stands before and after them.
 
-    Parameters
-    ----------
-    before, after : array, shape (4, 4)
-        Base or tool frame, where the piece begins or ends the chain.
-
+    before, after: base or tool frame, where the piece begins or ends the chain, shape (4, 4).
     """
 
     def __init__(self, run: Sequence[Factor], before: Array, after: Array) -> None:

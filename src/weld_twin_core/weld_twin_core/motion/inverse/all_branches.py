@@ -99,13 +99,8 @@ def past_limit(robot: Robot, joint: int, value: float) -> str:
     """
     Return what is wrong with a joint position for a message.
 
-    Parameters
-    ----------
-    joint : int
-        Counted from 0.
-    value : float [rad or m]
-        The position that would be needed.
-
+    joint: counted from 0.
+    value: the position that would be needed [rad or m].
     """
     return (
         f'joint {robot.joint_names[joint]!r} would have to be at {value:.3f}, outside '

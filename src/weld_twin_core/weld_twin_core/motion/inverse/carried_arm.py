@@ -81,9 +81,7 @@ class CarriedArm:
         """
         Return where the base of the arm is in the frame that the chain begins in.
 
-        Parameters
-        ----------
-        reported : array, shape (..., count) [rad or m]
+        reported: shape (..., count) [rad or m].
 
         Returns
         -------
@@ -98,9 +96,7 @@ class CarriedArm:
         """
         Return where the robot's own rows begin in the frame that the chain begins in.
 
-        Parameters
-        ----------
-        reported : array, shape (..., count) [rad or m]
+        reported: shape (..., count) [rad or m].
 
         Returns
         -------
@@ -117,12 +113,8 @@ class CarriedArm:
         """
         Return poses as the arm's base sees them, shape (..., 4, 4).
 
-        Parameters
-        ----------
-        poses : array, shape (..., 4, 4)
-            In the frame that the chain begins in.
-        reported : array, shape (..., count) [rad or m]
-
+        poses: in the frame that the chain begins in, shape (..., 4, 4).
+        reported: shape (..., count) [rad or m].
         """
         return np.asarray(np.linalg.inv(self.feet(reported)) @ poses) if self.count else poses
 
@@ -165,11 +157,8 @@ class CarriedArm:
         """
         Return joint positions closed onto poses by the arm, and the error left, as `polish` does.
 
-        Parameters
-        ----------
-        q : array, shape (N, n)
-        poses : array, shape (N, 4, 4)
-
+        q: shape (N, n).
+        poses: shape (N, 4, 4).
         """
         reported = q[..., : self.count]
         result, error = polish(self.arm, q[..., self.count :], self.seen(poses, reported))

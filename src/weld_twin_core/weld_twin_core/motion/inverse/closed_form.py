@@ -71,13 +71,8 @@ def branches(robot: Robot, poses: Array) -> Array:
 
     The index of a branch means the same arm posture at every sample. Angles are in (-pi, pi].
 
-    Parameters
-    ----------
-    robot : Robot
-        Of one of the two families.
-    poses : array, shape (N, 4, 4)
-        ``T_world_tool``.
-
+    robot: of one of the two families.
+    poses: ``T_world_tool``, shape (N, 4, 4).
     """
     arm = screws(robot)
     solver = _SOLVERS[str(family(robot))]

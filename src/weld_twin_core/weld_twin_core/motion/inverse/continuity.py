@@ -66,12 +66,8 @@ def jumps(robot: Robot, q: Array, poses: Array) -> Mask:
     Half way between two joint positions of one motion the tool is near both; half way between
     two branches it is somewhere else, or the joints move much farther than the tool.
 
-    Parameters
-    ----------
-    q : array, shape (..., N, n) [rad or m]
-    poses : array, shape (N, 4, 4)
-        Where the tool should be.
-
+    q: shape (..., N, n) [rad or m].
+    poses: where the tool should be, shape (N, 4, 4).
     """
     if len(poses) < 2:
         return np.zeros((*q.shape[:-2], 0), dtype=bool)

@@ -54,12 +54,8 @@ def follow(robot: Robot, poses: Array, seed: Array) -> Array | None:
     None where they do not start there, reach a limit, come near a singularity, or leave any
     other doubt; also for few samples, or an arm that does not have six joints.
 
-    Parameters
-    ----------
-    poses : array, shape (N, 4, 4)
-        Evenly spaced, by and large: the polynomials are over the samples.
-    seed : array, shape (6,) [rad or m]
-
+    poses: evenly spaced, by and large: the polynomials are over the samples, shape (N, 4, 4).
+    seed: shape (6,) [rad or m].
     """
     if robot.n != 6 or len(poses) < SHORT:
         return None

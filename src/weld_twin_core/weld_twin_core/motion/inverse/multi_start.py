@@ -39,12 +39,8 @@ def search(robot: Robot, pose: Array, seed: Array | None = None) -> tuple[Array,
     The starts are the same for every call, so the answer is repeatable. A chain with more
     than six joints gets from each start the solution nearest the middle of its range.
 
-    Parameters
-    ----------
-    pose : array, shape (4, 4)
-    seed : array, shape (n,), optional
-        One more start, tried first.
-
+    pose: shape (4, 4).
+    seed: one more start, tried first, shape (n,).
     """
     lower, upper = _range(robot)
     rng = np.random.default_rng(0)

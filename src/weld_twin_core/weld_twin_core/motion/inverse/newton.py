@@ -31,14 +31,9 @@ def least_step(jacobian: Array, error: Array, damping: Array | float = _FLOOR) -
     """
     Return the smallest joint step that takes a pose error away, shape (..., n) [rad or m].
 
-    Parameters
-    ----------
-    jacobian : array, shape (..., 6, n)
-    error : array, shape (..., 6) [m, rad]
-        What is missing to the pose wanted.
-    damping : float, or array of shape (...) [m^2]
-        Keeps the step finite near a singularity.
-
+    jacobian: shape (..., 6, n).
+    error: what is missing to the pose wanted, shape (..., 6) [m, rad].
+    damping: keeps the step finite near a singularity, shape (...) [m^2].
     """
     transposed = np.swapaxes(jacobian, -1, -2)
     square = jacobian @ transposed + np.asarray(damping)[..., None, None] * np.eye(6)
@@ -49,14 +44,9 @@ def polish(robot: Robot, q: Array, poses: Array, rounds: int = 12) -> tuple[Arra
     """
     Return joint positions closed onto the poses and the error left, shapes (N, n) and (N, 6).
 
-    Parameters
-    ----------
-    q : array, shape (N, n)
-        A start near the solution.
-    poses : array, shape (N, 4, 4)
-    rounds : int
-        Most Newton steps; convergence is quadratic.
-
+    q: a start near the solution, shape (N, n).
+    poses: shape (N, 4, 4).
+    rounds: most Newton steps; convergence is quadratic.
     """
     chain = frames(robot, q)
     error = pose_error(chain, poses)

@@ -22,12 +22,9 @@ def turn(axis: Array, angle: Array, vector: Array) -> Array:
     """
     Return vectors turned about a fixed axis, shape (..., 3).
 
-    Parameters
-    ----------
-    axis : array, shape (3,), of length 1
-    angle : array, shape (...) [rad]
-    vector : array, shape (..., 3)
-
+    axis: shape (3,), of length 1.
+    angle: shape (...) [rad].
+    vector: shape (..., 3).
     """
     cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
     along = (vector @ axis)[..., None] * axis
@@ -45,12 +42,9 @@ def angle_onto(axis: Array, start: Array, end: Array) -> Array:
     """
     Return the angle that turns one vector onto another, shape (...) [rad].
 
-    Parameters
-    ----------
-    axis : array, shape (3,), of length 1
-    start, end : array, shape (..., 3)
-        Of equal length and height along the axis; otherwise the nearest angle is returned.
-
+    axis: shape (3,), of length 1.
+    start, end: of equal length and height along the axis, shape (..., 3); otherwise the nearest
+    angle is returned.
     """
     sine = _cross(start, end) @ axis
     cosine = (start * end).sum(axis=-1) - (start @ axis) * (end @ axis)
@@ -61,16 +55,10 @@ def angle_to_height(along: Array, axis: Array, start: Array, height: Array) -> A
     """
     Return both angles at which a turned vector has a given component, shape (2, ...) [rad].
 
-    Parameters
-    ----------
-    along : array, shape (..., 3)
-        Direction of the component; the component counts in units of its length.
-    axis : array, shape (3,), of length 1
-    start : array, shape (..., 3)
-        The vector to turn.
-    height : array, shape (...)
-        The component wanted.
-
+    along: direction of the component, shape (..., 3); the component counts in units of its length.
+    axis: shape (3,), of length 1.
+    start: the vector to turn, shape (..., 3).
+    height: the component wanted, shape (...).
     """
     level = (start @ axis)[..., None] * axis
     cosine = ((start - level) * along).sum(axis=-1)
@@ -86,15 +74,10 @@ def angle_to_distance(offset: Array, axis: Array, start: Array, distance: Array)
     """
     Return both angles at which a sum has a given length, shape (2, ...) [rad].
 
-    Parameters
-    ----------
-    offset : array, shape (..., 3)
-    axis : array, shape (3,), of length 1
-    start : array, shape (..., 3)
-        The vector to turn; the sum is ``offset`` plus the turned vector.
-    distance : array, shape (...)
-        The length wanted.
-
+    offset: shape (..., 3).
+    axis: shape (3,), of length 1.
+    start: the vector to turn, shape (..., 3); the sum is ``offset`` plus the turned vector.
+    distance: the length wanted, shape (...).
     """
     height = 0.5 * (distance**2 - (offset**2).sum(axis=-1) - (start**2).sum(axis=-1))
     return angle_to_height(offset, axis, start, height)

@@ -27,10 +27,7 @@ def turns_to_middle(robot: Robot, low: Array, high: Array) -> Array:
     """
     Return how many whole turns bring a range of positions to the middle of the limits.
 
-    Parameters
-    ----------
-    low, high : array, shape (..., n) [rad or m]
-        Ends of the range of every joint.
+    low, high: ends of the range of every joint, shape (..., n) [rad or m].
 
     Returns
     -------

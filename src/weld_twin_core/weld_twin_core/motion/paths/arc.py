@@ -141,14 +141,9 @@ class _Circle:
         """
         Return the circle about a point and an axis of length 1, through a start (3,) [m].
 
-        Parameters
-        ----------
-        centre : array, shape (3,) [m]
-        axis : array, shape (3,), of length 1
-            The travel turns about it by the right hand.
-        start : array, shape (3,) [m]
-            A point on the circle, where it starts.
-
+        centre: shape (3,) [m].
+        axis: the travel turns about it by the right hand, shape (3,), of length 1.
+        start: a point on the circle, where it starts, shape (3,) [m].
         """
         radius = float(np.linalg.norm(start - centre))
         out = (start - centre) / radius

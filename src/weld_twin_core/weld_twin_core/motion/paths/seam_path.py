@@ -85,12 +85,9 @@ def frames_on(position: Array, tangent: Array, normal: Array) -> SeamFrames:
 
     Raises PathError: somewhere the normal lies along the seam.
 
-    Parameters
-    ----------
-    position : array, shape (N, 3) [m]
-    tangent : array, shape (N, 3), of length 1
-    normal : array, shape (3,) or (N, 3)
-
+    position: shape (N, 3) [m].
+    tangent: shape (N, 3), of length 1.
+    normal: shape (3,) or (N, 3).
     """
     flat = normal - (normal * tangent).sum(axis=-1, keepdims=True) * tangent
     size = np.linalg.norm(flat, axis=-1, keepdims=True)

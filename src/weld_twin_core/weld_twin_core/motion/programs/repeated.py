@@ -22,13 +22,8 @@ def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
 
     Raises ReachError: a pose is out of reach now.
 
-    Parameters
-    ----------
-    program : MoveProgram
-        With the points moved.
-    piece : Piece
-        As they were.
-
+    program: with the points moved.
+    piece: as they were.
     """
     q = np.array(piece.motion.q)
     for k, move in enumerate(piece.moves):

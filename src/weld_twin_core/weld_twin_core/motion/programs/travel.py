@@ -102,16 +102,10 @@ def travel(
     """
     Return the motion of a program; seams that cannot be followed are left out, with the reason.
 
-    Parameters
-    ----------
-    robot : Robot
-        Its base frame does not matter; the tool is that of each move.
-    start : array, shape (n,), optional
-        Joint positions before the first move of every piece.
-    known : callable, optional
-        Tells the postures that the arm is known to work in, shape (K, n) to (K,). Where a program
-        names no posture and one of them alone is known, it is taken.
-
+    robot: its base frame does not matter; the tool is that of each move.
+    start: joint positions before the first move of every piece, shape (n,).
+    known: tells the postures that the arm is known to work in, shape (K, n) to (K,). Where a
+    program names no posture and one of them alone is known, it is taken.
     """
     course = _Course(robot, program, known, {}, [])
     pieces: list[Piece] = []
@@ -252,15 +246,9 @@ def tool_way(
 
     Raises PathError: three places of an arc lie on a line.
 
-    Parameters
-    ----------
-    arm : Robot
-        With the tool of the move.
-    begin : array, shape (4, 4)
-        ``T_base_tool`` where it begins.
-    count, at : int
-        Samples, and which of them passes the place on the way; 0 to choose them.
-
+    arm: with the tool of the move.
+    begin: ``T_base_tool`` where it begins, shape (4, 4).
+    count, at: samples, and which of them passes the place on the way; 0 to choose them.
     """
     assert move.end is not None
     end = _pose(arm, program.place(move.end))

@@ -16,12 +16,7 @@ def measure_case(robot: Robot, path: Path, seed: int = 0) -> dict[str, float]:
     """
     Return everything the claims need to know about a robot on a seam.
 
-    Parameters
-    ----------
-    robot : Robot
-    path : Path
-    seed : int
-        Of the draws that some measures take.
+    seed: of the draws that some measures take.
 
     Returns
     -------

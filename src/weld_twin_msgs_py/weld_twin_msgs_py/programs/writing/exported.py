@@ -65,11 +65,8 @@ class Exported:
         """
         Return the joints of a move as shown, by what the controller calls them.
 
-        Parameters
-        ----------
-        own : str
-            A form with a number, of the arm's joints; external axes follow in the order of their names.
-
+        own: a form with a number, of the arm's joints; external axes follow in the order of their
+        names.
         """
         names = [own.format(k + 1) for k in range(self.context.axes)]
         labels = [*names, *(axis.label for axis in self.external)]

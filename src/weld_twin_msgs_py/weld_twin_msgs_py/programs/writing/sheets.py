@@ -58,15 +58,9 @@ def sheet(program: Exported, language: str, file: str, speeds: str, notes: Seque
     """
     Return the sheet as Markdown.
 
-    Parameters
-    ----------
-    file : str
-        Name of the program's file.
-    speeds : str
-        How fast it runs, in one sentence.
-    notes : sequence of str
-        What to look out for, in sentences.
-
+    file: name of the program's file.
+    speeds: how fast it runs, in one sentence.
+    notes: what to look out for, in sentences.
     """
     load, record, output = (text.format(trigger=program.trigger) for text in LOADING[language])
     when = 'while the arm stands' if program.stations else 'from the first to the last move'

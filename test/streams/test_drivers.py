@@ -256,6 +256,7 @@ def test_the_joints_of_a_driver_move_the_twin(cell, node, driver_node, which):
     np.testing.assert_allclose(rotation, expected[:3, :3], atol=1e-12)
     moved = stamp[0] + S // 100
     cell.wait(lambda: step(0.1, moved), 'poses while what stands beside the arm moves')
+    twin.tell_health()
     told = twin.health.lasting.get('joints beside', '')
     assert told.partition(' moved')[0] == CARRIED.get(which, '')
     driver_node.destroy_publisher(sender)

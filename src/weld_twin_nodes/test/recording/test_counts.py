@@ -21,9 +21,9 @@ from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import Status, bag_messages
 from weld_twin_msgs_py.messages.typestore import TYPES
 from weld_twin_nodes.live.completeness import NEW, SentBook, shortfall
-from weld_twin_nodes.live.meeting import Neighbours
+from weld_twin_nodes.live.meeting import apart, beyond
 from weld_twin_nodes.live.message_definition import definition
-from weld_twin_nodes.live.outputs import Sent
+from weld_twin_nodes.live.words import Book, Sent, word
 
 TWIN, INJECTOR = '/forward_kinematics_twin', '/error_injector'
 
@@ -33,23 +33,31 @@ def health(node, run='1', sent=None, **reached):
     return {**values, 'node': node}
 
 
+def take(book, values, at):
+    """Give a book what a node tells with its health, if it is one of the project's."""
+    told = word({values.get('node', 'somebody'): values}, at)
+    if told is not None:
+        book.take(told)
+
+
 def test_the_last_word_of_every_start_of_every_node_counts():
     book = SentBook()
-    book.take(health('/a', '1', {'/x': [10, 100, 900]}), 0.0)
-    book.take(health('/a', '1', {'/x': [20, 100, 1900]}), 1.0)
-    book.take(health('/a', '2', {'/x': [5, 2000, 2400]}), 2.0)
-    book.take(health('/b', '1', {'/x': [3, 50, 60], '/y': [1, None, None]}), 2.0)
+    take(book, health('/a', '1', {'/x': [10, 100, 900]}), 0.0)
+    take(book, health('/a', '1', {'/x': [20, 100, 1900]}), 1.0)
+    take(book, health('/a', '2', {'/x': [5, 2000, 2400]}), 2.0)
+    take(book, health('/b', '1', {'/x': [3, 50, 60], '/y': [1, None, None]}), 2.0)
     assert book.sent('/x') == Sent(28, 50, 2400)
     assert book.sent('/y') == Sent(1)
     assert book.sent('/z') is None
 
 
 @pytest.mark.parametrize('values', [{}, {'sent': 'x'}, {'sent': '[1]'}, {'sent': '{"/x": 3}'}])
-def test_health_of_somebody_else_counts_nothing(values):
+@pytest.mark.parametrize('node', [{}, {'node': '/somebody'}])
+def test_health_of_somebody_else_counts_nothing(values, node):
     book = SentBook()
-    book.take(values, 0.0)
+    take(book, {**values, **node}, 0.0)
     assert book.sent('/x') is None
-    assert Neighbours().apart(['/somebody']) == []
+    assert apart(book, ['/somebody']) == []
 
 
 def test_a_node_is_waited_for_until_it_has_told_or_never_will():
@@ -59,9 +67,9 @@ def test_a_node_is_waited_for_until_it_has_told_or_never_will():
     for look in np.arange(0.2, NEW + 0.3, 0.2):
         book.meet('/new', 10.0 + look)
     assert book.silent_since(10.5) == []  # a driver of somebody else
-    book.take(health('/new', sent={'/x': [1, 1, 1]}), 10.2)
+    take(book, health('/new', sent={'/x': [1, 1, 1]}), 10.2)
     assert book.silent_since(10.5) == ['/new']
-    book.take(health('/new', sent={'/x': [2, 1, 2]}), 10.6)
+    take(book, health('/new', sent={'/x': [2, 1, 2]}), 10.6)
     assert book.silent_since(10.5) == []
 
 
@@ -78,18 +86,18 @@ def test_a_node_that_did_not_hear_all_is_named():
         return {**health(TWIN, run), 'heard': json.dumps({'/x': [1, count], '/y': [0, 0]})}
 
     book = SentBook()
-    book.take(health('/a', sent={'/x': [100, 1, 100]}), 0.0)
-    book.take(listens(0), 0.1)
+    take(book, health('/a', sent={'/x': [100, 1, 100]}), 0.0)
+    take(book, listens(0), 0.1)
     assert book.unheard([TWIN]) == []  # they may be under way
-    book.take(health('/a', sent={'/x': [150, 1, 150]}), 1.0)
-    book.take(listens(30), 1.1)
+    take(book, health('/a', sent={'/x': [150, 1, 150]}), 1.0)
+    take(book, listens(30), 1.1)
     assert book.unheard([INJECTOR]) == []
     assert book.unheard([TWIN]) == [
         f"{TWIN} has received 30 of 100 messages on '/x': what it publishes lacks the others"
     ]
-    book.take(listens(150), 2.1)
+    take(book, listens(150), 2.1)
     assert book.unheard([TWIN]) == []
-    book.take(listens(3, '2'), 3.1)
+    take(book, listens(3, '2'), 3.1)
     assert book.unheard([TWIN]) == []  # it was started anew, and counts anew
 
 
@@ -123,35 +131,35 @@ def test_nothing_is_missing_where_all_is_there_or_nobody_told():
     assert shortfall(None, Sent(3)) is None
 
 
-def told(neighbours, node, inputs=(), heard=(), **reached):
+def told(book, node, inputs=(), heard=(), **reached):
     make = bag_messages()
     hears = json.dumps({topic: [count, 0] for topic, count in heard})
     own = Status(node, 0, '', {**health(node), 'reached': json.dumps(reached), 'heard': hears})
     others = [Status(f'{node}: {topic}', 0, '', {}) for topic in inputs]
-    neighbours.take(from_messages.diagnostics(make.statuses(1, [own, *others])))
+    book.take(word(from_messages.diagnostics(make.statuses(1, [own, *others])), 1.0))
 
 
 def test_nodes_have_met_when_each_reaches_all_who_listen():
-    there, neighbours = [TWIN, INJECTOR, '/recorder', '/driver'], Neighbours()
-    assert neighbours.apart(there) == [
+    there, book = [TWIN, INJECTOR, '/recorder', '/driver'], Book()
+    assert apart(book, there) == [
         f'{node} to tell of itself' for node in (TWIN, INJECTOR, '/recorder')
     ]
-    told(neighbours, '/recorder', ['/pose', '/joints'])
-    told(neighbours, INJECTOR, ['/joints'])
-    told(neighbours, TWIN, ['/joints'], **{'/pose': 0})
-    assert neighbours.apart(there) == [f'{TWIN} to reach /recorder on /pose']
-    told(neighbours, TWIN, ['/joints'], **{'/pose': 1})
-    assert neighbours.apart(there) == []
-    assert neighbours.apart([INJECTOR]) == []
-    told(neighbours, '/recorder', ['/pose'], heard=[('/pose', 0)])
-    assert neighbours.apart(there) == [f'/recorder to hear {TWIN} on /pose']
-    told(neighbours, '/recorder', ['/pose'], heard=[('/pose', 1)])
-    assert neighbours.apart(there) == []
+    told(book, '/recorder', ['/pose', '/joints'])
+    told(book, INJECTOR, ['/joints'])
+    told(book, TWIN, ['/joints'], **{'/pose': 0})
+    assert apart(book, there) == [f'{TWIN} to reach /recorder on /pose']
+    told(book, TWIN, ['/joints'], **{'/pose': 1})
+    assert apart(book, there) == []
+    assert apart(book, [INJECTOR]) == []
+    told(book, '/recorder', ['/pose'], heard=[('/pose', 0)])
+    assert apart(book, there) == [f'/recorder to hear {TWIN} on /pose']
+    told(book, '/recorder', ['/pose'], heard=[('/pose', 1)])
+    assert apart(book, there) == []
 
 
 def test_whom_others_have_met_is_waited_for():
-    neighbours = Neighbours()
-    told(neighbours, '/recorder', ['/pose'], heard=[('/pose', 2)], **{'/counts': 1})
+    book = Book()
+    told(book, '/recorder', ['/pose'], heard=[('/pose', 2)], **{'/counts': 1})
 
     def seen(topic):
         return {'/pose': 2, '/counts': 1}[topic]
@@ -159,14 +167,14 @@ def test_whom_others_have_met_is_waited_for():
     def nothing(_):
         return 0
 
-    assert neighbours.beyond(['/recorder'], seen, seen) == []
-    assert neighbours.beyond(['/recorder'], nothing, seen) == [
+    assert beyond(book, ['/recorder'], seen, seen) == []
+    assert beyond(book, ['/recorder'], nothing, seen) == [
         'somebody to be seen who sends /pose to /recorder'
     ]
-    assert neighbours.beyond(['/recorder'], seen, nothing) == [
+    assert beyond(book, ['/recorder'], seen, nothing) == [
         'somebody to be seen who takes /counts from /recorder'
     ]
-    assert neighbours.beyond([TWIN], nothing, nothing) == []
+    assert beyond(book, [TWIN], nothing, nothing) == []
 
 
 def test_the_definition_of_a_type_holds_all_it_is_made_of():

@@ -26,8 +26,7 @@ def spin_until(node: CellNode, reported: Callable[[], bool], what: str) -> None:
         The node is stopped before.
 
     """
-    node.get_logger().info(f'waiting for {what}')
-    node.health.lasting['waiting for'] = f'waiting for {what}'
+    node.wait_for(what)
     runner = SingleThreadedExecutor(context=node.context)
     runner.add_node(node)
     try:
@@ -38,4 +37,4 @@ def spin_until(node: CellNode, reported: Callable[[], bool], what: str) -> None:
     finally:
         runner.remove_node(node)
         runner.shutdown()
-    del node.health.lasting['waiting for']
+    node.wait_for('')

@@ -43,13 +43,13 @@ def base_on_tf(node: CellNode) -> Array:
         try:
             frames.tree.latest(measuring, base)
         except NoTransform as error:
-            node.health.lasting['frames'] = f'waiting for /tf: {error}'
+            node.keep('frames', f'waiting for /tf: {error}', logged=False)
             return False
         return True
 
     if not told():
         spin_until(node, told, f'/tf to tell where {base!r} is in {measuring!r}')
-    node.health.lasting.pop('frames', None)
+    node.keep('frames', '')
     T = frames.tree.latest(measuring, base)
     node.remark(f'the base is where /tf has {base!r} in {measuring!r}')
     node.every(LOOK_EVERY, lambda: _watch(node, frames, T))
@@ -62,17 +62,13 @@ def _watch(node: CellNode, frames: Frames, taken: Array) -> None:
     try:
         now = frames.tree.latest(measuring, base)
     except NoTransform as error:
-        node.health.lasting['frames'] = str(error)
+        node.keep('frames', str(error))
         return
     way = float(np.linalg.norm(now[:3, 3] - taken[:3, 3]))
     turn = float(np.linalg.norm(angle_between(now[:3, :3], taken[:3, :3])))
-    if way < MOVED and turn < MOVED:
-        node.health.lasting.pop('frames', None)
-        return
     sentence = (
         f'{base!r} has moved in {measuring!r} by {way * 1e3:.3g} mm and {np.degrees(turn):.3g} '
         'degrees since this node started; it goes on with the base where it was then: start it '
         'anew, or say T_measuring_base'
     )
-    node.health.lasting['frames'] = sentence
-    node.warn('frames', sentence)
+    node.keep('frames', sentence if way >= MOVED or turn >= MOVED else '')

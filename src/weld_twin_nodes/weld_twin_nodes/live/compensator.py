@@ -252,9 +252,7 @@ class Compensator(ManagedNode):
         if why != self._told and why.partition(':')[0] != self._told.partition(':')[0]:
             self.get_logger().warning(why or 'the model is used again')
         self._told = why
-        self.health.lasting.pop(WITHDRAWN, None)
-        if why:
-            self.health.lasting[WITHDRAWN] = why
+        self.keep(WITHDRAWN, why, logged=False)
 
     def _present(self) -> ProgramModel:
         """Return what acts on the arm under its present load and temperature."""

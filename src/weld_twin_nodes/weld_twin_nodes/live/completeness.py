@@ -4,17 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 from .all_nodes import MODULES
-from .outputs import NODE, RUN, Heard, Sent, read_heard, read_told
+from .words import Book, Heard, Sent, Word
 
 NEW = 3.0
 """Seconds a node is listened to for the first time; each tells of itself once a second. One that
 has not by then is not of this project."""
-UNDER_WAY = 0.5
-"""Seconds after which what was sent counts as due at every listener; a message takes milliseconds."""
 STEP = 0.5
 """Longest time [s] between two looks that counts as listened: a recorder that stood still, or was
 not given a processor, has not listened meanwhile."""
@@ -24,37 +22,21 @@ AT_START = 'at the start'
 """Where messages are missing that were sent before the recorder was there."""
 
 
-class SentBook:
-    """Keeps what every node last told of the messages it sent; each start counts by itself."""
+class SentBook(Book):
+    """The words of nodes beside a recorder, and for how long it has listened to each of them."""
 
     def __init__(self) -> None:
-        self._tellers: dict[tuple[str, str], dict[str, Sent]] = {}
-        self._due: dict[tuple[str, str], list[tuple[float, dict[str, Sent]]]] = {}
+        super().__init__()
         self._inputs: dict[str, dict[str, dict[str, tuple[Heard, int]]]] = {}
-        self._heard: dict[str, float] = {}
         self._looked: dict[str, float] = {}
         self._listened: dict[str, float] = {}
 
-    def take(self, values: Mapping[str, str], now: float) -> None:
-        """Take the health of a node at a time [s]; what tells of no messages is passed over."""
-        sent, heard = read_told(values), read_heard(values)
-        node, run = values.get(NODE, ''), values.get(RUN, '')
-        if sent:
-            self._tellers[node, run] = sent
-            self._due[node, run] = [*self._due.get((node, run), ())[-1:], (now, sent)]
-        if heard:
-            due = {topic: (own, self._due_by(topic, now)) for topic, own in heard.items()}
-            self._inputs.setdefault(node, {})[run] = due
-        if node:
-            self._heard[node] = now
-
-    def _due_by(self, topic: str, now: float) -> int:
-        """Return how many messages on a topic every listener should have by now [s]."""
-        out = 0
-        for reported in self._due.values():
-            early = [sent for then, sent in reported if then <= now - UNDER_WAY and topic in sent]
-            out += early[-1][topic].number if early else 0
-        return out
+    def take(self, word: Word) -> None:
+        """Take a word, and hold what the node has heard against what was due."""
+        super().take(word)
+        if word.heard:
+            due = {topic: (own, self.due(topic, word.at)) for topic, own in word.heard.items()}
+            self._inputs.setdefault(word.node, {})[word.run] = due
 
     def unheard(self, nodes: Collection[str]) -> list[str]:
         """
@@ -76,11 +58,7 @@ class SentBook:
 
     def never_told(self) -> list[str]:
         """Return the nodes of the project that were met and have not told anything at all."""
-        return [node for node in self._listened if _ours(node) and node not in self._heard]
-
-    def told_by(self, nodes: Collection[str]) -> list[str]:
-        """Return which of some nodes have told of themselves."""
-        return sorted(self._heard.keys() & set(nodes))
+        return [node for node in self._listened if _ours(node) and node not in self.nodes()]
 
     def meet(self, node: str, now: float) -> None:
         """Take note at every look [s] that a node publishes something that is recorded."""
@@ -90,27 +68,12 @@ class SentBook:
 
     def silent_since(self, then: float) -> list[str]:
         """Return the nodes met that tell, or may tell, of themselves and have not since [s]."""
-        out = []
-        for node, listened in self._listened.items():
-            heard = self._heard.get(node)
-            new = listened < NEW or _ours(node)
-            if new if heard is None else heard < then:
-                out.append(node)
-        return out
-
-    def tellers(self, topic: str) -> set[str]:
-        """Return the nodes that told of messages they sent on a topic."""
-        return {node for (node, _), reported in self._tellers.items() if topic in reported}
-
-    def sent(self, topic: str) -> Sent | None:
-        """Return what was sent on a topic by all who told, None if nobody did."""
-        rows = [reported[topic] for reported in self._tellers.values() if topic in reported]
-        if not rows:
-            return None
-        firsts = [row.first for row in rows if row.first is not None]
-        lasts = [row.last for row in rows if row.last is not None]
-        count = sum(row.number for row in rows)
-        return Sent(count, min(firsts, default=None), max(lasts, default=None))
+        told, recent = self.nodes(), self.nodes(then)
+        return [
+            node
+            for node, listened in self._listened.items()
+            if node not in recent and (node in told or listened < NEW or _ours(node))
+        ]
 
 
 def _ours(node: str) -> bool:

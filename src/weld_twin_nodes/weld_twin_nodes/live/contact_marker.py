@@ -110,7 +110,7 @@ class ContactMarker(CellNode):
         self._last.clear()
 
     def _on_joints(self, message: Any) -> None:
-        names = tuple(name for name in message.name if name not in self._carrying_nothing)
+        names = tuple(name for name in message.name if name not in self.carrying_nothing)
         if names:
             q = from_messages.joint_positions(message, names)
             self._parts.setdefault(names, Part()).take(from_messages.stamp_ns(message), q)

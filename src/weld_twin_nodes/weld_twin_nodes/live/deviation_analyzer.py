@@ -153,22 +153,15 @@ class DeviationAnalyzer(CellNode):
 
     def _look_at_clocks(self) -> None:
         """Warn, as long as it is so, of clocks that disagree and of deviations no arm has."""
-        self._keep('clocks', self._deviations.clocks())
+        self.keep('clocks', self._deviations.clocks())
         recent, most = self._deviations.recent, self.setting('implausible')
-        self._keep(
+        self.keep(
             'implausible',
             f'the deviation is {recent * 1e3:.3g} mm, more than any arm is off by '
             f'({most * 1e3:.3g} mm): compare frames, clocks, base and tool'
             if recent > most
             else '',
         )
-
-    def _keep(self, key: str, sentence: str) -> None:
-        if not sentence:
-            self.health.lasting.pop(key, None)
-            return
-        self.health.lasting[key] = sentence
-        self.warn(key, sentence)
 
     def _publish_metrics(self) -> None:
         self._told = self._deviations.samples

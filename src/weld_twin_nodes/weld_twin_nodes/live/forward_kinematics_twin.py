@@ -51,7 +51,8 @@ class ForwardKinematicsTwin(ModelNode):
             sample.temperature,
             sample.effort,
         )
-        self._tell_outside(self._sureness.outside)
+        why = '; '.join(self._sureness.outside)
+        self.keep(OUTSIDE, f'{OUTSIDE}: {why}' if why else '', logged=False)
         self._sure_pose.publish(
             self._encode_sure(sample.pose_stamp, position, rotation, covariance)
         )
@@ -75,13 +76,6 @@ class ForwardKinematicsTwin(ModelNode):
             return None
         posterior = read_posterior(self.robot, path)
         return None if posterior is None else LivePosterior(posterior)
-
-    def _tell_outside(self, reasons: tuple[str, ...]) -> None:
-        """Keep a warning among the diagnostics as long as the arm is outside."""
-        if reasons:
-            self.health.lasting[OUTSIDE] = f'{OUTSIDE}: {"; ".join(reasons)}'
-        else:
-            self.health.lasting.pop(OUTSIDE, None)
 
 
 def main(args: list[str] | None = None) -> int:

@@ -12,8 +12,8 @@ from math import inf, isfinite
 from weld_twin_msgs_py.messages.to_messages import Status
 
 from ..streams.stamp_watch import StampWatch
-from .outputs import HEARD, NODE, REACHED, RUN, SENT, Output, reached
-from .outputs import told as sent_so_far
+from .outputs import Output
+from .words import HEARD, NODE, REACHED, RUN, SENT
 
 OK, WARN, ERROR, STALE = range(4)
 """Levels of diagnostic_msgs/DiagnosticStatus."""
@@ -167,8 +167,10 @@ class Health:
                 'inputs': len(self.inputs),
                 'told': self._said_in_all,
                 **{f'remark_{k}': sentence for k, sentence in enumerate(self.remarks)},
-                SENT: sent_so_far(self.outputs),
-                REACHED: reached(self.outputs),
+                SENT: json.dumps({each.topic: each.sent for each in self.outputs}),
+                REACHED: json.dumps(
+                    {each.topic: each.get_subscription_count() for each in self.outputs}
+                ),
                 HEARD: json.dumps(
                     {name: [item.matched, item.received] for name, item in self.inputs.items()}
                 ),

@@ -138,7 +138,6 @@ class LiveDiagnosis(ManagedNode):
 
     def _take(self, role: Role, message: Any) -> None:
         self._window.take(role, message)
-        self.tell_beside(self._window.intake.joints.beside)
 
     def _take_image(self, message: Any) -> None:
         self._window.take_image(message)

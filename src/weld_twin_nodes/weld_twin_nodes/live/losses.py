@@ -14,7 +14,7 @@ from collections.abc import Collection
 
 from ..streams.stamp_watch import Seen
 from .health import Input
-from .outputs import Sent
+from .words import Sent, Word
 
 TELLS = 4
 """
@@ -33,7 +33,8 @@ that of all of it."""
 class Counted:
     """What came of a topic, held against what its publishers told they sent."""
 
-    def __init__(self) -> None:
+    def __init__(self, state: Input) -> None:
+        self._state = state
         self._sent: dict[tuple[str, str], Sent] = {}
         self._base = (0, 0)
         self._short: deque[int] = deque(maxlen=TELLS)
@@ -50,9 +51,10 @@ class Counted:
         """Return how many messages were sent since they are counted."""
         return self._total() - self._base[0]
 
-    def tell(self, teller: tuple[str, str], sent: Sent, state: Input) -> None:
+    def tell(self, word: Word) -> None:
         """Take what a node, in one of its runs, has sent by the time that this is heard."""
-        new = teller not in self._sent
+        teller, state = (word.node, word.run), self._state
+        sent, new = word.sent[state.topic], teller not in self._sent
         alone = not self._sent
         self._sent[teller] = sent
         self._told = True
@@ -61,12 +63,12 @@ class Counted:
             self._base = (0, 0) if whole else (self._total(), state.received)
             self._before, self._now = self._before + self._now, 0
             self._short.clear()
-        self._short.append(self._lack(state))
+        self._short.append(self._lack())
 
-    def look(self, state: Input) -> int:
+    def look(self) -> int:
         """Return how many messages are missing for good; to be called once a second."""
         if not self._told and self._sent:
-            self._short.append(self._lack(state))
+            self._short.append(self._lack())
         self._told = False
         if len(self._short) == TELLS:
             self._now = max(min(self._short), 0)  # what is sent again comes after all
@@ -75,8 +77,8 @@ class Counted:
     def _total(self) -> int:
         return sum(sent.number for sent in self._sent.values())
 
-    def _lack(self, state: Input) -> int:
-        return self._total() - self._base[0] - (state.received - self._base[1])
+    def _lack(self) -> int:
+        return self.sent - (self._state.received - self._base[1])
 
 
 class Losses:
@@ -92,7 +94,8 @@ class Losses:
 
     def __init__(self, state: Input) -> None:
         self._state = state
-        self.counted = Counted()
+        self._counted = Counted(state)
+        self.tell = self._counted.tell
         self._by_stamps = 0
         self._grew = self._since = 0.0
         self._said = False
@@ -109,12 +112,12 @@ class Losses:
         now : float [s]
 
         """
-        topic, seen, tellers = self._state.topic, self._state.stamps.look(), self.counted.tellers
+        topic, seen, tellers = self._state.topic, self._state.stamps.look(), self._counted.tellers
         out = [f'{topic}: {sentence}' for sentence in _of_clock(seen)]
         if tellers and set(senders) <= set(tellers):
-            lost = self.counted.look(self._state)
+            lost = self._counted.look()
             said = (
-                f'{topic}: {lost:,} of {self.counted.sent:,} messages that '
+                f'{topic}: {lost:,} of {self._counted.sent:,} messages that '
                 f'{" and ".join(tellers)} sent did not arrive'
             )
         else:

@@ -174,7 +174,7 @@ class ManagedNode(CellNode):
         if step is None:
             known = {step.number: step.label for step in STEPS}
             name = asked.label or known.get(asked.id, asked.id)
-            self._tell_once(f'the transition {name} is refused: the node is {self._state}')
+            self.tell_once(f'the transition {name} is refused: the node is {self._state}')
             response.success = False
             return response
         later = Later()
@@ -194,7 +194,7 @@ class ManagedNode(CellNode):
             if action is not None:
                 action()
         except (TwinError, OSError) as error:
-            self._tell_once(str(error))
+            self.tell_once(str(error))
             self._go(step, step.start)
         else:
             self._go(step, step.goal)

@@ -10,8 +10,7 @@ from typing import Any
 
 from .all_nodes import MODULES
 from .cell_node import CellNode
-from .neighbour_health import Statuses
-from .outputs import NODE, Heard, read_heard, read_reached
+from .words import Book
 
 QUIET = 1.0
 """
@@ -23,71 +22,53 @@ LOOK_EVERY = 0.05
 Count = Callable[[str], int]
 
 
-class Neighbours:
+def apart(book: Book, there: Collection[str]) -> list[str]:
     """
-    What the nodes of the project tell of the subscriptions they reach and the publishers they hear.
+    Return whose word or whose listeners are still to come, among the nodes there are.
 
     The graph a node sees is its own: that two others have not found each other yet, only they know,
     and one of the two may know it before the other.
     """
+    told = [word for word in book.latest() if word.node in there]
+    known = [node for node in there if node.rpartition('/')[2] in MODULES]
+    out = [f'{node} to tell of itself' for node in known if node not in book.nodes()]
+    for word in told:
+        for topic, count in word.reached.items():
+            wanted = [other.node for other in told if topic in other.inputs]
+            if count < len(wanted):
+                out.append(f'{word.node} to reach {" and ".join(wanted)} on {topic}')
+    for word in told:
+        for topic, heard in word.heard.items():
+            wanted = [other.node for other in told if topic in other.reached]
+            if heard.publishers < len(wanted):
+                out.append(f'{word.node} to hear {" and ".join(wanted)} on {topic}')
+    return out
 
-    def __init__(self) -> None:
-        self._inputs: dict[str, set[str]] = {}
-        self._reached: dict[str, dict[str, int]] = {}
-        self._heard: dict[str, dict[str, Heard]] = {}
 
-    def take(self, statuses: Statuses) -> None:
-        """Take a node's health."""
-        for values in statuses.values():
-            node = values.get(NODE, '')
-            if node:
-                names = [name.partition(': ') for name in statuses]
-                self._inputs[node] = {
-                    topic for owner, _, topic in names if topic and owner == node
-                }
-                self._reached[node] = read_reached(values)
-                self._heard[node] = read_heard(values)
+def beyond(book: Book, there: Collection[str], publishers: Count, subscribers: Count) -> list[str]:
+    """
+    Return whom the nodes that are there have met and the own graph does not show yet.
 
-    def apart(self, there: Collection[str]) -> list[str]:
-        """Return whose word or whose listeners are still to come, among the nodes there are."""
-        known = [node for node in there if node.rpartition('/')[2] in MODULES]
-        out = [f'{node} to tell of itself' for node in known if node not in self._inputs]
-        for node, reached in self._reached.items():
-            for topic, count in reached.items() if node in there else ():
-                wanted = [o for o, takes in self._inputs.items() if topic in takes and o in there]
-                if count < len(wanted):
-                    out.append(f'{node} to reach {" and ".join(wanted)} on {topic}')
-        return out + self._deaf(there)
+    Parameters
+    ----------
+    publishers, subscribers : callable
+        From the name of a topic to how many the own graph has.
 
-    def beyond(self, there: Collection[str], publishers: Count, subscribers: Count) -> list[str]:
-        """
-        Return whom the nodes that are there have met and the own graph does not show yet.
-
-        Parameters
-        ----------
-        publishers, subscribers : callable
-            From the name of a topic to how many the own graph has.
-
-        """
-        out = []
-        for node in there:
-            for topic, heard in self._heard.get(node, {}).items():
-                if publishers(topic) < heard.publishers:
-                    out.append(f'somebody to be seen who sends {topic} to {node}')
-            for topic, count in self._reached.get(node, {}).items():
-                if subscribers(topic) < count:
-                    out.append(f'somebody to be seen who takes {topic} from {node}')
-        return out
-
-    def _deaf(self, there: Collection[str]) -> list[str]:
-        """Return whom a node does not hear yet though it publishes what the node listens to."""
-        out = []
-        for node, inputs in self._heard.items():
-            for topic, heard in inputs.items() if node in there else ():
-                wanted = [o for o, gives in self._reached.items() if topic in gives and o in there]
-                if heard.publishers < len(wanted):
-                    out.append(f'{node} to hear {" and ".join(wanted)} on {topic}')
-        return out
+    """
+    out = []
+    for word in book.latest():
+        if word.node in there:
+            out += [
+                f'somebody to be seen who sends {topic} to {word.node}'
+                for topic, heard in word.heard.items()
+                if publishers(topic) < heard.publishers
+            ]
+            out += [
+                f'somebody to be seen who takes {topic} from {word.node}'
+                for topic, count in word.reached.items()
+                if subscribers(topic) < count
+            ]
+    return out
 
 
 class Meeting:
@@ -109,28 +90,21 @@ class Meeting:
         self._node, self._within, self._action = node, within, action
         self._begun = self._changed = time.monotonic()
         self._seen: Any = None
-        self._neighbours = Neighbours()
-        node.neighbours.hear(self._neighbours.take)
+        self._book = Book()
+        node.neighbours.hear(self._book.take)
         self._timer = node.every(LOOK_EVERY, self._look)
-        self._told = False
 
     def _look(self) -> None:
         now = time.monotonic()
         missing = self._missing(now)
-        late = now - self._begun > self._within
-        if missing and not late:
-            if not self._told:
-                self._told = True
-                self._node.get_logger().info(f'waiting for {missing}')
-            self._node.health.lasting['waiting'] = f'waiting for {missing}'
+        if missing and now - self._begun <= self._within:
+            self._node.wait_for(missing)
             return
         if missing:
-            sentence = f'waited {self._within:g} s for {missing}; beginning without'
-            self._node.get_logger().warning(sentence)
-            self._node.health.say(sentence)
-        self._node.health.lasting.pop('waiting', None)
+            self._node.tell_once(f'waited {self._within:g} s for {missing}; beginning without')
+        self._node.wait_for('')
         self._timer.cancel()
-        self._node.neighbours.hear_no_more(self._neighbours.take)
+        self._node.neighbours.hear_no_more(self._book.take)
         self._action()
 
     def _missing(self, now: float) -> str:
@@ -145,10 +119,10 @@ class Meeting:
         if not any(node.listeners().values()):
             return f'somebody to listen to {" or ".join(node.listeners())}'
         there = {f'{space.rstrip("/")}/{name}' for name, space in seen[0]}
-        apart = self._neighbours.apart(there)
-        apart += self._neighbours.beyond(there, node.count_publishers, node.count_subscribers)
-        if apart:
-            return ', '.join(apart)
+        unmet = apart(self._book, there)
+        unmet += beyond(self._book, there, node.count_publishers, node.count_subscribers)
+        if unmet:
+            return ', '.join(unmet)
         if node.unmatched() or now - self._changed < QUIET:
             return 'the listeners to be complete'
         return ''

@@ -64,7 +64,6 @@ class ModelNode(CellNode):
         sample = self.stream.step(message)
         if sample is not None:
             self.publish(sample)
-        self.tell_beside(self.stream.intake.joints.beside)
 
     def intakes(self) -> Sequence[Intake]:
         """Return what takes its messages in."""

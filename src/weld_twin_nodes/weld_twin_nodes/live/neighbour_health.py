@@ -14,14 +14,10 @@ from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import DIAGNOSTICS
 
-from .outputs import NODE, REACHED, RUN
-from .typed_input import reader
+from .reading import reader
+from .words import ALIVE, REACHED, Book, Word, word
 
-Statuses = dict[str, dict[str, str]]
-"""Names of statuses on `/diagnostics`, and what each tells by its keys."""
-Hearer = Callable[[Statuses], None]
-ALIVE = 2.0
-"""Seconds after its last word from which a node may stand still: each tells of itself once a second."""
+Hearer = Callable[[Word], None]
 
 
 class NeighbourHealth:
@@ -29,10 +25,8 @@ class NeighbourHealth:
 
     def __init__(self, node: Node) -> None:
         self._read = reader(DIAGNOSTICS.type)
-        self._told_at: dict[str, float] = {}
-        self._runs: dict[str, dict[str, float]] = {}
-        self._twice: dict[str, float] = {}
-        self._hearers: list[Hearer] = []
+        self._book = Book()
+        self._hearers: list[Hearer] = [self._book.take]
         self._subscription: Any = node.create_subscription(
             DIAGNOSTICS.message_class(),
             DIAGNOSTICS.name,
@@ -55,34 +49,20 @@ class NeighbourHealth:
         with handle:
             while (taken := handle.take_message(self._subscription.msg_type, True)) is not None:
                 self._take(taken[0])
-        now = time.monotonic()
-        return {node for node, reported in self._told_at.items() if now - reported < ALIVE}
+        return self._book.nodes(time.monotonic() - ALIVE)
 
     def twice(self, node: str) -> bool:
         """Return whether two nodes of one name tell of themselves."""
-        return time.monotonic() - self._twice.get(node, -2.0 * ALIVE) < 2.0 * ALIVE
-
-    def _take_run(self, node: str, run: str, now: float) -> None:
-        """Take note of a start of a node: it runs twice where another spoke between two of its words."""
-        reported = {
-            each: at for each, at in self._runs.get(node, {}).items() if now - at < 2.0 * ALIVE
-        }
-        if any(at > reported.get(run, now) for at in reported.values()):
-            self._twice[node] = now
-        self._runs[node] = {**reported, run: now}
+        return self._book.twice(node, time.monotonic())
 
     def _take(self, data: bytes) -> None:
         """Hand on what nodes of the project tell; statuses of others are not even read."""
         if REACHED.encode() not in data:
             return
         try:
-            statuses = from_messages.diagnostics(self._read(data))
+            told = word(from_messages.diagnostics(self._read(data)), time.monotonic())
         except TwinError:  # somebody else's, and none of the inputs
             return
-        now = time.monotonic()
-        for row in statuses.values():
-            if NODE in row:
-                self._told_at[row[NODE]] = now
-                self._take_run(row[NODE], row.get(RUN, ''), now)
-        for hearer in [*self._hearers]:
-            hearer(statuses)
+        if told is not None:
+            for hearer in [*self._hearers]:
+                hearer(told)

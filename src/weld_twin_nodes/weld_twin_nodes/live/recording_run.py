@@ -12,16 +12,15 @@ from weld_twin_core import __version__
 from weld_twin_msgs_py.bags import BackgroundBag, GrowingBag
 from weld_twin_msgs_py.bags.ends import COMPLETENESS
 from weld_twin_msgs_py.messages.cdr_read import decoder
-from weld_twin_msgs_py.messages.topics import BY_NAME, ROBOT_DESCRIPTION, Topic
+from weld_twin_msgs_py.messages.topics import ROBOT_DESCRIPTION
 
 from .asked_nodes import AskedNodes
 from .cell_node import CellNode
 from .completeness import AT_START, SentBook, Shortfall, shortfall
-from .neighbour_health import Statuses
 from .offered_channel import offered_channel
-from .outputs import Sent
 from .partners import named
 from .recorded_topic import RecordedTopic
+from .words import Sent
 
 _TEXT = decoder(ROBOT_DESCRIPTION.type)
 LOOK_EVERY = 0.2
@@ -84,65 +83,45 @@ class RecordingRun:
         self._moved = 0.0
         self._lacked: dict[str, int] = {}
         self._concluded = False
-        self._topics: dict[str, RecordedTopic] = {}
-        self._untyped = {
-            node.resolve_topic_name(name): _row(name) for name in node.setting('topics')
+        given = {node.resolve_topic_name(name): name for name in node.setting('topics')}
+        self._topics = {
+            name: RecordedTopic(node, each, self._write) for name, each in given.items()
         }
-        self._subscribe()
-        node.neighbours.hear(self._hear)
+        node.neighbours.hear(self._book.take)
         self._timers = [node.every(LOOK_EVERY, self._look)]
-        names = ', '.join([*self._topics, *(f'{name} when it appears' for name in self._untyped)])
-        node.get_logger().info(f'recording into {self.out}: {names}')
+        node.get_logger().info(
+            f'recording into {self.out}: '
+            + ', '.join(
+                name if topic.source.kind else f'{name} when it appears'
+                for name, topic in self._topics.items()
+            )
+        )
 
     # Taking in -------------------------------------------------------------------------------
 
     def _look(self) -> None:
         """Follow what appears on the graph; end when nothing can be written any more."""
-        self._subscribe()
         for topic in self._topics.values():
-            topic.adapt()
+            topic.source.adapt()
         self._meet()
         if self._bag.failure is not None:
             self._done()
 
-    def _subscribe(self) -> None:
-        """Subscribe to the topics whose type is known by now."""
-        present: dict[str, list[str]] = {}
-        if any(row is None for row in self._untyped.values()):
-            present = dict(self._node.get_topic_names_and_types())
-        for name, row in list(self._untyped.items()):
-            kinds = [row.type] if row is not None else present.get(name, [])
-            if not kinds:
-                continue
-            del self._untyped[name]
-            try:
-                self._topics[name] = RecordedTopic(self._node, name, kinds[0], row, self._write)
-            except ImportError as error:
-                sentence = f'{name} is not recorded: {error}'
-                self._node.get_logger().warning(sentence)
-                self._node.health.lasting[f'type of {name}'] = sentence
-
-    def _write(self, topic: RecordedTopic, data: bytes) -> None:
-        if not topic.announced:
-            topic.announced = True
-            self._bag.announce(offered_channel(topic.name, topic.kind, topic.publishers()))
-        taken = self._bag.put(
-            topic.name, topic.kind, data, self._node.get_clock().now().nanoseconds
-        )
+    def _write(self, topic: RecordedTopic, kind: str, data: bytes) -> None:
+        if topic.announced != kind:
+            topic.announced = kind
+            self._bag.announce(offered_channel(topic.name, kind, topic.source.publishers()))
+        taken = self._bag.put(topic.name, kind, data, self._node.get_clock().now().nanoseconds)
         if not taken and self._bag.failure is None:
             self._node.refuse(topic.name, 'the disk does not keep up, messages are dropped')
-        if topic.name.endswith(ROBOT_DESCRIPTION.name) and topic.kind == ROBOT_DESCRIPTION.type:
+        if topic.name.endswith(ROBOT_DESCRIPTION.name) and kind == ROBOT_DESCRIPTION.type:
             self._asked.describe(_TEXT(data).data)
-
-    def _hear(self, statuses: Statuses) -> None:
-        for values in statuses.values():
-            self._book.take(values, time.monotonic())
 
     def counts(self) -> dict[str, Any]:
         """Return the messages written by topic, those dropped, and who told how many were sent."""
         written, dropped = self._bag.counts()
         counts = {topic: written.get(topic, 0) for topic in self._topics}
-        return {**counts, 'dropped': dropped, 'told_by': self._book.told_by(self._meet())}
+        return {**counts, 'dropped': dropped, 'told_by': sorted(self._book.nodes() & self._meet())}
 
     # Ending ----------------------------------------------------------------------------------
 
@@ -163,7 +142,7 @@ class RecordingRun:
             return
         now = time.monotonic()
         for topic in self._topics.values():
-            topic.take_waiting()
+            topic.source.take_waiting()
         lacking = {name: short.recorded for name, short in self._shortfalls().items()}
         if lacking != self._lacked:
             self._lacked, self._moved = lacking, now
@@ -218,7 +197,8 @@ class RecordingRun:
                 reported[name] = {'sent': sent.number, 'recorded': sent.number, 'missing': 0}
         self._bag.note(COMPLETENESS, reported)
         sentences = [short.sentence(name) for name, short in lacking.items()]
-        sentences += [f'{name}: nobody published this topic' for name in self._untyped]
+        unknown = [name for name, topic in self._topics.items() if not topic.source.kind]
+        sentences += [f'{name}: nobody published this topic' for name in unknown]
         silent = set(self._book.never_told())
         if self._ending_since is not None:
             silent.update(self._untold())
@@ -226,8 +206,7 @@ class RecordingRun:
         if not self._joins:
             sentences += self._book.unheard(self._publishers)
         for k, sentence in enumerate(sentences):
-            self._node.get_logger().warning(sentence)
-            self._node.health.lasting[f'incomplete {k}'] = sentence
+            self._node.keep(f'incomplete {k}', sentence)
         if reported and not lacking:
             total = sum(row['sent'] for row in reported.values())
             self._node.get_logger().info(f'all {total:,} messages that were sent are in the bag')
@@ -246,15 +225,9 @@ class RecordingRun:
             self._node.destroy_timer(timer)
         if not self._concluded:
             for topic in self._topics.values():
-                topic.take_waiting()
+                topic.source.take_waiting()
             self._conclude()
         self._asked.close()
-        self._node.neighbours.hear_no_more(self._hear)
-        for topic in self._topics.values():
-            topic.close()
+        self._node.neighbours.hear_no_more(self._book.take)
+        self._node.stop_listening(*(topic.source for topic in self._topics.values()))
         self._bag.close()
-
-
-def _row(name: str) -> Topic | None:
-    """Return the row of the table of topics for a name as it was given."""
-    return BY_NAME.get('/' + name.lstrip('/'))

@@ -80,14 +80,11 @@ def _described(node: CellNode, topic: str, read: Callable[[str], Robot]) -> Robo
         except TwinError as error:
             node.refuse(topic, str(error))
             return
-        node.health.lasting.pop(CHANGED, None)
-        if not same:
-            sentence = (
-                f'another robot is told on {topic} now; this node goes on with the one that it '
-                'started with: start it anew'
-            )
-            node.get_logger().warning(sentence)
-            node.health.lasting[CHANGED] = sentence
+        sentence = (
+            f'another robot is told on {topic} now; this node goes on with the one that it '
+            'started with: start it anew'
+        )
+        node.keep(CHANGED, '' if same else sentence)
 
     node.create_subscription(
         ROBOT_DESCRIPTION.message_class(),

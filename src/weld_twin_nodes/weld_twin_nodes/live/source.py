@@ -1,0 +1,229 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A subscription that follows its publishers: in the type they have, and in what they offer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
+
+from weld_twin_msgs_py.messages.topics import BEST_EFFORT, VOLATILE, Qos
+
+from .message_classes import message_class
+from .partners import Senders, elsewhere, unheard_publishers
+from .telling_node import TellingNode
+
+AGAIN = 0.05
+"""
+Seconds until a subscription of another type is tried (again). Fast DDS knows one type of a topic
+in a process, and forgets it when the executor has let go of the subscription before: a turn later.
+"""
+SELDOM = 5.0
+"""Longest time from one try to the next [s], each twice the one before: each failure is a dozen lines
+of the middleware on the terminal."""
+LEAST = {'reliability': BEST_EFFORT, 'durability': VOLATILE}
+"""What every publisher offers."""
+MOST = 10_000
+"""Messages taken at once of what waits: as many as the deepest queue holds."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """
+    What is asked for of a topic.
+
+    Attributes
+    ----------
+    given : str
+        Its name, before remapping and without the namespace.
+    kinds : tuple of str
+        Message types that are understood, the usual one first.
+    qos : Qos
+    any_kind : bool
+        Whether any other type is taken too.
+    own : str
+        Its name in the table of topics, which another namespace would go before.
+    required : bool
+        Whether the node can do nothing without it.
+    yields : tuple of str
+        Policies of which less is asked for where a publisher offers less.
+
+    """
+
+    given: str
+    kinds: tuple[str, ...]
+    qos: Qos
+    any_kind: bool = False
+    own: str = ''
+    required: bool = False
+    yields: tuple[str, ...] = ()
+
+
+class Source:
+    """
+    One input of a node, by a subscription that is made anew when its publishers are others.
+
+    Parameters
+    ----------
+    take : callable
+        Takes the type and the bytes of a message.
+
+    Attributes
+    ----------
+    kind : str
+        The type that is taken now; empty while none is known.
+
+    """
+
+    def __init__(
+        self,
+        node: TellingNode,
+        wanted: Wanted,
+        take: Callable[[str, bytes], None],
+    ) -> None:
+        self._node, self._wanted, self._take = node, wanted, take
+        self.name = node.resolve_topic_name(wanted.given)
+        self.kind: str = (*wanted.kinds, '')[0]
+        self._qos = wanted.qos
+        self._senders = Senders()
+        self._missing: set[str] = set()
+        self._subscription: Any = None
+        self._trying: Any = None
+        self._delay, self._pause = '', AGAIN
+        self._subscribe()
+
+    def publishers(self) -> list[Any]:
+        """Return what the graph tells of the publishers of the type that is taken."""
+        infos = self._node.get_publishers_info_by_topic(self.name)
+        return [info for info in infos if info.topic_type == self.kind]
+
+    def adapt(self) -> None:
+        """Follow the publishers where none is left of what is taken."""
+        kind = self._wished()
+        if self._trying is not None or not kind:
+            return
+        if kind != self.kind or self._subscription is None:
+            self.close()
+            self._try_in_a_moment()
+        elif self._suited() != self._qos:
+            self.close()
+            self._subscribe()
+            asked = f'{self._qos.reliability}, {self._qos.durability}'
+            self._node.remark(f'{self.name}: a publisher offers {asked}; it is taken so')
+
+    def _wished(self) -> str:
+        """Return the type that the publishers have, the one that is taken if one of them has it."""
+        there = self._kinds_there()
+        others = tuple(sorted(there)) if self._wanted.any_kind else ()
+        for kind in (self.kind, *self._wanted.kinds, *others):
+            if kind in there and self._readable(kind):
+                return kind
+        return self.kind if self._readable(self.kind) else ''
+
+    def _kinds_there(self) -> set[str]:
+        return {info.topic_type for info in self._node.get_publishers_info_by_topic(self.name)}
+
+    def _readable(self, kind: str) -> bool:
+        """Return whether a type is installed here; tell where it is not."""
+        if not kind or kind in self._missing:
+            return False
+        try:
+            message_class(kind)
+        except ImportError as error:
+            self._missing.add(kind)
+            self._node.keep(kind, f'{self.name} carries what cannot be read: {error}')
+            return False
+        return True
+
+    def _suited(self) -> Qos:
+        """Return a quality of service that every publisher can serve, where less may do."""
+        offers = [info.qos_profile for info in self.publishers()]
+        less: dict[str, Any] = {
+            policy: LEAST[policy]
+            for policy in self._wanted.yields
+            if any(getattr(offer, policy).name.lower() == LEAST[policy] for offer in offers)
+        }
+        return replace(self._qos, **less)
+
+    def unheard(self) -> list[str]:
+        """Return a sentence for every publisher of which nothing arrives, or where one may be."""
+        wanted = self._wanted
+        if self._subscription is None:
+            return [self._delay] if self._delay else []
+        if wanted.required and not self._node.count_publishers(self.name):
+            lost = elsewhere(self._node, self.name, wanted.own, wanted.kinds)
+            return [lost] if lost else []
+        understood = [*self._kinds_there()] if wanted.any_kind else wanted.kinds
+        return unheard_publishers(self._node, self.name, self.kind, self._qos, understood)
+
+    def switched(self) -> str:
+        """Return in a sentence that somebody else publishes it now, empty where that is not so."""
+        return self._senders.changed(self._node, self.name)
+
+    def matched(self) -> int:
+        """Return how many publishers the subscription has met."""
+        return 0 if self._subscription is None else int(self._subscription.get_publisher_count())
+
+    def take_waiting(self) -> None:
+        """Take what has reached this process and waits for its turn."""
+        if self._subscription is None:
+            return
+        handle = self._subscription.handle
+        with handle:
+            for _ in range(MOST):
+                taken = handle.take_message(self._subscription.msg_type, True)
+                if taken is None:
+                    break
+                self._take(self.kind, taken[0])
+
+    def close(self) -> None:
+        """Take what waits, and nothing more."""
+        self._stop_trying()
+        if self._subscription is not None:
+            self.take_waiting()
+            self._node.destroy_subscription(self._subscription)
+        self._subscription = None
+
+    def _stop_trying(self) -> None:
+        if self._trying is not None:
+            self._node.destroy_timer(self._trying)
+        self._trying = None
+
+    def _try_in_a_moment(self) -> None:
+        """Subscribe in a later turn of the executor."""
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._trying = self._node.create_timer(self._pause, self._subscribe, clock=steady)
+
+    def _subscribe(self) -> None:
+        """Take the type that the publishers have; try again later where it cannot be done yet."""
+        again, kind, before = self._trying is not None, self._wished(), self.kind
+        self._stop_trying()
+        if not kind:
+            return
+        self.kind = kind
+        self._qos = self._suited()
+        try:
+            self._subscription = self._node.create_subscription(
+                message_class(kind),
+                self._wanted.given,
+                partial(self._take, kind),
+                self._qos.to_rclpy(),
+                raw=True,
+                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            )
+        except RuntimeError as error:  # rclpy's own error of it has no public name
+            self.kind = before
+            if again:  # the first try in a process may be too early
+                said = ' '.join(str(error).partition(', at /')[0].split())
+                self._delay = f'{self.name} cannot be taken as {kind} yet ({said}); tried again'
+                self._pause = min(2.0 * self._pause, SELDOM)
+            self._try_in_a_moment()
+            return
+        self._delay, self._pause = '', AGAIN
+        if kind not in self._wanted.kinds[:1]:
+            self._node.remark(f'{self.name} is taken as {kind}')

@@ -1,0 +1,232 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A node that tells how it is doing: in its log at once, and on `/diagnostics` once a second."""
+
+from __future__ import annotations
+
+import time
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.node import Node
+
+from weld_twin_msgs_py.messages.to_messages import ros_messages
+from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, Topic
+
+from .health import Health, Input
+from .losses import Losses
+from .neighbour_health import NeighbourHealth
+from .outputs import Output
+from .partners import senders
+from .words import Word
+
+WARN_EVERY = 5.0
+"""Seconds between two warnings about the same topic."""
+HEALTH_EVERY = 1.0
+"""Seconds between two health messages."""
+
+
+class TellingNode(Node):
+    """
+    A node with its health.
+
+    Attributes
+    ----------
+    neighbours : NeighbourHealth
+        What the others tell.
+    partners : list of callable
+        Each returns a sentence for everybody at the other end of a topic whom nothing reaches, or of
+        whom nothing comes.
+
+    """
+
+    def __init__(self, name: str, **kwargs: Any) -> None:
+        super().__init__(name, **kwargs)
+        self.messages = ros_messages()
+        self.refused = 0
+        self.partners: list[Callable[[], list[str]]] = []
+        self._warned: dict[str, float] = {}
+        self._losses: dict[str, Losses] = {}
+        self._held: list[Input] = []
+        self._unmatched: list[str] = []
+        self.declare()
+        self.health = Health(self.get_fully_qualified_name(), self.setting('stale_after'))
+        self.diagnostics = self.offer(DIAGNOSTICS, awaited=False)
+        self.neighbours = NeighbourHealth(self)
+        self.neighbours.hear(self._hear_counts)
+        self.partners += [self._named_twice, self._timeless]
+        self.every(HEALTH_EVERY, self.tell_health)
+
+    @abstractmethod
+    def declare(self) -> None:
+        """Declare the parameters."""
+
+    def setting(self, name: str) -> Any:
+        """Return the value of a parameter."""
+        return self.get_parameter_or(name).value
+
+    def get_logger(self) -> RcutilsLogger:
+        """Return the logger of this node."""
+        logger: RcutilsLogger = super().get_logger()  # type: ignore[no-untyped-call]
+        return logger
+
+    def every(self, period: float, action: Callable[[], None]) -> Any:
+        """Return a timer [s] that runs on whether or not simulated time stands still."""
+
+        def guarded() -> None:
+            try:
+                action()
+            except Exception:
+                self.raise_unless_over()
+
+        return self.create_timer(period, guarded, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def raise_unless_over(self) -> None:
+        """Pass an exception on, except what a shutdown in the middle of a callback causes."""
+        if self.context.ok():
+            raise
+
+    @abstractmethod
+    def offer(self, topic: Topic, *, awaited: bool = True) -> Output:
+        """Return a publisher of a topic of the table; ``wait_for_subscribers`` is for awaited."""
+
+    # What happens ----------------------------------------------------------------------------
+
+    def refuse(self, source: str, reason: str) -> None:
+        """Count a sample that cannot be used, and say why, now and then."""
+        self.refused += 1
+        state = self.health.inputs.get(source)
+        if state is None:
+            self.health.say(f'{source}: {reason}')
+        else:
+            state.refused += 1
+            state.last_reason = reason
+        self.warn(source, f'{source}: {reason} ({self.refused} refused so far)')
+
+    def remark(self, sentence: str) -> None:
+        """Tell once what was taken for granted: in the log, and in the node's health as long."""
+        if sentence and sentence not in self.health.remarks:
+            self.health.remarks.append(sentence)
+            self.get_logger().info(sentence)
+
+    def warn(self, source: str, sentence: str) -> None:
+        """Write a sentence into the log, unless one from the same source was written just now."""
+        now = time.monotonic()
+        if now - self._warned.get(source, -WARN_EVERY) >= WARN_EVERY:
+            self._warned[source] = now
+            self.get_logger().warning(sentence)
+
+    def tell_once(self, sentence: str) -> None:
+        """Tell something in the log and in the next health message, if there is something."""
+        if sentence:
+            self.get_logger().warning(sentence)
+            self.health.say(sentence)
+
+    def keep(self, key: str, sentence: str, *, logged: bool = True) -> None:
+        """Tell something as long as it is so, in the log when it begins; an empty sentence ends it."""
+        if not sentence:
+            self.health.lasting.pop(key, None)
+            return
+        if logged and key not in self.health.lasting:
+            self.get_logger().warning(sentence)
+        self.health.lasting[key] = sentence
+
+    # Inputs ----------------------------------------------------------------------------------
+
+    def watch(self, name: str, *, required: bool, steady: bool, held: bool = False) -> Input:
+        """
+        Return a new input, whose rate, age and losses are told from now on.
+
+        Parameters
+        ----------
+        held : bool
+            Its last value counts until the next one comes; that it does so without a source is told.
+
+        """
+        state = self.health.watch(name, required=required, steady=steady)
+        self._losses[name] = Losses(state)
+        if held:
+            self._held.append(state)
+        return state
+
+    def unwatch(self, name: str) -> None:
+        """Tell no more of an input."""
+        self.health.inputs.pop(name, None)
+        self._losses.pop(name, None)
+        self._held = [state for state in self._held if state.topic != name]
+        self.keep(_loss_of(name), '')
+
+    def look(self) -> None:
+        """Look at the inputs before their health is told."""
+
+    def tell_health(self) -> None:
+        """Tell of the node and its inputs."""
+        self.look()
+        for name, state in self.health.inputs.items():
+            state.publishers = self.count_publishers(name)
+        self._look_at_losses()
+        self._look_at_held()
+        self._look_at_partners()
+        self.diagnostics.publish(
+            self.messages.statuses(self.get_clock().now().nanoseconds, self.health.statuses())
+        )
+
+    def tell_last_losses(self) -> None:
+        """Tell of losses that the end of the node cuts short."""
+        for losses in self._losses.values():
+            for sentence in losses.ended():
+                self.get_logger().warning(sentence)
+
+    def _hear_counts(self, word: Word) -> None:
+        """Hold what a node tells it has sent against what has come of it."""
+        for topic in word.sent.keys() & self._losses.keys():
+            self._losses[topic].tell(word)
+
+    def _look_at_losses(self) -> None:
+        """Tell of an input that lacks messages when it begins and when it ends."""
+        now = time.monotonic()
+        for name, losses in self._losses.items():
+            for sentence in losses.look(senders(self, name), now):
+                self.tell_once(sentence)
+            self.keep(_loss_of(name), losses.telling, logged=False)
+
+    def _look_at_held(self) -> None:
+        """Tell, as long as it is so, of a value that counts although nobody tells it any more."""
+        now = time.monotonic()
+        for state in self._held:
+            held = state.silent(now) and state.used  # what was refused counts for nothing
+            age = f'{now - state.used:.1f} s old, nothing usable came since'
+            told = f'{state.topic}: the value that counts is {age}' if held else ''
+            self.keep(f'held from {state.topic}', told)
+
+    def _look_at_partners(self) -> None:
+        """Tell of every partner that does not match, as long as it is there."""
+        unmatched = [sentence for look in self.partners for sentence in look()]
+        for sentence in unmatched:
+            if sentence not in self._unmatched:
+                self.get_logger().warning(sentence)
+        self._unmatched = unmatched
+        self.keep('partners', '; '.join(unmatched), logged=False)
+
+    def _named_twice(self) -> list[str]:
+        """Return that another node has this one's name, if one has."""
+        own = self.get_fully_qualified_name()
+        if not self.neighbours.twice(own):
+            return []
+        return [
+            f'another node of the name {own} is running: both publish, and both answer; end one of them'
+        ]
+
+    def _timeless(self) -> list[str]:
+        """Return that simulated time is asked for and has not begun, if so."""
+        if not self.setting('use_sim_time') or self.get_clock().now().nanoseconds:
+            return []
+        return ['use_sim_time is set, and nothing has come on /clock: time stands at zero']
+
+
+def _loss_of(name: str) -> str:
+    """Return under what the health keeps that messages of an input go missing."""
+    return f'loss of {name}'

@@ -170,6 +170,11 @@ def point(message: Any) -> Array:
     return _xyz(message.point, 'the point')
 
 
+def position(message: Any) -> Array:
+    """Return the position of a pose or a point as `pose` and `point` do, shape (3,) [m]."""
+    return point(message) if hasattr(message, 'point') else pose(message)[0]
+
+
 def vector3(message: Any) -> Array:
     """
     Return the vector of a Vector3Stamped, shape (3,).

@@ -31,7 +31,7 @@ from ..streams.stamp_watch import StampWatch
 from .all_nodes import refuse_unknown
 from .health import Input
 from .outputs import Output
-from .partners import readers, unreached_subscribers
+from .partners import full_names, unreached_subscribers
 from .qos_overrides import QosOverrides
 from .reading import Turn, measured_turn, reader
 from .settings import SHARED, Setting
@@ -263,7 +263,9 @@ class CellNode(TellingNode):
             self.keep(BESIDE, intake.joints.beside.warning(self.carrying_nothing))
         for source in self._sources:
             source.adapt()
-            self.health.inputs[source.name].matched = source.matched()
+            state = self.health.inputs[source.name]
+            state.publishers, state.matched = len(source.infos), source.matched()
+            state.senders = full_names(source.infos)
             self.tell_once(source.switched())
 
     def time_went_back(self) -> None:
@@ -394,7 +396,8 @@ class CellNode(TellingNode):
         """Wait until all who take an output have all of it, or stand still; return whether they have."""
         asked = begun if self.ending_since is None else self.ending_since
         while True:
-            live = readers(self, output.topic) <= self.neighbours.alive()
+            readers = full_names(self.get_subscriptions_info_by_topic(output.topic))
+            live = readers <= self.neighbours.alive()
             remaining = (begun + LAST_WORDS if live else asked + ALIVE) - time.monotonic()
             # What stands still has had its time with the outputs before, and an ack is there or not.
             if output.wait_for_all_acked(

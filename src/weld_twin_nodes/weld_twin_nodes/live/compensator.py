@@ -387,9 +387,8 @@ class Compensator(ManagedNode):
         return f'the model was withdrawn meanwhile: {why}' if why else ''
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(Compensator, args)
+main = partial(run, Compensator)
+"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

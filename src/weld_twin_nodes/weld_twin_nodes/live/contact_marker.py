@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -197,9 +198,8 @@ class ContactMarker(CellNode):
             raise DataError(f"table '{path}' cannot be written: {error.strerror}") from None
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(ContactMarker, args)
+main = partial(run, ContactMarker)
+"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from functools import partial
 from typing import Any, ClassVar
 
-from weld_twin_core.arrays import Array
+from weld_twin_msgs_py.assembly import Role
 from weld_twin_msgs_py.assembly.frame_names import MeasuringFrame
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_write import Vector3Encoder
@@ -88,7 +89,7 @@ class DeviationAnalyzer(CellNode):
         self.every(self.setting('metrics_idle'), self._on_idle)
         self.every(LOOK_EVERY, self._look_at_clocks)
         self.listen(TWIN_BASE, self._on_base)
-        self._measured_inputs = MeasuredInputs(self, self._on_pose, self._on_point)
+        self._measured_inputs = MeasuredInputs(self, self._on_measured)
         self.listen(TWIN_POSE, self._on_twin, required=True)
 
     def time_went_back(self) -> None:
@@ -97,13 +98,8 @@ class DeviationAnalyzer(CellNode):
         self._deviations.reset()
         self._seen = self._told = 0
 
-    def _on_pose(self, message: Any) -> None:
-        self._measured(message, from_messages.pose(message)[0])
-
-    def _on_point(self, message: Any) -> None:
-        self._measured(message, from_messages.point(message))
-
-    def _measured(self, message: Any, position: Array) -> None:
+    def _on_measured(self, _: Role, message: Any) -> None:
+        position = from_messages.position(message)
         self._frame.take(message.header.frame_id)
         self.remark(self._frame.remark)
         self._publish(self._deviations.add_measured(from_messages.stamp_ns(message), position))
@@ -175,9 +171,8 @@ class DeviationAnalyzer(CellNode):
         )
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(DeviationAnalyzer, args)
+main = partial(run, DeviationAnalyzer)
+"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

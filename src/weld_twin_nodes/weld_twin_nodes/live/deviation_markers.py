@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, ClassVar
 
+from weld_twin_msgs_py.assembly import Role
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import (
     DEVIATION,
@@ -44,7 +46,7 @@ class DeviationMarkers(CellNode):
         self._markers = self.offer(MARKERS)
         self.time_went_back()
         self.listen(TWIN_BASE, self._on_base)
-        self._measured_inputs = MeasuredInputs(self, self._on_pose, self._on_point)
+        self._measured_inputs = MeasuredInputs(self, self._on_measured)
         self.listen(DEVIATION, self._on_deviation, required=True)
         self.every(self.setting('every'), self._draw)
 
@@ -61,11 +63,8 @@ class DeviationMarkers(CellNode):
     def _on_base(self, message: Any) -> None:
         self._rotation = from_messages.pose(message)[1]
 
-    def _on_pose(self, message: Any) -> None:
-        self._lines.measured(from_messages.stamp_ns(message), from_messages.pose(message)[0])
-
-    def _on_point(self, message: Any) -> None:
-        self._lines.measured(from_messages.stamp_ns(message), from_messages.point(message))
+    def _on_measured(self, _: Role, message: Any) -> None:
+        self._lines.measured(from_messages.stamp_ns(message), from_messages.position(message))
 
     def _on_deviation(self, message: Any) -> None:
         vector = self._rotation @ from_messages.vector3(message)
@@ -80,9 +79,8 @@ class DeviationMarkers(CellNode):
         )
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(DeviationMarkers, args)
+main = partial(run, DeviationMarkers)
+"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

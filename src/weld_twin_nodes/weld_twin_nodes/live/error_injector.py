@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, ClassVar
 
 from weld_twin_core.twin.twin import Twin
@@ -47,9 +48,8 @@ class ErrorInjector(ModelNode):
         self._pose.publish(self._encode_pose(sample.pose_stamp, position, sample.poses.rotation))
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(ErrorInjector, args)
+main = partial(run, ErrorInjector)
+"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from weld_twin_core.twin.live_posterior import LivePosterior
@@ -78,9 +79,8 @@ class ForwardKinematicsTwin(ModelNode):
         return None if posterior is None else LivePosterior(posterior)
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(ForwardKinematicsTwin, args)
+main = partial(run, ForwardKinematicsTwin)
+"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

@@ -44,6 +44,8 @@ class Input:
         self.topic = topic
         self.received = self.refused = self.others = 0
         self.publishers = 0
+        self.senders: set[str] = set()
+        """Nodes that publish it, by the graph."""
         self.matched = 0
         """Publishers that the subscription itself has met; the graph may know of more."""
         self.last_reason = ''

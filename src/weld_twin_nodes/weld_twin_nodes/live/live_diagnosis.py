@@ -101,10 +101,8 @@ class LiveDiagnosis(ManagedNode):
             required, held = role is Role.JOINTS, role in SIGNALS
             self.listen(topic, partial(self._take, role), required=required, held=held)
         if self._names.cameras:
-            self.listen(IMAGE_POINTS, self._take_image)
-        self._measured = MeasuredInputs(
-            self, partial(self._take, Role.POSE), partial(self._take, Role.POINT)
-        )
+            self.listen(IMAGE_POINTS, self._window.take_image)
+        self._measured = MeasuredInputs(self, self._take)
         self._looking = self.every(LOOK_EVERY, self._look)
 
     def finish(self) -> None:
@@ -138,9 +136,6 @@ class LiveDiagnosis(ManagedNode):
 
     def _take(self, role: Role, message: Any) -> None:
         self._window.take(role, message)
-
-    def _take_image(self, message: Any) -> None:
-        self._window.take_image(message)
 
     def time_went_back(self) -> None:
         """Forget the window."""
@@ -193,9 +188,8 @@ class LiveDiagnosis(ManagedNode):
             )
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(LiveDiagnosis, args)
+main = partial(run, LiveDiagnosis)
+"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

@@ -10,7 +10,6 @@ word. Nodes of the project tell with their health how many they sent; what came 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection
 
 from ..streams.stamp_watch import Seen
 from .health import Input
@@ -101,20 +100,11 @@ class Losses:
         self._said = False
         self.telling = ''
 
-    def look(self, senders: Collection[str], now: float) -> list[str]:
-        """
-        Return sentences on what went missing since the last look, and on the stamps.
-
-        Parameters
-        ----------
-        senders : collection of str
-            Nodes that publish the topic, by the graph.
-        now : float [s]
-
-        """
+    def look(self, now: float) -> list[str]:
+        """Return sentences at a time [s], on what went missing since the last look and on stamps."""
         topic, seen, tellers = self._state.topic, self._state.stamps.look(), self._counted.tellers
         out = [f'{topic}: {sentence}' for sentence in _of_clock(seen)]
-        if tellers and set(senders) <= set(tellers):
+        if tellers and self._state.senders <= set(tellers):
             lost = self._counted.look()
             said = (
                 f'{topic}: {lost:,} of {self._counted.sent:,} messages that '

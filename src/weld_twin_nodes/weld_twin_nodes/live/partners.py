@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from rclpy.node import Node
@@ -17,25 +17,27 @@ UNKNOWN = '_NODE_NAME_UNKNOWN_'
 
 
 def unheard_publishers(
-    node: Node, topic: str, kind: str, wanted: Qos, understood: Sequence[str] = ()
+    infos: Sequence[Any], topic: str, kind: str, wanted: Qos, understood: Collection[str] = ()
 ) -> list[str]:
     """
     Return a sentence for every publisher of a topic of which nothing arrives.
 
     Parameters
     ----------
+    infos : sequence of TopicEndpointInfo
+        The publishers.
     topic : str
         Its name after remapping, with the namespace.
     kind : str
         Message type that is asked for.
     wanted : Qos
         Quality of service that is asked for.
-    understood : sequence of str
+    understood : collection of str
         Types that could be taken instead, if nobody published the one that is.
 
     """
     out = []
-    for info in _named(node.get_publishers_info_by_topic(topic)):
+    for info in _named(infos):
         if info.topic_type != kind and info.topic_type in understood:
             reason = f'sends {info.topic_type} where another sends {kind}, which is taken'
         elif info.topic_type != kind:
@@ -45,16 +47,6 @@ def unheard_publishers(
         if reason:
             out.append(f'{topic}: {full_name(info)} {reason}; nothing of it arrives')
     return out
-
-
-def senders(node: Node, topic: str) -> set[str]:
-    """Return the full names of the nodes that publish a topic."""
-    return {full_name(info) for info in node.get_publishers_info_by_topic(topic)}
-
-
-def readers(node: Node, topic: str) -> set[str]:
-    """Return the full names of the nodes that subscribe to a topic."""
-    return {full_name(info) for info in node.get_subscriptions_info_by_topic(topic)}
 
 
 def elsewhere(node: Node, topic: str, own: str, kinds: Sequence[str]) -> str:
@@ -92,9 +84,8 @@ class Senders:
     def __init__(self) -> None:
         self._before: frozenset[str] = frozenset()
 
-    def changed(self, node: Node, topic: str) -> str:
+    def changed(self, topic: str, infos: Sequence[Any]) -> str:
         """Return in a sentence that others publish it than before, empty where they do not."""
-        infos = node.get_publishers_info_by_topic(topic)
         now = frozenset(map(full_name, _named(infos)))
         if not now or len(now) < len({info.node_name for info in infos}):
             return ''  # the graph does not have their names yet
@@ -140,6 +131,11 @@ def _gap(offered: QoSProfile, asked: QoSProfile) -> str:
 def _named(infos: Sequence[Any]) -> list[Any]:
     """Return those whose names the graph has; the others' follow in a moment."""
     return [info for info in infos if UNKNOWN not in info.node_name]
+
+
+def full_names(infos: Sequence[Any]) -> set[str]:
+    """Return the names of the nodes of endpoints, with their namespaces."""
+    return set(map(full_name, infos))
 
 
 def full_name(info: Any) -> str:

@@ -13,7 +13,7 @@ from weld_twin_msgs_py.messages.topics import BY_NAME, LATCHED, RELIABLE, VOLATI
 
 from .cell_node import CellNode
 from .outputs import header_stamp
-from .partners import full_name
+from .partners import full_names
 from .source import LEAST, Wanted
 from .words import Sent
 
@@ -79,7 +79,7 @@ class RecordedTopic:
 
     def publishing_nodes(self) -> set[str]:
         """Return the full names of the nodes that publish it."""
-        return {full_name(info) for info in self.source.publishers()}
+        return full_names(self.source.publishers())
 
     def _take(self, kind: str, data: bytes) -> None:
         self._state.arrived()

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -145,9 +146,8 @@ class Recorder(ManagedNode):
         return response
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(Recorder, args)
+main = partial(run, Recorder)
+"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

@@ -77,6 +77,8 @@ class Source:
     ----------
     kind : str
         The type that is taken now; empty while none is known.
+    infos : list of TopicEndpointInfo
+        All publishers, as the graph had them at the last look.
 
     """
 
@@ -90,6 +92,7 @@ class Source:
         self.name = node.resolve_topic_name(wanted.given)
         self.kind: str = (*wanted.kinds, '')[0]
         self._qos = wanted.qos
+        self.infos: list[Any] = []
         self._senders = Senders()
         self._missing: set[str] = set()
         self._subscription: Any = None
@@ -98,9 +101,12 @@ class Source:
         self._subscribe()
 
     def publishers(self) -> list[Any]:
-        """Return what the graph tells of the publishers of the type that is taken."""
-        infos = self._node.get_publishers_info_by_topic(self.name)
-        return [info for info in infos if info.topic_type == self.kind]
+        """Return the publishers that there are now of the type that is taken."""
+        self.infos = self._node.get_publishers_info_by_topic(self.name)
+        return self._own()
+
+    def _own(self) -> list[Any]:
+        return [info for info in self.infos if info.topic_type == self.kind]
 
     def adapt(self) -> None:
         """Follow the publishers where none is left of what is taken."""
@@ -118,15 +124,13 @@ class Source:
 
     def _wished(self) -> str:
         """Return the type that the publishers have, the one that is taken if one of them has it."""
-        there = self._kinds_there()
+        self.infos = self._node.get_publishers_info_by_topic(self.name)
+        there = {info.topic_type for info in self.infos}
         others = tuple(sorted(there)) if self._wanted.any_kind else ()
         for kind in (self.kind, *self._wanted.kinds, *others):
             if kind in there and self._readable(kind):
                 return kind
         return self.kind if self._readable(self.kind) else ''
-
-    def _kinds_there(self) -> set[str]:
-        return {info.topic_type for info in self._node.get_publishers_info_by_topic(self.name)}
 
     def _readable(self, kind: str) -> bool:
         """Return whether a type is installed here; tell where it is not."""
@@ -142,7 +146,7 @@ class Source:
 
     def _suited(self) -> Qos:
         """Return a quality of service that every publisher can serve, where less may do."""
-        offers = [info.qos_profile for info in self.publishers()]
+        offers = [info.qos_profile for info in self._own()]
         less: dict[str, Any] = {
             policy: LEAST[policy]
             for policy in self._wanted.yields
@@ -155,15 +159,15 @@ class Source:
         wanted = self._wanted
         if self._subscription is None:
             return [self._delay] if self._delay else []
-        if wanted.required and not self._node.count_publishers(self.name):
+        if wanted.required and not self.infos:
             lost = elsewhere(self._node, self.name, wanted.own, wanted.kinds)
             return [lost] if lost else []
-        understood = [*self._kinds_there()] if wanted.any_kind else wanted.kinds
-        return unheard_publishers(self._node, self.name, self.kind, self._qos, understood)
+        understood = {info.topic_type for info in self.infos if wanted.any_kind} | {*wanted.kinds}
+        return unheard_publishers(self.infos, self.name, self.kind, self._qos, understood)
 
     def switched(self) -> str:
         """Return in a sentence that somebody else publishes it now, empty where that is not so."""
-        return self._senders.changed(self._node, self.name)
+        return self._senders.changed(self.name, self.infos)
 
     def matched(self) -> int:
         """Return how many publishers the subscription has met."""

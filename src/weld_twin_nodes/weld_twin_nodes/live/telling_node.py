@@ -20,7 +20,6 @@ from .health import Health, Input
 from .losses import Losses
 from .neighbour_health import NeighbourHealth
 from .outputs import Output
-from .partners import senders
 from .words import Word
 
 WARN_EVERY = 5.0
@@ -165,8 +164,6 @@ class TellingNode(Node):
     def tell_health(self) -> None:
         """Tell of the node and its inputs."""
         self.look()
-        for name, state in self.health.inputs.items():
-            state.publishers = self.count_publishers(name)
         self._look_at_losses()
         self._look_at_held()
         self._look_at_partners()
@@ -189,7 +186,7 @@ class TellingNode(Node):
         """Tell of an input that lacks messages when it begins and when it ends."""
         now = time.monotonic()
         for name, losses in self._losses.items():
-            for sentence in losses.look(senders(self, name), now):
+            for sentence in losses.look(now):
                 self.tell_once(sentence)
             self.keep(_loss_of(name), losses.telling, logged=False)
 

@@ -15,6 +15,7 @@ import numpy as np
 from weld_twin_core.arm.rotation import transform
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.assembly import Role
 from weld_twin_msgs_py.assembly.foreign_types import stamped_pose
 from weld_twin_msgs_py.assembly.transforms import NoTransform, NotYet, TransformTree
 from weld_twin_msgs_py.messages import from_messages
@@ -73,17 +74,12 @@ class MeasuredInputs:
 
     Parameters
     ----------
-    on_pose, on_point : callable
-        Take the messages.
+    use : callable
+        Takes what a message tells, a pose or a point, and the message.
 
     """
 
-    def __init__(
-        self,
-        node: CellNode,
-        on_pose: Callable[[Any], None],
-        on_point: Callable[[Any], None],
-    ) -> None:
+    def __init__(self, node: CellNode, use: Callable[[Role, Any], None]) -> None:
         self._node = node
         self._wanted = node.setting('measuring_frame').strip('/')
         self._waiting: deque[tuple[float, str, Any, Callable[[Any], None]]] = deque()
@@ -93,9 +89,9 @@ class MeasuredInputs:
             self._tree = frames.tree
             frames.changed.append(self._retry)
             node.every(LOOK_EVERY, self._retry)
-        for topic, use in ((MEASURED_POSE, on_pose), (MEASURED_POINT, on_point)):
+        for topic, role in ((MEASURED_POSE, Role.POSE), (MEASURED_POINT, Role.POINT)):
             name = node.resolve_topic_name(topic.relative)
-            node.listen(topic, partial(self._take, name, use))
+            node.listen(topic, partial(self._take, name, partial(use, role)))
 
     def clear(self) -> None:
         """Forget what waits, as after a jump of the clock."""

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -214,9 +215,8 @@ def _listened(listeners: dict[str, int]) -> str:
     return ', '.join(f'{count} subscribers of {topic}' for topic, count in listeners.items())
 
 
-def main(args: list[str] | None = None) -> int:
-    """Run the node."""
-    return run(TrajectoryGenerator, args)
+main = partial(run, TrajectoryGenerator)
+"""Run the node with arguments, or with those of the program; return the exit code."""
 
 
 if __name__ == '__main__':

@@ -125,7 +125,7 @@ class Source:
     def _wished(self) -> str:
         """Return the type that the publishers have, the one that is taken if one of them has it."""
         self.infos = self._node.get_publishers_info_by_topic(self.name)
-        there = {info.topic_type for info in self.infos}
+        there: set[str] = {info.topic_type for info in self.infos}
         others = tuple(sorted(there)) if self._wanted.any_kind else ()
         for kind in (self.kind, *self._wanted.kinds, *others):
             if kind in there and self._readable(kind):

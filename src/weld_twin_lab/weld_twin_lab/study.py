@@ -29,7 +29,8 @@ from typing import TYPE_CHECKING, Any
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
-from weld_twin_nodes.cli.options import add_pool
+from weld_twin_nodes.cli.options import POOL
+from weld_twin_nodes.cli.parsing import Options, add_options
 from weld_twin_nodes.offline.output_directory import write_owned
 from weld_twin_nodes.offline.owned_files import LIST
 
@@ -67,14 +68,16 @@ def option(flag: str, default: Any, metavar: Any, text: str, **more: Any) -> Add
     return add
 
 
-def options(*rows: Add, out: str = 'where results go', of: str = 'DIR', pool: bool = False) -> Add:
+def options(
+    *rows: Options, out: str = 'where results go', of: str = 'DIR', pool: bool = False
+) -> Add:
     """
     Return what adds the options of a study.
 
     Parameters
     ----------
-    *rows : callable
-        As `option` returns them.
+    *rows : str or callable
+        Tables as `add_options` reads them, or what `option` returns.
     out, of : str
         What ``--out`` says; it must be given. An empty text adds none.
     pool : bool
@@ -82,11 +85,10 @@ def options(*rows: Add, out: str = 'where results go', of: str = 'DIR', pool: bo
 
     """
     last = option('--out', REQUIRED, of, out)
-    every = [*rows, *([add_pool] * pool), *([last] * bool(out))]
+    every: list[Options] = [*rows, *([POOL] * pool), *([last] * bool(out))]
 
     def add_arguments(parser: argparse.ArgumentParser) -> None:
-        for add in every:
-            add(parser)
+        add_options(parser, *every)
 
     return add_arguments
 

@@ -11,7 +11,10 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
+
+from weld_twin_core import __version__
+from weld_twin_core.errors import TwinError
 
 from ..offline.environment import THREADS
 from .options import add_command
@@ -28,7 +31,7 @@ COMMANDS = {
     **dict.fromkeys(('history', 'iso9283', 'sensitivity', 'serve', 'demo'), REPORT),
     'lab': 'weld_twin_lab.cli',
 }
-"""Commands in the order of the help, and where each lies: a file, or a folder with a file a job."""
+"""Commands in the order of the help, and where each lies."""
 BEFORE = ('detect',)
 """Commands that make what another takes; the help of that one tells of them."""
 BRINGS = {'weld_twin_report': 'writes pages', 'weld_twin_lab': 'is a proof'}
@@ -80,9 +83,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stderr.close()  # whoever read our output has gone; there is nobody to tell
         return 0
-    except Exception as error:
-        if not _expected(error):
-            raise
+    except (TwinError, OSError) as error:  # what the user can do something about
         print(f'weld-twin: {_one_line(error)}', file=sys.stderr)
         return USAGE_ERROR
 
@@ -138,7 +139,9 @@ def parser_of(words: Sequence[str] = ()) -> Parser:
         description="Digital twin of a welding robot's positional accuracy.",
         epilog='weld-twin COMMAND --help tells more. Angles are rad, lengths m unless said.',
     )
-    parser.add_argument('--version', action='version', version=_version(), help=argparse.SUPPRESS)
+    parser.add_argument(
+        '--version', action='version', version=f'weld-twin {__version__}', help=argparse.SUPPRESS
+    )
     subparsers = parser.add_subparsers(required=True, metavar='COMMAND', title='commands')
     typed = _command(words)
     chosen = OLD.get(typed, typed).partition(' ')[0]
@@ -169,9 +172,8 @@ def _add(subparsers: argparse._SubParsersAction[Parser], name: str, chosen: str)
     parser = subparsers.add_parser(name, help=short_help(text), description=text)
     parser.example = module.EXAMPLE
     places = parser.add_subparsers(required=True, metavar='JOB', title='jobs')
-    for job in jobs:
-        made = import_module(f'{module.__name__}.{job}')
-        add_command(places, job, made).set_defaults(run=made.run)
+    for word, job in jobs.items():
+        add_command(places, word, job).set_defaults(run=job.run)
 
 
 def _path(name: str) -> str:
@@ -182,26 +184,13 @@ def _module(name: str) -> ModuleType:
     return import_module(_path(name))
 
 
-def _jobs(module: ModuleType | None) -> list[str]:
-    """Return the jobs of a command that is a folder, none of another."""
-    return list(getattr(module, 'JOBS', ()))
+def _jobs(module: ModuleType | None) -> dict[str, SimpleNamespace]:
+    """Return the jobs of a command by name; none of a command that has one job."""
+    return getattr(module, 'JOBS', {})
 
 
 def _installed(package: str) -> bool:
     return find_spec(package) is not None
-
-
-def _version() -> str:
-    from weld_twin_core import __version__
-
-    return f'weld-twin {__version__}'
-
-
-def _expected(error: Exception) -> bool:
-    """Tell whether the user can do something about it."""
-    from weld_twin_core.errors import TwinError
-
-    return isinstance(error, TwinError | OSError)
 
 
 def _one_line(error: Exception) -> str:

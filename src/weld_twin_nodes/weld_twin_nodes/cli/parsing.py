@@ -1,13 +1,45 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A parser whose ``--help`` fits on one screen: options that few need wait behind ``--help-all``."""
+"""
+Options from tables of help, and a parser whose ``--help`` fits on one screen.
+
+A table has a row for each option: what is typed, two spaces or more, and what it does. What has to
+be known besides stands in the row, where a reader sees it::
+
+    BAG ...                recordings, one or more; [BAG ...] may be none, [BAG] one or none
+    --robot R, required    which robot
+    how it was measured:
+    --setup N              which recording of the diagnosis [default: 1]
+    --holdout BAG          not fitted, but judged on; may be given again
+    --topics TOPIC ...     play only these
+    --unit {m,mm}          of lengths
+    --clock [HZ=100]       the number counts where the option stands alone
+    --apply                correct what is wrong; a switch, for it takes no value
+    rare:
+    --wait S               rows from here to the next heading are shown by --help-all alone
+
+What is not given is None where a number, a list of values or a choice is read, an empty list where
+several may be given, and else an empty text.
+"""
 
 from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
+
+Options = str | Callable[[argparse.ArgumentParser], None]
+"""A table of options, or a function that adds some by itself."""
+RARE = 'rare'
+"""Heading of the rows that few need."""
+AGAIN = 'may be given again'
+_DEFAULT = re.compile(r'\[default: (.*?)\]')
+_INTEGERS = ('N', 'NANOS')
+_NUMBERS = (
+    *('S', 'HZ', 'MIN', 'M', 'MM', 'M/S', 'GB', 'DEG', 'DEGC'),
+    *('X', 'Y', 'Z', 'RX', 'RY', 'RZ'),
+)
 
 
 class Rare(str):
@@ -16,59 +48,113 @@ class Rare(str):
     __slots__ = ()
 
 
-class Adder:
-    """
-    Adds options to one group of a parser.
-
-    Parameters
-    ----------
-    title : str, optional
-        Heading of the group in the help; left out, the options are those of the command itself.
-    rare : bool
-        Whether the options are shown by ``--help-all`` alone.
-
-    """
-
-    def __init__(
-        self, parser: argparse.ArgumentParser, title: str = '', *, rare: bool = False
-    ) -> None:
-        self._group = parser.add_argument_group(title) if title else parser
-        self._rare = rare
-
-    def __call__(self, *names: str, many: bool = False, rare: bool = False, **more: Any) -> None:
-        """
-        Add an option, a flag or a positional argument.
-
-        Parameters
-        ----------
-        *names : str
-            The name; of an option what its value is called, none for a flag; the help. As in
-            ``add('--align', 'FRAMES', 'frames that are not known')``.
-        many : bool
-            The option may be given again; its values make a list.
-        rare : bool
-            The option is shown by ``--help-all`` alone.
-        **more
-            As `argparse` takes them.
-
-        """
-        name, *metavar, text = names
-        kind: dict[str, Any] = {}
-        if metavar:
-            kind['metavar'] = metavar[0] if len(metavar) == 1 else tuple(metavar)
-        if len(metavar) > 1:
-            kind['nargs'] = len(metavar)
-        if many:
-            kind |= {'action': 'append', 'default': []}
-        elif name.startswith('-') and not metavar and 'choices' not in more:
-            kind['action'] = 'store_true'
-        shown = text.replace('{default}', _number(more.get('default')))
-        kind['help'] = Rare(shown) if rare or self._rare else shown
-        self._group.add_argument(name, **kind | more)
+def texts(text: str) -> tuple[str, ...]:
+    """Return texts with commas between."""
+    return tuple(part.strip() for part in text.split(','))
 
 
-def _number(value: object) -> str:
-    return f'{value:g}' if isinstance(value, float) else str(value)
+def floats(text: str) -> tuple[float, ...]:
+    """Return numbers with commas between."""
+    return tuple(float(part) for part in text.split(','))
+
+
+def integers(text: str) -> tuple[int, ...]:
+    """Return whole numbers with commas between."""
+    return tuple(int(part) for part in text.split(','))
+
+
+def robot_file(spec: str) -> str:
+    """Return the file of a robot of one's own that is named; what else was given as it is."""
+    from weld_twin_msgs_py.robots.own_robots import as_file
+
+    return as_file(spec)
+
+
+READ: dict[str, Callable[[str], Any]] = {
+    **dict.fromkeys(_INTEGERS, int),
+    **dict.fromkeys(_NUMBERS, float),
+    'A,B,C': texts,
+    'N,N': integers,
+    '1,-1,...': floats,
+    'DEG,DEG,...': floats,
+    'R': robot_file,
+}
+"""How a value is read, by what the help calls it; all others are texts."""
+
+
+def add_options(parser: argparse.ArgumentParser, *parts: Options) -> None:
+    """Add the options of tables, each of which begins outside any group."""
+    for part in parts:
+        if callable(part):
+            part(parser)
+            continue
+        group: Any = parser
+        rare = False
+        for typed, text in _rows(part):
+            if text:
+                _add(group, typed, text, rare)
+            elif typed == RARE:
+                rare = True
+            else:
+                group, rare = parser.add_argument_group(typed), False
+
+
+def _rows(table: str) -> Iterator[tuple[str, str]]:
+    """Yield what is typed and what it does; of a heading its words, and nothing."""
+    # What is indented goes on with the row above.
+    for row in re.sub(r'\n +(?=\S)', ' ', table).splitlines():
+        typed, _, text = row.partition('  ')
+        if typed:
+            yield typed if text else typed.removesuffix(':'), text.strip()
+
+
+def _add(group: Any, typed: str, text: str, rare: bool) -> None:
+    name, *values = typed.removesuffix(', required').split()
+    more: dict[str, Any] = {'required': True} if typed.endswith(', required') else {}
+    if not name.startswith('-'):
+        name, more = _positional(name, values)
+    elif not values:
+        more['action'] = 'store_true'
+    else:
+        more |= _value(values, again=AGAIN in text)
+    usual = _DEFAULT.search(text)
+    if usual:
+        more['default'] = more.get('type', str)(usual[1])
+        text = _DEFAULT.sub(r'(default: \1)', text)
+    group.add_argument(name, help=Rare(text) if rare else text, **more)
+
+
+def _positional(name: str, values: Sequence[str]) -> tuple[str, dict[str, Any]]:
+    """Return the attribute of a positional argument, and how it is read."""
+    shown = name.strip('[]')
+    many, left_out = bool(values), name.startswith('[')
+    more: dict[str, Any] = {'metavar': shown}
+    if many:
+        more['nargs'] = '*' if left_out else '+'
+    elif left_out:
+        more |= {'nargs': '?', 'default': ''}
+    return re.split(r'[.|]', shown)[0].lower(), more
+
+
+def _value(values: Sequence[str], *, again: bool) -> dict[str, Any]:
+    """Return how the values of an option are read."""
+    shown = values[0]
+    if shown.startswith('{'):
+        return {'choices': tuple(shown.strip('{}').split(','))}
+    if shown.startswith('['):
+        shown, _, alone = shown.strip('[]').partition('=')
+        return {'metavar': shown, 'nargs': '?', 'type': READ[shown], 'const': READ[shown](alone)}
+    read = READ.get(shown)
+    more: dict[str, Any] = {'metavar': shown, 'default': None if read else ''}
+    if read:
+        more['type'] = read
+    if values[1:] == ['...']:
+        more |= {'action': 'extend', 'nargs': '+', 'default': []}
+    elif len(values) > 1:
+        more |= {'metavar': tuple(values), 'nargs': len(values)}
+    if again:
+        more |= {'action': 'append', 'default': []}
+    return more
 
 
 class Parser(argparse.ArgumentParser):

@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from .parsing import Adder
+from weld_twin_core.errors import DataError
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -18,37 +18,30 @@ if TYPE_CHECKING:
     from weld_twin_msgs_py.programs.controllers import Cell
 
 _UNITS = {'mm': 1e-3, 'um': 1e-6, 'm': 1.0, 'deg': 0.017453292519943295, 'rad': 1.0}
-
-
-def add_program_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say how the numbers of a program are meant."""
-    add = Adder(parser, 'how the numbers of a program are meant', rare=True)
-    text = 'numbers of a tool that the program only names, as the controller shows them (mm and '
-    text += 'degrees, ABB with a quaternion, Universal Robots in m and rad)'
-    add('--tool', 'NAME=X,Y,Z,...', text, many=True)
-    add('--base', 'NAME=X,Y,Z,...', 'the same of a base (user frame, work object)', many=True)
-    text = 'of every axis of a Yaskawa arm whose points are in pulses'
-    add('--pulses-per-degree', 'N,N,...', text)
-    text = 'which joint of the robot file each external axis is, such as E1=rail,E2=-tilt (KUKA), '
-    text += 'eax_a=rail (ABB), GP2.J1=tilt (FANUC); a minus where it counts the other way'
-    add('--external', 'E=JOINT,...', text, default='')
-    text = 'bases that go along with the positioner, where the program does not say; or none'
-    add('--on-positioner', 'NAME,...', text)
-    text = (
-        "where a track begins in the controller's world, for positions in frames that stand still"
-    )
-    add('--world', 'X,Y,Z,...', text)
-
-
-def add_trigger(parser: argparse.ArgumentParser) -> None:
-    """Add the option that names the output by which a program tells the instrument to measure."""
-    text = 'digital output that tells the instrument when to measure (default: {default})'
-    Adder(parser, rare=True)('--trigger', 'N', text, type=int, default=1)
+PROGRAM = """
+how the numbers of a program are meant:
+rare:
+--tool NAME=X,Y,Z,...    numbers of a tool that the program only names, as the controller shows them
+                         (mm and degrees, ABB with a quaternion, Universal Robots in m and rad); may
+                         be given again
+--base NAME=X,Y,Z,...    the same of a base (user frame, work object); may be given again
+--pulses-per-degree N,N,...  of every axis of a Yaskawa arm whose points are in pulses
+--external E=JOINT,...   which joint of the robot file each external axis is, such as
+                         E1=rail,E2=-tilt (KUKA), eax_a=rail (ABB), GP2.J1=tilt (FANUC); a minus
+                         where it counts the other way
+--on-positioner NAME,...  bases that go along with the positioner, where the program does not say; or
+                         none
+--world X,Y,Z,...        where a track begins in the controller's world, for positions in frames that
+                         stand still
+"""
+TRIGGER = """
+rare:
+--trigger N              digital output that tells the instrument when to measure [default: 1]
+"""
 
 
 def check_program(args: argparse.Namespace) -> None:
     """Refuse a language that there is not, and an output that no controller has."""
-    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.programs.writing import WRITERS
 
     if args.controller not in WRITERS:
@@ -61,18 +54,9 @@ def check_program(args: argparse.Namespace) -> None:
 
 
 def context_of(args: argparse.Namespace, robot: Robot, language: str) -> Context:
-    """
-    Return the robot and frames that a program is read with.
-
-    Parameters
-    ----------
-    language : str
-        Says how --tool and --base are written.
-
-    """
+    """Return the robot and frames of a program; its language says how --tool and --base are written."""
     import numpy as np
 
-    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.programs import Context, controller_of
 
     pulses = None
@@ -90,7 +74,7 @@ def _cell(args: argparse.Namespace, language: str) -> Cell:
     from weld_twin_msgs_py.programs.controllers import Cell
 
     along = None
-    if args.on_positioner is not None:
+    if args.on_positioner:
         names = {name.strip().lower() for name in args.on_positioner.split(',')}
         along = frozenset(names - {'none', ''})
     world = _frames([f'world={args.world}'], '--world', language) if args.world else {}
@@ -98,7 +82,6 @@ def _cell(args: argparse.Namespace, language: str) -> Cell:
 
 
 def _frames(given: Sequence[str], option: str, language: str) -> dict[str, Array]:
-    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.programs.languages import pose_notation
 
     notation = pose_notation(language)
@@ -114,8 +97,6 @@ def _frames(given: Sequence[str], option: str, language: str) -> dict[str, Array
 
 
 def _numbers(text: str, option: str) -> list[float]:
-    from weld_twin_core.errors import DataError
-
     try:
         values = [float(part) for part in text.split(',')]
     except ValueError:
@@ -129,21 +110,9 @@ def quantity(text: str, units: Sequence[str], option: str) -> float:
     """
     Return a size with its unit, such as ``2mm`` or ``0.5deg``, in SI.
 
-    Parameters
-    ----------
-    units : sequence of str
-        Those that make sense here; the first is meant where none is written.
-    option : str
-        For the message.
-
-    Raises
-    ------
-    DataError
-        It is no size in one of the units.
-
+    Of ``units`` the first is meant where none is written. A DataError names the ``option`` where the
+    text is no size in one of them.
     """
-    from weld_twin_core.errors import DataError
-
     result = re.fullmatch(r'\s*([\d.]+(?:[eE][-+]?\d+)?)\s*([a-z]*)\s*', text)
     unit = result[2] or units[0] if result else ''
     try:
@@ -158,8 +127,6 @@ def quantity(text: str, units: Sequence[str], option: str) -> float:
 def start_of(args: argparse.Namespace, robot: Robot) -> Array | None:
     """Return the joint positions of --start, degrees as written, in the model's units."""
     import numpy as np
-
-    from weld_twin_core.errors import DataError
 
     if not args.start:
         return None

@@ -11,18 +11,19 @@ from typing import Any
 import numpy as np
 
 from weld_twin_nodes.wording.quantities import counted, millimetres, odds
-from weld_twin_nodes.wording.words import cause
 
-from ..history.coordinate_words import coordinate
-from ..history.database import Database
+from ..history.database import Damaged, Database
 from ..history.entry import Entry
 from ..history.runs import NEWEST, Run, Runs
+from ..history.words import HEADS, causes_of, coordinate, row
 from ..report.charts import Axis
 from ..report.html import Child, Figure, Html, document, figures, section, sentences, table, tag
 from .control_chart import control_chart
 
 CHARTS = 8
 """Charts of single values: those that changed first, then those that are named as causes."""
+CAUSES = 3
+"""Causes named of a diagnosis; more are counted."""
 ROWS = 20
 """Diagnoses listed, the newest first."""
 TROUBLES = 10
@@ -40,35 +41,13 @@ STYLE = (
 def cell_page(
     database: Database, cell: str, home: str | None = None, ways: Html | None = None
 ) -> str:
-    """
-    Return the page of a cell.
-
-    Parameters
-    ----------
-    home : str, optional
-        Address of the page of all cells.
-    ways : Html, optional
-        The way to other pages.
-
-    Raises
-    ------
-    DataError
-        There is no such cell.
-
-    """
+    """Return the page of a cell with its way ``home``, to that of all cells, and to others."""
     entries = database.entries(cell, NEWEST)
     runs = Runs(database)
     changes = runs.look(cell, entries)
-    back = None if home is None else tag('p', tag('a', 'All cells', href=home))
     body = tag(
         'main',
-        tag(
-            'header',
-            ways,
-            tag('p', 'History of ', tag('b', cell), class_='kind'),
-            tag('p', f'{entries[-1].robot} · {_span(entries)}', class_='subject'),
-            back,
-        ),
+        _head(cell, home, ways, f'{entries[-1].robot} · {_span(entries)}'),
         tag('section', tag('h1', _headline(entries, changes)), _figures(entries), id_='verdict'),
         _changed(changes),
         _charts(entries, changes),
@@ -78,12 +57,28 @@ def cell_page(
     return document(f'{cell} · history', body, charts=True, style=STYLE)
 
 
-def damaged_page(cell: str, why: str, home: str | None = None, ways: Html | None = None) -> str:
-    """Return the page of a cell whose rows cannot be read: it says why, and the others have theirs."""
-    back = None if home is None else tag('p', tag('a', 'All cells', href=home))
-    head = tag('header', ways, tag('p', 'History of ', tag('b', cell), class_='kind'), back)
-    said = tag('section', tag('h1', 'This cell cannot be read.'), tag('p', why), id_='damaged')
-    return document(f'{cell} · history', tag('main', head, said), style=STYLE)
+def page_of(
+    database: Database, cell: str, home: str | None = None, ways: Html | None = None
+) -> str:
+    """Return the page of a cell; where its rows cannot be read, one that says why."""
+    try:
+        return cell_page(database, cell, home, ways)
+    except Damaged as error:
+        why = tag('p', str(error))
+        said = tag('section', tag('h1', 'This cell cannot be read.'), why, id_='damaged')
+        return document(
+            f'{cell} · history', tag('main', _head(cell, home, ways), said), style=STYLE
+        )
+
+
+def _head(cell: str, home: str | None, ways: Html | None, subject: str | None = None) -> Html:
+    return tag(
+        'header',
+        ways,
+        tag('p', 'History of ', tag('b', cell), class_='kind'),
+        tag('p', subject, class_='subject') if subject else None,
+        tag('p', tag('a', 'All cells', href=home)) if home else None,
+    )
 
 
 def _span(entries: Sequence[Entry]) -> str:
@@ -113,16 +108,9 @@ def _figures(entries: Sequence[Entry]) -> Html:
         ('Verdict', last.status, sure),
         ('Gap', millimetres(last.gap_m), 'without what was found'),
         ('Left', millimetres(last.unexplained_m), 'with it'),
-        ('Recorded', str(last.at.date()), causes_of(last.effects)),
+        ('Recorded', str(last.at.date()), causes_of(last.effects, CAUSES)),
     ]
     return figures(cells)
-
-
-def causes_of(effects: Sequence[Mapping[str, Any]], most: int = 3) -> str:
-    """Return what was named, the strongest first; many are counted."""
-    names = [cause(str(each['effect']), each.get('joint')) for each in effects]
-    more = f' and {len(names) - most} more' if len(names) > most else ''
-    return ', '.join(names[:most]) + more
 
 
 def _changed(changes: Sequence[Mapping[str, Any]]) -> Html | None:
@@ -182,19 +170,8 @@ def _number(value: float | None) -> float:
 
 def _diagnoses(entries: Sequence[Entry]) -> Html:
     """Return the newest diagnoses as a table."""
-    rows = [
-        (
-            str(entry.at.date()),
-            entry.status,
-            '' if entry.confidence is None else odds(entry.confidence),
-            millimetres(entry.gap_m),
-            millimetres(entry.unexplained_m),
-            causes_of(entry.effects),
-        )
-        for entry in entries[: -ROWS - 1 : -1]
-    ]
-    heads = ('recorded', 'verdict', 'sure', 'gap', 'left', 'causes')
-    return section('Last diagnoses', table(heads, rows), id_='diagnoses')
+    rows = [row(entry, CAUSES) for entry in entries[: -ROWS - 1 : -1]]
+    return section('Last diagnoses', table(HEADS, rows), id_='diagnoses')
 
 
 def troubles_section(

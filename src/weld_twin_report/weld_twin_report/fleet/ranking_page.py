@@ -11,8 +11,9 @@ from weld_twin_nodes.wording.quantities import counted, millimetres
 
 from ..history.database import Database
 from ..history.runs import Run, Runs
+from ..history.words import causes_of
 from ..report.html import Child, Figure, Html, document, figures, section, table, tag
-from .cell_page import STYLE, causes_of, troubles_section
+from .cell_page import STYLE, troubles_section
 
 ROWS = 500
 """Cells listed; more are counted."""

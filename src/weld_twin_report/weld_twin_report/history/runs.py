@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from weld_twin_core.errors import DataError
 
-from .changed_words import as_dict
 from .database import Damaged, Database, Refused
 from .entry import Entry
 from .passing import Unavailable
 from .tracking import changed, observations
+from .words import as_dict
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection

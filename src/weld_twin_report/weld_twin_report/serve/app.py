@@ -8,7 +8,7 @@ import asyncio
 import json
 import shutil
 from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,10 +23,10 @@ from starlette.requests import ClientDisconnect
 
 from weld_twin_core.errors import DataError, TwinError
 
-from ..fleet.cell_page import cell_page, damaged_page
+from ..fleet.cell_page import page_of
 from ..fleet.ranking_page import ranking_page
 from ..history import Unavailable
-from ..history.database import Damaged, Database
+from ..history.database import Database
 from ..report.html import Html
 from . import pages
 from .access import Access, be, be_nobody
@@ -344,14 +344,8 @@ def _written(job: Job, result: Path) -> list[str]:
 
 def _cells(url: str, place: str, cell: str, ways: Html) -> Response:
     """Return the page of all cells of a database, or of one."""
-    database = Database(url, make=False)
-    try:
+    with closing(Database(url, make=False)) as database:
         if cell:
-            try:
-                return HTMLResponse(cell_page(database, cell, place, ways))
-            except Damaged as error:
-                return HTMLResponse(damaged_page(cell, str(error), place, ways))
+            return HTMLResponse(page_of(database, cell, place, ways))
         page = ranking_page(database, lambda name: f'{place}/{quote(name, safe="")}', ways)
-        return HTMLResponse(page)
-    finally:
-        database.close()
+    return HTMLResponse(page)

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import os
 
-from weld_twin_nodes.cli.options import add_output, output
+from weld_twin_nodes.cli.options import folder_output, output
 from weld_twin_nodes.offline.environment import THREADS
 
 from ...study import Study, option, options, study
 
 add_arguments = options(
-    lambda parser: add_output(parser, 'where results go'),
+    folder_output('where results go'),
     option('--quick', False, None, 'small sizes, to see that it runs'),
     out='',
 )

@@ -9,7 +9,7 @@ stations with efforts, with its page, as weld-twin diagnose writes it.
 
 from __future__ import annotations
 
-from weld_twin_nodes.cli.options import add_output, add_robot
+from weld_twin_nodes.cli.options import ROBOT, folder_output
 
 from ...study import REQUIRED, Study, option, options, study
 
@@ -18,9 +18,9 @@ PAGE = 'efforts.md'
 
 add_arguments = options(
     option('table', REQUIRED, 'TABLE', 'stations with measured poses and efforts'),
-    add_robot,
+    ROBOT,
     option('--folds', 5, 'N', 'stretches (default: 5)'),
-    lambda parser: add_output(parser, 'where table and page go'),
+    folder_output('where table and page go'),
     out='',
 )
 

@@ -11,38 +11,34 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..options import add_file_output, output_file
-from ..parsing import Adder
+from weld_twin_core.errors import DataError
+
+from ..options import file_output, output_file
 
 EXAMPLE = 'weld-twin detect images --board board.yaml --joints joints.csv --out pixels.csv'
 SUFFIXES = ('.png', '.jpg', '.jpeg', '.tif', '.tiff', '.bmp', '.pgm')
 """Images of a folder that are looked at."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add = Adder(parser)
-    add('images', 'IMAGE', 'images, or a folder of them', nargs='+')
-    text = (
-        'charuco, chessboard or tags: kind, squares, their side, and markers, as docs/cameras.md has '
-        'it'
-    )
-    add('--board', 'FILE.yaml', text, required=True)
-    add('--camera', 'NAME', 'what the table calls the camera', default='camera')
-    add('--joints', 'FILE.csv', 'joint angles of every image')
-    add_file_output(parser, 'table to write', required=True)
+OPTIONS = (
+    """
+IMAGE ...                images, or a folder of them
+--board FILE.yaml, required  charuco, chessboard or tags: kind, squares, their side, and markers, as
+                         docs/cameras.md has it
+--camera NAME            what the table calls the camera [default: camera]
+--joints FILE.csv        joint angles of every image
+""",
+    file_output('table to write'),
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the table, and say in how many images the board was found."""
-    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.files.csv_text import csv_text
     from weld_twin_msgs_py.tables.camera_files import read_board
 
     from ...offline.board_detection import detector
 
     find = detector(read_board(args.board))
-    paths = _paths(args.images)
+    paths = _paths(args.image)
     header, beside = _joints(args.joints, paths)
     rows, result = list[tuple[str, ...]](), 0
     for path, own in zip(paths, beside, strict=True):
@@ -64,8 +60,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _paths(given: list[str]) -> list[Path]:
     """Return the images, those of folders by name."""
-    from weld_twin_core.errors import DataError
-
     out = list[Path]()
     for text in given:
         path = Path(text)
@@ -80,11 +74,10 @@ def _paths(given: list[str]) -> list[Path]:
     return out
 
 
-def _joints(file: str | None, paths: list[Path]) -> tuple[list[str], list[list[str]]]:
+def _joints(file: str, paths: list[Path]) -> tuple[list[str], list[list[str]]]:
     """Return the columns beside the pixels, and their cells for every image."""
-    if file is None:
+    if not file:
         return [], [[] for _ in paths]
-    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.tables.cells import read_cells
 
     cells = read_cells(file, None, None)

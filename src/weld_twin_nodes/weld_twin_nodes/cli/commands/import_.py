@@ -13,9 +13,10 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..options import add_bag_output, add_cameras, add_robot, robot_of
-from ..parsing import Adder
-from ..table_options import add_table_options, table_of
+from weld_twin_core.errors import ModelError
+
+from ..options import BAG_OUTPUT, CAMERAS, ROBOT, robot_of
+from ..table_options import TABLE, table_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -23,31 +24,29 @@ if TYPE_CHECKING:
     from weld_twin_core.recording import Recording
 
 EXAMPLE = 'weld-twin import examples/files/measurements.csv --robot ur5 --out my_cell'
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add = Adder(parser)
-    add('file', 'FILE.csv', 'table of text')
-    add_robot(parser)
-    add_bag_output(parser)
-    text = 'FILE.csv has joint angles and what was touched; this file describes it'
-    add('--contacts', 'ARTEFACT.yaml', text)
-    add('--table', 'CSV', 'also write every deviation from the twin', rare=True)
-    add('--picture', 'PNG', 'also draw the deviations', rare=True)
-    add_cameras(parser)
-    add_table_options(parser)
+OPTIONS = (
+    'FILE.csv                 table of text',
+    ROBOT,
+    BAG_OUTPUT,
+    """
+--contacts ARTEFACT.yaml  FILE.csv has joint angles and what was touched; this file describes it
+rare:
+--table CSV              also write every deviation from the twin
+--picture PNG            also draw the deviations
+""",
+    CAMERAS,
+    TABLE,
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the bag, say how the table was read and how far the nominal twin is off."""
-    from weld_twin_core.errors import ModelError
     from weld_twin_core.metrics.deviation import deviation_metrics
     from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.bags import write_recording
 
     robot = robot_of(args)
-    if args.contacts is not None and (args.table or args.picture):
+    if args.contacts and (args.table or args.picture):
         raise ModelError('--table and --picture need measured positions; contacts have none')
     recording, said = table_of(args, robot, args.file)
     if recording.contacts is not None:

@@ -12,18 +12,19 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from weld_twin_core.errors import DataError
+
 from ..options import (
+    BAG_OUTPUT,
+    OF_TOPICS,
+    ROBOT,
     TOPICS,
-    add_bag_output,
-    add_robot,
-    add_topics,
     refuse,
     robot_of,
     say_doubts,
     topics_of,
     twin_of,
 )
-from ..parsing import Adder
 
 EXAMPLE = (
     'weld-twin simulate --robot ur5 --effects bags/elbow_play.yaml --path spline --out my_bag'
@@ -37,59 +38,47 @@ SEAM = {
     'start_stamp': 1_000_000_000,
 }
 """What is simulated of a seam unless told; a stamp [ns] of 0 would mean unset."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add = Adder(parser)
-    add('bag', 'BAG', 'recording with joint states; left out, a seam is simulated', nargs='?')
-    add_robot(parser)
-    text = 'effects that the twin knows: diagnosis.json, or an effects file'
-    add('--model', 'FILE', text, default='')
-    add_bag_output(parser)
-    _add_seam(parser)
-    add = Adder(parser, 'of a recording')
-    text = 'recording of the diagnosis whose set-up is meant, if the set-up moved between them'
-    add('--setup', 'N', text, type=int, rare=True)
-    text = 'of the arm, where the bag has none or another is meant'
-    add('--temperature', 'DEGC', text, type=float)
-    add('--table', 'FILE.csv', 'also write the poses as a table, with standard deviations')
-    add_topics(parser)
-
-
-def _add_seam(parser: argparse.ArgumentParser) -> None:
-    add = Adder(parser, 'of a seam')
-    add('--effects', 'E.yaml', 'effects to inject', default='')
-    text = 'path file, or line, arc, circle, polyline, spline, weave (default: line)'
-    add('--path', 'P', text)
-    text = 'time law: constant, trapezoid, s-curve, smooth, aggressive (default: smooth)'
-    add('--profile', 'LAW', text)
-    text = 'travel speed (default: as fast as profile and joints allow)'
-    add('--speed', 'M/S', text, type=float)
-    add('--rate', 'HZ', 'samples a second (default: 125)', type=float)
-    add('--seed', 'N', 'seed of the measurement noise (default: 0)', type=int)
-    text = 'stamp of the first sample (default: 1 s)'
-    add('--start-stamp', 'NS', text, type=int, rare=True)
-    text = 'take values that no machine comes near, for a study of extremes'
-    add('--allow-implausible', text, rare=True)
+OPTIONS = (
+    '[BAG]                    recording with joint states; left out, a seam is simulated',
+    ROBOT,
+    '--model FILE             effects that the twin knows: diagnosis.json, or an effects file',
+    BAG_OUTPUT,
+    """
+of a seam:
+--effects E.yaml         effects to inject
+--path P                 path file, or line, arc, circle, polyline, spline, weave (default: line)
+--profile LAW            time law: constant, trapezoid, s-curve, smooth, aggressive (default: smooth)
+--speed M/S              travel speed (default: as fast as profile and joints allow)
+--rate HZ                samples a second (default: 125)
+--seed N                 seed of the measurement noise (default: 0)
+rare:
+--start-stamp NANOS      stamp of the first sample (default: 1 s)
+--allow-implausible      take values that no machine comes near, for a study of extremes
+of a recording:
+--temperature DEGC       of the arm, where the bag has none or another is meant
+--table FILE.csv         also write the poses as a table, with standard deviations
+rare:
+--setup N                recording of the diagnosis whose set-up is meant, if the set-up moved between
+                         them
+""",
+    TOPICS,
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the bag of a seam, or of a recording."""
-    if args.bag is not None:
+    if args.bag:
         refuse(args, (*SEAM, 'effects', 'allow_implausible'), 'is of a seam; leave it or BAG out')
         return _predict(args)
-    refuse(args, ('setup', 'temperature', 'table', *TOPICS), 'is of a recording; give a BAG')
+    refuse(args, ('setup', 'temperature', 'table', *OF_TOPICS), 'is of a recording; give a BAG')
     for name, usual in SEAM.items():
-        if getattr(args, name) is None:
+        if getattr(args, name) in (None, ''):
             setattr(args, name, usual)
     return _simulate(args)
 
 
 def _simulate(args: argparse.Namespace) -> int:
     """Write the bag of a seam and print the deviation."""
-    from weld_twin_core.errors import DataError
-
     from ...offline.seam_motion import plan_motion, stamps
     from ...offline.simulated_bag import write_simulation
     from ...offline.simulation import Simulation
@@ -118,7 +107,6 @@ def _simulate(args: argparse.Namespace) -> int:
 
 def _predict(args: argparse.Namespace) -> int:
     """Write the bag; say how far measured and twin are apart where something was measured."""
-    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.bags import read_recording
 
     from ...offline.prediction import on_one_clock, predictor, told_sureness, write_prediction

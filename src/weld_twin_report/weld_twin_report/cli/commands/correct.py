@@ -15,20 +15,21 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.options import (
+    OF_TOPICS,
+    ROBOT,
+    STORAGE,
     TOPICS,
-    add_output,
-    add_robot,
-    add_storage,
-    add_topics,
+    folder_output,
+    inputs_of,
     output,
     refuse,
     robot_of,
     say_doubts,
     topics_of,
 )
-from weld_twin_nodes.cli.parsing import Adder
-from weld_twin_nodes.cli.program_options import add_program_options, context_of, quantity, start_of
+from weld_twin_nodes.cli.program_options import PROGRAM, context_of, quantity, start_of
 
 if TYPE_CHECKING:
     from weld_twin_msgs_py.programs import Context, Program
@@ -47,46 +48,42 @@ OF_PROGRAMS = (
 BAGS = ('.mcap', '.db3')
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add = Adder(parser)
-    text = 'program (a .dat is found beside it), or a bag with the nominal joint commands'
-    add('what', 'PROGRAM|BAG', text)
-    add_robot(parser)
-    add('--model', 'FILE', 'diagnosis.json, or an effects file')
-    add_output(parser, 'directory of results; of a bag, the bag to write')
-    add = Adder(parser, 'of a program')
-    text = 'language, where the file does not tell it'
-    add('--controller', 'L', text, default='')
-    text = 'how far a point may be moved (default: 2mm 1deg)'
-    add('--max-correction', 'LENGTH', 'ANGLE', text)
-    text = 'of the tool, such as 0.3mm: also say how probably it is kept all along the seams'
-    add('--tolerance', 'LENGTH', text)
-    text = 'of a coordinate of your instrument, for what to measure more (default: 0.03mm)'
-    add('--noise', 'LENGTH', text, rare=True)
-    text = 'joints before the first move, in degrees (mm for sliding ones)'
-    add('--start', 'A,A,...', text)
-    add('--temperature', 'DEGC', 'of the arm when the program runs', type=float)
-    text = 'which recording of the diagnosis (default: 1)'
-    add('--setup', 'N', text, type=int, rare=True)
-    add_program_options(parser)
-    add_storage(parser)
-    add_topics(parser)
+OPTIONS = (
+    'PROGRAM|BAG  program (a .dat is found beside it), or a bag with the nominal joint commands',
+    ROBOT,
+    '--model FILE             diagnosis.json, or an effects file',
+    folder_output('directory of results; of a bag, the bag to write'),
+    """
+of a program:
+--controller L           language, where the file does not tell it
+--max-correction LENGTH ANGLE  how far a point may be moved (default: 2mm 1deg)
+--tolerance LENGTH       of the tool, such as 0.3mm: also say how probably it is kept all along the
+                         seams
+--start A,A,...          joints before the first move, in degrees (mm for sliding ones)
+--temperature DEGC       of the arm when the program runs
+rare:
+--noise LENGTH           of a coordinate of your instrument, for what to measure more (default:
+                         0.03mm)
+--setup N                which recording of the diagnosis (default: 1)
+""",
+    PROGRAM,
+    STORAGE,
+    TOPICS,
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Correct a bag or a program; say what is expected."""
-    what = Path(args.what)
+    what = Path(args.program)
     if what.is_dir() or what.suffix.lower() in BAGS:
-        refuse(args, OF_PROGRAMS, f"is of a program; '{args.what}' is a bag")
+        refuse(args, OF_PROGRAMS, f"is of a program; '{args.program}' is a bag")
         return _corrected_bag(args)
-    refuse(args, TOPICS, f"is of a bag; '{args.what}' is none")
+    refuse(args, OF_TOPICS, f"is of a bag; '{args.program}' is none")
     return _corrected_program(args)
 
 
 def _corrected_bag(args: argparse.Namespace) -> int:
     """Write the commands and say what they gain by the model, and where it knows too little."""
-    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.bags import read_recording
     from weld_twin_nodes.offline.compensating import compensated, told_trust, write_compensated
 
@@ -94,7 +91,7 @@ def _corrected_bag(args: argparse.Namespace) -> int:
         raise DataError('say with --model by which effects the commands are corrected')
     robot = robot_of(args)
     robot.refuse_positioner('a compensated motion')
-    recording = read_recording(args.what, robot, topics_of(args))
+    recording = read_recording(args.program, robot, topics_of(args))
     made = compensated(robot, args.model, recording)
     say_doubts(made.model.twin, args.model)
     if made.told:
@@ -125,9 +122,9 @@ def _corrected_program(args: argparse.Namespace) -> int:
     from weld_twin_msgs_py.programs.source import read_source
 
     robot = robot_of(args)
-    language = language_of(read_source(args.what), args.what, args.controller)
+    language = language_of(read_source(args.program), args.program, args.controller)
     context = context_of(args, robot, language)
-    program = read_program(args.what, context, language)
+    program = read_program(args.program, context, language)
     if args.model:
         return _by_model(args, context, program)
     with output(args, RESULT) as place:
@@ -141,7 +138,6 @@ def _corrected_program(args: argparse.Namespace) -> int:
 def _by_model(args: argparse.Namespace, context: Context, program: Program) -> int:
     from weld_twin_core.twin.program_correction import Caps
     from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
-    from weld_twin_msgs_py.files.input_files import hashed
     from weld_twin_msgs_py.files.whole_files import write_text
     from weld_twin_nodes.offline.correcting import (
         corrected_program,
@@ -167,7 +163,7 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
     entry['notes'] += not_told(content)
     if args.tolerance:
         entry['tolerance'] = tolerance_entry(made, model, *_allowed(args))
-    inputs = [hashed('program', args.what), hashed('model', args.model)]
+    inputs = inputs_of(program=args.program, model=args.model)
     entry['inputs'] = [item.as_dict() for item in inputs]
     with output(args, RESULT) as place:
         _write_texts(place, program, made.texts)

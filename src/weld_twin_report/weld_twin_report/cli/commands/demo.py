@@ -6,23 +6,20 @@ from __future__ import annotations
 
 import argparse
 
-from weld_twin_nodes.cli.options import add_output
-from weld_twin_nodes.cli.parsing import Adder
+from weld_twin_core.errors import TwinError
+from weld_twin_nodes.cli.options import folder_output
 
 EXAMPLE = 'weld-twin demo --out out'
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add_output(parser, 'directory for the results (default: out)', default='out')
-    text = 'weld the seam again through the compensator, and show both beside each other'
-    Adder(parser)('--closed-loop', text)
+OPTIONS = (
+    folder_output('directory for the results', default='out'),
+    '--closed-loop  weld the seam again through the compensator, and show both beside each other',
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo."""
-    from weld_twin_core.errors import TwinError
-
     try:
         import rclpy  # noqa: F401
     except ImportError:

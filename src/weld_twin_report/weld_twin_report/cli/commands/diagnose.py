@@ -19,18 +19,20 @@ from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from weld_twin_core.errors import DataError, ModelError
 from weld_twin_nodes.cli.options import (
-    add_output,
-    add_robot,
-    add_topics,
+    ALIGN,
+    ROBOT,
+    TOPICS,
+    folder_output,
     given_urdf,
+    inputs_of,
     output,
     robot_of,
     topics_of,
     twin_of,
 )
-from weld_twin_nodes.cli.parsing import Adder
-from weld_twin_nodes.cli.table_options import add_table_options, table_of
+from weld_twin_nodes.cli.table_options import RARE_TABLE, table_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -38,7 +40,6 @@ if TYPE_CHECKING:
     from weld_twin_core.diagnosis import Diagnosis
     from weld_twin_core.diagnosis.advice import Limits
     from weld_twin_core.recording import Recording
-    from weld_twin_msgs_py.files.input_files import InputFile
     from weld_twin_nodes.offline.set_up_changes import SetUpChange
 
     from ...report.diagnosis_page import Sheet
@@ -58,79 +59,51 @@ JOINT_STATES = 150_000
 """The same; twenty minutes at 125 Hz."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add = Adder(parser)
-    add('bags', 'BAG', 'bags or tables of one robot', nargs='+')
-    add_robot(parser)
-    add_output(parser, 'directory for the results')
-    _add_setup(parser)
-    _add_causes(parser)
-    _add_sheet(parser)
-    _add_next(parser)
-    add_topics(parser)
-    add_table_options(parser, rare=True)
-
-
-def _add_setup(parser: argparse.ArgumentParser) -> None:
-    add = Adder(parser, 'how it was measured')
-    text = 'a recording that is not fitted; the shrink is judged on it; may be given again'
-    add('--holdout', 'BAG', text, many=True)
-    text = 'frames that are not known, and are fitted: base, tool, or base,tool'
-    add('--align', 'FRAMES', text, default='')
-    text = (
-        'errors that may differ between the recordings, such as joint_offset,tool_pose,base_pose'
-    )
-    add('--may-change', 'NAMES', text, default='')
-    text = 'what was changed in the cell for one of the bags: load=KG hung from the tool point '
-    text += (
-        '(load=KG,X,Y,Z: there in the tool frame [m]; below 0: taken off), another tool, or the '
-    )
-    text += 'instrument moved; may be given again'
-    add('--changed', 'BAG', 'WHAT', text, many=True, rare=True)
-    text = 'what measured: at960, at930, at901, at500, gts3800, or its largest '
-    text += 'permissible error in mm, such as 0.015+0.006/m; @3 behind it: 3 m away'
-    add('--instrument', 'NAME', text, rare=True)
-    text = 'describes what the contacts of the bags touched, where they were not imported with it'
-    add('--contacts', 'ARTEFACT.yaml', text, rare=True)
-    text = 'if data or set-up are wrong and one correction explains it, make it and go on'
-    add('--apply', text)
-
-
-def _add_causes(parser: argparse.ArgumentParser) -> None:
-    add = Adder(parser, 'what is known of the causes')
-    text = 'effects file or diagnosis.json; the twin has these effects from the start'
-    add('--effects-known', 'FILE', text, default='')
-    text = 'effects that cannot be the cause'
-    add('--exclude-effect', 'NAME', text, action='extend', nargs='+', default=[])
-
-
-def _add_sheet(parser: argparse.ArgumentParser) -> None:
-    add = Adder(parser, 'what the page shows')
-    text = 'largest deviation allowed; the page says by ISO 14253-1 whether the robot passes'
-    add('--tolerance', 'MM', text, type=float)
-    text = 'standard uncertainty of a measured position, from the certificate of the instrument'
-    add('--uncertainty', 'MM', text, type=float, rare=True)
-    text = 'what joints are called: a prefix (A1, A2, ...), or a YAML file of lines "joint: name"'
-    add('--joint-names', 'A|J|FILE', text, default='', rare=True)
-    text = 'say how sure the corrected robot is there: a program, a bag, or a box X,Y,Z:X,Y,Z (corners '
-    text += 'in the base frame, mm)'
-    add('--region', 'R', text, rare=True)
-    text = 'whose controller it is, if the name of the robot does not tell'
-    add('--controller', text, choices=BRANDS, rare=True)
-    add('--pdf', 'print the page to report.pdf, to sign; needs Chromium')
-
-
-def _add_next(parser: argparse.ArgumentParser) -> None:
-    add = Adder(parser, 'the next experiment', rare=True)
-    text = 'that it may take, with what has to be set up (default: 60)'
-    add('--experiment-minutes', 'MIN', text, type=float)
-    text = 'where the question is closed, but some joints did not move widely, plan one in which '
-    text += 'they do'
-    add('--confirm', text)
-    text = 'x,y,z of the lower and of the upper corner [m], in the measuring frame: the arm stays '
-    text += 'between them'
-    add('--cell-box', 'NUMBERS', text, default='')
+OPTIONS = (
+    'BAG ...                  bags or tables of one robot',
+    ROBOT,
+    folder_output('directory for the results'),
+    f"""
+how it was measured:
+--holdout BAG            a recording that is not fitted; the shrink is judged on it; may be given again
+{ALIGN}
+--may-change NAMES       errors that may differ between the recordings, such as
+                         joint_offset,tool_pose,base_pose
+--apply                  if data or set-up are wrong and one correction explains it, make it and go on
+rare:
+--changed BAG WHAT       what was changed in the cell for one of the bags: load=KG hung from the tool
+                         point (load=KG,X,Y,Z: there in the tool frame [m]; below 0: taken off),
+                         another tool, or the instrument moved; may be given again
+--instrument NAME        what measured: at960, at930, at901, at500, gts3800, or its largest permissible
+                         error in mm, such as 0.015+0.006/m; @3 behind it: 3 m away
+--contacts ARTEFACT.yaml  describes what the contacts of the bags touched, where they were not imported
+                         with it
+what is known of the causes:
+--effects-known FILE     effects file or diagnosis.json; the twin has these effects from the start
+--exclude-effect NAME ...  effects that cannot be the cause
+what the page shows:
+--tolerance MM           largest deviation allowed; the page says by ISO 14253-1 whether the robot
+                         passes
+--pdf                    print the page to report.pdf, to sign; needs Chromium
+rare:
+--uncertainty MM         standard uncertainty of a measured position, from the certificate of the
+                         instrument
+--joint-names A|J|FILE   what joints are called: a prefix (A1, A2, ...), or a YAML file of lines
+                         "joint: name"
+--region REGION          say how sure the corrected robot is there: a program, a bag, or a box
+                         X,Y,Z:X,Y,Z (corners in the base frame, mm)
+--controller {{{','.join(BRANDS)}}}  whose controller it is, if the name of the robot does not tell
+the next experiment:
+rare:
+--experiment-minutes MIN  that it may take, with what has to be set up (default: 60)
+--confirm                where the question is closed, but some joints did not move widely, plan one in
+                         which they do
+--cell-box NUMBERS       x,y,z of the lower and of the upper corner [m], in the measuring frame: the arm
+                         stays between them
+""",
+    TOPICS,
+    RARE_TABLE,
+)
 
 
 def _sheet(args: argparse.Namespace) -> Sheet:
@@ -148,8 +121,6 @@ def _sheet(args: argparse.Namespace) -> Sheet:
 
 
 def _metres(value: float | None, option: str) -> float | None:
-    from weld_twin_core.errors import ModelError
-
     if value is not None and not 0.0 < value < 1000.0:
         raise ModelError(f'{option} {value:g}: give millimetres above 0 and below 1000')
     return None if value is None else 1e-3 * value
@@ -166,7 +137,13 @@ def run(args: argparse.Namespace) -> int:
     sheet = _sheet(args)
     with output(args, RESULT) as place:
         diagnosis = _diagnosis(args)
-        write_results(place, diagnosis, _inputs(args), given_urdf(args), sheet)
+        inputs = inputs_of(
+            recording=args.bag,
+            held_out=args.holdout,
+            robot=args.robot,
+            effects_known=args.effects_known,
+        )
+        write_results(place, diagnosis, inputs, given_urdf(args), sheet)
         if args.pdf:
             print_page(place / PAGE, place / PDF)
     console = Console(highlight=False)
@@ -179,20 +156,19 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
     from weld_twin_core.diagnosis import diagnose
     from weld_twin_core.diagnosis.algebra.problem import frames_named
     from weld_twin_core.diagnosis.frames.changes import families_named
-    from weld_twin_core.errors import ModelError
     from weld_twin_nodes.offline.region import region
     from weld_twin_nodes.offline.set_up_changes import told
 
     align, excluded = frames_named(args.align, '--align'), _families(args.exclude_effect)
     changing = families_named(args.may_change, '--may-change')
-    if changing and len(args.bags) < 2:
+    if changing and len(args.bag) < 2:
         raise ModelError('--may-change compares recordings; give two or more bags of one arm')
     changes = _changes(args)
     twin = twin_of(robot_of(args), args.effects_known)
     judged = region(twin.robot, args.region)[0] if args.region else None
     with _progress() as tell:
         recordings = _read(args, twin.robot, 'base' in align, tell)
-        count = len(args.bags)
+        count = len(args.bag)
         fitted, more = told(_bounded(recordings[:count]), changes, twin.robot)
         result = diagnose(
             fitted,
@@ -219,7 +195,7 @@ def _read(
     what = instrument(args.instrument) if args.instrument else None
     topics = topics_of(args)
     out: list[Recording] = []
-    for path in (*args.bags, *args.holdout):
+    for path in (*args.bag, *args.holdout):
         tell(f'reading {path}')
         if Path(path).suffix.lower() in TABLES:
             result, _ = table_of(args, robot, path)  # what was assumed is in its notes
@@ -246,26 +222,22 @@ def _in_region(result: Diagnosis, reported: str, judged: Array) -> Diagnosis:
 
 def _changes(args: argparse.Namespace) -> dict[int, SetUpChange]:
     """Return what was changed for which bag, counted from 0."""
-    from weld_twin_core.errors import DataError
     from weld_twin_nodes.offline.set_up_changes import set_up_change
 
     out = {}
     for bag, what in args.changed:
-        if bag not in args.bags:
+        if bag not in args.bag:
             raise DataError(f"--changed: '{bag}' is none of the recordings")
-        out[args.bags.index(bag)] = set_up_change(what)
+        out[args.bag.index(bag)] = set_up_change(what)
     return out
 
 
 def _limits(args: argparse.Namespace) -> Limits:
     """Return what the next experiment may cost, and where it has to stay."""
-    from dataclasses import replace
-
     import numpy as np
 
     from weld_twin_core.diagnosis.advice import Limits
     from weld_twin_core.diagnosis.advice.postures import USUAL_MINUTES
-    from weld_twin_core.errors import DataError
 
     minutes = USUAL_MINUTES if args.experiment_minutes is None else args.experiment_minutes
     limits = Limits(minutes, confirm=args.confirm)
@@ -280,13 +252,13 @@ def _limits(args: argparse.Namespace) -> Limits:
     return replace(limits, box=np.array(numbers).reshape(2, 3))
 
 
-def _described(recording: Recording, artefact: str | None) -> Recording:
+def _described(recording: Recording, artefact: str) -> Recording:
     """Return the recording with its contacts as an artefact file describes them."""
     from weld_twin_core.contacts import Contacts
     from weld_twin_msgs_py.files.artefact_file import read_artefact
 
     contacts = recording.contacts
-    if artefact is None or contacts is None:
+    if not artefact or contacts is None:
         return recording
     reported = Contacts(read_artefact(artefact), contacts.labels, contacts.value, contacts.sigma)
     return replace(recording, contacts=reported)
@@ -312,7 +284,6 @@ def _share(own: int, total: int, most: int) -> int:
 
 def _families(names: Sequence[str]) -> tuple[str, ...]:
     from weld_twin_core.effects import REGISTRY
-    from weld_twin_core.errors import ModelError
 
     for name in names:
         if name not in REGISTRY:
@@ -321,18 +292,6 @@ def _families(names: Sequence[str]) -> tuple[str, ...]:
                 + ', '.join(sorted(REGISTRY))
             )
     return tuple(names)
-
-
-def _inputs(args: argparse.Namespace) -> list[InputFile]:
-    from weld_twin_msgs_py.files.input_files import hashed
-
-    out = [hashed('recording', path) for path in args.bags]
-    out += [hashed('held out', path) for path in args.holdout]
-    if Path(args.robot).is_file():
-        out.append(hashed('robot', args.robot))
-    if args.effects_known:
-        out.append(hashed('effects known', args.effects_known))
-    return out
 
 
 @contextmanager

@@ -17,14 +17,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from weld_twin_nodes.cli.options import add_force, add_robot, output, refuse, robot_of
-from weld_twin_nodes.cli.parsing import Adder
-from weld_twin_nodes.cli.program_options import (
-    add_program_options,
-    add_trigger,
-    check_program,
-    context_of,
-)
+from weld_twin_core.errors import DataError, TwinError
+from weld_twin_nodes.cli.options import ANY_ROBOT, FORCE, links_of, output, refuse, robot_of
+from weld_twin_nodes.cli.parsing import add_options
+from weld_twin_nodes.cli.program_options import PROGRAM, TRIGGER, check_program, context_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -46,55 +42,48 @@ PLAN = {'minutes': None, 'postures': None, 'noise': 0.03, 'seconds': 10.0, 'spre
 """What a plan is made with unless told: minutes, number, mm, s and degrees."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add = Adder(parser)
-    add('directory', 'DIR', 'the investigation', nargs='?')
-    add('bags', 'BAG', 'recordings to begin or go on with', nargs='*')
-    add_robot(parser, required=False)
-    text = f'minutes of experiments (default: {BUDGET:g})'
-    add('--budget', 'MIN', text, type=float)
-    add('--align', 'FRAMES', 'as for diagnose', default='')
-    add('--effects-known', 'FILE', 'as for diagnose', default='', rare=True)
-    add('--cell-box', 'NUMBERS', 'as for diagnose', default='', rare=True)
-    text = 'write what is to be measured as a program too, as export program does'
-    add('--controller', 'L', text, default='')
-    text = 'what was changed in the cell for the new bags, where it was not what was asked: '
-    text += 'load=KG, tool, instrument, or nothing'
-    add('--changed', 'WHAT', text)
-    add_force(parser)
-    text = 'run and record experiments in the cell that is up, until something has to be changed'
-    add('--live', text)
-    text = 'with --live: speed against real time (default: {default})'
-    add('--playback', 'X', text, type=float, default=1.0, rare=True)
-    _add_plan(parser)
-    add_trigger(parser)
-    add_program_options(parser)
-
-
-def _add_plan(parser: argparse.ArgumentParser) -> None:
-    add = Adder(parser, 'plan the first measurement')
-    add('--tolerance', 'MM', 'of the tool, such as 0.3; asks for a plan', type=float)
-    add('--minutes', 'M', 'there is time for', type=float)
-    add('--postures', 'N', 'so many, in place of as many as are needed', type=int)
-    text = 'standard deviation of a measured coordinate: about 0.03 with a tracker or a measuring '
-    text += 'arm, 0.1 with cameras, 0.1 to 0.2 with a pin (default: 0.03)'
-    add('--noise', 'MM', text, type=float)
-    text = 'that one station takes, the way to it apart (default: 10)'
-    add('--seconds', 'S', text, type=float, rare=True)
-    text = 'every joint turns so far to either side of a usual posture (default: 75)'
-    add('--spread', 'DEG', text, type=float, rare=True)
-    add('--model', 'FILE', 'diagnosis.json: plan what to measure on top of it')
-    text = 'where the tool is to be sure, with --model: a program, a bag, or a box X,Y,Z:X,Y,Z (corners '
-    text += 'in the base frame, mm); the whole reach if left out'
-    add('--region', 'R', text)
-    add('--out', 'FOLDER', 'where the plan goes, instead of DIR', rare=True)
+OPTIONS = (
+    """
+[DIR]                    the investigation
+[BAG ...]                recordings to begin or go on with
+""",
+    ANY_ROBOT,
+    """
+--budget MIN             minutes of experiments (default: 60)
+--align FRAMES           as for diagnose
+--controller L           write what is to be measured as a program too, as export program does
+--changed WHAT           what was changed in the cell for the new bags, where it was not what was
+                         asked: load=KG, tool, instrument, or nothing
+--live                   run and record experiments in the cell that is up, until something has to be
+                         changed
+rare:
+--effects-known FILE     as for diagnose
+--cell-box NUMBERS       as for diagnose
+--playback X             with --live: speed against real time [default: 1]
+""",
+    FORCE,
+    """
+plan the first measurement:
+--tolerance MM           of the tool, such as 0.3; asks for a plan
+--minutes MIN            there is time for
+--postures N             so many, in place of as many as are needed
+--noise MM               standard deviation of a measured coordinate: about 0.03 with a tracker or a
+                         measuring arm, 0.1 with cameras, 0.1 to 0.2 with a pin (default: 0.03)
+--model FILE             diagnosis.json: plan what to measure on top of it
+--region REGION          where the tool is to be sure, with --model: a program, a bag, or a box
+                         X,Y,Z:X,Y,Z (corners in the base frame, mm); the whole reach if left out
+rare:
+--seconds S              that one station takes, the way to it apart (default: 10)
+--spread DEG             every joint turns so far to either side of a usual posture (default: 75)
+--out FOLDER             where the plan goes, instead of DIR
+""",
+    TRIGGER,
+    PROGRAM,
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Plan, begin, go on, or tell where it stands."""
-    from weld_twin_core.errors import DataError
-
     if args.tolerance is not None:
         return _planned(args)
     refuse(
@@ -102,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
         (*PLAN, 'out', 'model', 'region'),
         'is of a plan; say with --tolerance what it is for',
     )
-    if args.directory is None:
+    if not args.dir:
         raise DataError('give DIR, the folder of the investigation, or plan with --tolerance')
     return _investigated(args)
 
@@ -111,17 +100,16 @@ def _planned(args: argparse.Namespace) -> int:
     """Print how many stations and how sure; write the files."""
     from math import radians
 
-    from weld_twin_core.errors import DataError
     from weld_twin_nodes.offline.measurement_plan import plan_table
 
     refuse(args, ('live', 'budget', 'changed'), 'is of an investigation, not of a plan')
-    if args.bags:
+    if args.bag:
         raise DataError('a plan comes before the first recording; leave --tolerance or BAG out')
-    if args.robot is None:
+    if not args.robot:
         raise DataError('a plan needs --robot')
     if args.controller:
         check_program(args)
-    args.out = args.out or args.directory
+    args.out = args.out or args.dir
     if args.controller and not args.out:
         raise DataError('--controller writes a program; say with --out where')
     if args.minutes is None and args.postures is None:
@@ -165,7 +153,6 @@ def _more(
     """Return the plan of what to measure on top of a diagnosis, and say how sure it is so far."""
     from weld_twin_core.diagnosis.predicting.planned import Wanted, plan_more
     from weld_twin_core.effects.setup_motion import of_the_robot
-    from weld_twin_core.errors import DataError
     from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.files.diagnosis_model import load_model
     from weld_twin_msgs_py.files.posterior_entry import read_posterior
@@ -248,28 +235,27 @@ def _program(
 
 def _investigated(args: argparse.Namespace) -> int:
     """Begin, go on, or tell where it stands."""
-    from weld_twin_core.errors import DataError
     from weld_twin_nodes.offline.investigation import STATE, read_state
 
     from ...report.investigation_page import headline
 
-    directory = Path(args.directory)
+    directory = Path(args.dir)
     begun = (directory / STATE).exists()
-    if not begun and not args.bags:
+    if not begun and not args.bag:
         raise DataError(
             f"'{directory}' is no investigation; begin one with recordings, or plan with --tolerance"
         )
-    if not args.bags and not args.live and args.budget is None:
+    if not args.bag and not args.live and args.budget is None:
         print(headline(read_state(directory)))
         return 0
     state = _continued(args, directory) if begun else _begun(args, directory)
-    if args.bags:
-        state = _round(args, directory, state, args.bags, _changes(args, state))
-        args.changed = None
+    if args.bag:
+        state = _round(args, directory, state, args.bag, _changes(args, state))
+        args.changed = ''
     elif args.budget is not None:
         state = _with_budget(args, directory, state)
     # What has to be changed by hand is done when the person calls again.
-    done = not args.bags
+    done = not args.bag
     while args.live and state['state'] == 'open' and (done or not _asked(state)['changes']):
         state = _recorded(args, directory, state)
         done = False
@@ -307,14 +293,13 @@ def _changes(args: argparse.Namespace, state: dict[str, Any]) -> str:
     """Return what was changed in the cell for the new bags."""
     from weld_twin_nodes.offline.set_up_changes import set_up_change
 
-    if args.changed is None:
+    if not args.changed:
         return str(_asked(state).get('changes') or '')
     return '' if args.changed == 'nothing' else str(set_up_change(args.changed))
 
 
 def _recorded(args: argparse.Namespace, directory: Path, state: dict[str, Any]) -> dict[str, Any]:
     """Run and record what is asked for in the cell that is up, and take it in."""
-    from weld_twin_core.errors import DataError
     from weld_twin_nodes.harness.recorded_experiment import recorded_experiment
 
     if 'robot_minutes' not in _asked(state):
@@ -328,7 +313,6 @@ def _recorded(args: argparse.Namespace, directory: Path, state: dict[str, Any]) 
 
 
 def _begun(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
-    from weld_twin_core.errors import DataError
     from weld_twin_nodes.offline.investigation import begin
     from weld_twin_nodes.offline.measurement_plan import TABLE
 
@@ -341,14 +325,13 @@ def _begun(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
         raise DataError(f'--budget must be minutes, got {budget}')
     words = [('--align', args.align), ('--effects-known', args.effects_known)]
     words += [('--cell-box', args.cell_box)]
-    words += zip(CHAIN, (args.base_link, args.tip_link, args.flange_link), strict=True)
+    words += zip(CHAIN, (link or '' for link in links_of(args)), strict=True)
     # A box may begin with a minus, and is then taken for an option unless it is joined.
     options = [f'{word}={value}' for word, value in words if value]
     return begin(args.robot, options, budget)
 
 
 def _continued(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
-    from weld_twin_core.errors import DataError
     from weld_twin_nodes.offline.investigation import read_state
 
     state = read_state(directory)
@@ -400,7 +383,6 @@ def _heard(
     state: dict[str, Any], bags: list[str], changes: str, place: Path, *, force: bool
 ) -> tuple[Mapping[str, Any], str]:
     """Diagnose all recordings, and the experiments by themselves; return what to believe."""
-    from weld_twin_core.errors import TwinError
     from weld_twin_nodes.offline.closing import weighed
     from weld_twin_nodes.offline.investigation import changed, recordings
     from weld_twin_nodes.offline.set_up_changes import FRAMES
@@ -434,7 +416,7 @@ def _diagnosed(
     from . import diagnose
 
     parser = argparse.ArgumentParser()
-    diagnose.add_arguments(parser)
+    add_options(parser, *diagnose.OPTIONS)
     remaining = max(float(state['budget_min']) - float(state['spent_min']), LEAST)
     words = [*bags, '--robot', state['robot'], '--out', str(place), *state['options']]
     words += ['--experiment-minutes', f'{remaining:g}', *(['--force'] if force else [])]
@@ -461,7 +443,6 @@ def _write_experiment(
 def _write_program(
     args: argparse.Namespace, state: dict[str, Any], made: Path, place: Path
 ) -> None:
-    from weld_twin_core.errors import TwinError
     from weld_twin_msgs_py.robots import load_robot
 
     words = dict(word.split('=', 1) for word in state['options'])

@@ -15,14 +15,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from weld_twin_nodes.cli.options import (
-    add_output,
-    add_robot,
-    add_topics,
+    ALIGN,
+    ROBOT,
+    TOPICS,
+    folder_output,
+    inputs_of,
     output,
     robot_of,
     topics_of,
 )
-from weld_twin_nodes.cli.parsing import Adder
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -40,15 +41,13 @@ FAR = 0.1
 """Accuracy [m] from which two frames are mixed up rather than an arm inaccurate."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add = Adder(parser)
-    add('bag', 'BAG', 'recording of the cell')
-    add_robot(parser)
-    text = 'frames that are not known, and are fitted: base, tool, or base,tool'
-    add('--align', 'FRAMES', text, default='')
-    add_output(parser, 'directory for the results')
-    add_topics(parser)
+OPTIONS = (
+    'BAG                      recording of the cell',
+    ROBOT,
+    ALIGN,
+    folder_output('directory for the results'),
+    TOPICS,
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -82,14 +81,11 @@ def _write(
     args: argparse.Namespace,
 ) -> None:
     from weld_twin_core import __version__
-    from weld_twin_msgs_py.files.input_files import hashed
     from weld_twin_msgs_py.files.whole_files import write_text
 
     from ...report.performance_page import performance_page
 
-    inputs = [hashed('recording', args.bag)]
-    if Path(args.robot).is_file():
-        inputs.append(hashed('robot', args.robot))
+    inputs = inputs_of(recording=args.bag, robot=args.robot)
     result = {
         'schema': SCHEMA,
         'version': __version__,

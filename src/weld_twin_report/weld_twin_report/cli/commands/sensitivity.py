@@ -16,8 +16,8 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from weld_twin_nodes.cli.options import add_output, add_robot, add_topics, robot_of, topics_of
-from weld_twin_nodes.cli.parsing import Adder
+from weld_twin_core.errors import DataError, ModelError
+from weld_twin_nodes.cli.options import ANY_ROBOT, TOPICS, folder_output, robot_of, topics_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -27,60 +27,42 @@ if TYPE_CHECKING:
     from ...sensitivity_report import Setting
 
 EXAMPLE = 'weld-twin sensitivity --robot ur5 --path spline --out study'
-_FRAME = ('X', 'Y', 'Z', 'RX', 'RY', 'RZ')
 _WORK = 'weld_twin_report.sensitivity_report.work'
 """What the processes that work need: they import it while this one gets their tasks ready."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add = Adder(parser)
-    add('bag', 'BAG', 'study the motion recorded in a bag', nargs='?')
-    add_robot(parser, required=False)
-    add_output(parser, 'directory for the results')
-    _add_question(parser)
-    _add_effort(parser)
-    add_topics(parser)
-
-
-def _add_question(parser: argparse.ArgumentParser) -> None:
-    add = Adder(parser, 'what is studied')
-    text = 'path file, or line, arc, circle, polyline, spline, weave (default: {default})'
-    add('--path', 'P', text, default='line')
-    text = 'tolerance file (default: typical sizes of joint_offset, link_length, link_twist, '
-    text += 'backlash and base_pose)'
-    add('--tolerances', 'FILE', text)
-    text = 'effects file or diagnosis.json; the twin has these effects from the start'
-    add('--effects-known', 'FILE', text, default='')
-    text = 'draw figure 6 to 14, posture or recorded, and nothing else; may be given again'
-    add('--figure', 'K', text, many=True)
-    add('--claims', 'measure the claims of the paper')
-    add = Adder(parser, 'of the seam, and of the claims', rare=True)
-    add('--claims-robots', 'R', 'robots of the claims (default: seven builds)', nargs='+')
-    text = "tool frame in the flange [m, rotation vector rad], instead of the model's"
-    add('--tool', *_FRAME, text, type=float)
-    add('--points', 'N', 'path points (default: {default})', type=int, default=200)
-    text = 'weld tolerance across the seam (default: {default})'
-    add('--across', 'M', text, type=float, default=5e-4)
-    text = 'weld tolerance of the stick-out (default: {default})'
-    add('--stickout', 'M', text, type=float, default=1e-3)
-    text = 'direction out of the work, for a recorded motion (default: against the wire)'
-    add('--normal', *_FRAME[:3], text, type=float)
-
-
-def _add_effort(parser: argparse.ArgumentParser) -> None:
-    add = Adder(parser, 'how much is run, and where', rare=True)
-    text = 'Sobol base samples, a power of two (default: {default})'
-    add('--samples', 'N', text, type=int, default=1024)
-    text = 'runs of the tolerance stack (default: {default})'
-    add('--runs', 'N', text, type=int, default=20_000)
-    text = 'trajectories of the Morris screening (default: {default})'
-    add('--trajectories', 'N', text, type=int, default=50)
-    text = 'placements tried for the advice (default: {default})'
-    add('--placements', 'N', text, type=int, default=32)
-    add('--seed', 'N', 'seed of all draws (default: {default})', type=int, default=0)
-    add('--workers', 'N', 'processes (default: one a core)', type=int, default=0)
-    add('--scheduler', 'ADDRESS', 'Dask scheduler to run on instead', default='')
+OPTIONS = (
+    '[BAG]                    study the motion recorded in a bag',
+    ANY_ROBOT,
+    folder_output('directory for the results'),
+    """
+what is studied:
+--path P                 path file, or line, arc, circle, polyline, spline, weave [default: line]
+--tolerances FILE        tolerance file (default: typical sizes of joint_offset, link_length,
+                         link_twist, backlash and base_pose)
+--effects-known FILE     effects file or diagnosis.json; the twin has these effects from the start
+--figure K               draw figure 6 to 14, posture or recorded, and nothing else; may be given again
+--claims                 measure the claims of the paper
+of the seam, and of the claims:
+rare:
+--claims-robots R ...    robots of the claims (default: seven builds)
+--tool X Y Z RX RY RZ    tool frame in the flange [m, rotation vector rad], instead of the model's
+--points N               path points [default: 200]
+--across M               weld tolerance across the seam [default: 5e-4]
+--stickout M             weld tolerance of the stick-out [default: 1e-3]
+--normal X Y Z           direction out of the work, for a recorded motion (default: against the wire)
+how much is run, and where:
+rare:
+--samples N              Sobol base samples, a power of two [default: 1024]
+--runs N                 runs of the tolerance stack [default: 20000]
+--trajectories N         trajectories of the Morris screening [default: 50]
+--placements N           placements tried for the advice [default: 32]
+--seed N                 seed of all draws [default: 0]
+--workers N              processes (default: one a core)
+--scheduler ADDRESS      Dask scheduler to run on instead
+""",
+    TOPICS,
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -101,7 +83,10 @@ def run(args: argparse.Namespace) -> int:
             print(f'{place / FIGURES / drawing.name}.svg: {drawing.caption}')
         return 0
     robots = _claims_robots(args)
-    with closing(pool_of(args.scheduler, args.workers, ahead=_WORK)) as pool, _progress() as tell:
+    with (
+        closing(pool_of(args.scheduler, args.workers or 0, ahead=_WORK)) as pool,
+        _progress() as tell,
+    ):
         from ...sensitivity_report import make_study
 
         page = make_study(
@@ -119,7 +104,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _setting(args: argparse.Namespace) -> Setting | None:
-    from weld_twin_core.errors import DataError
     from weld_twin_core.motion.paths import KINDS, default_seam
     from weld_twin_core.sensitivity import WeldTolerance
     from weld_twin_msgs_py.files.path_file import read_path
@@ -158,7 +142,6 @@ def _robot(args: argparse.Namespace) -> Robot:
 
     from weld_twin_core.arm.robot import Robot
     from weld_twin_core.arm.rotation import rotation_matrix, transform
-    from weld_twin_core.errors import DataError
 
     if args.robot:
         robot = robot_of(args)
@@ -176,7 +159,6 @@ def _robot(args: argparse.Namespace) -> Robot:
 
 
 def _tolerances(args: argparse.Namespace, robot: Robot) -> tuple[Tolerance, ...]:
-    from weld_twin_core.errors import ModelError
     from weld_twin_core.sensitivity import default_tolerances, tolerances_from_list
     from weld_twin_msgs_py.files.yaml_file import read_yaml
 

@@ -10,8 +10,11 @@ server that is started again goes on with what waits.
 from __future__ import annotations
 
 import argparse
+import secrets
+from dataclasses import replace
+from pathlib import Path
 
-from weld_twin_nodes.cli.parsing import Adder
+from weld_twin_core.errors import DataError
 
 EXAMPLE = 'weld-twin serve --dir served'
 GIGABYTE = 1_000_000_000
@@ -22,36 +25,30 @@ TOKEN = 24
 """Bytes of chance in a token."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add = Adder(parser)
-    text = 'where uploads and results lie (default: {default})'
-    add('--dir', 'DIR', text, default='weld_twin_served')
-    text = '0: any that is free (default: {default})'
-    add('--port', 'N', text, type=int, default=8765)
-    text = '0.0.0.0 lets other machines in (default: {default})'
-    add('--host', 'HOST', text, default='localhost')
-    text = 'a host name or address that browsers use for this machine; may be given again'
-    add('--name', 'NAME', text, many=True, rare=True)
-    add('--token', 'TEXT', 'what visitors need (default: drawn anew)', default='')
-    add('--db', 'URL', 'history of the plant, shown to everybody', default='')
-    add('--live', 'show the verdict of running nodes')
-    add('--behind-proxy', 'a proxy here tells in X-Forwarded-For whom it asks for', rare=True)
-    add = Adder(parser, 'limits', rare=True)
-    add('--workers', 'N', 'side by side (default: {default})', type=int, default=1)
-    add('--upload', 'GB', 'of one recording (default: {default})', type=float, default=1.0)
-    text = 'of everything that is kept (default: {default})'
-    add('--disk', 'GB', text, type=float, default=20.0)
-    add('--memory', 'GB', 'of one diagnosis (default: {default})', type=float, default=6.0)
-    add('--minutes', 'N', 'of one diagnosis (default: {default})', type=float, default=15.0)
+OPTIONS = (
+    """
+--dir DIR                where uploads and results lie [default: weld_twin_served]
+--port N                 0: any that is free [default: 8765]
+--host HOST              0.0.0.0 lets other machines in [default: localhost]
+--token TEXT             what visitors need (default: drawn anew)
+--db URL                 history of the plant, shown to everybody
+--live                   show the verdict of running nodes
+rare:
+--name NAME              a host name or address that browsers use for this machine; may be given again
+--behind-proxy           a proxy here tells in X-Forwarded-For whom it asks for
+limits:
+rare:
+--workers N              side by side [default: 1]
+--upload GB              of one recording [default: 1]
+--disk GB                of everything that is kept [default: 20]
+--memory GB              of one diagnosis [default: 6]
+--minutes MIN            of one diagnosis [default: 15]
+""",
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
-    import secrets
-    from pathlib import Path
-
-    from weld_twin_core.errors import DataError
     from weld_twin_report.guarded import Limits
     from weld_twin_report.serve import Settings
     from weld_twin_report.serve.running import serve
@@ -81,8 +78,6 @@ def run(args: argparse.Namespace) -> int:
         live=args.live,
     )
     if not settings.alone and not settings.token:
-        from dataclasses import replace
-
         settings = replace(settings, token=secrets.token_urlsafe(TOKEN))
     serve(settings, lambda address: print(f'open {address}', flush=True))
     return 0

@@ -15,8 +15,16 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from weld_twin_nodes.cli.options import add_force, add_robot, add_topics, output, topics_of
-from weld_twin_nodes.cli.parsing import Adder
+from weld_twin_core.errors import DataError, ModelError
+from weld_twin_nodes.cli.options import (
+    ANY_ROBOT,
+    FORCE,
+    TOPICS,
+    inputs_of,
+    links_of,
+    output,
+    topics_of,
+)
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -28,28 +36,27 @@ NOT_KEPT = 4
 """Exit code where less was reached than promised."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    add = Adder(parser)
-    add('bag', 'AFTER_BAG', 'recorded after the correction')
-    text = 'diagnosis.json that the correction is from'
-    add('--model', 'FILE', text, required=True)
-    text = 'folder that correct wrote, where a program was corrected'
-    add('--program', 'DIR', text)
-    add_robot(parser, required=False)
-    text = 'frames that were set up anew since the diagnosis, and are fitted: base, tool, or '
-    text += 'base,tool (default: both are as they were)'
-    add('--align', 'FRAMES', text, default='')
-    text = 'which recording of the diagnosis (default: {default})'
-    add('--setup', 'N', text, type=int, default=1, rare=True)
-    add('--out', 'DIR', 'folder for verification.json and a page')
-    add_force(parser)
-    add_topics(parser)
+OPTIONS = (
+    """
+AFTER_BAG                recorded after the correction
+--model FILE, required   diagnosis.json that the correction is from
+--program DIR            folder that correct wrote, where a program was corrected
+""",
+    ANY_ROBOT,
+    """
+--align FRAMES           frames that were set up anew since the diagnosis, and are fitted: base, tool,
+                         or base,tool (default: both are as they were)
+--out DIR                folder for verification.json and a page
+rare:
+--setup N                which recording of the diagnosis [default: 1]
+""",
+    FORCE,
+    TOPICS,
+)
 
 
 def run(args: argparse.Namespace) -> int:
     """Compare, say what was promised and what was measured, write it where asked."""
-    from weld_twin_core.errors import DataError
     from weld_twin_msgs_py.bags import read_recording
     from weld_twin_msgs_py.files.diagnosis_model import mended_source, read_diagnosis, read_model
     from weld_twin_nodes.offline.verifying import verified
@@ -62,14 +69,14 @@ def run(args: argparse.Namespace) -> int:
     if not 0 < args.setup <= len(model.bases):
         raise DataError(f'the diagnosis has {len(model.bases)} set-up(s), not {args.setup}')
     recording = read_recording(
-        args.bag, robot, topics_of(args), one_clock=False, needs_measurements=True
+        args.after_bag, robot, topics_of(args), one_clock=False, needs_measurements=True
     )
     recording, mended = mended_source(model, robot, recording, args.setup - 1)
     result = verified(
         content,
         model,
         recording,
-        correction=None if args.program is None else _correction(args.program),
+        correction=_correction(args.program) if args.program else None,
         align=args.align,
         setup=args.setup - 1,
     )
@@ -86,12 +93,11 @@ def _write(
     args: argparse.Namespace, content: dict[str, Any], epoch_ns: int, result: Verification
 ) -> None:
     """Write verification.json and the page."""
-    from weld_twin_msgs_py.files.input_files import hashed
     from weld_twin_msgs_py.files.whole_files import write_text
 
     from ...report.verification_page import verification_page
 
-    inputs = [hashed('recording', args.bag), hashed('model', args.model)]
+    inputs = inputs_of(recording=args.after_bag, model=args.model)
     entry = result.as_dict() | {
         'robot': content['model']['robot'],
         'kinematics': content['model']['kinematics'],
@@ -106,15 +112,15 @@ def _write(
 
 def _robot(args: argparse.Namespace, content: dict[str, Any]) -> Robot:
     """Return the robot that was named, else the one that the diagnosis was made with."""
-    from weld_twin_core.errors import ModelError
     from weld_twin_msgs_py.robots import load_robot
 
+    links = links_of(args)[:2]
     if args.robot:
-        return load_robot(args.robot, args.base_link, args.tip_link)
+        return load_robot(args.robot, *links)
     files = [item['path'] for item in content.get('inputs', []) if item.get('use') == 'robot']
     name = files[0] if files else str((content.get('model') or {}).get('robot'))
     try:
-        return load_robot(name, args.base_link, args.tip_link)
+        return load_robot(name, *links)
     except ModelError:
         raise ModelError(
             f'the robot of the diagnosis, {name!r}, is not to be found here; give it with --robot'
@@ -122,8 +128,6 @@ def _robot(args: argparse.Namespace, content: dict[str, Any]) -> Robot:
 
 
 def _correction(folder: str) -> dict[str, Any]:
-    from weld_twin_core.errors import DataError
-
     path = Path(folder)
     path = path / CORRECTION if path.is_dir() else path
     try:

@@ -1,24 +1,80 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What changed, as sentences and as plain data."""
+"""A history as people read it: its coordinates, its diagnoses, and what changed."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
+from weld_twin_core.effects import REGISTRY
 from weld_twin_core.history import Change, Observation, outlook, reaches
-from weld_twin_nodes.wording.quantities import uncertain
+from weld_twin_nodes.wording.quantities import display_unit, millimetres, odds, uncertain
+from weld_twin_nodes.wording.words import cause
 
-from .coordinate_words import coordinate
+from .entry import Entry
 from .tracking import DAY
 
+_TOOL = 'tool.'
 WEEK = 7.0
 """Days."""
 ALIKE = 3
 """Alternatives in a sentence; more are counted."""
+HEADS = ('recorded', 'verdict', 'sure', 'gap', 'left', 'causes')
+"""Heads of a table of diagnoses."""
+
+
+def row(entry: Entry, most: int | None = None) -> tuple[str, ...]:
+    """Return a row of such a table, with so many causes at most."""
+    return (
+        str(entry.at.date()),
+        entry.status,
+        '' if entry.confidence is None else odds(entry.confidence),
+        millimetres(entry.gap_m),
+        millimetres(entry.unexplained_m),
+        causes_of(entry.effects, most),
+    )
+
+
+def causes_of(effects: Sequence[Mapping[str, Any]], most: int | None = None) -> str:
+    """Return what was named, the strongest first; of many only some are named, the rest counted."""
+    names = [cause(str(each['effect']), each.get('joint')) for each in effects]
+    shown = names[:most]
+    more = f' and {len(names) - len(shown)} more' if len(names) > len(shown) else ''
+    return ', '.join(shown) + more
+
+
+class Coordinate(NamedTuple):
+    """Effect and joint of a coordinate, its name, and factor and unit in which people read it."""
+
+    effect: str
+    joint: str | None
+    words: str
+    factor: float
+    unit: str
+
+
+def coordinate(name: str) -> Coordinate:
+    """Return what a coordinate is, such as 'tool.x' or 'joint_offset elbow_joint 0'."""
+    if name.startswith(_TOOL):
+        axis = name.removeprefix(_TOOL)
+        factor, unit = display_unit(axis, 'rad' if axis.startswith('turn') else 'm')
+        words = f'turn of the tool about {axis[-1]}' if 'turn' in axis else f'tool along {axis}'
+        return Coordinate('tool_pose', None, words, factor, unit)
+    effect, *joint, number = name.split(' ')
+    kind = REGISTRY.get(effect)
+    reported = [p for p in kind.parameters if p.differentiable] if kind else []
+    factor, unit = 1.0, ''
+    if reported:
+        parameter = reported[min(int(number), len(reported) - 1)]
+        factor, unit = display_unit(parameter.name, parameter.unit)
+    where, _, source = ' '.join(joint).partition('<')
+    one = len(reported) == 1 and number == '0'
+    words = cause(effect, where or None) + ('' if one else f', part {int(number) + 1}')
+    words += f' from {source}' if source else ''
+    return Coordinate(effect, where or None, words, factor, unit)
 
 
 def date(day: float) -> str:
@@ -59,15 +115,8 @@ def forecast(
     """
     Return when a trend reaches its limit; None where there is no trend or no limit.
 
-    Parameters
-    ----------
-    seen : sequence of Observation
-        All diagnoses of the cell.
-    result : sequence of Change
-        All that changed.
-    limits : mapping of str to float
-        Largest value allowed of an effect, SI units.
-
+    ``seen`` are all diagnoses of the cell, ``result`` is all that changed, ``limits`` are the largest
+    values allowed of effects, in SI units.
     """
     what = coordinate(change.name)
     if change.kind != 'trend' or what.effect not in limits:

@@ -10,68 +10,65 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from struct import Struct, pack
+from typing import ClassVar
 
 from weld_twin_core.arrays import Array
 
 from .from_messages import NANOSECONDS
 from .to_messages import quaternion
 
+_BEGIN = b'\0\1\0\0'
+"""How plain CDR with the low byte first begins."""
 
-class PoseEncoder:
-    """Serialises PoseStamped messages of one frame."""
+
+class _Stamped:
+    """Serialises messages of one frame that are a header and so many doubles."""
+
+    numbers: ClassVar[int]
 
     def __init__(self, frame_id: str) -> None:
-        self._head, self._body = _stamped(frame_id, '7d')
+        frame = frame_id.encode() + b'\0'
+        head = pack(f'<I{len(frame)}s', len(frame), frame)
+        self._head = head + bytes(-len(head) % 8)  # the stamp before it takes eight
+        self._pack = Struct(f'<4siI{len(self._head)}s{self.numbers}d').pack
+
+
+class PoseEncoder(_Stamped):
+    """Serialises PoseStamped messages."""
+
+    numbers = 7
 
     def __call__(self, ns: int, position: Array, rotation: Array) -> bytes:
         """Return the message of a stamp [ns], a position (3,) [m] and a rotation (3, 3)."""
-        return self._body.pack(
-            b'\0\1\0\0',
-            *divmod(ns, NANOSECONDS),
-            self._head,
-            *position.tolist(),
-            *quaternion(rotation),
-        )
+        when, pose = divmod(ns, NANOSECONDS), (*position.tolist(), *quaternion(rotation))
+        return self._pack(_BEGIN, *when, self._head, *pose)
 
 
-class PoseCovarianceEncoder:
-    """Serialises PoseWithCovarianceStamped messages of one frame."""
+class PoseCovarianceEncoder(_Stamped):
+    """Serialises PoseWithCovarianceStamped messages."""
 
-    def __init__(self, frame_id: str) -> None:
-        self._head, self._body = _stamped(frame_id, '43d')
+    numbers = 43
 
     def __call__(self, ns: int, position: Array, rotation: Array, covariance: Array) -> bytes:
         """Return the message of a stamp [ns], (3,) [m], (3, 3) and (6, 6) [m^2, rad^2]."""
-        return self._body.pack(
-            b'\0\1\0\0',
-            *divmod(ns, NANOSECONDS),
-            self._head,
-            *position.tolist(),
-            *quaternion(rotation),
-            *covariance.ravel().tolist(),
-        )
+        when, pose = divmod(ns, NANOSECONDS), (*position.tolist(), *quaternion(rotation))
+        return self._pack(_BEGIN, *when, self._head, *pose, *covariance.ravel().tolist())
 
 
-class Vector3Encoder:
-    """Serialises Vector3Stamped messages of one frame."""
+class Vector3Encoder(_Stamped):
+    """Serialises Vector3Stamped messages."""
 
-    def __init__(self, frame_id: str) -> None:
-        self._head, self._body = _stamped(frame_id, '3d')
+    numbers = 3
 
     def __call__(self, ns: int, vector: Array) -> bytes:
-        """Return the message of a stamp [ns] and a vector (3,)."""
-        return self._body.pack(b'\0\1\0\0', *divmod(ns, NANOSECONDS), self._head, *vector.tolist())
+        """Return the message of a stamp [ns] and a vector, shape (numbers,)."""
+        return self._pack(_BEGIN, *divmod(ns, NANOSECONDS), self._head, *vector.tolist())
 
 
-class TwistEncoder:
-    """Serialises TwistStamped messages of one frame."""
+class TwistEncoder(Vector3Encoder):
+    """Serialises TwistStamped messages; the vector is a way and a turn."""
 
-    def __init__(self, frame_id: str) -> None:
-        self._head, self._body = _stamped(frame_id, '6d')
-
-    def __call__(self, ns: int, twist: Array) -> bytes:
-        """Return the message of a stamp [ns] and a way and turn (6,), linear part first."""
-        return self._body.pack(b'\0\1\0\0', *divmod(ns, NANOSECONDS), self._head, *twist.tolist())
+    numbers = 6
 
 
 class JointStateEncoder:
@@ -93,15 +90,7 @@ class JointStateEncoder:
 
     def __call__(self, ns: int, q: Array, qd: Array | None = None) -> bytes:
         """Return the message of a stamp [ns], positions (n,) and velocities (n,) if known."""
-        start = (b'\0\1\0\0', *divmod(ns, NANOSECONDS), self._head, *q.tolist())
+        start = (_BEGIN, *divmod(ns, NANOSECONDS), self._head, *q.tolist())
         if qd is None:
             return self._alone.pack(*start, 0, 0)
         return self._both.pack(*start, self._count, *qd.tolist(), 0)
-
-
-def _stamped(frame_id: str, values: str) -> tuple[bytes, Struct]:
-    """Return the serialised frame, padded for doubles behind it, and the whole message."""
-    frame = frame_id.encode() + b'\0'
-    head = pack(f'<I{len(frame)}s', len(frame), frame)
-    head += bytes(-len(head) % 8)  # the stamp before it takes eight
-    return head, Struct(f'<4siI{len(head)}s{values}')

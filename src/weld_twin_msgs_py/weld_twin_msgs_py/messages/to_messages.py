@@ -43,6 +43,9 @@ class Messages:
     def _make(self, kind: str, **fields: Any) -> Any:
         return self._lookup(kind)(**fields)
 
+    def _stamped(self, kind: str, ns: int, frame_id: str, **fields: Any) -> Any:
+        return self._make(kind, header=self.header(ns, frame_id), **fields)
+
     def time(self, ns: int) -> Any:
         """Return a builtin_interfaces/Time."""
         sec, nanosec = divmod(int(ns), NANOSECONDS)
@@ -63,9 +66,10 @@ class Messages:
     ) -> Any:
         """Return a JointState from positions, velocities, efforts, (n,) each [rad, rad/s, N m]."""
         empty = np.zeros(0)
-        return self._make(
+        return self._stamped(
             'sensor_msgs/msg/JointState',
-            header=self.header(ns, frame_id),
+            ns,
+            frame_id,
             name=list(names),
             position=self._numbers(np.asarray(q, dtype=np.float64)),
             velocity=self._numbers(empty if qd is None else np.asarray(qd, dtype=np.float64)),
@@ -78,10 +82,8 @@ class Messages:
 
     def pose(self, ns: int, position: Array, rotation: Array, frame_id: str = 'base') -> Any:
         """Return a PoseStamped from position (3,) [m] and rotation (3, 3)."""
-        return self._make(
-            'geometry_msgs/msg/PoseStamped',
-            header=self.header(ns, frame_id),
-            pose=self._pose(position, rotation),
+        return self._stamped(
+            'geometry_msgs/msg/PoseStamped', ns, frame_id, pose=self._pose(position, rotation)
         )
 
     def pose_with_covariance(
@@ -105,10 +107,8 @@ class Messages:
             pose=self._pose(position, rotation),
             covariance=np.array(covariance, dtype=np.float64).reshape(36),
         )
-        return self._make(
-            'geometry_msgs/msg/PoseWithCovarianceStamped',
-            header=self.header(ns, frame_id),
-            pose=inner,
+        return self._stamped(
+            'geometry_msgs/msg/PoseWithCovarianceStamped', ns, frame_id, pose=inner
         )
 
     def _pose(self, position: Array, rotation: Array) -> Any:
@@ -120,18 +120,14 @@ class Messages:
 
     def point(self, ns: int, position: Array, frame_id: str = 'base') -> Any:
         """Return a PointStamped, (3,) [m]."""
-        return self._make(
-            'geometry_msgs/msg/PointStamped',
-            header=self.header(ns, frame_id),
-            point=self._xyz('Point', position),
+        return self._stamped(
+            'geometry_msgs/msg/PointStamped', ns, frame_id, point=self._xyz('Point', position)
         )
 
     def vector3(self, ns: int, vector: Array, frame_id: str = 'base') -> Any:
         """Return a Vector3Stamped, (3,)."""
-        return self._make(
-            'geometry_msgs/msg/Vector3Stamped',
-            header=self.header(ns, frame_id),
-            vector=self._xyz('Vector3', vector),
+        return self._stamped(
+            'geometry_msgs/msg/Vector3Stamped', ns, frame_id, vector=self._xyz('Vector3', vector)
         )
 
     def wrench(self, ns: int, wrench: Array, frame_id: str = 'tool') -> Any:
@@ -141,24 +137,20 @@ class Messages:
             force=self._xyz('Vector3', wrench[:3]),
             torque=self._xyz('Vector3', wrench[3:]),
         )
-        return self._make(
-            'geometry_msgs/msg/WrenchStamped', header=self.header(ns, frame_id), wrench=inner
-        )
+        return self._stamped('geometry_msgs/msg/WrenchStamped', ns, frame_id, wrench=inner)
 
     def temperature(self, ns: int, celsius: float, frame_id: str = '') -> Any:
         """Return a Temperature [degC]; its variance is left unknown (zero)."""
-        return self._make(
-            'sensor_msgs/msg/Temperature',
-            header=self.header(ns, frame_id),
-            temperature=float(celsius),
-            variance=0.0,
+        return self._stamped(
+            'sensor_msgs/msg/Temperature', ns, frame_id, temperature=float(celsius), variance=0.0
         )
 
     def contact(self, ns: int, label: str, value: float = 0.0, sigma: float = 0.0) -> Any:
         """Return the Range of a contact: what is touched, a length and its deviation [m]."""
-        return self._make(
+        return self._stamped(
             'sensor_msgs/msg/Range',
-            header=self.header(ns, label),
+            ns,
+            label,
             radiation_type=0,
             field_of_view=0.0,
             min_range=0.0,
@@ -176,9 +168,10 @@ class Messages:
             )
             for k, name in enumerate(FIELDS)
         ]
-        return self._make(
+        return self._stamped(
             'sensor_msgs/msg/PointCloud2',
-            header=self.header(ns, camera),
+            ns,
+            camera,
             height=1,
             width=len(data),
             fields=fields,
@@ -204,9 +197,10 @@ class Messages:
 
     def statuses(self, ns: int, statuses: Sequence[Status]) -> Any:
         """Return a DiagnosticArray."""
-        return self._make(
+        return self._stamped(
             'diagnostic_msgs/msg/DiagnosticArray',
-            header=self.header(ns, ''),
+            ns,
+            '',
             status=[self._status(status) for status in statuses],
         )
 
@@ -247,17 +241,14 @@ class Messages:
     def joint_trajectory(self, ns: int, names: Sequence[str], motion: JointMotion) -> Any:
         """Return a JointTrajectory of a motion; its first point is at time zero."""
         points = self.trajectory_points(motion.t - motion.t[0], motion.q, motion.velocity)
-        return self._make(
-            'trajectory_msgs/msg/JointTrajectory',
-            header=self.header(ns, ''),
-            joint_names=list(names),
-            points=points,
+        return self._stamped(
+            'trajectory_msgs/msg/JointTrajectory', ns, '', joint_names=list(names), points=points
         )
 
     def path(self, ns: int, poses: Array, frame_id: str = 'world') -> Any:
         """Return a Path through tool poses, shape (N, 4, 4)."""
         stamped = [self.pose(ns, T[:3, 3], T[:3, :3], frame_id) for T in poses]
-        return self._make('nav_msgs/msg/Path', header=self.header(ns, frame_id), poses=stamped)
+        return self._stamped('nav_msgs/msg/Path', ns, frame_id, poses=stamped)
 
     def markers(self, ns: int, markers: Sequence[Lines], frame_id: str = 'world') -> Any:
         """Return a MarkerArray; each marker replaces the one of its name."""
@@ -272,9 +263,10 @@ class Messages:
             self._make('std_msgs/msg/ColorRGBA', r=float(r), g=float(g), b=float(b), a=1.0)
             for r, g, b in lines.colors
         ]
-        return self._make(
+        return self._stamped(
             'visualization_msgs/msg/Marker',
-            header=self.header(ns, frame_id),
+            ns,
+            frame_id,
             ns=lines.name,
             id=0,
             type=kinds.LINE_STRIP if lines.strip else kinds.LINE_LIST,

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 from zlib import crc32
@@ -111,88 +111,213 @@ def _read(
     cells: Cells, robot: Robot, options: TableOptions, said: list[str]
 ) -> tuple[Table, Units]:
     columns = find_columns(cells.header, robot, options)
-    cells = _usable(cells, columns, options, said)
-    said.append('joint columns are ' + ', '.join(columns.joints))
-    raw = cells.stack(columns.joints)
-    judge = partial(_relative_misfit, cells, robot, columns, options)
-    units = joint_units(raw, robot, columns.joints, options, said, judge)
-    q = joint_angles(cells, robot, columns.joints, options, said, units)
-    position, scale = _position(cells, robot, q, columns, options, said)
-    rotation = _rotation(cells, robot, q, columns, options, said) if columns.rotation else None
-    sigma = _sigma(cells, columns, scale, said) if columns.sigma else None
-    _check(cells, robot, q, position, options, said)
-    epoch, t = _clock(cells, columns, said)
-    recording = Recording(
-        cells.path.stem,
-        JointMotion(t, q, static=True),
-        Measurements(t, position, rotation, sigma),
-        temperature=_temperature(cells, columns, t, said),
-        effort=_effort(cells, robot, columns, t, said),
-        epoch_ns=epoch,
-        notes=tuple(said),
-    )
-    return Table(recording, tuple(said)), units
+    reading = _Reading(_usable(cells, columns, options, said), robot, columns, options, said)
+    return reading.table()
 
 
-def _clock(cells: Cells, columns: Columns, said: list[str]) -> tuple[int, Array]:
-    """Return what the stamps count from [ns since 1970] and the stamps, shape (M,) [s]."""
-    t, sentence = stamps(cells, columns.time, columns.unit(columns.time), columns.date)
-    said.append(sentence)
-    if t is None:
-        return own_epoch(cells.path), np.arange(float(len(cells.rows)))
-    first = round(float(t[0]))
-    if t[-1] >= LAST_STAMP:
-        said.append(BEYOND)
-    if not 0.0 <= t[0] <= t[-1] < LAST_STAMP:
-        return own_epoch(cells.path), t - first
-    return first * 1_000_000_000, t - first
+@dataclass(frozen=True)
+class _Reading:
+    """One reading of a table; every assumption is said."""
 
+    cells: Cells
+    robot: Robot
+    columns: Columns
+    options: TableOptions
+    said: list[str]
 
-def _temperature(cells: Cells, columns: Columns, t: Array, said: list[str]) -> Signal | None:
-    name = columns.temperature
-    if name is None:
-        return None
-    values = cells.numbers(name)
-    unit = columns.unit(name) or ('K' if np.median(values) > _HOT else 'degC')
-    scale = factor(_KELVINS, unit, name, 'the temperature')
-    said.append(f'temperature is {name!r} in {unit}')
-    return Signal(t, (values - _FREEZING[unit]) * scale)
-
-
-def _effort(
-    cells: Cells, robot: Robot, columns: Columns, t: Array, said: list[str]
-) -> JointSignal | None:
-    """Return the measured efforts; what cannot be used is left out, for few ask for it."""
-    names = columns.effort
-    if not names:
-        return None
-    units = [columns.unit(name) for name in names]
-    if not {unit or 'N m' for unit in units} <= set(_TORQUES):
-        said.append(
-            f'the efforts {", ".join(names)} are in {units[0]} and left out: springs take N m'
+    def table(self) -> tuple[Table, Units]:
+        """Return what the table means, and the units of the joints whose columns name none."""
+        cells, robot, columns, said = self.cells, self.robot, self.columns, self.said
+        said.append('joint columns are ' + ', '.join(columns.joints))
+        raw = cells.stack(columns.joints)
+        judge = replace(self, said=[])._relative_misfit
+        units = joint_units(raw, robot, columns.joints, self.options, said, judge)
+        q = joint_angles(cells, robot, columns.joints, self.options, said, units)
+        position, scale = self._position(q)
+        rotation = self._rotation(q) if columns.rotation else None
+        sigma = self._sigma(scale) if columns.sigma else None
+        self._check(q, position)
+        epoch, t = self._clock()
+        recording = Recording(
+            cells.path.stem,
+            JointMotion(t, q, static=True),
+            Measurements(t, position, rotation, sigma),
+            temperature=self._temperature(t),
+            effort=self._effort(t),
+            epoch_ns=epoch,
+            notes=tuple(said),
         )
-        return None
-    values = cells.stack(names)
-    empty = np.argwhere(~np.isfinite(values))
-    if empty.size:
-        row, column = empty[0]
-        said.append(
-            f'the efforts are left out, for line {cells.lines[row]} has none in {names[column]!r}'
+        return Table(recording, tuple(said)), units
+
+    def _clock(self) -> tuple[int, Array]:
+        """Return what the stamps count from [ns since 1970] and the stamps, shape (M,) [s]."""
+        named = self.columns
+        t, sentence = stamps(self.cells, named.time, named.unit(named.time), named.date)
+        self.said.append(sentence)
+        if t is None:
+            return own_epoch(self.cells.path), np.arange(float(len(self.cells.rows)))
+        first = round(float(t[0]))
+        if t[-1] >= LAST_STAMP:
+            self.said.append(BEYOND)
+        if not 0.0 <= t[0] <= t[-1] < LAST_STAMP:
+            return own_epoch(self.cells.path), t - first
+        return first * 1_000_000_000, t - first
+
+    def _temperature(self, t: Array) -> Signal | None:
+        name = self.columns.temperature
+        if name is None:
+            return None
+        values = self.cells.numbers(name)
+        unit = self.columns.unit(name) or ('K' if np.median(values) > _HOT else 'degC')
+        scale = factor(_KELVINS, unit, name, 'the temperature')
+        self.said.append(f'temperature is {name!r} in {unit}')
+        return Signal(t, (values - _FREEZING[unit]) * scale)
+
+    def _effort(self, t: Array) -> JointSignal | None:
+        """Return the measured efforts; what cannot be used is left out, for few ask for it."""
+        names = self.columns.effort
+        if not names:
+            return None
+        units = [self.columns.unit(name) for name in names]
+        if not {unit or 'N m' for unit in units} <= set(_TORQUES):
+            self.said.append(
+                f'the efforts {", ".join(names)} are in {units[0]} and left out: springs take N m'
+            )
+            return None
+        values = self.cells.stack(names)
+        empty = np.argwhere(~np.isfinite(values))
+        if empty.size:
+            line, name = self.cells.lines[empty[0][0]], names[empty[0][1]]
+            self.said.append(f'the efforts are left out, for line {line} has none in {name!r}')
+            return None
+        unit = next((unit for unit in units if unit), 'N m, as the header names no unit')
+        self.said.append(
+            f'efforts are {", ".join(names)} in {unit}; --use-effort has springs take them'
         )
-        return None
-    unit = next((unit for unit in units if unit), 'N m, as the header names no unit')
-    said.append(f'efforts are {", ".join(names)} in {unit}; --use-effort has springs take them')
-    return JointSignal(t, values * [_TORQUES[unit or 'N m'] for unit in units])
+        return JointSignal(t, values * [_TORQUES[unit or 'N m'] for unit in units])
 
+    def _relative_misfit(self, q: Array) -> float:
+        """Return how far joints and positions are from belonging together, as a share of the way."""
+        position, _ = self._position(q)
+        rows = np.unique(np.linspace(0, len(q) - 1, _JUDGED).astype(int))
+        spread = float(np.linalg.norm(position[rows].std(axis=0)))
+        return float(np.median(misfit(self.robot, q[rows], position[rows]))) / max(spread, 1e-9)
 
-def _relative_misfit(
-    cells: Cells, robot: Robot, columns: Columns, options: TableOptions, q: Array
-) -> float:
-    """Return how far joints and positions are from belonging together, as a share of the way."""
-    position, _ = _position(cells, robot, q, columns, options, [])
-    rows = np.unique(np.linspace(0, len(q) - 1, _JUDGED).astype(int))
-    spread = float(np.linalg.norm(position[rows].std(axis=0)))
-    return float(np.median(misfit(robot, q[rows], position[rows]))) / max(spread, 1e-9)
+    def _position(self, q: Array) -> tuple[Array, str]:
+        """Return measured positions (M, 3) [m] and the table's unit of length."""
+        named = self.columns.position or self.columns.target
+        off = () if self.columns.position else self.columns.difference
+        sign = 1.0 if self.options.difference == 'add' else -1.0
+        units = (self.options.length_unit, *map(self.columns.unit, named + off))
+        reported = next((unit for unit in units if unit), None)
+        raw = self.cells.stack(named) + (sign * self.cells.stack(off) if off else 0.0)
+        unit, sentence = length_unit(raw, self.robot, q, reported)
+        what = 'a measured position' if self.columns.position else 'a position'
+        position = self._metres(named, unit, what)
+        if self.columns.position:
+            self.said.append('measured positions are ' + ', '.join(named))
+            if any(set(tokens(name)) & OWN for name in named):
+                self.said.append(
+                    f'{named[0]} may be what the controller computes; only an instrument measures'
+                )
+        else:
+            position = position + sign * self._metres(off, unit, what)
+            word = 'plus' if sign > 0.0 else 'minus'
+            self.said.append(
+                f'measured = target ({", ".join(named)}) {word} difference '
+                f'({", ".join(self.columns.difference)}); --difference decides'
+            )
+        if sentence:
+            self.said.append(sentence)
+        return position, unit
+
+    def _metres(self, names: tuple[str, ...], usual: str, what: str) -> Array:
+        """Return columns of lengths [m], each in its own unit where the header gives it one."""
+        scale = [
+            factor(
+                METRES, self.options.length_unit or self.columns.unit(name) or usual, name, what
+            )
+            for name in names
+        ]
+        return np.asarray(self.cells.stack(names) * scale)
+
+    def _rotation(self, q: Array) -> Array:
+        values = self.cells.stack(self.columns.rotation)
+        if values.shape[1] == 4:
+            rotation = matrix_from_quaternion(values, 'measured quaternion')
+            self.said.append('measured quaternions are ' + ', '.join(self.columns.rotation))
+            off = disagreement(rotation, self.robot, q)
+            if off > AGREES:
+                self.said.append(
+                    f'relative rotations disagree with the arm by {np.degrees(off):.3g} deg: the '
+                    'quaternion or joint columns may not be what they seem'
+                )
+            return rotation
+        own = [
+            self.options.rotation_unit or self.columns.unit(name) for name in self.columns.rotation
+        ]
+        reported = next((unit for unit in own if unit), None)
+        unit, sentence = angle_unit(values, reported, 'measured angles')
+        if sentence:
+            self.said.append(sentence)
+        angles = values * [
+            factor(RADIANS, each or unit, name, 'a measured angle')
+            for each, name in zip(own, self.columns.rotation, strict=True)
+        ]
+        convention = self.options.rotation
+        if convention is None:
+            convention, sentence = find_convention(angles, self.robot, q)
+            self.said.append(sentence)
+        return rotations(angles, convention)
+
+    def _sigma(self, unit: str) -> Array:
+        values = self.cells.stack(self.columns.sigma) * [
+            factor(METRES, self.columns.unit(name) or unit, name, 'a standard deviation')
+            for name in self.columns.sigma
+        ]
+        names = ', '.join(self.columns.sigma)
+        self.said.append(f'standard deviations are {names}, joined by mean square')
+        return np.asarray(np.sqrt((values**2).mean(axis=1)))
+
+    def _check(self, q: Array, position: Array) -> None:
+        """
+        Say how far the positions are from the nominal arm, and which rows stand out.
+
+        A table that does not fit is refused where the user said how to read it. Read by its own
+        header it stays as it is: `diagnose` finds out which mistake was made in it.
+        """
+        if len(q) < 8:
+            self.said.append('too few rows to check the positions against the arm')
+            return
+        off = misfit(self.robot, q, position)
+        typical = float(np.median(off))
+        reach = float(abs(self.robot.a).sum() + abs(self.robot.d).sum())
+        self.said.append(
+            f'with base and tool fitted, positions are {typical * 1e3:.3g} mm (median) from the '
+            'nominal arm'
+        )
+        if typical < _TOO_GOOD:
+            self.said.append(
+                'no instrument agrees so well with an arm: these positions were computed, not measured, '
+                'and a diagnosis of them will find no gap'
+            )
+        if typical > _WRONG * reach:
+            sentence = (
+                f'positions are {typical * 1e3:.3g} mm from where robot {self.robot.name!r} would be, '
+                'with base and tool fitted: wrong robot, joint columns, or units; --joint-columns, '
+                '--angle-unit or --length-unit decide'
+            )
+            if self.options.joint_columns or self.options.angle_unit or self.options.length_unit:
+                raise DataError(sentence)
+            self.said.append(f'{sentence}, and weld-twin diagnose says what is wrong')
+            return
+        far = np.flatnonzero(off > _FAR * typical)
+        if far.size:
+            worst = int(far[off[far].argmax()])
+            self.said.append(
+                f'{far.size} rows stand out, most of all line {self.cells.lines[worst]} with '
+                f'{off[worst] * 1e3:.3g} mm; they are kept, --skip-rows leaves rows out'
+            )
 
 
 def own_epoch(path: Path) -> int:
@@ -231,154 +356,4 @@ def _usable(cells: Cells, columns: Columns, options: TableOptions, said: list[st
             f"{values[keep[k], j]:.3g} is far beyond any robot's; look for slipped columns or "
             'decimal signs, or leave the row out with --skip-rows'
         )
-    return Cells(
-        cells.path,
-        cells.header,
-        [cells.rows[k] for k in keep],
-        [cells.lines[k] for k in keep],
-        cells.decimal,
-        cells.said,
-    )
-
-
-def _position(
-    cells: Cells,
-    robot: Robot,
-    q: Array,
-    columns: Columns,
-    options: TableOptions,
-    said: list[str],
-) -> tuple[Array, str]:
-    """Return measured positions (M, 3) [m] and the table's unit of length."""
-    named = columns.position or columns.target
-    off = () if columns.position else columns.difference
-    sign = 1.0 if options.difference == 'add' else -1.0
-    reported = next((u for u in (options.length_unit, *map(columns.unit, named + off)) if u), None)
-    raw = cells.stack(named) + (sign * cells.stack(off) if off else 0.0)
-    unit, sentence = length_unit(raw, robot, q, reported)
-    what = 'a measured position' if columns.position else 'a position'
-    position = _metres(cells, named, columns, options, unit, what)
-    if columns.position:
-        said.append('measured positions are ' + ', '.join(named))
-        if any(set(tokens(name)) & OWN for name in named):
-            said.append(
-                f'{named[0]} may be what the controller computes; only an instrument measures'
-            )
-    else:
-        position = position + sign * _metres(cells, off, columns, options, unit, what)
-        word = 'plus' if sign > 0.0 else 'minus'
-        said.append(
-            f'measured = target ({", ".join(named)}) {word} difference '
-            f'({", ".join(columns.difference)}); --difference decides'
-        )
-    if sentence:
-        said.append(sentence)
-    return position, unit
-
-
-def _metres(
-    cells: Cells,
-    names: tuple[str, ...],
-    columns: Columns,
-    options: TableOptions,
-    usual: str,
-    what: str,
-) -> Array:
-    """Return columns of lengths [m], each in its own unit where the header gives it one."""
-    scale = [
-        factor(METRES, options.length_unit or columns.unit(name) or usual, name, what)
-        for name in names
-    ]
-    return np.asarray(cells.stack(names) * scale)
-
-
-def _rotation(
-    cells: Cells,
-    robot: Robot,
-    q: Array,
-    columns: Columns,
-    options: TableOptions,
-    said: list[str],
-) -> Array:
-    values = cells.stack(columns.rotation)
-    if values.shape[1] == 4:
-        rotation = matrix_from_quaternion(values, 'measured quaternion')
-        said.append('measured quaternions are ' + ', '.join(columns.rotation))
-        off = disagreement(rotation, robot, q)
-        if off > AGREES:
-            said.append(
-                f'relative rotations disagree with the arm by {np.degrees(off):.3g} deg: the '
-                'quaternion or joint columns may not be what they seem'
-            )
-        return rotation
-    own = [options.rotation_unit or columns.unit(name) for name in columns.rotation]
-    reported = next((unit for unit in own if unit), None)
-    unit, sentence = angle_unit(values, reported, 'measured angles')
-    if sentence:
-        said.append(sentence)
-    angles = values * [
-        factor(RADIANS, each or unit, name, 'a measured angle')
-        for each, name in zip(own, columns.rotation, strict=True)
-    ]
-    convention = options.rotation
-    if convention is None:
-        convention, sentence = find_convention(angles, robot, q)
-        said.append(sentence)
-    return rotations(angles, convention)
-
-
-def _sigma(cells: Cells, columns: Columns, unit: str, said: list[str]) -> Array:
-    values = cells.stack(columns.sigma) * [
-        factor(METRES, columns.unit(name) or unit, name, 'a standard deviation')
-        for name in columns.sigma
-    ]
-    said.append('standard deviations are ' + ', '.join(columns.sigma) + ', joined by mean square')
-    return np.asarray(np.sqrt((values**2).mean(axis=1)))
-
-
-def _check(
-    cells: Cells,
-    robot: Robot,
-    q: Array,
-    position: Array,
-    options: TableOptions,
-    said: list[str],
-) -> None:
-    """
-    Say how far the positions are from the nominal arm, and which rows stand out.
-
-    A table that does not fit is refused where the user said how to read it. Read by its own
-    header it stays as it is: `diagnose` finds out which mistake was made in it.
-    """
-    if len(q) < 8:
-        said.append('too few rows to check the positions against the arm')
-        return
-    off = misfit(robot, q, position)
-    typical = float(np.median(off))
-    reach = float(abs(robot.a).sum() + abs(robot.d).sum())
-    said.append(
-        f'with base and tool fitted, positions are {typical * 1e3:.3g} mm (median) from the '
-        'nominal arm'
-    )
-    if typical < _TOO_GOOD:
-        said.append(
-            'no instrument agrees so well with an arm: these positions were computed, not measured, '
-            'and a diagnosis of them will find no gap'
-        )
-    if typical > _WRONG * reach:
-        sentence = (
-            f'positions are {typical * 1e3:.3g} mm from where robot {robot.name!r} would be, with '
-            'base and tool fitted: wrong robot, joint columns, or units; --joint-columns, '
-            '--angle-unit or --length-unit decide'
-        )
-        if options.joint_columns or options.angle_unit or options.length_unit:
-            raise DataError(sentence)
-        said.append(f'{sentence}, and weld-twin diagnose says what is wrong')
-        return
-    far = np.flatnonzero(off > _FAR * typical)
-    if far.size:
-        worst = int(far[off[far].argmax()])
-        said.append(
-            f'{far.size} rows stand out, most of all line {cells.lines[worst]} with '
-            f'{off[worst] * 1e3:.3g} mm; they are kept, --skip-rows leaves rows out'
-        )
+    return cells.taken(keep)

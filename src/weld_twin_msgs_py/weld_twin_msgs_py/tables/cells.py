@@ -4,11 +4,14 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
@@ -81,6 +84,32 @@ class Cells:
     def stack(self, names: tuple[str, ...]) -> Array:
         """Return columns side by side, shape (rows, len(names))."""
         return np.stack([self.numbers(name) for name in names], axis=1)
+
+    def taken(self, rows: Iterable[int]) -> Cells:
+        """Return the table with some of its rows, counted from 0."""
+        kept = [int(k) for k in rows]
+        return replace(
+            self, rows=[self.rows[k] for k in kept], lines=[self.lines[k] for k in kept]
+        )
+
+    def by_words(self, words: Mapping[str, set[str]], but: Sequence[str] = ()) -> dict[str, str]:
+        """Return the columns by use, by the first word of their names; a unit is no part of it."""
+        out: dict[str, str] = {}
+        for name in self.header:
+            first = re.split(r'[^0-9a-zäöüß]+', name.lower())[0]
+            for use, known in words.items():
+                if first in known and name not in but:
+                    out.setdefault(use, name)
+        return out
+
+    def alike(self, names: Sequence[str]) -> tuple[NDArray[np.intp], list[int]]:
+        """Return the group of every row, those alike in some columns, and the first row of each."""
+        keys = list(zip(*(self.column(name) for name in names), strict=True))
+        first: dict[tuple[str, ...], int] = {}
+        for k, key in enumerate(keys):
+            first.setdefault(key, k)
+        number = {key: i for i, key in enumerate(first)}
+        return np.array([number[key] for key in keys]), list(first.values())
 
 
 def read_cells(

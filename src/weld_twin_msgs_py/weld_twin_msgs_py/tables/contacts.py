@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +21,7 @@ from ..files.whole_files import write_text
 from .build import Table, own_epoch
 from .cells import Cells, read_cells
 from .header import CONTACTS, joint_columns, unit_of
-from .joint_readings import joint_angles
+from .joint_readings import station_joints
 from .table_options import TableOptions
 from .unit_guess import METRES, factor
 from .words import shortened
@@ -105,11 +103,9 @@ def read_contacts(
     columns = _columns(cells, alone)
     joints = joint_columns(cells.header, robot, options)
     said.append('joint columns are ' + ', '.join(joints))
-    cells = _once(_kept(cells, options), [*joints, *columns.values()], said)
-    q = joint_angles(cells, robot, joints, options, said)
-    gaps = np.flatnonzero(~np.isfinite(q).all(axis=1))
-    if gaps.size:
-        raise DataError(f"table '{path}' line {cells.lines[gaps[0]]} has an empty joint angle")
+    kept = cells.taken(k for k in range(len(cells.rows)) if k + 1 not in options.skip_rows)
+    cells = _once(kept, [*joints, *columns.values()], said)
+    q = station_joints(cells, robot, joints, options, said)
     labels = _labels(cells, columns, alone)
     value = _lengths(cells, columns.get('value'), options, said)
     sigma = _lengths(cells, columns.get('sigma'), options, said)
@@ -150,15 +146,12 @@ def _once(cells: Cells, names: list[str], said: list[str]) -> Cells:
     Logs that have a row for everything that was noted at a posture repeat the joints to the last
     digit; two touches never do.
     """
-    first: dict[tuple[str, ...], int] = {}
-    for k, key in enumerate(zip(*(cells.column(name) for name in names), strict=True)):
-        first.setdefault(key, k)
+    _, first = cells.alike(names)
     more = len(cells.rows) - len(first)
     if not more:
         return cells
     said.append(f'{more} rows repeat a posture to the last digit; each counts once')
-    kept = list(first.values())
-    return replace(cells, rows=[cells.rows[k] for k in kept], lines=[cells.lines[k] for k in kept])
+    return cells.taken(first)
 
 
 def _touched(contacts: Contacts, known: Artefact) -> list[str]:
@@ -171,16 +164,11 @@ def _touched(contacts: Contacts, known: Artefact) -> list[str]:
 
 def _columns(cells: Cells, alone: str | None) -> dict[str, str]:
     """
-    Return the columns by use; their unit, if any, is the last word of their name.
+    Return the columns by use.
 
     Where all that can be touched is one thing, ``alone``, no column has to name it.
     """
-    out: dict[str, str] = {}
-    for name in cells.header:
-        first = re.split(r'[^0-9a-zäöüß]+', name.lower())[0]
-        for use, words in WORDS.items():
-            if first in words:
-                out.setdefault(use, name)
+    out = cells.by_words(WORDS)
     if 'contact' not in out and alone is None:
         raise DataError(
             f"table '{cells.path}' has no column 'contact' that says what each posture touched; "
@@ -188,11 +176,6 @@ def _columns(cells: Cells, alone: str | None) -> dict[str, str]:
             'artefact file with it alone will do'
         )
     return out
-
-
-def _kept(cells: Cells, options: TableOptions) -> Cells:
-    keep = [k for k in range(len(cells.rows)) if k + 1 not in options.skip_rows]
-    return replace(cells, rows=[cells.rows[k] for k in keep], lines=[cells.lines[k] for k in keep])
 
 
 def _lengths(

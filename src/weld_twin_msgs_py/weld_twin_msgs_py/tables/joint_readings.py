@@ -39,6 +39,18 @@ class Units(NamedTuple):
     slide: str
 
 
+def station_joints(
+    cells: Cells, robot: Robot, names: tuple[str, ...], options: TableOptions, said: list[str]
+) -> Array:
+    """Return `joint_angles` of stations; refuses a row that lacks one."""
+    q = joint_angles(cells, robot, names, options, said)
+    gaps = np.flatnonzero(~np.isfinite(q).all(axis=1))
+    if gaps.size:
+        line = cells.lines[gaps[0]]
+        raise DataError(f"table '{cells.path}' line {line} has an empty joint angle")
+    return q
+
+
 Judge = Callable[[Array], float]
 """Joint positions as the model counts them, shape (M, n) [rad, m], to how far off they are."""
 

@@ -4,9 +4,7 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +19,7 @@ from .build import Table, own_epoch
 from .cells import Cells, read_cells
 from .clock_column import stamps
 from .header import joint_columns, time_columns, unit_of
-from .joint_readings import joint_angles
+from .joint_readings import station_joints
 from .table_options import TableOptions
 from .words import shortened
 
@@ -70,14 +68,9 @@ def read_pixels(
     columns = _columns(cells, options)
     joints = joint_columns(cells.header, robot, options)
     said.append('joint columns are ' + ', '.join(joints))
-    image, first = _images(cells, columns, joints)
-    stations = replace(
-        cells, rows=[cells.rows[k] for k in first], lines=[cells.lines[k] for k in first]
-    )
-    q = joint_angles(stations, robot, joints, options, said)
-    gaps = np.flatnonzero(~np.isfinite(q).all(axis=1))
-    if gaps.size:
-        raise DataError(f"table '{path}' line {stations.lines[gaps[0]]} has an empty joint angle")
+    image, first = cells.alike([*joints, *([columns['image']] if 'image' in columns else [])])
+    stations = cells.taken(first)
+    q = station_joints(stations, robot, joints, options, said)
     t = _clock(stations, said)
     seen = _sightings(cells, columns, cameras, targets, image, t)
     recording = Recording(
@@ -94,13 +87,8 @@ def read_pixels(
 
 
 def _columns(cells: Cells, options: TableOptions) -> dict[str, str]:
-    """Return the columns by use; a unit is no part of their name."""
-    out: dict[str, str] = {}
-    for name in cells.header:
-        first = re.split(r'[^0-9a-zäöüß]+', name.lower())[0]
-        for use, words in WORDS.items():
-            if first in words and name not in (options.joint_columns or ()):
-                out.setdefault(use, name)
+    """Return the columns by use."""
+    out = cells.by_words(WORDS, but=options.joint_columns or ())
     for use in ('u', 'v', 'point'):
         if use not in out:
             raise DataError(
@@ -108,19 +96,6 @@ def _columns(cells: Cells, options: TableOptions) -> dict[str, str]:
                 f'columns are {shortened(cells.header)}'
             )
     return out
-
-
-def _images(
-    cells: Cells, columns: dict[str, str], joints: Sequence[str]
-) -> tuple[np.ndarray, list[int]]:
-    """Return the image of every row, and the first row of each image."""
-    names = [*joints, *([columns['image']] if 'image' in columns else [])]
-    keys = list(zip(*(cells.column(name) for name in names), strict=True))
-    first: dict[tuple[str, ...], int] = {}
-    for k, key in enumerate(keys):
-        first.setdefault(key, k)
-    number = {key: i for i, key in enumerate(first)}
-    return np.array([number[key] for key in keys]), list(first.values())
 
 
 def _clock(stations: Cells, said: list[str]) -> np.ndarray:

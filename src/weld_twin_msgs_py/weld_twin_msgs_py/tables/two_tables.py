@@ -115,10 +115,7 @@ def _moving(
             'the clock of the instrument'
         )
     at = np.column_stack([np.interp(own[inside], times, column) for column in q.T])
-    kept = replace(
-        seen, rows=[seen.rows[k] for k in inside], lines=[seen.lines[k] for k in inside]
-    )
-    both = _joined(log, kept, names, at, own[inside])
+    both = _joined(log, seen.taken(inside), names, at, own[inside])
     options = replace(options, time_column=None)  # both share one now
     (still, said_all), units = stations(both, robot, options, said)
     begin = still.epoch_ns * 1e-9
@@ -167,8 +164,7 @@ def _kept(cells: Cells, keep: NDArray[np.intp], said: list[str], why: str) -> Ce
     if not keep.size:
         raise DataError(f"table '{cells.path}' has no complete row")
     said.append(f'{cells.path.name}: {out} rows are left out {why}')
-    rows, lines = [cells.rows[k] for k in keep], [cells.lines[k] for k in keep]
-    return replace(cells, rows=rows, lines=lines)
+    return cells.taken(keep)
 
 
 def _clock(cells: Cells, options: TableOptions) -> tuple[str | None, str | None]:

@@ -42,17 +42,6 @@ class JointMotion:
     """
     The joint stream.
 
-    Attributes
-    ----------
-    t : array, shape (N,) [s]
-        Stamps on the joint clock, strictly increasing, counted from the recording's epoch.
-    q : array, shape (N, n) [rad or m]
-        Joint positions, as commanded or as the controller read them.
-    qd : array, shape (N, n) [rad/s or m/s], optional
-        Velocity where the controller gives it.
-    static : bool
-        Each row is a station at rest, visited in order; nothing is known of the motion between.
-
     Raises
     ------
     DataError
@@ -71,9 +60,14 @@ class JointMotion:
     """
 
     t: Array
+    """Stamps on the joint clock, strictly increasing, counted from the recording's epoch, shape
+    (N,) [s]."""
     q: Array
+    """Joint positions, as commanded or as the controller read them, shape (N, n) [rad or m]."""
     qd: Array | None = None
+    """Velocity where the controller gives it, shape (N, n) [rad/s or m/s]."""
     static: bool = False
+    """Each row is a station at rest, visited in order; nothing is known of the motion between."""
 
     def __post_init__(self) -> None:
         t = increasing(self.t, 'joint stamps')
@@ -148,20 +142,6 @@ class Measurements:
     """
     Measured tool poses or points, in the world (measuring) frame.
 
-    Attributes
-    ----------
-    t : array, shape (M,) [s]
-        Stamps on the measurement clock, same epoch as the joint stream.
-    position : array, shape (M, 3) [m]
-    rotation : array, shape (M, 3, 3), optional
-        ``R_world_tool``; left out, points were measured.
-    sigma : array, shape (M,) [m], optional
-        Standard deviation of each position, where the instrument gives it.
-    noise : PoseNoise, optional
-        How sure each is in every direction, where the instrument tells it.
-    common : Common, optional
-        Errors that all samples share; they are fitted along.
-
     Raises
     ------
     DataError
@@ -178,11 +158,17 @@ class Measurements:
     """
 
     t: Array
+    """Stamps on the measurement clock, same epoch as the joint stream, shape (M,) [s]."""
     position: Array
+    """Shape (M, 3) [m]."""
     rotation: Array | None = None
+    """``R_world_tool``, shape (M, 3, 3); left out, points were measured."""
     sigma: Array | None = None
+    """Standard deviation of each position, where the instrument gives it, shape (M,) [m]."""
     noise: PoseNoise | None = None
+    """How sure each is in every direction, where the instrument tells it."""
     common: Common | None = None
+    """Errors that all samples share; they are fitted along."""
 
     def __post_init__(self) -> None:
         t = increasing(self.t, 'measurement stamps')
@@ -255,16 +241,6 @@ class Signal:
     """
     A sampled side signal, such as a temperature or the wrench on the tool.
 
-    Attributes
-    ----------
-    t : array, shape (K,) [s]
-        Stamps on the joint clock, strictly increasing.
-    value : array, shape (K,) or (K, 6)
-        Temperatures [degC], or force and torque [N, N m].
-    held : bool
-        A sample is in force until the next one, as a running twin has it; else the signal is
-        straight between samples.
-
     Raises
     ------
     DataError
@@ -280,8 +256,12 @@ class Signal:
     """
 
     t: Array
+    """Stamps on the joint clock, strictly increasing, shape (K,) [s]."""
     value: Array
+    """Temperatures [degC], or force and torque [N, N m], shape (K,) or (K, 6)."""
     held: bool = False
+    """A sample is in force until the next one, as a running twin has it; else the signal is
+    straight between samples."""
 
     _columns: ClassVar[int | None] = 6
 
@@ -323,31 +303,6 @@ class Recording:
     """
     One recording of the cell.
 
-    Attributes
-    ----------
-    wrench : Signal, value shape (K, 6) [N, N m], optional
-        Force and torque on the tool, in ``wrench_frame``.
-    wrench_frame : str
-        'tool', or 'base' for a wrench given in the base frame.
-    temperature : Signal, value shape (K,) [degC], optional
-    epoch_ns : int
-        What the stamps count from, [ns] since 1970.
-    notes : tuple of str
-        What a reader should know of it, in sentences.
-    incomplete : tuple of str
-        What of it is missing, in sentences: messages its recorder knows were sent, and streams
-        that begin late or end early against the others.
-    contacts : Contacts, optional
-        What the tool point touched in every posture, in place of measured positions.
-    simulated : bool
-        Whether it says of itself that a simulator made it, with or without noise of an instrument.
-    effort : JointSignal, value shape (K, n) [N m, or N of a slide], optional
-        Effort of each joint as the controller measured it; there where springs are to take it.
-    effort_holds : bool
-        The effort is what holds the load, as ROS means it; else it is the load itself.
-    images : Sightings, optional
-        What cameras saw, of which the measurements were made; see `bundle`.
-
     Raises
     ------
     DataError
@@ -369,16 +324,30 @@ class Recording:
     joints: JointMotion
     measured: Measurements | None = None
     wrench: Signal | None = None
+    """Force and torque on the tool, in ``wrench_frame``, shape (K, 6) [N, N m]."""
     wrench_frame: str = 'tool'
+    """'tool', or 'base' for a wrench given in the base frame."""
     temperature: Signal | None = None
+    """Shape (K,) [degC]."""
     epoch_ns: int = 0
+    """What the stamps count from, [ns] since 1970."""
     notes: tuple[str, ...] = ()
+    """What a reader should know of it, in sentences."""
     incomplete: tuple[str, ...] = ()
+    """What of it is missing, in sentences: messages its recorder knows were sent, and streams that
+    begin late or end early against the others."""
     contacts: Contacts | None = None
+    """What the tool point touched in every posture, in place of measured positions."""
     simulated: bool = False
+    """Whether it says of itself that a simulator made it, with or without noise of an
+    instrument."""
     effort: JointSignal | None = None
+    """Effort of each joint as the controller measured it, shape (K, n) [N m, or N of a slide];
+    there where springs are to take it."""
     effort_holds: bool = True
+    """The effort is what holds the load, as ROS means it; else it is the load itself."""
     images: Sightings | None = None
+    """What cameras saw, of which the measurements were made; see `bundle`."""
 
     def __post_init__(self) -> None:
         if self.contacts is not None and self.contacts.size != self.joints.t.size:

@@ -67,31 +67,6 @@ class Robot:
     their rows backwards: a row is of its own chain, from the positioner's foot outward, and so are
     the sign of its joint and every error of it.
 
-    Attributes
-    ----------
-    a, alpha, d, theta, beta : array, shape (n,) [m, rad]
-        DH values at joint position zero.
-    prismatic : array of bool, shape (n,)
-    lower, upper, max_velocity, max_acceleration : array, shape (n,) [rad or m, per s, per s^2]
-    T_world_base, T_flange_tool : array, shape (4, 4)
-        Where the chain begins and ends; it begins at the end of a positioner's rows.
-    behind : int
-        Rows that the chain passes backwards: joints of the positioner, 0 for a robot alone.
-    T_root_base : array, shape (4, 4) [m]
-        Where the robot's rows begin, in the frame where those of the positioner begin.
-    mass : array, shape (n,) [kg]; com : array, shape (n, 3) [m]
-        Link masses and centres in the DH frame at the end of each link.
-    payload_mass : float [kg]; payload_com : array, shape (3,) [m], in the tool frame
-    gravity : array, shape (3,) [m/s^2]
-        In the frame where the robot's rows begin, which stands still.
-    source : str
-        Where the numbers come from.
-    plausible : mapping
-        What this robot's errors can be where it is known better than of robots at large: effect,
-        parameter, and ``sd``, ``low``, ``high``; see `weld_twin_core.effects.plausible`.
-    controller : ControllerFrames, optional
-        Where the controller has its base and flange, of a robot that says so, as a URDF does.
-
     Raises
     ------
     ModelError
@@ -120,24 +95,41 @@ class Robot:
     d: Array
     theta: Array
     beta: Array
+    """DH values at joint position zero, shape (n,) [m, rad]."""
     prismatic: NDArray[np.bool_]
+    """Shape (n,)."""
     lower: Array
     upper: Array
     max_velocity: Array
     max_acceleration: Array
+    """Shape (n,) [rad or m, per s, per s^2]."""
     convention: str = 'standard'
     T_world_base: Array = field(default_factory=lambda: np.eye(4))
     T_flange_tool: Array = field(default_factory=lambda: np.eye(4))
+    """Where the chain begins and ends, shape (4, 4); it begins at the end of a positioner's
+    rows."""
     mass: Array | None = None
+    """Of the links, shape (n,) [kg]."""
     com: Array | None = None
+    """Their centres in the DH frame at the end of each link, shape (n, 3) [m]."""
     payload_mass: float = 0.0
+    """[kg]"""
     payload_com: Array = field(default_factory=lambda: np.zeros(3))
+    """In the tool frame, shape (3,) [m]."""
     gravity: Array = field(default_factory=lambda: np.array(STANDARD_GRAVITY))
+    """In the frame where the robot's rows begin, which stands still, shape (3,) [m/s^2]."""
     source: str = ''
+    """Where the numbers come from."""
     plausible: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
+    """What this robot's errors can be where it is known better than of robots at large: effect,
+    parameter, and ``sd``, ``low``, ``high``; see `weld_twin_core.effects.plausible`."""
     controller: ControllerFrames | None = None
+    """Where the controller has its base and flange, of a robot that says so, as a URDF does."""
     behind: int = 0
+    """Rows that the chain passes backwards: joints of the positioner, 0 for a robot alone."""
     T_root_base: Array = field(default_factory=lambda: np.eye(4))
+    """Where the robot's rows begin, in the frame where those of the positioner begin, shape (4, 4)
+    [m]."""
 
     def __post_init__(self) -> None:
         n = len(self.joint_names)

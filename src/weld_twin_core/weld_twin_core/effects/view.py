@@ -52,17 +52,6 @@ class Plausible:
     """
     Spread and range of one parameter, in its own unit.
 
-    Attributes
-    ----------
-    sd : float
-        Standard deviation among machines, and of what people do to them.
-    low, high : float
-        What lies outside is no property of a machine.
-    source : str
-        A publication that was read, or an argument that starts with 'derived'.
-    by_robot : callable, optional
-        Returns low and high on a robot, where they hang on it.
-
     Examples
     --------
     >>> import weld_twin_core as wt
@@ -72,10 +61,14 @@ class Plausible:
     """
 
     sd: float
+    """Standard deviation among machines, and of what people do to them."""
     low: float
     high: float
+    """What lies outside is no property of a machine."""
     source: str
+    """A publication that was read, or an argument that starts with 'derived'."""
     by_robot: Callable[[Robot], tuple[float, float]] | None = None
+    """Returns low and high on a robot, where they hang on it."""
 
     @property
     def derived(self) -> bool:
@@ -93,28 +86,6 @@ class Parameter:
     """
     One parameter of an effect.
 
-    Attributes
-    ----------
-    name, unit : str
-        The unit in SI, as people read it.
-    size : int
-        Number of components; 0 means a number or a list of any length.
-    typical : float
-        A magnitude worth worrying about; scales fits and default tolerances.
-    lower, upper : float
-        Physical bounds.
-    differentiable : bool
-        Whether `Effect.gradient` gives its derivative.
-    linear : bool
-        Whether the displacement is proportional to it.
-    idealised : float
-        Share by which an arm's own value differs from the one that fits best, because springs
-        harden and modes couple where the formula is ideal.
-    range : Plausible, optional
-        What a machine can have of it; left out, nothing is known.
-    sliding : Plausible, optional
-        The same where its joint slides, in m instead of rad.
-
     Examples
     --------
     >>> import weld_twin_core as wt
@@ -127,38 +98,31 @@ class Parameter:
 
     name: str
     unit: str
+    """The unit in SI, as people read it."""
     size: int = 1
+    """Number of components; 0 means a number or a list of any length."""
     typical: float = 1.0
+    """A magnitude worth worrying about; scales fits and default tolerances."""
     lower: float = -np.inf
     upper: float = np.inf
+    """Physical bounds."""
     differentiable: bool = True
+    """Whether `Effect.gradient` gives its derivative."""
     linear: bool = True
+    """Whether the displacement is proportional to it."""
     idealised: float = 0.0
+    """Share by which an arm's own value differs from the one that fits best, because springs
+    harden and modes couple where the formula is ideal."""
     range: Plausible | None = None
+    """What a machine can have of it; left out, nothing is known."""
     sliding: Plausible | None = None
+    """The same where its joint slides, in m instead of rad."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
     """
     What an effect may look at: the samples that reach its stage.
-
-    Attributes
-    ----------
-    t : array, shape (N,), or (D, N) where the delay is drawn [s]
-    elapsed : array, shape as t [s]
-        Time since the recording's first stamp.
-    q, qd : array, shape (..., N, n) [rad, rad/s]
-    static : bool
-        Samples are stations at rest; their order is known, their timing means nothing.
-    wrench : array, shape t.shape + (6,), optional [N, N m]
-    temperature : array, shape as t, optional [degC]
-    effort : array, shape t.shape + (n,), optional [N m, or N of a slide]
-        As the controller measured it; what springs take in the place of the statics.
-    effort_holds : bool
-        The effort holds the load; else it is the load itself.
-    shift : mapping
-        Channels displaced by the stages before.
 
     Examples
     --------
@@ -173,16 +137,26 @@ class View:
 
     robot: Robot
     t: Array
+    """Shape (N,), or (D, N) where the delay is drawn [s]."""
     elapsed: Array
+    """Time since the recording's first stamp, shape as t [s]."""
     q: Array
     qd: Array
+    """Shape (..., N, n) [rad, rad/s]."""
     static: bool = False
+    """Samples are stations at rest; their order is known, their timing means nothing."""
     wrench: Array | None = None
+    """Shape t.shape + (6,) [N, N m]."""
     wrench_frame: str = 'tool'
     temperature: Array | None = None
+    """Shape as t [degC]."""
     effort: Array | None = None
+    """As the controller measured it, shape t.shape + (n,) [N m, or N of a slide]; what springs
+    take in the place of the statics."""
     effort_holds: bool = True
+    """The effort holds the load; else it is the load itself."""
     shift: Shift = field(default_factory=dict)
+    """Channels displaced by the stages before."""
 
     @cached_property
     def frames(self) -> Frames:

@@ -20,21 +20,14 @@ _LEAST = 24
 
 @dataclass(frozen=True, eq=False)
 class Circle:
-    """
-    A circle in space.
-
-    Attributes
-    ----------
-    centre : array, shape (3,) [m]
-    axes : array, shape (2, 3)
-        Unit vectors in its plane; angles count from the first to the second.
-    radius : float [m]
-
-    """
+    """A circle in space."""
 
     centre: Array
+    """Shape (3,) [m]."""
     axes: Array
+    """Unit vectors in its plane, shape (2, 3); angles count from the first to the second."""
     radius: float
+    """[m]"""
 
     def angles(self, points: Array) -> Array:
         """Return the angle [rad] of every point, shape (N,)."""

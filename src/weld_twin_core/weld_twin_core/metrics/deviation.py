@@ -29,22 +29,6 @@ class DeviationMetrics:
     """
     Deviation of one run; entries are None where the data do not allow them.
 
-    Attributes
-    ----------
-    rms_m, mean_m, p95_m, max_m : float [m]
-        Of the length of the deviation, D(t).
-    d_norm : float [-]
-        Largest deviation over path length; None for a path without length.
-    d_cum_m : float [m]
-        Sum of D over the samples.
-    d_time_m_s : float [m s]
-        Integral of D over time, by trapezoids; None without stamps.
-    path_length_m : float [m]
-    orientation_rms_rad, orientation_max_rad : float [rad]
-        Of the angle between measured and nominal orientation.
-    along_rms_m, across_rms_m, normal_rms_m : float [m]
-        Of the components on the seam axes.
-
     Examples
     --------
     `deviation_metrics` makes it.
@@ -61,15 +45,22 @@ class DeviationMetrics:
     mean_m: float
     p95_m: float
     max_m: float
+    """Of the length of the deviation, D(t) [m]."""
     d_norm: float | None
+    """Largest deviation over path length [-]; None for a path without length."""
     d_cum_m: float
+    """Sum of D over the samples [m]."""
     d_time_m_s: float | None
+    """Integral of D over time, by trapezoids [m s]; None without stamps."""
     path_length_m: float | None
+    """[m]"""
     orientation_rms_rad: float | None
     orientation_max_rad: float | None
+    """Of the angle between measured and nominal orientation [rad]."""
     along_rms_m: float | None
     across_rms_m: float | None
     normal_rms_m: float | None
+    """Of the components on the seam axes [m]."""
 
     def as_dict(self) -> dict[str, float | int | None]:
         """Return the fields as plain numbers."""

@@ -37,31 +37,21 @@ DRIFT_CYCLES = 10
 
 @dataclass(frozen=True)
 class PosePerformance:
-    """
-    AP and RP of one commanded pose (clauses 7.2.1 and 7.2.2).
-
-    Attributes
-    ----------
-    ap_m : float [m]
-        Distance of the barycentre of the attained positions from the command.
-    rp_m : float [m]
-        Radius of the repeatability sphere: mean distance from the barycentre plus three
-        standard deviations of it.
-    ap_xyz_m : tuple of 3 floats [m]
-        Barycentre minus command.
-    ap_rad, rp_rad : tuple of 3 floats [rad], optional
-        Mean orientation against the command, and three standard deviations about the mean, as
-        components of a rotation vector; for the small turns meant here these are the standard's
-        three angles.
-
-    """
+    """AP and RP of one commanded pose (clauses 7.2.1 and 7.2.2)."""
 
     cycles: int
     ap_m: float
+    """Distance of the barycentre of the attained positions from the command [m]."""
     rp_m: float
+    """Radius of the repeatability sphere: mean distance from the barycentre plus three standard
+    deviations of it [m]."""
     ap_xyz_m: tuple[float, float, float]
+    """Barycentre minus command [m]."""
     ap_rad: tuple[float, float, float] | None = None
     rp_rad: tuple[float, float, float] | None = None
+    """Mean orientation against the command, and three standard deviations about the mean, as
+    components of a rotation vector [rad]; for the small turns meant here these are the standard's
+    three angles."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields as plain numbers and tuples."""
@@ -70,26 +60,17 @@ class PosePerformance:
 
 @dataclass(frozen=True)
 class PathPerformance:
-    """
-    AT and RT of one commanded path (clauses 8.2 and 8.3).
-
-    Attributes
-    ----------
-    at_m : float [m]
-        Largest distance of the barycentre path from the command path.
-    rt_m : float [m]
-        Largest, over the path, of mean distance from the barycentre plus three standard
-        deviations of it.
-    at_index, rt_index : int
-        Command point at which each was found.
-
-    """
+    """AT and RT of one commanded path (clauses 8.2 and 8.3)."""
 
     cycles: int
     at_m: float
+    """Largest distance of the barycentre path from the command path [m]."""
     rt_m: float
+    """Largest, over the path, of mean distance from the barycentre plus three standard deviations
+    of it [m]."""
     at_index: int
     rt_index: int
+    """Command point at which each was found."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields as plain numbers."""
@@ -98,22 +79,14 @@ class PathPerformance:
 
 @dataclass(frozen=True)
 class DriftPerformance:
-    """
-    Drift of pose characteristics (clause 7.6).
-
-    Attributes
-    ----------
-    dap_m, drp_m : float [m]
-        Largest change of AP and of RP against the first group of cycles.
-    ap_m, rp_m : tuple of floats [m]
-        AP and RP of every group.
-
-    """
+    """Drift of pose characteristics (clause 7.6)."""
 
     dap_m: float
     drp_m: float
+    """Largest change of AP and of RP against the first group of cycles [m]."""
     ap_m: tuple[float, ...]
     rp_m: tuple[float, ...]
+    """AP and RP of every group [m]."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields as plain numbers and tuples."""

@@ -52,21 +52,6 @@ class Plan:
     """
     A planned motion.
 
-    Attributes
-    ----------
-    motion : JointMotion
-        With velocity.
-    poses : array, shape (N, 4, 4)
-        ``T_world_tool`` commanded.
-    seam : SeamFrames
-        The seam under each sample.
-    s : array, shape (N,) [m]
-        Arc length of each sample.
-    length : float [m]
-        Of the seam.
-    report : PlanReport
-        What the plan asks of the robot.
-
     Examples
     --------
     `plan` makes it.
@@ -80,11 +65,17 @@ class Plan:
     """
 
     motion: JointMotion
+    """With velocity."""
     poses: Array
+    """``T_world_tool`` commanded, shape (N, 4, 4)."""
     seam: SeamFrames
+    """The seam under each sample."""
     s: Array
+    """Arc length of each sample, shape (N,) [m]."""
     length: float
+    """Of the seam [m]."""
     report: PlanReport
+    """What the plan asks of the robot."""
 
 
 def plan(

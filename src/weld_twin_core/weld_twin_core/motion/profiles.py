@@ -159,26 +159,16 @@ class Smooth(Profile):
 
 @dataclass(frozen=True)
 class Aggressive(Profile):
-    """
-    Rapid changes of direction: forward, half-way back, forward again, to the end of the seam.
-
-    Attributes
-    ----------
-    speed : float [m/s]
-        Most in either direction.
-    acceleration : float [m/s^2]
-        At every start, stop and reversal, without a ramp.
-    reversals : int
-        How often the travel turns; rounded up to an even number.
-    back : float
-        Part of each advance that is travelled back, at most 1.
-
-    """
+    """Rapid changes of direction: forward, half-way back and forward again, to the seam's end."""
 
     speed: float = 0.25
+    """Most in either direction [m/s]."""
     acceleration: float = 2.5
+    """At every start, stop and reversal, without a ramp [m/s^2]."""
     reversals: int = 10
+    """How often the travel turns; rounded up to an even number."""
     back: float = 0.8
+    """Part of each advance that is travelled back, at most 1."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -29,24 +29,15 @@ _DEFAULTS = {'mean': 0.0}
 
 @dataclass(frozen=True)
 class Distribution:
-    """
-    A distribution, cut off at the bounds of the parameter.
-
-    Attributes
-    ----------
-    kind : str
-        One of `KINDS`.
-    numbers : tuple of float
-        In the order of `KINDS`, in the unit of the parameter.
-    lower, upper : float
-        Values outside have no probability.
-
-    """
+    """A distribution, cut off at the bounds of the parameter."""
 
     kind: str
+    """One of `KINDS`."""
     numbers: tuple[float, ...]
+    """In the order of `KINDS`, in the unit of the parameter."""
     lower: float = -np.inf
     upper: float = np.inf
+    """Values outside have no probability."""
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

@@ -25,28 +25,17 @@ _AGREED = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """
-    A study as a function of draws; see `model`.
-
-    Attributes
-    ----------
-    study : Study
-    tolerances : tuple of Tolerance
-    expansion : Expansion or None
-        None where every run is exact.
-    error : float
-        Largest difference of a deviation to the exact twin, relative to the largest deviation of
-        its run, over the runs compared; 0 for exact runs.
-    fast : DhStudy, optional
-        Runs draws of nothing but DH values exactly.
-
-    """
+    """A study as a function of draws; see `model`."""
 
     study: Study
     tolerances: tuple[Tolerance, ...]
     expansion: Expansion | None
+    """None where every run is exact."""
     error: float
+    """Largest difference of a deviation to the exact twin, relative to the largest deviation of
+    its run, over the runs compared; 0 for exact runs."""
     fast: DhStudy | None = None
+    """Runs draws of nothing but DH values exactly."""
 
     def __call__(self, draws: Array) -> Outcomes:
         """Return what runs come to, draws shape (D, P)."""
@@ -78,8 +67,6 @@ def model(
 
     Parameters
     ----------
-    study : Study
-    tolerances : sequence of Tolerance
     exact : bool
         Run every draw exactly: those of nothing but DH values by `kernels.draws`, all others
         through the twin.
@@ -124,7 +111,6 @@ def exact_deviations(study: Study, tolerances: Sequence[Tolerance], draws: Array
 
     Parameters
     ----------
-    study : Study
     tolerances : sequence of Tolerance, length P
     draws : array, shape (D, P)
         In the units of the tolerances.

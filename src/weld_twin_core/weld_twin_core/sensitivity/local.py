@@ -39,35 +39,25 @@ _KINK = 1e-2
 
 @dataclass(frozen=True, eq=False)
 class LocalSensitivity:
-    """
-    Sensitivities of P parameters at N path points.
-
-    Attributes
-    ----------
-    tolerances : tuple of Tolerance, length P
-    weights : array, shape (N,)
-        Arc length that belongs to each path point, as a part of all.
-    length : float [m]
-    vectors : array, shape (P, N, 3) [m per unit]
-        Analytic d position / d parameter in seam axes.
-    turns : array, shape (P, N) [rad per unit]
-        Size of the analytic d orientation / d parameter.
-    forward : array, shape (P, N) [m per unit]
-        D of a small error over the error: the paper's difference at no error.
-    offset_analytic, offset_difference : array, shape (P, N) [m per unit]
-        dD/dp at an error of typical size, and its two-sided difference; NaN where D has a kink
-        there, as it has at the path point where a gap of that width is just crossed.
-
-    """
+    """Sensitivities of P parameters at N path points."""
 
     tolerances: tuple[Tolerance, ...]
     weights: Array
+    """Arc length that belongs to each path point, as a part of all, shape (N,)."""
     length: float
+    """[m]"""
     vectors: Array
+    """Analytic d position / d parameter in seam axes, shape (P, N, 3) [m per unit]."""
     turns: Array
+    """Size of the analytic d orientation / d parameter, shape (P, N) [rad per unit]."""
     forward: Array
+    """D of a small error over the error: the paper's difference at no error, shape (P, N) [m per
+    unit]."""
     offset_analytic: Array
     offset_difference: Array
+    """dD/dp at an error of typical size, and its two-sided difference, shape (P, N) [m per unit];
+    NaN where D has a kink there, as it has at the path point where a gap of that width is just
+    crossed."""
 
     @property
     def analytic(self) -> Array:
@@ -173,7 +163,6 @@ def local_sensitivity(study: Study, tolerances: Sequence[Tolerance]) -> LocalSen
 
     Parameters
     ----------
-    study : Study
     tolerances : sequence of Tolerance
         Slopes are taken at no error; the forward difference uses the typical size.
 
@@ -251,14 +240,7 @@ class Posture:
 
 
 def posture(study: Study) -> Posture:
-    """
-    Return condition number, manipulability and largest gain along a seam.
-
-    Parameters
-    ----------
-    study : Study
-
-    """
+    """Return condition number, manipulability and largest gain along a seam."""
     motion = study.recording.joints
     q = motion.q if study.at is None else motion.at(study.at)[0]
     strength = np.linalg.svd(jacobian(study.robot, q)[..., :3, :], compute_uv=False)

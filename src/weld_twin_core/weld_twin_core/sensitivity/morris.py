@@ -42,23 +42,14 @@ MARGIN = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Screening:
-    """
-    Elementary effects of P inputs over the range of their tolerance.
-
-    Attributes
-    ----------
-    names : tuple of str, length P
-    mu_star, mu_star_half, sigma : array, shape (P,)
-        Mean size of the effect with the half-width of its 95 % interval, and its scatter; in the
-        unit of the result.
-    trajectories, runs, seed : int
-
-    """
+    """Elementary effects of P inputs over the range of their tolerance."""
 
     names: tuple[str, ...]
     mu_star: Array
     mu_star_half: Array
     sigma: Array
+    """Mean size of the effect with the half-width of its 95 % interval, and its scatter, shape
+    (P,); in the unit of the result."""
     trajectories: int
     runs: int
     seed: int
@@ -84,20 +75,11 @@ class Screening:
 
 @dataclass(frozen=True)
 class MorrisDesign:
-    """
-    Which runs Morris screening needs.
-
-    Attributes
-    ----------
-    names : tuple of str, length P
-    trajectories : int
-        Every one costs P + 1 runs.
-    seed : int
-
-    """
+    """Which runs Morris screening needs."""
 
     names: tuple[str, ...]
     trajectories: int = 50
+    """Every one costs P + 1 runs."""
     seed: int = 0
 
     def __post_init__(self) -> None:

@@ -20,23 +20,16 @@ from .sweep import DEGREE
 
 @dataclass(frozen=True)
 class Sizes:
-    """
-    Errors of the scenarios; the same on every joint.
-
-    Attributes
-    ----------
-    offset : float [rad]
-    length : float [m]
-    initial : float [m]
-        Size of the initialization offset, along the diagonal of the world frame.
-    width : float [rad]
-
-    """
+    """Errors of the scenarios; the same on every joint."""
 
     offset: float = 0.05 * DEGREE
+    """[rad]"""
     length: float = 1e-4
+    """[m]"""
     initial: float = 5e-4
+    """Size of the initialization offset, along the diagonal of the world frame [m]."""
     width: float = 0.03 * DEGREE
+    """[rad]"""
 
 
 def sources(robot: Robot, sizes: Sizes | None = None) -> dict[str, tuple[Effect, ...]]:
@@ -57,7 +50,6 @@ def scenario_deviations(study: Study, sizes: Sizes | None = None) -> dict[str, A
 
     Parameters
     ----------
-    study : Study
     sizes : Sizes, optional
         Left out, those of the paper.
 
@@ -81,7 +73,6 @@ def spread_of_passes(study: Study, deviations: Array) -> Array:
 
     Parameters
     ----------
-    study : Study
     deviations : array, shape (..., N, 3) [m]
 
     """

@@ -26,36 +26,23 @@ POINTS = 200
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """
-    A motion along a seam, sampled where the deviation is looked at.
-
-    Attributes
-    ----------
-    robot : Robot
-    recording : Recording
-        The commanded joint motion and the side signals.
-    at : array, shape (N,) [s], optional
-        Instants looked at; left out, the joint stamps.
-    s : array, shape (N,) [m]
-        Arc length travelled along the seam; falls where the motion goes back.
-    axes : array, shape (N, 3, 3)
-        Rows along, across and normal of the seam, in the world frame.
-    length : float [m]
-    known : tuple of Effect
-        Effects believed to act; deviations are counted from the twin that has them.
-    nominal : Poses
-        Of that twin, shape (N, 3) and (N, 3, 3).
-
-    """
+    """A motion along a seam, sampled where the deviation is looked at."""
 
     robot: Robot
     recording: Recording
+    """The commanded joint motion and the side signals."""
     at: Array | None
+    """Instants looked at, shape (N,) [s]; left out, the joint stamps."""
     s: Array
+    """Arc length travelled along the seam, shape (N,) [m]; falls where the motion goes back."""
     axes: Array
+    """Rows along, across and normal of the seam, in the world frame, shape (N, 3, 3)."""
     length: float
+    """[m]"""
     known: tuple[Effect, ...]
+    """Effects believed to act; deviations are counted from the twin that has them."""
     nominal: Poses
+    """Of that twin, shape (N, 3) and (N, 3, 3)."""
 
     @property
     def samples(self) -> int:
@@ -91,8 +78,6 @@ def planned_study(
 
     Parameters
     ----------
-    robot : Robot
-    path : Path
     profile : Profile or str
         A time law, or the name of one with its default numbers.
     points : int
@@ -125,8 +110,6 @@ def study_of_plan(robot: Robot, planned: Plan, known: tuple[Effect, ...] = ()) -
 
     Parameters
     ----------
-    robot : Robot
-    planned : Plan
     known : tuple of Effect
         Effects believed to act.
 
@@ -150,13 +133,10 @@ def recorded_study(
 
     Parameters
     ----------
-    robot : Robot
-    recording : Recording
     points : int
         At most as many as there are measurements, or joint states without any.
     normal : array, shape (3,), optional
         Direction out of the work; left out, against the tool's z at every sample.
-    known : tuple of Effect
 
     Raises
     ------
@@ -186,14 +166,6 @@ def _away(rotation: Array, tangent: Array) -> Array:
 
 
 def with_known(study: Study, known: tuple[Effect, ...]) -> Study:
-    """
-    Return the study counted from a twin with other known effects.
-
-    Parameters
-    ----------
-    study : Study
-    known : tuple of Effect
-
-    """
+    """Return the study counted from a twin with other known effects."""
     nominal = Twin(study.robot, known).poses(study.recording, study.at)
     return replace(study, known=known, nominal=nominal)

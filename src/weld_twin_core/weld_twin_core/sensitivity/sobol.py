@@ -97,23 +97,13 @@ class SobolIndices:
 
 @dataclass(frozen=True)
 class SobolDesign:
-    """
-    Which runs Sobol indices need.
-
-    Attributes
-    ----------
-    names : tuple of str, length P
-    base_samples : int
-        A power of two.
-    groups : tuple of str, length P, optional
-        Inputs of one group are drawn together and get one index.
-    seed : int
-
-    """
+    """Which runs Sobol indices need."""
 
     names: tuple[str, ...]
     base_samples: int = 1024
+    """A power of two."""
     groups: tuple[str, ...] | None = None
+    """Inputs of one group are drawn together and get one index."""
     seed: int = 0
 
     def __post_init__(self) -> None:

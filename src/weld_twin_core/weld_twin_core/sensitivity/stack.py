@@ -23,20 +23,12 @@ _COVERAGE = 0.95
 
 @dataclass(frozen=True)
 class WeldTolerance:
-    """
-    How far off a weld may be.
-
-    Attributes
-    ----------
-    across_m : float [m]
-        Most to either side of the seam; half a wire diameter suits MIG.
-    stickout_m : float [m]
-        Most along the work normal, which changes the wire's free length.
-
-    """
+    """How far off a weld may be."""
 
     across_m: float = 5e-4
+    """Most to either side of the seam [m]; half a wire diameter suits MIG."""
     stickout_m: float = 1e-3
+    """Most along the work normal, which changes the wire's free length [m]."""
 
     def __post_init__(self) -> None:
         if not (self.across_m > 0.0 and self.stickout_m > 0.0):
@@ -120,7 +112,6 @@ def probabilities(runs: int, inputs: int, seed: int = 0) -> Array:
         At least 20.
     inputs : int
         Number of tolerances.
-    seed : int
 
     Raises
     ------

@@ -31,27 +31,19 @@ BENT = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """
-    The deviation over the size of one error.
-
-    Attributes
-    ----------
-    name, unit : str
-    values : array, shape (K,) [unit]
-    max_m, mean_m : array, shape (K,) [m]
-    linear_m : array, shape (K,) [m]
-        Largest deviation if it were proportional, from the slope at no error.
-    length : float [m]
-
-    """
+    """The deviation over the size of one error."""
 
     name: str
     unit: str
     values: Array
+    """Shape (K,) [unit]."""
     max_m: Array
     mean_m: Array
+    """Shape (K,) [m]."""
     linear_m: Array
+    """Largest deviation if it were proportional, from the slope at no error, shape (K,) [m]."""
     length: float
+    """[m]"""
 
     @property
     def departure(self) -> Array:
@@ -78,7 +70,6 @@ def sweep(study: Study, tolerance: Tolerance, values: Array) -> Sweep:
 
     Parameters
     ----------
-    study : Study
     tolerance : Tolerance
         Says which parameter of which effect.
     values : array, shape (V,)
@@ -94,7 +85,6 @@ def together(study: Study, tolerances: Sequence[Tolerance], values: Array, name:
 
     Parameters
     ----------
-    study : Study
     tolerances : sequence of Tolerance
         All of one unit.
     values : array, shape (V,)
@@ -126,7 +116,6 @@ def default_values(tolerance: Tolerance, count: int = 25) -> Array:
 
     Parameters
     ----------
-    tolerance : Tolerance
     count : int
         How many sizes, evenly spread.
 
@@ -144,8 +133,6 @@ def end_of_linearity(study: Study, tolerance: Tolerance, largest: float = 1.0) -
 
     Parameters
     ----------
-    study : Study
-    tolerance : Tolerance
     largest : float
         Where the search ends, in the unit of the parameter.
 

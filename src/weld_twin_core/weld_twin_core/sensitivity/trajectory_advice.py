@@ -40,26 +40,12 @@ def expected_deviation(study: Study, tolerances: Sequence[Tolerance]) -> Array:
     Return the root of the expected squared deviation at every path point, shape (N,) [m].
 
     To first order in the scatter, about the mean of every error.
-
-    Parameters
-    ----------
-    study : Study
-    tolerances : sequence of Tolerance
-
     """
     return _Scatter.of(study.known, tolerances).deviation(study)
 
 
 def expected_rms(study: Study, tolerances: Sequence[Tolerance]) -> float:
-    """
-    Return the root of the expected squared deviation over the arc length [m].
-
-    Parameters
-    ----------
-    study : Study
-    tolerances : sequence of Tolerance
-
-    """
+    """Return the root of the expected squared deviation over the arc length [m]."""
     return _rms(study, expected_deviation(study, tolerances))
 
 
@@ -128,9 +114,6 @@ def compare_profiles(
 
     Parameters
     ----------
-    robot : Robot
-    path : Path
-    tolerances : sequence of Tolerance
     profiles : sequence of str
         Names of time laws.
     points : int
@@ -170,22 +153,15 @@ def stretched(study: Study, factor: float) -> Study:
 
 @dataclass(frozen=True)
 class Placement:
-    """
-    A torch rotation and a place of the base.
-
-    Attributes
-    ----------
-    rotation : float [rad]
-        Turn of the torch about the wire, which the weld does not notice.
-    x, y : float [m]; yaw : float [rad]
-        Move of the base in its own frame.
-
-    """
+    """A torch rotation and a place of the base."""
 
     rotation: float = 0.0
+    """Turn of the torch about the wire, which the weld does not notice [rad]."""
     x: float = 0.0
     y: float = 0.0
+    """Move of the base in its own frame [m]."""
     yaw: float = 0.0
+    """Its turn [rad]."""
 
     def robot(self, robot: Robot) -> Robot:
         """Return the robot on its new place."""
@@ -254,16 +230,12 @@ def advise(
 
     Parameters
     ----------
-    robot : Robot
-    path : Path
-    tolerances : sequence of Tolerance
     torch : Torch, optional
         As given; left out, upright on the seam.
     room : Room, optional
         How far the base may move, and how much room the arm must keep.
     tries : int
         Placements in the sample; the simplex search may take as many again for each free value.
-    seed : int
 
     Raises
     ------

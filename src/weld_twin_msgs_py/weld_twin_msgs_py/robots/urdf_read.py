@@ -37,7 +37,6 @@ def read_urdf(
 
     Parameters
     ----------
-    path : Path or str
     base_link, tip_link : str, optional
         Left out: the root, and the only leaf that moves or ``tool0``. The base may also be a link
         that is fixed beside the chain, as ``base`` of a UR arm is, or the table of a positioner.

@@ -40,7 +40,6 @@ def write_urdf(
 
     Parameters
     ----------
-    path : Path or str
     notes : sequence of str
         Comments at the top.
 

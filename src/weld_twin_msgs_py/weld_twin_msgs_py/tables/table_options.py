@@ -32,65 +32,46 @@ _LENGTHS = {
 
 @dataclass(frozen=True)
 class TableOptions:
-    """
-    Options of a table import; each is ``--name-with-dashes`` on the command line.
-
-    Attributes
-    ----------
-    joint_columns : tuple of str, optional
-        In chain order.
-    position_columns : tuple of 3 str, optional
-        Measured x, y, z.
-    target_columns, difference_columns : tuple of 3 str, optional
-        Commanded position and its difference, where no measured position is given.
-    difference : str
-        'add': measured = target + difference; 'subtract': measured = target - difference.
-    rotation_columns : tuple of 3 or 4 str, optional
-        Three angles about x, y, z (or a rotation vector), or a quaternion x, y, z, w.
-    rotation : str, optional
-        'XYZ' means R = Rx Ry Rz (intrinsic); 'ZYX' is roll-pitch-yaw; 'rotvec' a rotation vector.
-    length_unit, angle_unit, slide_unit, rotation_unit : str, optional
-        Of positions, joint angles, joints that slide, and measured angles.
-    sigma_columns : tuple of 1 or 3 str, optional
-        Standard deviation of the position, in its unit.
-    joint_signs : tuple of n float, optional
-        1 or -1 for every joint, where the controller counts it the other way than the model.
-    joint_offsets : tuple of n float, optional [deg, mm for a slide]
-        Added to the columns, in the model's sense.
-    coupled : str, optional
-        '3+2': the model's joint 3 is the column of joint 3 plus that of joint 2, where a
-        pendant counts joint 3 against the ground; '3-2' takes it off.
-    marker : str, optional
-        Of an export that holds several things that were tracked.
-    positions_only : bool
-        Leave measured orientation out.
-    skip_rows : tuple of int
-        Rows to leave out, the first under the header being 1.
-
-    """
+    """Options of a table import; each is ``--name-with-dashes`` on the command line."""
 
     delimiter: str | None = None
     decimal: str | None = None
     joint_columns: tuple[str, ...] | None = None
+    """In chain order."""
     position_columns: tuple[str, ...] | None = None
+    """Measured x, y, z."""
     target_columns: tuple[str, ...] | None = None
     difference_columns: tuple[str, ...] | None = None
+    """Commanded position and its difference, where no measured position is given."""
     difference: str = 'add'
+    """'add': measured = target + difference; 'subtract': measured = target - difference."""
     rotation_columns: tuple[str, ...] | None = None
+    """Three angles about x, y, z (or a rotation vector), or a quaternion x, y, z, w."""
     rotation: str | None = None
+    """'XYZ' means R = Rx Ry Rz (intrinsic); 'ZYX' is roll-pitch-yaw; 'rotvec' a rotation
+    vector."""
     length_unit: str | None = None
     angle_unit: str | None = None
     slide_unit: str | None = None
     rotation_unit: str | None = None
+    """Of positions, joint angles, joints that slide, and measured angles."""
     sigma_columns: tuple[str, ...] | None = None
+    """Standard deviation of the position, in its unit."""
     temperature_column: str | None = None
     time_column: str | None = None
     joint_signs: tuple[float, ...] | None = None
+    """1 or -1 for every joint, where the controller counts it the other way than the model."""
     joint_offsets: tuple[float, ...] | None = None
+    """Added to the columns, in the model's sense [deg, mm for a slide]."""
     coupled: str | None = None
+    """'3+2': the model's joint 3 is the column of joint 3 plus that of joint 2, where a pendant
+    counts joint 3 against the ground; '3-2' takes it off."""
     marker: str | None = None
+    """Of an export that holds several things that were tracked."""
     positions_only: bool = False
+    """Leave measured orientation out."""
     skip_rows: tuple[int, ...] = ()
+    """Rows to leave out, the first under the header being 1."""
 
     def __post_init__(self) -> None:
         for item in fields(self):

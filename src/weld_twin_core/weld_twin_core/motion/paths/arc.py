@@ -15,22 +15,15 @@ from .seam_path import Path, SeamFrames, frames_on, positive, unit, up
 
 @dataclass(frozen=True, eq=False)
 class Arc(Path):
-    """
-    The circular arc from ``start`` through ``middle`` to ``end``.
-
-    Attributes
-    ----------
-    start, middle, end : array, shape (3,) [m]
-    normal : array, shape (3,), optional
-        Out of the work; left out, the normal of the arc's plane that looks up (or, for a plane
-        that is upright, the one about which the arc turns left).
-
-    """
+    """The circular arc from ``start`` through ``middle`` to ``end``."""
 
     start: Array
     middle: Array
     end: Array
+    """Shape (3,) [m]."""
     normal: Array | None = None
+    """Out of the work, shape (3,); left out, the normal of the arc's plane that looks up (or, for
+    a plane that is upright, the one about which the arc turns left)."""
 
     def __post_init__(self) -> None:
         for name in ('start', 'middle', 'end'):
@@ -76,31 +69,21 @@ class Arc(Path):
 
 @dataclass(frozen=True, eq=False)
 class Circle(Path):
-    """
-    A circular seam about an axis, as round a pipe stub.
-
-    Attributes
-    ----------
-    centre : array, shape (3,) [m]
-    radius : float [m]
-    axis : array, shape (3,)
-        The travel turns left about it.
-    start : array, shape (3,), optional
-        Direction from the centre to where the seam begins; left out, along world x as far as
-        the axis lets it.
-    turns : float
-        How much of a turn; more than 1 overlaps.
-    normal : array, shape (3,), optional
-        Out of the work; left out, the axis.
-
-    """
+    """A circular seam about an axis, as round a pipe stub."""
 
     centre: Array
+    """Shape (3,) [m]."""
     radius: float
+    """[m]"""
     axis: Array = field(default_factory=up)
+    """The travel turns left about it, shape (3,)."""
     start: Array | None = None
+    """Direction from the centre to where the seam begins, shape (3,); left out, along world x as
+    far as the axis lets it."""
     turns: float = 1.0
+    """How much of a turn; more than 1 overlaps."""
     normal: Array | None = None
+    """Out of the work, shape (3,); left out, the axis."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'centre', readonly(self.centre, (3,), 'circle centre'))

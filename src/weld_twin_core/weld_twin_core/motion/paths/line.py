@@ -15,20 +15,13 @@ from .seam_path import Path, SeamFrames, frames_on, unit, up
 
 @dataclass(frozen=True, eq=False)
 class Line(Path):
-    """
-    A straight seam from ``start`` to ``end``.
-
-    Attributes
-    ----------
-    start, end : array, shape (3,) [m]
-    normal : array, shape (3,)
-        Out of the work; only the part perpendicular to the seam counts.
-
-    """
+    """A straight seam from ``start`` to ``end``."""
 
     start: Array
     end: Array
+    """Shape (3,) [m]."""
     normal: Array = field(default_factory=up)
+    """Out of the work, shape (3,); only the part perpendicular to the seam counts."""
 
     def __post_init__(self) -> None:
         for name in ('start', 'end'):

@@ -17,23 +17,14 @@ from .seam_path import Path, SeamFrames, frames_on, positive, unit, up
 
 @dataclass(frozen=True, eq=False)
 class Polyline(Path):
-    """
-    Straight pieces through points, each corner replaced by an arc of the blend radius.
-
-    Attributes
-    ----------
-    points : array, shape (M, 3) [m]
-        M at least 2; inner points are the corners.
-    blend : float [m]
-        Radius of the rounded corners.
-    normal : array, shape (3,)
-        Out of the work.
-
-    """
+    """Straight pieces through points, each corner replaced by an arc of the blend radius."""
 
     points: Array
+    """M at least 2, shape (M, 3) [m]; inner points are the corners."""
     blend: float = 0.005
+    """Radius of the rounded corners [m]."""
     normal: Array = field(default_factory=up)
+    """Out of the work, shape (3,)."""
 
     def __post_init__(self) -> None:
         points = readonly(self.points, (None, 3), 'polyline points')

@@ -19,20 +19,13 @@ _CELLS = 32
 
 @dataclass(frozen=True, eq=False)
 class Spline(Path):
-    """
-    The cubic spline through points, in arc length.
-
-    Attributes
-    ----------
-    points : array, shape (M, 3) [m]
-        M at least 2; taught points, or a list imported from a drawing or a seam tracker.
-    normal : array, shape (3,) or (M, 3)
-        Out of the work; one per point is interpolated.
-
-    """
+    """The cubic spline through points, in arc length."""
 
     points: Array
+    """M at least 2, shape (M, 3) [m]; taught points, or a list imported from a drawing or a seam
+    tracker."""
     normal: Array = field(default_factory=up)
+    """Out of the work, shape (3,) or (M, 3); one per point is interpolated."""
 
     def __post_init__(self) -> None:
         points = readonly(self.points, (None, 3), 'spline points')

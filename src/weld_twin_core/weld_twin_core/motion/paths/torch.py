@@ -33,22 +33,15 @@ HEADINGS = ('fixed', 'seam')
 
 @dataclass(frozen=True)
 class Torch:
-    """
-    Torch angles along a seam.
-
-    Attributes
-    ----------
-    work, travel, rotation : float [rad]
-    heading : str
-        'fixed': the torch turns about the wire no more than it must, as the wire does not care;
-        'seam': the tool's x follows the travel.
-
-    """
+    """Torch angles along a seam."""
 
     work: float = 0.0
     travel: float = 0.0
     rotation: float = 0.0
+    """[rad]"""
     heading: str = 'fixed'
+    """'fixed': the torch turns about the wire no more than it must, as the wire does not care;
+    'seam': the tool's x follows the travel."""
 
     def __post_init__(self) -> None:
         if self.heading not in HEADINGS:
@@ -66,7 +59,6 @@ class Torch:
 
         Parameters
         ----------
-        frames : SeamFrames
         first : SeamFrames, optional
             The seam at its start, which a fixed heading refers to; left out, ``frames[0]``.
 

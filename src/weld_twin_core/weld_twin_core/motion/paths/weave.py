@@ -22,24 +22,16 @@ class Weave(Path):
 
     Arc length, tangent and normal stay those of the seam underneath: speed is travel speed, and
     the torch does not turn with the swing.
-
-    Attributes
-    ----------
-    seam : Path
-    amplitude : float [m]
-        Largest distance from the seam, to either side.
-    wavelength : float [m]
-        Travel per full swing.
-    form : str
-        'sine'; 'zigzag', straight from side to side; or 'triangle', which runs down the work to
-        each side of the corner of a fillet: the torch also lifts by the distance from the seam.
-
     """
 
     seam: Path
     amplitude: float
+    """Largest distance from the seam, to either side [m]."""
     wavelength: float
+    """Travel per full swing [m]."""
     form: str = 'sine'
+    """'sine'; 'zigzag', straight from side to side; or 'triangle', which runs down the work to
+    each side of the corner of a fillet: the torch also lifts by the distance from the seam."""
 
     def __post_init__(self) -> None:
         if self.form not in FORMS:

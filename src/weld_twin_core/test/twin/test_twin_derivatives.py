@@ -11,62 +11,9 @@ from weld_twin_core.effects import Effect, effect_from_mapping
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.twin import Twin
 
-ENTRIES = {
-    'joint_offset': {'joint': 'j2', 'offset': 1e-3},
-    'link_length': {'joint': 'j1', 'da': 1e-4},
-    'link_offset': {'joint': 'j1', 'dd': 1e-4},
-    'link_twist': {'joint': 'j1', 'dalpha': 1e-3},
-    'axis_parallelism': {'joint': 'j1', 'dbeta': 1e-3},
-    'base_pose': {'xyz': [1e-3, 2e-3, 0.0], 'rotvec': [1e-2, 0.2, 0.1]},
-    'tool_pose': {'xyz': [1e-3, 2e-3, 0.1], 'rotvec': [1e-2, 0.2, 0.1]},
-    'setup_settling': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time_constant': 2.0},
-    'setup_step': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time': 1.0},
-    'instrument_knock': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time': 1.0},
-    'tool_slip': {'xyz': [1e-3, 0.0, 0.0], 'rotvec': [0.0, 0.0, 0.0], 'time': 1.0},
-    'joint_slip': {'joint': 'j1', 'offset': 1e-3, 'time': 1.0},
-    'gear_ratio': {'joint': 'j1', 'scale': 1e-3},
-    'joint_curve': {
-        'joint': 'j1',
-        'values': [1e-4, -2e-4, 4e-4],
-        'knots': [-1.0, 0.2, 1.5],
-    },
-    'frame_curve': {'xyz': [0.0, 1e-6] * 3, 'rotvec': [0.0, 1e-6] * 3, 'knots': [0.0, 4.0]},
-    'transmission_ripple': {
-        'joint': 'j1',
-        'amplitude': [1e-4, 2e-4],
-        'order': [3, 50],
-        'phase': [0.3, 0.2],
-    },
-    'joint_coupling': {'joint': 'j3', 'source': 'j4', 'ratio': 1e-3},
-    'backlash': {'joint': 'j2', 'width': 1e-3},
-    'gear_ratio_by_direction': {'joint': 'j2', 'difference': 1e-2, 'travel': 0.02},
-    'hysteresis': {'joint': 'j2', 'amplitude': 1e-3, 'travel': 0.2},
-    'friction': {'joint': 'j2', 'windup': 5e-3, 'asymmetry': -0.2, 'travel': 0.1},
-    'joint_compliance': {'joint': 'j1', 'compliance': 1e-5},
-    'loaded_play': {'joint': 'j1', 'width': 1e-4, 'torque': 20.0},
-    'bearing_tilt': {
-        'joint': 'j1',
-        'lean': [1e-3, 2e-3, 3e-3, -1e-3],
-        'second': [1e-4, 2e-4, -3e-4, 1e-4],
-    },
-    'wear': {'rate': 1e-4, 'slowing': 0.2},
-    'cartesian_compliance': {'compliance': [1e-6, 2e-6, 3e-6]},
-    'payload': {'mass': 2.0, 'com': [0.01, 0.02, 0.03]},
-    'servo_lag': {'joint': 'j3', 'time_constant': 0.01},
-    'time_delay': {'delay': 0.01},
-    'clock_rate': {'rate': 1e-3},
-    'thermal_growth': {'coefficient': 1e-5},
-    'link_warm_up': {'joint': 'j2', 'strain': 1e-3, 'warming_time': 20.0},
-    'drift': {'xyz_rate': [1e-6, 2e-6, 3e-6]},
-    'vibration': {'joint': 'j2', 'frequency': 4.0, 'damping': 0.05, 'gain': 0.3},
-    'measurement_scale': {'scale': 1e-4},
-    'pedestal_tilt': {'compliance': [1e-6, 2e-6]},
-    'hose_pull': {'force': [10.0, -20.0, 30.0], 'stiffness': 40.0},
-    'refraction': {'warming': [1.0, -2.0, 3.0]},
-}
 CLOCKS = ('time_delay', 'clock_rate')
 WITHOUT = {'quantization', 'measurement_noise'}
-ENTRIES = usual(ENTRIES, without=WITHOUT)
+ENTRIES = usual(without=WITHOUT)
 SPRUNG = ('payload', 'hose_pull')  # they show through a spring
 # No product of two of these displacements exists, so the sum of their derivatives is exact.
 SEPARATE = [

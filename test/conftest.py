@@ -12,7 +12,8 @@ from weld_twin_core.arm import catalog
 HERE = Path(__file__).parent
 FOLDERS = ('diagnosis', 'house', 'serve', 'soundness')
 sys.path[:0] = [str(HERE), *(str(HERE / folder) for folder in FOLDERS)]
-sys.path.insert(0, str(HERE.parent / 'src/weld_twin_core/test/soundness'))
+CORE = HERE.parent / 'src/weld_twin_core/test'
+sys.path[:0] = [str(CORE), str(CORE / 'soundness')]
 
 
 @pytest.fixture

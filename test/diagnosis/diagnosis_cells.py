@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from small_arm import small_arm
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.rotation import matrix_from_quaternion
@@ -86,9 +87,13 @@ def recorded(
 
 
 @cache
-def solved(*effects, robot='ur5', seed=1, exclude=(), align=(), experiment=False, **options):
-    """Return the diagnosis of a recording with effects, each a tuple (name, key, value, ...)."""
-    arm = load(robot)
+def solved(*effects, robot='', seed=1, exclude=(), align=(), experiment=False, **options):
+    """
+    Return the diagnosis of a recording with effects, each a tuple (name, key, value, ...).
+
+    The robot is the small arm, or one of the catalogue.
+    """
+    arm = load(robot) if robot else small_arm()
     true = [
         {'effect': e[0], **dict(zip(e[1::2], map(_plain, e[2::2]), strict=True))} for e in effects
     ]

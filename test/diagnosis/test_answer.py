@@ -87,7 +87,7 @@ ANSWERS = {
     'points': ((('backlash', 'joint', 'elbow_joint', 'width', 8e-4),), {'orientation': False}),
     'stations': (
         (('joint_compliance', 'joint', 'shoulder_lift_joint', 'compliance', 1.2e-5),),
-        {'static': 120},
+        {'static': 60},
     ),
     'nothing': ((), {}),
 }

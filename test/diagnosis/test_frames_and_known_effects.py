@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, effect, recorded, sites
 from scipy.spatial.transform import Rotation
+from small_arm import small_arm
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
@@ -50,9 +51,9 @@ def test_arbitrary_base_and_tool_frames_are_found_and_the_cause_with_them():
 
 
 def test_two_recordings_each_have_a_base_frame_of_their_own():
-    robot, bases = load('ur5'), (frame(2), frame(3))
+    robot, bases = small_arm(), (frame(2), frame(3))
     recordings = [
-        recorded(robot.with_frames(base=base), [SPRING], seed, static=70, name=f'set-up {seed}')
+        recorded(robot.with_frames(base=base), [SPRING], seed, static=40, name=f'set-up {seed}')
         for seed, base in enumerate(bases)
     ]
     answer = diagnose(recordings, robot, align=frozenset({'base'}), experiment=False)
@@ -63,9 +64,9 @@ def test_two_recordings_each_have_a_base_frame_of_their_own():
 
 
 def test_an_effect_known_beforehand_is_not_diagnosed_again():
-    robot = load('ur5')
+    robot = small_arm()
     known = effect('joint_compliance', joint='shoulder_lift_joint', compliance=1.2e-5)
-    recording = recorded(robot, [SPRING], static=70, richness=0.0)
+    recording = recorded(robot, [SPRING], static=40, richness=0.0)
     answer = diagnose([recording], robot, known=[known], experiment=False)
     assert (answer.status, answer.effects) == ('none', ())
     assert answer.gap.rms_m == pytest.approx(FLOOR, rel=0.1)
@@ -73,10 +74,10 @@ def test_an_effect_known_beforehand_is_not_diagnosed_again():
 
 
 def test_held_out_recordings_judge_the_shrink():
-    robot = load('ur5')
+    robot = small_arm()
     seen, unseen = (
         recorded(robot, [SPRING], seed, static=n, name=name)
-        for seed, n, name in ((1, 70, 'seen'), (2, 50, 'unseen'))
+        for seed, n, name in ((1, 40, 'seen'), (2, 50, 'unseen'))
     )
     answer = diagnose([seen], robot, holdout=[unseen], experiment=False)
     shrink = answer.shrink

@@ -6,7 +6,7 @@ Diagnoses of a small arm: the truth is named, and every number is as it was kept
 A change of the engine that is meant to change nothing leaves them as they are. After one that is meant
 to change answers they are written anew, and the difference is read:
 
-    tools/in_env python test/diagnosis/test_kept_answers.py
+    tools/in_env env PYTHONPATH=src/weld_twin_core/test python test/diagnosis/test_kept_answers.py
 
 Probabilities are left out, for they are learned anew from time to time, and so are sentences.
 """
@@ -20,9 +20,8 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnosis_cells import recorded, sites
+from small_arm import small_arm
 
-from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.advice import Limits
 from weld_twin_core.diagnosis.predicting import sizes
@@ -70,15 +69,6 @@ CASES = {
 asked, and what it must name."""
 
 
-@cache
-def arm() -> Robot:
-    """Return the first three joints of a UR5, with a tool off their axes."""
-    whole = load('ur5').to_mapping()
-    short = {key: whole[key][:3] for key in ('joints', 'links')}
-    tool = {'xyz': [0.1, 0.05, 0.2], 'quat_xyzw': [0.0, 0.0, 0.0, 1.0]}
-    return Robot.from_mapping({**whole, **short, 'tool': tool})
-
-
 def many() -> list[dict[str, Any]]:
     """Return an error of every zero and every link."""
     rng = np.random.default_rng(4)
@@ -90,7 +80,7 @@ def many() -> list[dict[str, Any]]:
     return [
         {'effect': name, 'joint': joint, key: float(rng.normal(scale=size))}
         for name, key, size in kinds
-        for joint in arm().joint_names
+        for joint in small_arm().joint_names
     ]
 
 
@@ -99,9 +89,11 @@ def given(name: str) -> dict[str, Any]:
     """Return what a case hands to a diagnosis; made once."""
     truths, held, made, asked, _ = CASES[name]
     truths = [many()] if name == 'many' else truths
-    each = [recorded(arm(), true, k, name=f'{k}', **made) for k, true in enumerate(truths, 1)]
+    each = [
+        recorded(small_arm(), true, k, name=f'{k}', **made) for k, true in enumerate(truths, 1)
+    ]
     used = len(each) - held
-    return {'recordings': each[:used], 'robot': arm(), 'holdout': each[used:], **asked}
+    return {'recordings': each[:used], 'robot': small_arm(), 'holdout': each[used:], **asked}
 
 
 def answer(name: str) -> Any:

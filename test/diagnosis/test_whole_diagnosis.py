@@ -7,6 +7,7 @@ import gc
 import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, recorded, shaken, sites, solved
+from small_arm import small_arm
 
 from weld_twin_core import JointMotion, Measurements, Recording, Twin, default_seam, plan
 from weld_twin_core.arm.catalog import load
@@ -16,9 +17,7 @@ from weld_twin_core.effects import BearingTilt, JointOffset, ServoLag
 
 SINGLE = {
     'backlash': dict(joint='elbow_joint', width=8e-4),
-    'joint_compliance': dict(joint='shoulder_lift_joint', compliance=1.2e-5),
     'servo_lag': dict(joint='elbow_joint', time_constant=8e-3),
-    'transmission_ripple': dict(joint='shoulder_lift_joint', amplitude=3e-4, order=20, phase=0.7),
     'joint_offset': dict(joint='elbow_joint', offset=-6e-4),  # away from where the load pulls
     'time_delay': dict(delay=6e-3),
     'tool_pose': dict(xyz=(4e-4, -3e-4, 2e-4), rotvec=(6e-4, 0.0, -8e-4)),
@@ -55,22 +54,16 @@ def test_a_single_cause_is_named_on_its_joint_with_its_size(name):
     (found,) = answer.effects
     right = near(found, truth)
     assert all(right.values()), (right, found.as_dict())
+    assert answer.causes[0].place[0][0] == found.effect.at
+    assert answer.causes[0].dependence[0][0] == found.effect.on
     assert answer.confidence > 0.9
-    assert answer.sure
     assert answer.shrink.rms_after_m == pytest.approx(FLOOR, rel=0.1)
 
 
 def test_a_large_wobble_with_a_high_spot_is_one_cause():
-    robot, rng = load('ur5'), np.random.default_rng(5)
-    t = np.arange(0.0, 40.0, 0.02)
-    q = 1.2 * np.sin(2.0 * np.pi * (0.05 + 0.013 * np.arange(6)) * t[:, None]) + [
-        0,
-        -1,
-        1,
-        -1,
-        1,
-        0,
-    ]
+    robot, rng = small_arm(), np.random.default_rng(5)
+    t = np.arange(0.0, 40.0, 0.05)
+    q = 1.2 * np.sin(2.0 * np.pi * (0.05 + 0.013 * np.arange(3)) * t[:, None]) + [0, -1, 1]
     wobble = BearingTilt('shoulder_pan_joint', (5e-4, 2e-4, 0.0, 1e-4), (4e-5, -3e-5, 0.0, 2e-5))
     moved = Recording('run', JointMotion(t, q))
     seen = Twin(robot, [wobble]).poses(moved)
@@ -106,11 +99,13 @@ def test_without_a_flaw_nothing_is_named():
     assert (answer.status, answer.effects, answer.indistinguishable) == ('none', (), ())
     assert answer.gap.rms_m == pytest.approx(FLOOR, rel=0.1)
     assert answer.gap.noise_floor_m == pytest.approx(FLOOR, rel=0.1)
+    assert answer.contributions is None  # there is nothing to be thought away
     assert answer.shrink.ratio == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_cause_taken_out_of_the_library_stays_unknown_and_nothing_stands_in_for_it():
-    answer = solved(flaw('backlash', joint='elbow_joint', width=1.5e-3), exclude=('backlash',))
+    play = flaw('backlash', joint='elbow_joint', width=1.5e-3)
+    answer = solved(play, robot='ur5', seconds=8.0, exclude=('backlash',))
     assert answer.status == 'unknown'
     assert answer.effects == ()
     assert answer.unexplained.above_noise
@@ -121,7 +116,7 @@ def test_a_cause_taken_out_of_the_library_stays_unknown_and_nothing_stands_in_fo
 
 def test_offsets_of_parallel_links_are_named_together():
     # axes 2, 3 and 4 of this arm are parallel: their d values do exactly the same
-    answer = solved(flaw('link_offset', joint='elbow_joint', dd=4e-4))
+    answer = solved(flaw('link_offset', joint='elbow_joint', dd=4e-4), robot='ur5')
     parallel = {('link_offset', f'{j}_joint') for j in ('shoulder_lift', 'elbow', 'wrist_1')}
     assert answer.status == 'ambiguous'
     assert sites(answer) == [parallel]
@@ -129,16 +124,8 @@ def test_offsets_of_parallel_links_are_named_together():
     assert all(near(found, {'dd': 4e-4}).values())
 
 
-@pytest.mark.parametrize(
-    'truth',
-    [
-        flaw('joint_offset', joint='shoulder_pan_joint', offset=5e-4),
-        flaw('base_pose', xyz=(0.0, 0.0, 0.0), rotvec=(0.0, 0.0, 5e-4)),
-    ],
-    ids=['offset', 'turn'],
-)
-def test_an_offset_of_the_first_joint_and_a_turn_of_the_base_are_named_together(truth):
-    answer = solved(truth)
+def test_an_offset_of_the_first_joint_and_a_turn_of_the_base_are_named_together():
+    answer = solved(flaw('base_pose', xyz=(0.0, 0.0, 0.0), rotvec=(0.0, 0.0, 5e-4)))
     assert answer.status == 'ambiguous'
     (group,) = sites(answer)
     assert {('joint_offset', 'shoulder_pan_joint'), ('base_pose', None)} <= group
@@ -156,7 +143,7 @@ def test_positions_alone_are_enough_for_play():
 
 def test_stations_at_rest_are_enough_for_a_soft_joint():
     truth = dict(joint='shoulder_lift_joint', compliance=1.2e-5)
-    answer = solved(flaw('joint_compliance', **truth), static=120)
+    answer = solved(flaw('joint_compliance', **truth), static=60)
     assert answer.status == 'identified'
     assert sites(answer) == [{('joint_compliance', 'shoulder_lift_joint')}]
     assert all(near(answer.effects[0], truth).values())
@@ -164,16 +151,15 @@ def test_stations_at_rest_are_enough_for_a_soft_joint():
 
 def test_the_same_data_give_the_same_answer():
     truth = dict(joint='shoulder_lift_joint', compliance=1.2e-5)
-    robot = load('ur5')
-    recording = recorded(robot, [{'effect': 'joint_compliance', **truth}], static=120)
-    again = diagnose([recording], robot)
-    assert again.as_dict() == solved(flaw('joint_compliance', **truth), static=120).as_dict()
+    recording = recorded(small_arm(), [{'effect': 'joint_compliance', **truth}], static=60)
+    again = diagnose([recording], small_arm(), experiment=False)
+    assert again.as_dict() == solved(flaw('joint_compliance', **truth), static=60).as_dict()
 
 
 def test_what_stands_in_for_two_causes_gives_way_once_one_of_them_is_found():
     """On this seam friction of joint_a5 fits best alone, and no machine has it beside the lag."""
     robot = load('kuka_kr16_2')
-    seam = plan(robot, default_seam(robot, 'weave'), 'aggressive', rate_hz=125.0, fit=True)
+    seam = plan(robot, default_seam(robot, 'weave'), 'aggressive', rate_hz=50.0, fit=True)
     commanded = Recording('seam', seam.motion)
     flaws = [ServoLag('joint_a2', time_constant=6e-3), JointOffset('joint_a5', offset=1.1e-3)]
     real = Twin(robot, flaws).poses(commanded)
@@ -193,10 +179,10 @@ def test_a_diagnosis_that_is_over_holds_no_memory():
         gc.collect()
         return sum(isinstance(one, Fit) for one in gc.get_objects())
 
-    arm = load('ur5')
+    arm = small_arm()
     before = fits()
     true = [{'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 2e-3}]
-    answer = diagnose([recorded(arm, true, 3, seconds=6.0)], arm)
+    answer = diagnose([recorded(arm, true, 3, seconds=3.0)], arm, experiment=False)
     assert answer.effects
     del answer
     assert fits() <= before

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Cells of the soundness tests for all folders; bundled robots."""
+"""Cells of the soundness tests and a small arm for all folders; bundled robots."""
 
 import sys
 from pathlib import Path
@@ -9,7 +9,8 @@ import pytest
 
 from weld_twin_core.arm import catalog
 
-sys.path.insert(0, str(Path(__file__).parent / 'soundness'))
+HERE = Path(__file__).parent
+sys.path[:0] = [str(HERE), str(HERE / 'soundness')]
 
 
 @pytest.fixture

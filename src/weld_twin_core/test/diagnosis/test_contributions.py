@@ -49,12 +49,3 @@ def test_what_is_left_and_all_parts_are_the_figures_of_the_diagnosis(cell):
     left, parts = found.contributions.left[0], found.contributions.parts[0]
     assert rms(left) == pytest.approx(found.shrink.rms_after_m, rel=1e-9)
     assert rms(left + parts.sum(axis=0)) == pytest.approx(found.shrink.rms_before_m, rel=1e-9)
-
-
-def test_where_no_cause_is_named_nothing_can_be_thought_away(cell):
-    robot, seam, noise, _ = cell
-    bare = wt.Twin(robot).poses(seam).position + noise
-    found = wt.diagnose(
-        seam.with_measured(wt.Measurements(seam.joints.t, bare)), robot, experiment=False
-    )
-    assert found.status == 'none' and found.contributions is None

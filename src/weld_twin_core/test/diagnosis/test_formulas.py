@@ -6,28 +6,29 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from small_arm import small_arm
 
 import weld_twin_core as wt
 
 ELBOW = 2
 NOISE = 2e-5
-CENTRE = np.array([0.3, -1.2, 1.4, -1.0, -1.3, 0.2])
+CENTRE = np.array([0.3, -1.2, 1.4])
 
 
-def swinging(seconds: float = 20.0) -> wt.JointMotion:
-    """Return joints that swing at frequencies of their own, within the UR5's limits."""
-    t = np.arange(0.0, seconds, 0.02)
-    way = 0.5 * np.sin(np.outer(t, 0.7 + 0.31 * np.arange(6)) + np.arange(6))
+def swinging() -> wt.JointMotion:
+    """Return joints that swing at frequencies of their own, within the arm's limits."""
+    t = np.arange(0.0, 20.0, 0.02)
+    way = 0.5 * np.sin(np.outer(t, 0.7 + 0.31 * np.arange(3)) + np.arange(3))
     return wt.JointMotion(t, CENTRE + way)
 
 
 def recorded(bend=None, instrument=None, noise=(NOISE,) * 3) -> wt.Recording:
-    """Return a recording of a UR5 with one joint, or the instrument, bent by a function."""
+    """Return a recording with one joint, or the instrument, bent by a function."""
     commanded = swinging()
     q = np.array(commanded.q)
     if bend is not None:
         q[:, ELBOW] += bend(q[:, ELBOW])
-    real = wt.Twin(wt.load('ur5')).poses(wt.Recording('real', wt.JointMotion(commanded.t, q)))
+    real = wt.Twin(small_arm()).poses(wt.Recording('real', wt.JointMotion(commanded.t, q)))
     seen = real.position if instrument is None else instrument(real.position)
     drawn = np.random.default_rng(5).normal(size=seen.shape) * np.array(noise)
     measured = wt.Measurements(commanded.t, seen + drawn)
@@ -69,7 +70,7 @@ def first(found):
 
 
 def test_an_instrument_that_errs_by_a_law_of_its_own_is_no_scale():
-    found = wt.diagnose(recorded(instrument=far_off), wt.load('ur5'), experiment=False)
+    found = wt.diagnose(recorded(instrument=far_off), small_arm(), experiment=False)
     assert found.status == 'unknown'
     assert first(found) == ('instrument', 'place')
     assert not found.effects
@@ -77,15 +78,13 @@ def test_an_instrument_that_errs_by_a_law_of_its_own_is_no_scale():
 
 
 def test_an_instrument_with_a_wrong_unit_is_told_by_its_name():
-    found = wt.diagnose(
-        recorded(instrument=lambda p: 1.0001 * p), wt.load('ur5'), experiment=False
-    )
+    found = wt.diagnose(recorded(instrument=lambda p: 1.0001 * p), small_arm(), experiment=False)
     assert [named.effect.name for named in found.effects] == ['measurement_scale']
 
 
 @pytest.mark.parametrize('bend', [jumping, worn_in_the_middle])
 def test_lost_motion_of_another_law_is_placed_and_not_named(bend):
-    found = wt.diagnose(recorded(bend), wt.load('ur5'), experiment=False)
+    found = wt.diagnose(recorded(bend), small_arm(), experiment=False)
     assert found.status == 'unknown'
     place, dependence = first(found)
     assert place == 'elbow_joint'
@@ -94,12 +93,12 @@ def test_lost_motion_of_another_law_is_placed_and_not_named(bend):
 
 def test_an_encoder_that_rounds_is_placed_though_its_family_was_taken_out():
     found = wt.diagnose(
-        recorded(rounded), wt.load('ur5'), exclude=('quantization',), experiment=False
+        recorded(rounded), small_arm(), exclude=('quantization',), experiment=False
     )
     assert found.status == 'unknown'
     assert first(found)[0] == 'elbow_joint'
 
 
 def test_noise_of_the_instrument_comes_from_no_joint():
-    found = wt.diagnose(recorded(noise=(2e-5, 3e-5, 4e-5)), wt.load('ur5'), experiment=False)
+    found = wt.diagnose(recorded(noise=(2e-5, 3e-5, 4e-5)), small_arm(), experiment=False)
     assert found.status == 'none'

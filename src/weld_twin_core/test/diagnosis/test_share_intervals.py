@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from small_arm import small_arm
 
 import weld_twin_core as wt
 
@@ -15,14 +16,12 @@ SHOULDER, ELBOW = 'shoulder_lift_joint', 'elbow_joint'
 
 
 def swings():
-    """Return a UR5 whose joints swing at frequencies of their own for 20 s."""
+    """Return an arm whose joints swing at frequencies of their own for 20 s."""
     rng = np.random.default_rng(3)
     t = np.arange(0.0, 20.0, 0.04)
-    centre = np.array([0.3, -1.2, 1.4, -1.0, -1.3, 0.2])
-    sizes, rates = rng.uniform(0.3, 0.9, 6), rng.uniform(0.05, 0.3, 6)
-    return wt.load('ur5'), wt.JointMotion(
-        t, centre + sizes * np.sin(2 * np.pi * t[:, None] * rates)
-    )
+    sizes, rates = rng.uniform(0.3, 0.9, 3), rng.uniform(0.05, 0.3, 3)
+    q = np.array([0.3, -1.2, 1.4]) + sizes * np.sin(2 * np.pi * t[:, None] * rates)
+    return small_arm(), wt.JointMotion(t, q)
 
 
 def solved(effects, seed=5):

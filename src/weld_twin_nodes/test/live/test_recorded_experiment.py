@@ -32,8 +32,11 @@ def asked(tmp_path):
 def test_the_recording_holds_the_motion_and_what_the_cell_measured(asked, tmp_path):
     experiment, robot = asked
     with Cell(tmp_path / 'cell') as cell:
-        cell.start('error_injector', robot='ur5', effects=OFFSET)
-        bag = recorded_experiment(experiment, 'ur5', 2.0, tmp_path / 'bag', rate=25.0)
+        # The motion waits for recorder and injector, and the injector's first pose for the recorder.
+        injector = {'robot': 'ur5', 'effects': OFFSET, 'wait_for_subscribers': 1}
+        cell.start('error_injector', reliable_inputs=True, **injector)
+        moving = {'rate': 25.0, 'wait_for_subscribers': 2}
+        bag = recorded_experiment(experiment, 'ur5', 2.0, tmp_path / 'bag', **moving)
         with pytest.raises(DataError, match='exists already'):
             recorded_experiment(experiment, 'ur5', 2.0, tmp_path / 'bag')
     recording = read_recording(bag, robot)

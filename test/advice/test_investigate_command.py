@@ -6,42 +6,57 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import yaml
+from small_arm import small_arm
 
 import weld_twin_core as wt
 from weld_twin_msgs_py.bags import write_recording
+from weld_twin_msgs_py.robots import write_robot_yaml
 from weld_twin_nodes.cli.in_process import weld_twin
 
 SPRING = wt.effects.JointCompliance('shoulder_lift_joint', compliance=1.2e-5)
 BOX = '-1.2,-1.2,-0.2,1.2,1.2,1.6'
 
 
-def measured(robot, place, q, seed, load=0.0):
-    arm = replace(robot, payload_mass=load)
+HOME = np.array([0.2, -1.3, 1.5])
+ARM = small_arm()
+
+
+@pytest.fixture
+def robot(tmp_path):
+    """Return the file of the arm that is asked about."""
+    write_robot_yaml(tmp_path / 'arm.yaml', ARM)
+    return ('--robot', str(tmp_path / 'arm.yaml'))
+
+
+def about(width, count=25):
+    return HOME + width * np.random.default_rng(1).uniform(-1.0, 1.0, (count, 3))
+
+
+def measured(place, q, seed, load=0.0):
+    arm = replace(ARM, payload_mass=load)
     motion = wt.JointMotion(15.0 * np.arange(len(q)), np.asarray(q), static=True)
     real = wt.Twin(arm, [SPRING]).poses(wt.Recording(place.name, motion))
     noise = np.random.default_rng(seed).normal(0.0, 4e-5, real.position.shape)
     seen = wt.Measurements(motion.t, real.position + noise, real.rotation)
-    write_recording(place, wt.Recording(place.name, motion, seen), robot)
+    write_recording(place, wt.Recording(place.name, motion, seen), ARM)
     return str(place)
 
 
-def test_what_is_asked_for_is_taken_in_and_judged(ur5, tmp_path):
-    rng = np.random.default_rng(1)
-    near = np.array([0.2, -1.3, 1.5, -1.8, -1.5, 0.1]) + 0.03 * rng.uniform(-1, 1, (25, 6))
-    first = measured(ur5, tmp_path / 'monday', near, 1)
-    place = tmp_path / 'cell'
+def test_what_is_asked_for_is_taken_in_and_judged(robot, tmp_path):
+    first, place = measured(tmp_path / 'monday', about(0.03), 1), tmp_path / 'cell'
     said = weld_twin(
-        *('investigate', str(place), first, '--robot', 'ur5', '--budget', '6', f'--cell-box={BOX}')
+        *('investigate', str(place), first, *robot, '--budget', '6', f'--cell-box={BOX}')
     )
     assert said.code == 0, said.err
     asked = json.loads((place / 'investigation.json').read_text())['rounds'][0]['asked']
     assert 0.0 < asked['minutes'] <= 6.0 and asked['decided'] is None
     wanted = yaml.safe_load((place / 'round-0' / 'experiment.yaml').read_text())
-    tips = wt.forward(ur5, np.array(wanted['q']))[:, :3, 3]
+    tips = wt.forward(ARM, np.array(wanted['q']))[:, :3, 3]
     low, high = np.array([float(v) for v in BOX.split(',')]).reshape(2, 3)
     assert ((tips >= low) & (tips <= high)).all()
-    second = measured(ur5, tmp_path / 'tuesday', wanted['q'], 2)
+    second = measured(tmp_path / 'tuesday', wanted['q'], 2)
     said = weld_twin('investigate', str(place), second)
     assert said.code == 0, said.err
     state = json.loads((place / 'investigation.json').read_text())
@@ -52,11 +67,9 @@ def test_what_is_asked_for_is_taken_in_and_judged(ur5, tmp_path):
     assert ('joint_compliance', 'shoulder_lift_joint') in named
 
 
-def test_a_larger_budget_goes_on_where_the_first_was_spent(ur5, tmp_path):
-    rng = np.random.default_rng(1)
-    near = np.array([0.2, -1.3, 1.5, -1.8, -1.5, 0.1]) + 0.03 * rng.uniform(-1, 1, (25, 6))
-    first, place = measured(ur5, tmp_path / 'monday', near, 1), str(tmp_path / 'cell')
-    said = weld_twin('investigate', place, first, '--robot', 'ur5', '--budget', '0.3')
+def test_a_larger_budget_goes_on_where_the_first_was_spent(robot, tmp_path):
+    first, place = measured(tmp_path / 'monday', about(0.03), 1), str(tmp_path / 'cell')
+    said = weld_twin('investigate', place, first, *robot, '--budget', '0.3')
     assert said.code == 0 and 'budget spent' in said.out
     said = weld_twin('investigate', place, '--live')
     assert said.code == 2 and 'a larger --budget opens it again' in said.err
@@ -70,12 +83,11 @@ def test_a_larger_budget_goes_on_where_the_first_was_spent(ur5, tmp_path):
     assert json.loads((tmp_path / 'cell' / 'investigation.json').read_text())['budget_min'] == 40.0
 
 
-def test_a_weight_that_was_hung_for_one_recording_is_told(ur5, tmp_path):
-    rng = np.random.default_rng(1)
-    near = np.array([0.2, -1.3, 1.5, -1.8, -1.5, 0.1]) + 0.4 * rng.uniform(-1, 1, (40, 6))
-    first = measured(ur5, tmp_path / 'first', near[:25], 1)
-    heavy = measured(ur5, tmp_path / 'heavy', near[25:], 2, load=5.0)
-    words = ('diagnose', first, heavy, '--robot', 'ur5', '--out', str(tmp_path / 'out'))
+def test_a_weight_that_was_hung_for_one_recording_is_told(robot, tmp_path):
+    near = about(0.4, 40)
+    first = measured(tmp_path / 'first', near[:25], 1)
+    heavy = measured(tmp_path / 'heavy', near[25:], 2, load=5.0)
+    words = ('diagnose', first, heavy, *robot, '--out', str(tmp_path / 'out'))
     said = weld_twin(*words, '--changed', heavy, 'load=5')
     assert said.code == 0, said.err
     effect = json.loads((tmp_path / 'out' / 'diagnosis.json').read_text())['verdict']['effects'][0]

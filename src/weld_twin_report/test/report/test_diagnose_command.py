@@ -103,10 +103,10 @@ def test_the_verdict_is_printed(said, found):
     assert str(found / 'report.html') in said.out.replace('\n', '')
 
 
-def test_what_is_known_is_in_the_twin_from_the_start(cell, tmp_path):
+def test_what_is_known_is_in_the_twin_from_the_start_and_what_is_excluded_never_is(cell, tmp_path):
     run(
         *('diagnose', cell / 'first', '--robot', 'ur5', '--effects-known', cell / 'true.yaml'),
-        *('--out', tmp_path / 'rest'),
+        *('--exclude-effect', 'servo_lag', '--out', tmp_path / 'rest'),
     )
     data = json.loads((tmp_path / 'rest' / 'diagnosis.json').read_text())
     assert data['gap']['rms_m'] < 1.1 * np.sqrt(3) * 2e-5
@@ -115,16 +115,10 @@ def test_what_is_known_is_in_the_twin_from_the_start(cell, tmp_path):
         'joint': 'elbow_joint',
         'width': WIDTH,
     }
-
-
-def test_an_excluded_family_is_never_named(cell, tmp_path):
-    run(
-        *('diagnose', cell / 'first', '--robot', 'ur5', '--exclude-effect', 'backlash'),
-        *('--out', tmp_path / 'd'),
-    )
-    data = json.loads((tmp_path / 'd' / 'diagnosis.json').read_text())
     named = {e['effect'] for e in data['verdict']['effects'] + data['candidates']}
-    assert 'backlash' not in named
+    assert (
+        'servo_lag' not in named and data['not_considered']['servo_lag'] == 'excluded by the user'
+    )
 
 
 @pytest.mark.parametrize(

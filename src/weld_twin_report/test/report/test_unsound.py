@@ -29,7 +29,7 @@ def run(*words):
     return main([str(word) for word in words])
 
 
-def measured(seed, seconds=16.0, rate=60.0, velocity=False):
+def measured(seed, seconds=9.0, rate=60.0, velocity=False):
     """Return a motion of a UR5 whose elbow zero is off, with its measured points."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, seconds, 1.0 / rate)

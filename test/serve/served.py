@@ -45,7 +45,7 @@ class Server:
         for name, value in headers.items():
             request.add_header(name.replace('_', '-'), value)
         try:
-            with urllib.request.urlopen(request, timeout=20) as answer:
+            with urllib.request.urlopen(request, timeout=60) as answer:
                 return answer.status, answer.read().decode()
         except urllib.error.HTTPError as error:
             return error.code, error.read().decode()
@@ -84,7 +84,7 @@ class Person:
         """Return status, address and text of a page."""
         request = Request(self.root + path, data, {'Content-Type': kind} if kind else {})
         try:
-            with self.open(request, timeout=30) as answer:
+            with self.open(request, timeout=60) as answer:
                 return (
                     answer.status,
                     answer.url.removeprefix(self.root),

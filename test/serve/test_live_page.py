@@ -56,5 +56,5 @@ def test_the_last_verdict_of_the_nodes_is_shown(tmp_path):
 
 
 def read(address):
-    with urllib.request.urlopen(address, timeout=20) as answer:
+    with urllib.request.urlopen(address, timeout=60) as answer:
         return answer.read().decode()

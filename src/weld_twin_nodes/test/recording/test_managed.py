@@ -151,7 +151,7 @@ def test_a_recorder_serves_all_else_while_it_waits_for_a_node_that_stands_still(
         twin.signal(signal.SIGCONT)
     assert answer.result().success
     assert time.monotonic() - begun > 2.0
-    assert served > 1  # who serves nothing meanwhile answers when it is over
+    assert served > 0  # who serves nothing meanwhile answers when it is over
     assert recorder.state == 'inactive'
     assert 'activate is refused: the node is deactivating' in cell.processes[1].log
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, weighed
+from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, hidden, weighed
 
 SMALL = 40
 """Coordinates of one family."""
@@ -47,3 +47,11 @@ def test_what_a_frame_hides_is_as_wide_as_the_family_has_it():
     both = np.array([1.0, 0.7])
     pair = rough.covariance[np.ix_([0, -1], [0, -1])]
     assert np.sqrt(both @ pair @ both) < 0.2
+
+
+def test_what_places_that_nobody_measured_take_up_is_hidden():
+    """A first zero turns all places with it; what is left of it in the data is rounding."""
+    rng = np.random.default_rng(4)
+    columns = np.stack([1e-14 * rng.normal(size=300), rng.normal(size=300)])
+    rows = Rows(columns, np.zeros(300), 1.0, np.array([20.0, 20.0]))
+    assert hidden(rows, np.zeros(2, dtype=bool)).tolist() == [True, False]

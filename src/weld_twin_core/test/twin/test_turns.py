@@ -21,7 +21,7 @@ from weld_twin_core.recording import JointMotion, Measurements, Recording
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.goal_correction import Start, corrected_goal
 from weld_twin_core.twin.goal_motion import Goal
-from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior
+from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior, pose_covariances
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_core.twin.turns import just_turned
 
@@ -53,6 +53,49 @@ def played(q, width):
     return out
 
 
+def swinging(rng):
+    """Return stamps and a motion of all joints."""
+    t = np.arange(0.0, 40.0, 0.02)
+    return t, HOME + 0.5 * np.sin(np.outer(t, rng.uniform(0.5, 1.3, 6)) + rng.uniform(0.0, 6.0, 6))
+
+
+def fitted(robot, t, q, real, effect, rng):
+    """Return an effect fitted to what an instrument sees of joints, and how well it does."""
+    seen = forward(robot, real)[:, :3, 3] + rng.normal(scale=2e-5, size=(t.size, 3))
+    problem = Problem((Recording('free', JointMotion(t, q), Measurements(t, seen)),))
+    start = Model(robot, (robot.T_world_base,), (), (effect,))
+    precision = effect_precision(start)
+    scale = robust_scale(problem, problem.residuals(start))
+    model = fit(problem, start, scale, precision).model
+    residuals = problem.residuals(model)
+    scale, floor = robust_scale(problem, residuals), noise_floor(problem, residuals)
+    return problem, model, scale, precision, floor
+
+
+def test_a_joint_that_shakes_is_not_taken_for_the_noise_of_the_instrument():
+    """A link sticks and jumps from sample to sample: white as noise, but along one lever alone."""
+    robot, rng = load('ur5'), np.random.default_rng(5)
+    t, q = swinging(rng)
+    jumps = 3e-4 * rng.uniform(-1.0, 1.0, (2, t.size))
+    real, again = q.copy(), q.copy()
+    real[:, 1] += jumps[0]
+    again[:, 1] += jumps[1]
+    zero = effect_from_mapping(
+        {'effect': 'joint_offset', 'joint': 'shoulder_lift_joint', 'offset': 0.0}
+    )
+    made = fitted(robot, t, q, real, zero, rng)
+    posterior = allowed(*made)
+    assert np.flatnonzero(posterior.discrepancy.gears).tolist() == [1]
+    twin, motion = made[1].twin(0), Recording('again', JointMotion(t, q))
+    error = forward(robot, again)[:, :3, 3] - twin.poses(motion).position
+    covariance = pose_covariances(posterior, twin, motion, t)[:, :3, :3]
+    size = np.einsum('mi,mi->m', error, np.linalg.solve(covariance, error[..., None])[..., 0])
+    assert 0.85 < (size < 6.251).mean() <= 1.0  # 90 % of chi squared with three freedoms
+    assert np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean()) < 2.0 * np.sqrt(
+        (error**2).sum(axis=1).mean()
+    )
+
+
 @pytest.mark.parametrize(
     ('law', 'sure'),
     [
@@ -62,21 +105,11 @@ def played(q, width):
 )
 def test_a_law_of_lost_motion_that_does_not_hold_shows_where_joints_turn(law, sure):
     robot, rng = load('ur5'), np.random.default_rng(5)
-    t = np.arange(0.0, 40.0, 0.02)
-    q = HOME + 0.5 * np.sin(np.outer(t, rng.uniform(0.5, 1.3, 6)) + rng.uniform(0.0, 6.0, 6))
+    t, q = swinging(rng)
     real = q.copy()
     real[:, 2] = played(q[:, 2], WIDTH)
-    seen = forward(robot, real)[:, :3, 3] + rng.normal(scale=2e-5, size=(t.size, 3))
-    recording = Recording('free', JointMotion(t, q), Measurements(t, seen))
-    problem = Problem((recording,))
     effect = effect_from_mapping({**law, 'joint': 'elbow_joint'})
-    start = Model(robot, (robot.T_world_base,), (), (effect,))
-    precision = effect_precision(start)
-    scale = robust_scale(problem, problem.residuals(start))
-    found = fit(problem, start, scale, precision)
-    scale = robust_scale(problem, problem.residuals(found.model))
-    floor = noise_floor(problem, problem.residuals(found.model))
-    turns = allowed(problem, found.model, scale, precision, floor).discrepancy.turns
+    turns = allowed(*fitted(robot, t, q, real, effect, rng)).discrepancy.turns
     assert not np.delete(turns, 2).any()
     # Any part of what is lost is as likely: the standard deviation of even chances over the gap.
     assert (turns[2] == pytest.approx(WIDTH / np.sqrt(3.0), rel=0.1)) is not sure

@@ -24,15 +24,15 @@ from ...twin.posterior import Directions, Posterior, postures_within_limits, usu
 from ...twin.reversals import is_play, lost_motion
 from ...twin.twin import Twin
 from ..algebra.definite import inverted
-from ..algebra.designed import designed
-from ..algebra.fit import LEAST_TURN, coordinates
+from ..algebra.fit import LEAST_TURN, Fit, coordinates
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Model, Problem, Scale
 from ..frames.open_directions import VISIBLE, open_directions
 from ..unseen.folds import posture_regions
+from ..unseen.unseen_stretches import Unseen
 from . import plausible_arm
-from .leftover import Unseen, leftover
+from .leftover import Foretold, leftover, told_noise
 from .sizes import Prior, Rows, weighed, with_prior
 
 ROWS = 9000
@@ -74,9 +74,13 @@ def allowed(
     rows, prior = _rows(problem, model, scale, what), _prior(what, model)
     models = weighed(rows, prior, _expected(problem, scale))
     system = Conditioning(rows, prior, models.shown, models.noise)
-    unseen = _unseen(problem, model, scale, precision, rows)
+    fit = Fit(model, rows.residual, coordinates(model))
+    regions = Unseen.of(problem, scale, fit, precision).by(posture_regions(problem))
+    levers = _levers(problem, model, scale)
+    foretold = Foretold.of(regions, rows.columns, levers, system.given)
+    noise, turning = told_noise(problem, floor), ~np.asarray(model.robot.prismatic)
     lost = _lost(problem, model)
-    remaining = leftover(problem, scale, unseen, system.given, floor, models.rough, lost)
+    remaining = leftover(problem, foretold, turning, noise, models.rough, lost)
     curves = np.split(
         models.open, what.count - np.cumsum([k.size for k in what.knots[::-1]])[::-1]
     )
@@ -145,28 +149,15 @@ def _joints(recording: Recording) -> Array:
 
 def _rows(problem: Problem, model: Model, scale: Scale, what: Directions) -> Rows:
     features = problem.features(model)
-    parts = [problem.seen(k, what.columns(maker, k)) for k, maker in enumerate(features)]
+    whole = [what.columns(maker, k) for k, maker in enumerate(features)]
+    parts = [problem.seen(k, part) for k, part in enumerate(whole)]
     residual = problem.whitened(problem.residuals(model), scale)
     share = effective_share(residual, problem.rows, problem.samples)
-    return Rows(problem.whitened(parts, scale), residual, share)
-
-
-def _unseen(problem: Problem, model: Model, scale: Scale, precision: Array, rows: Rows) -> Unseen:
-    own, _ = designed(problem, model, scale)
-    pull, x = np.zeros(own.count), np.zeros(own.count)
-    if precision.size:
-        pull[-precision.size :], x[-precision.size :] = precision, coordinates(model)
-    levers = _levers(problem, model, scale)
-    return Unseen(
-        own,
-        pull,
-        pull * x,
-        rows.columns,
-        levers[~np.asarray(model.robot.prismatic)],
-        levers,
-        rows.residual,
-        posture_regions(problem),
-    )
+    moved = None
+    if problem.touched:
+        moved = np.sqrt(sum((part[:, :3] ** 2).sum(axis=(1, 2)) for part in whole))
+        moved /= scale.position
+    return Rows(problem.whitened(parts, scale), residual, share, moved)
 
 
 def _levers(problem: Problem, model: Model, scale: Scale) -> Array:

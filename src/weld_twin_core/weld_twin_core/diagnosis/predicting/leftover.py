@@ -12,7 +12,7 @@ how much the arm has of all the small errors that could be told.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,12 +23,11 @@ from scipy.special import chdtri
 from ...arrays import Array
 from ...recording import Recording
 from ...twin.turns import just_turned
-from ..algebra.definite import Index, unit_diagonal
-from ..algebra.designed import Design
-from ..algebra.fit import TRUSTED, solve_scaled
-from ..algebra.independent_rows import by_sample
+from ..algebra.definite import unit_diagonal
+from ..algebra.fit import trusted
 from ..algebra.noise_floor import NoiseFloor
-from ..algebra.problem import Problem, Scale
+from ..algebra.problem import Problem
+from ..unseen.unseen_stretches import Unseen
 
 HOLD = 0.9
 """Share of unseen postures that their regions shall hold."""
@@ -44,8 +43,14 @@ SURE = 2.0
 """Standard errors from which on what neighbours have in common is no chance."""
 ROUNDING = 1e-10
 """Added to a covariance of unit diagonal, so that it stays definite where its inverse hardly is."""
-AXES = slice(0, 3)
-"""Rows of a sample that are positions, or all that a contact sees."""
+MOST = 800
+"""Samples that tell what is left over; more say the same."""
+LONE = 3.0
+"""Log odds against what is left coming from one gear alone, beside which one it is: a judgement."""
+PARTS = (0.25, 0.5, 0.75, 1.0, 1.5)
+"""Parts of the errors' own covariance that an instrument may leave."""
+CERTAIN = 5.0
+"""Log likelihood by which levers must explain what is left better than an instrument does."""
 STEPS = 60
 """Halvings of the bracket in which the size is sought; far below rounding."""
 
@@ -62,41 +67,97 @@ Given = Callable[[NDArray[np.bool_]], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
-class Unseen:
+class Foretold:
     """
-    What predicts rows from others.
+    Every sample as the other regions of posture foretell it.
+
+    Shifts [m] first, then turns [rad]. Rows that a sample does not have are zero.
 
     Attributes
     ----------
-    own : Design
-        Whitened columns of frames and found effects: what the fit turned.
-    precision, pull : array, shape (K,)
-        Of the fit's prior, and how hard it pulls from where the fit is.
-    columns : array, shape (P, rows)
-        Those of the coordinates that are uncertain.
-    turns : array, shape (n, rows)
-        Those of the joints that turn.
-    levers : array, shape (n, rows)
-        Those of all joints.
-    residual : array, shape (rows,)
-    labels : array, shape (rows,)
-        Block of like posture of every row.
+    error : array, shape (N, 6)
+        What was measured less what was foretold.
+    ways : array, shape (R, N, 6)
+        In which what was foretold may be off, each of one standard deviation.
+    levers : array, shape (n, N, 6)
+        d pose / d joint.
+    seen : array of bool, shape (N, 6)
+        Rows that a sample has.
+    region : array, shape (N,)
+        Which region of posture it lies in.
+    good : array of bool, shape (N,)
+        Samples that are no outliers.
+    middle : float
+        How far to go from the fitted model to the middle of those allowed to foretell best.
 
     """
 
-    own: Design
-    precision: Array
-    pull: Array
-    columns: Array
-    turns: Array
+    error: Array
+    ways: Array
     levers: Array
-    residual: Array
-    labels: Array
+    seen: NDArray[np.bool_]
+    region: NDArray[np.int_]
+    good: NDArray[np.bool_]
+    middle: float
+
+    @classmethod
+    def of(cls, unseen: Unseen, columns: Array, levers: Array, given: Given) -> Foretold:
+        """
+        Return what a model foretells of samples that it was not fitted to.
+
+        Parameters
+        ----------
+        unseen : Unseen
+            Of the fitted model, with regions of posture left out in turn.
+        columns, levers : array, shapes (P, rows) and (n, rows)
+            Whitened, of the coordinates that are uncertain and of all joints.
+
+        """
+        labels, error = unseen.labels, unseen.whole
+        ways = np.empty((len(columns) + 1, labels.size))
+        for region in np.unique(labels):
+            out = labels == region
+            mean, covariance = given(out)
+            scaled, size = unit_diagonal(covariance, ROUNDING)
+            ways[:-1, out] = (np.linalg.cholesky(scaled).T * size) @ columns[:, out]
+            # The mean is counted from the fit to all rows, the error from the fit to the others.
+            ways[-1, out] = mean @ columns[:, out] + error[out] - unseen.residual[out]
+        problem, scale = unseen.problem, unseen.scale
+        weights, counts = np.concatenate(scale.weights), np.repeat(problem.rows, problem.samples)
+        seen = np.arange(6) < counts[:, None]
+        place = np.nonzero(seen)
+        unit = np.repeat([scale.position, scale.orientation], 3)[place[1]] / np.sqrt(
+            weights[place[0]]
+        )
+
+        def by_sample(rows: Array) -> Array:
+            whole = np.zeros((*rows.shape[:-1], *seen.shape))
+            whole[..., place[0], place[1]] = rows * unit
+            return whole
+
+        good = np.concatenate(trusted(scale.weights))
+        use = good[place[0]]
+        return cls(
+            by_sample(error),
+            by_sample(ways),
+            by_sample(levers),
+            seen,
+            labels[np.flatnonzero(place[1] == 0)],
+            good,
+            _middle(error[use], ways[-1, use], labels[use]),
+        )
+
+    def axes(self, part: slice) -> tuple[Array, Array, Array]:
+        """Return errors (K, c), moments (K, c, c) and levers (K, c, n) of samples that have rows."""
+        some = self.good & self.seen[:, part].all(axis=1)
+        ways, levers = self.ways[:, some, part], self.levers[:, some, part]
+        moments = np.einsum('rki,rkj->kij', ways, ways, optimize=True)
+        return self.error[some, part], moments, levers.transpose(1, 2, 0)
 
 
 class Rest(NamedTuple):
     """
-    What is left over: per axis at the tool [m], about each axis [rad], in every gear [rad].
+    What is left over: per axis at the tool [m], about each axis [rad], in every gear, shape (n,) [rad].
 
     ``turns``, shape (n,) [rad or m], is what is left over in joints that have just turned around,
     on top of that. ``middle`` is how far to go from the fitted model to the middle of those allowed, as
@@ -105,17 +166,16 @@ class Rest(NamedTuple):
 
     position: float
     orientation: float
-    gear: float
+    gears: Array
     turns: Array
     middle: float
 
 
 def leftover(
     problem: Problem,
-    scale: Scale,
-    unseen: Unseen,
-    given: Given,
-    floor: NoiseFloor,
+    foretold: Foretold,
+    turning: NDArray[np.bool_],
+    noise: float | None,
     rough: float,
     lost: Array,
 ) -> Rest:
@@ -124,57 +184,45 @@ def leftover(
 
     Parameters
     ----------
-    given : callable
-        Mean and covariance of the uncertain coordinates given all rows but those of a mask.
-    floor : NoiseFloor
-        What the recordings themselves say of the instrument's noise.
+    foretold : Foretold
+        Of the samples of the problem.
+    turning : array of bool, shape (n,)
+        Joints that turn; what slides has no gear.
+    noise : float or None
+        Of a measured coordinate [m], told with the data or seen in them.
     rough : float
         Share of the arm's small errors that are of a usual size.
     lost : array, shape (n,) [rad or m]
         How much motion was found to be lost in every joint.
 
     """
-    samples, weight = _by_sample(problem), np.concatenate(scale.weights)
-    errors, moments, beside, middle = _predicted(problem, unseen, given, samples, weight > TRUSTED)
-    levers = [unseen.turns[:, index].T @ unseen.turns[:, index] for index in samples]
-
-    def part(axes: slice) -> tuple[Array, Array, Array]:
-        """Return errors, moments and levers on three axes of the samples that have them."""
-        wide = [k for k, index in enumerate(samples) if index.size >= axes.stop]
-        unit = (scale.position if axes.start < 3 else scale.orientation) / np.sqrt(weight[wide])
-        count = axes.stop - axes.start
-        square = [
-            np.array([each[k][axes, axes] for k in wide]).reshape(-1, count, count)
-            * unit[:, None, None] ** 2
-            for each in (moments, levers)
-        ]
-        off = np.array([errors[k][axes] for k in wide]).reshape(-1, count) * unit[:, None]
-        return off, square[0], square[1]
-
-    if all(index.size < 3 for index in samples):
-        # Faces and lengths show one way each: nothing parts what is left by axes or gears.
-        off, moment, _ = part(slice(0, 1))
-        remaining = max(float((off**2).mean() - moment.mean()), 0.0)
-        position, gear = float(np.sqrt(remaining)), 0.0
+    if foretold.seen[:, :3].all(axis=1).any():
+        spread = _shared(*foretold.axes(slice(0, 3)), turning)
     else:
-        position, gear, remaining = _shared(*part(AXES))
-    e, v, levered = part(slice(3, 6))
+        # Faces and lengths show one way each: nothing parts what is left by axes or gears.
+        error, moment, _ = foretold.axes(slice(0, 1))
+        remaining = max(float((error**2).mean() - moment.mean()), 0.0)
+        spread = Spread(float(np.sqrt(remaining)), np.zeros(lost.size), False)
+    error, moment, lever = foretold.axes(slice(3, 6))
     # Without measured turns the tool turns as much as it shifts on an arm of a metre.
-    turn = _size(e, v + gear**2 * levered, np.eye(3)) if e.size else position
-    noise = _noise(problem, floor, scale.position)
-    share = _of_the_arm(remaining / scale.position**2, beside, noise, rough, problem.at_rest)
-    at_turns = _at_turns(problem, unseen, samples, errors, moments, lost)
-    return Rest(position * share, turn * share, gear * share, at_turns, middle)
+    orientation = spread.position
+    if error.size:
+        moved = lever * spread.gears
+        orientation = _size(error, moment + np.einsum('kin,kjn->kij', moved, moved), np.eye(3))
+    common = _in_common(problem, foretold)
+    share = _of_the_arm(spread.position**2, common, noise, rough, problem.at_rest)
+    of_gears = 1.0 if spread.surely else share
+    at_turns = _at_turns(problem, foretold, lost)
+    return Rest(
+        spread.position * share,
+        orientation * share,
+        spread.gears * of_gears,
+        at_turns,
+        foretold.middle,
+    )
 
 
-def _at_turns(
-    problem: Problem,
-    unseen: Unseen,
-    samples: list[Index],
-    errors: list[Array],
-    moments: list[Array],
-    lost: Array,
-) -> Array:
+def _at_turns(problem: Problem, foretold: Foretold, lost: Array) -> Array:
     """
     Return how far joints may be off where they have just turned around, shape (n,) [rad or m].
 
@@ -183,23 +231,21 @@ def _at_turns(
     be lost: evenly likely ones have this standard deviation. Else it is as much as the noise may hide.
     """
     out = np.zeros(lost.size)
-    seen = np.array([k for k, error in enumerate(errors) if error.size >= 3], dtype=int)
-    if not lost.any() or problem.at_rest or not seen.size:
+    use = foretold.good & foretold.seen[:, :3].all(axis=1)
+    if not lost.any() or problem.at_rest or not use.any():
         return out
-    excess = np.array(
-        [(errors[k][AXES] ** 2).mean() - moments[k].diagonal()[AXES].mean() for k in seen]
-    )
-    near = np.concatenate([_turned(problem, k) for k in range(len(problem.recordings))])[seen]
+    open_ = (foretold.ways[:, use, :3] ** 2).sum(axis=0)
+    excess = (foretold.error[use, :3] ** 2 - open_).mean(axis=1)
+    near = np.concatenate([_turned(problem, k) for k in range(len(problem.recordings))])[use]
     for i in np.flatnonzero(lost):
         here, beside = excess[near[:, i]], excess[~near[:, i]]
+        out[i] = lost[i] / np.sqrt(3.0)
         if min(here.size, beside.size) < FEW:
             continue
         doubt = CLEAR * np.sqrt(here.var() / here.size + beside.var() / beside.size)
-        more, out[i] = here.mean() - beside.mean(), lost[i] / np.sqrt(3.0)
+        more = here.mean() - beside.mean()
         if more <= doubt:
-            size = np.mean(
-                [(unseen.levers[i, samples[k][:3]] ** 2).mean() for k in seen[near[:, i]]]
-            )
+            size = (foretold.levers[i, use, :3][near[:, i]] ** 2).mean()
             out[i] = min(out[i], PEAK * np.sqrt(max(more + doubt, 0.0) / max(size, 1e-300)))
     return out
 
@@ -213,107 +259,81 @@ def _turned(problem: Problem, k: int) -> NDArray[np.bool_]:
 
 
 def _of_the_arm(
-    remaining: float, beside: float, noise: float | None, rough: float, at_rest: bool
+    remaining: float, common: float, noise: float | None, rough: float, at_rest: bool
 ) -> float:
     """
     Return the part of what is left over that is the arm's, as a factor of its size.
 
     Parameters
     ----------
-    remaining, beside : float
-        Variance of what is left, and what of it neighbours have in common [noise of the fit].
-    noise : float, optional
-        Standard deviation of the instrument [noise of the fit]; None where nothing tells it.
+    remaining : float
+        Variance of what is left [m^2].
+    common : float
+        The share of it that neighbours have in common.
+    noise : float or None
+        Standard deviation of the instrument [m]; None where nothing tells it.
     at_rest : bool
         Whether stations were measured, which lie apart.
 
     """
-    # Where open directions account for all of it, neighbours have nothing in common either.
-    remaining = max(remaining, 1e-12)
-    common = min(max(beside, 0.0), remaining)
-    alone = remaining - common
+    alone = 1.0 - common
     if noise is None:
         common += alone * min(rough / ROUGH, 1.0)
     elif at_rest:
-        common += max(alone - noise**2, 0.0)
-    return float(np.sqrt(common / remaining))
+        common += max(alone - noise**2 / max(remaining, 1e-300), 0.0)
+    return float(np.sqrt(common))
 
 
-def _shared(errors: Array, moments: Array, levers: Array) -> tuple[float, float, float]:
+class Spread(NamedTuple):
     """
-    Return what is left over per axis [m] and per gear [rad]: the likeliest mixture.
+    What is left over per axis [m] and in every joint [rad], shape (n,).
 
-    And the variance of an axis by both together [m^2].
+    ``surely`` tells that no instrument leaves it: it goes by the levers of joints.
     """
-    lever = float(np.trace(levers, axis1=1, axis2=2).mean()) / 3.0
-    best = (-np.inf, 0.0, 0.0, 0.0)
-    for share in SHARES if lever > 0.0 else SHARES[:1]:
-        shape = (1.0 - share) * np.eye(3) + share * levers / max(lever, 1e-300)
-        size = _size(errors, moments, shape)
-        whole = moments + (size**2 + 1e-18) * shape + 1e-18 * np.eye(3)
-        solved = np.linalg.solve(whole, errors[..., None])[..., 0]
-        likely = -0.5 * float(((errors * solved).sum(axis=1) + np.linalg.slogdet(whole)[1]).sum())
-        gear = size * np.sqrt(share / max(lever, 1e-300))
-        best = max(best, (likely, size * np.sqrt(1.0 - share), float(gear), size**2))
-    return best[1], best[2], best[3]
+
+    position: float
+    gears: Array
+    surely: bool
 
 
-def _by_sample(problem: Problem) -> list[Index]:
-    """Return the row numbers of every sample."""
-    size = sum(c * m for c, m in zip(problem.rows, problem.samples, strict=True))
-    parts = by_sample(np.arange(size), problem.rows, problem.samples)
-    return [row for part in parts for row in part]
-
-
-def _predicted(
-    problem: Problem,
-    unseen: Unseen,
-    given: Given,
-    samples: list[Index],
-    good: NDArray[np.bool_],
-) -> tuple[list[Array], list[Array], float, float]:
+def _shared(errors: Array, moments: Array, levers: Array, turning: NDArray[np.bool_]) -> Spread:
     """
-    Return the error of every sample predicted from other regions, and its second moment.
+    Return what is left over as the likeliest mixture of what is alike in all directions and of gears.
 
-    And the variance that good samples have in common with their neighbours, and `_middle`.
+    Of all gears alike, or of one alone. An instrument is less sure along some directions than along
+    others, and these stay where they are; levers turn with the arm.
+
+    Parameters
+    ----------
+    errors, moments, levers : array, shapes (K, 3), (K, 3, 3) and (K, 3, n)
+    turning : array of bool, shape (n,)
+
     """
-    errors, shifts = np.array(unseen.residual), np.zeros(unseen.residual.size)
-    normal = unseen.own.normal()
-    normal[np.diag_indices_from(normal)] += unseen.precision
-    right = unseen.own.times(unseen.residual) - unseen.pull
-    place = np.repeat(np.arange(len(samples)), [index.size for index in samples])
-    moments: list[Array] = [np.zeros((0, 0))] * len(samples)
-    alike: list[_Alike] = []
-    for b in np.unique(unseen.labels):
-        out = unseen.labels == b
-        mine, columns = unseen.own.within(np.flatnonzero(out)), unseen.columns[:, out]
-        pulled = right - mine.times(unseen.residual[out])
-        moved = mine.mixed(solve_scaled(normal - mine.normal(), pulled, 1e-9))
-        mean, covariance = given(out)
-        errors[out] -= moved
-        # The mean is counted from the fit to all rows, the error from the fit to the others.
-        shifts[out] = mean @ columns - moved
-        ways = np.vstack([_ways(covariance) @ columns, shifts[out]])
-        here = np.unique(place[out])
-        ends = np.cumsum([0, *(samples[k].size for k in here)])
-        own = {k: ways[:, a:b] for k, a, b in zip(here, ends[:-1], ends[1:], strict=True)}
-        for k in here:
-            moments[k] = own[k].T @ own[k]
-        for size, group in _neighbours(problem, here[good[here]]):
-            # Touches of several kinds see a point by so many rows each; the like are compared.
-            like = [k for k in group if samples[k].size == samples[group[0]].size]
-            if len(like) > 1:
-                each = [(errors[samples[k]][AXES], own[k][:, AXES]) for k in like]
-                alike.append(_Alike.of(size, each))
-    left = [errors[index] for index in samples]
-    use = np.concatenate([samples[k] for k in np.flatnonzero(good)])
-    return left, moments, _common(alike), _middle(errors[use], shifts[use], unseen.labels[use])
+    few = np.unique(np.linspace(0, len(errors) - 1, min(len(errors), MOST)).round().astype(int))
+    errors, moments, levers = errors[few], moments[few], levers[few]
+    best = (-np.inf, 0.0, np.zeros(turning.size))
+    singles = np.eye(turning.size)[turning]
+    cost = np.log(max(len(singles), 1)) + LONE
+    for gears, price in ((turning * 1.0, 0.0), *((one, cost) for one in singles)):
+        moved = levers * gears
+        lever = np.einsum('kin,kjn->kij', moved, moved)
+        reach = max(float(np.trace(lever, axis1=1, axis2=2).mean()) / 3.0, 1e-300)
+        for share in SHARES if reach > 1e-300 else SHARES[:1]:
+            shape = (1.0 - share) * np.eye(3) + share * lever / reach
+            size = _size(errors, moments, shape)
+            likely = _likelihood(errors, moments + size**2 * shape) - price * (share > 0.0)
+            each = size * np.sqrt(np.array([1.0 - share, share / reach]))
+            best = max(best, (likely, float(each[0]), each[1] * gears), key=lambda one: one[0])
+    fixed = errors.T @ errors / len(errors)
+    still = max(_likelihood(errors, moments + part * fixed) for part in PARTS)
+    return Spread(best[1], best[2], bool(best[2].any()) and best[0] > still + CERTAIN)
 
 
-def _ways(covariance: Array) -> Array:
-    """Return the ways in which coordinates may be off, of one standard deviation each, shape (P, P)."""
-    scaled, deviation = unit_diagonal(covariance, ROUNDING)
-    return np.asarray(np.linalg.cholesky(scaled).T * deviation)
+def _likelihood(errors: Array, covariances: Array) -> float:
+    """Return how likely errors (K, 3) of given covariances (K, 3, 3) are, as a logarithm."""
+    whole = covariances + 1e-18 * np.eye(3)
+    solved = np.linalg.solve(whole, errors[..., None])[..., 0]
+    return -0.5 * float(((errors * solved).sum(axis=1) + np.linalg.slogdet(whole)[1]).sum())
 
 
 def _middle(errors: Array, shifts: Array, labels: Array) -> float:
@@ -336,65 +356,61 @@ def _middle(errors: Array, shifts: Array, labels: Array) -> float:
     return share if sure else 0.0
 
 
-class _Alike(NamedTuple):
+def _in_common(problem: Problem, foretold: Foretold) -> float:
     """
-    What neighbours have in common, summed over all pairs of a group of ``size`` or fewer.
+    Return the share of what is left that neighbours have in common, beyond open directions and chance.
 
-    ``agree`` is the sum of products of errors, ``open`` that of what open directions account for,
-    ``square`` the sum of squared errors over samples, ``pairs`` and ``rows`` how many there are.
+    What the instrument does differs from one sample to the next, what the arm does does not. Over few
+    neighbours what changes fast shows, over many what is small. Samples that err against each other
+    have no white noise either. Shifts count, or all that a contact sees.
     """
+    best, regions = 0.0, np.unique(foretold.region)
+    sums: dict[int, list[Array]] = {}
+    foreseen = np.sqrt(2.0 / regions.size)  # how far a variance of so many draws may be off
+    for region in regions:
+        here = np.flatnonzero((foretold.region == region) & foretold.good)
+        for size, order, starts in _neighbours(problem, here):
+            error, ways = foretold.error[order, :3], foretold.ways[:, order, :3]
+            alone = np.stack([error**2, (ways**2).sum(axis=0), foretold.seen[order, :3]])
+            each = np.add.reduceat(alone, starts, axis=1)
+            together = [
+                np.add.reduceat(error, starts) ** 2,
+                (np.add.reduceat(ways, starts, axis=1) ** 2).sum(axis=0),
+                each[2] ** 2,
+            ]
+            # Of all pairs of a group: products of errors, those by open directions, how many pairs.
+            pairs = (np.stack(together) - each).sum(axis=(1, 2))
+            sums.setdefault(size, []).append(np.concatenate([pairs, each.sum(axis=(1, 2))]))
+    for total in (np.sum(parts, axis=0) for parts in sums.values()):
+        agree, open_ = total[:2] / max(total[2], 1.0)
+        square, own = total[3:5] / max(total[5], 1.0)
+        chance = SURE * np.hypot(square * np.sqrt(2.0 / max(total[2], 1.0)), open_ * foreseen)
+        common = max(agree - open_, 0.0) if agree - open_ > chance else 0.0
+        common = -agree if -agree > chance else common
+        best = max(best, common / max(square - own, common, 1e-300))
+    return best
 
-    size: int
-    agree: float
-    open: float
-    square: float
-    pairs: int
-    rows: int
 
-    @classmethod
-    def of(cls, size: int, each: Sequence[tuple[Array, Array]]) -> _Alike:
-        """Return the sums of a group, of errors (c,) and ways to be off (R, c) each."""
-        square = sum(float(e @ e) for e, _ in each)
-        own = sum(float((w**2).sum()) for _, w in each)
-        whole, ways = (np.sum(part, axis=0) for part in zip(*each, strict=True))
-        agree, together = float(whole @ whole) - square, float((ways**2).sum()) - own
-        width = whole.size
-        return cls(
-            size, agree, together, square, width * len(each) * (len(each) - 1), width * len(each)
-        )
-
-
-def _common(alike: Sequence[_Alike]) -> float:
+def _neighbours(
+    problem: Problem, here: NDArray[np.int_]
+) -> Iterator[tuple[int, NDArray[np.int_], NDArray[np.int_]]]:
     """
-    Return the variance that neighbours have in common, beyond open directions and chance.
+    Yield groups of neighbours in time; of stations, in posture.
 
-    Over few neighbours what changes fast shows, over many what is small. Samples that err against
-    each other have no white noise either.
+    How many there are at most, samples in their order, and where each group begins among them.
     """
-    result = [0.0]
-    for size in dict.fromkeys(one.size for one in alike):
-        mine = [one for one in alike if one.size == size]
-        pairs = sum(one.pairs for one in mine)
-        noise = sum(one.square for one in mine) / sum(one.rows for one in mine)
-        agree, own = (sum(v) / pairs for v in zip(*((o.agree, o.open) for o in mine), strict=True))
-        chance = SURE * float(np.hypot(noise * np.sqrt(2.0 / pairs), own))
-        result += [agree - own] * (agree - own > chance) + [-agree] * (-agree > chance)
-    return max(result)
-
-
-def _neighbours(problem: Problem, here: Array) -> Iterator[tuple[int, Array]]:
-    """Yield groups of neighbours in time, and how many there are at most; of stations, in posture."""
+    if here.size < 2:
+        return
     if not problem.at_rest:
         for size in NEIGHBOURS:
-            for start in range(0, here.size - 1, size):
-                yield size, here[start : start + size]
-    elif here.size > 1:
-        q = np.concatenate([_postures(r) for r in problem.recordings])[here]
-        apart = ((q[:, None] - q[None]) ** 2).sum(axis=2)
-        np.fill_diagonal(apart, np.inf)
-        pairs = np.stack([np.arange(here.size), apart.argmin(axis=1)], axis=1)
-        for pair in np.unique(np.sort(pairs, axis=1), axis=0):
-            yield 2, here[pair]
+            yield size, here, np.arange(0, here.size, size)
+        return
+    q = np.concatenate([_postures(r) for r in problem.recordings])[here]
+    apart = ((q[:, None] - q[None]) ** 2).sum(axis=2)
+    np.fill_diagonal(apart, np.inf)
+    pairs = np.stack([np.arange(here.size), apart.argmin(axis=1)], axis=1)
+    pairs = np.unique(np.sort(pairs, axis=1), axis=0)
+    yield 2, here[pairs.ravel()], np.arange(0, pairs.size, 2)
 
 
 def _postures(recording: Recording) -> Array:
@@ -425,13 +441,13 @@ def _size(errors: Array, moments: Array, shape: Array) -> float:
     return float(np.sqrt(high))
 
 
-def _noise(problem: Problem, floor: NoiseFloor, unit: float) -> float | None:
-    """Return the instrument's noise in units [m], told with the data or seen in them; None without."""
+def told_noise(problem: Problem, floor: NoiseFloor) -> float | None:
+    """Return the instrument's noise [m], told with the data or seen in them; None without."""
     reported = [
         float(np.median(r.measured.sigma))
         for r in problem.recordings
         if r.measured is not None and r.measured.sigma is not None
     ]
     if reported:
-        return float(np.mean(reported)) / unit
-    return floor.sigma / unit if floor.independent else None
+        return float(np.mean(reported))
+    return floor.sigma if floor.independent else None

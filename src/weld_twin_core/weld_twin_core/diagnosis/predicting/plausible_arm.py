@@ -162,7 +162,7 @@ def discrepancy(robot: Robot, rest: Rest, fine: Array, result: Sequence[Effect])
     return Discrepancy(
         rest.position,
         rest.orientation,
-        rest.gear * turning,
+        rest.gears * turning,
         fine * turning,
         SPACING,
         rest.turns,

@@ -77,12 +77,15 @@ class Rows:
     Whitened rows at the fitted model, in units of its noise.
 
     ``columns`` (P, rows) are those of the coordinates of a `Prior`, ``residual`` (rows,) is what
-    the model leaves, ``share`` the part of the rows that count as independent.
+    the model leaves, ``share`` the part of the rows that count as independent. ``moved`` (P,) is
+    how far a coordinate moves the tool in all of them together, where they do not show it all:
+    places that are touched and not known take up much of it.
     """
 
     columns: Array
     residual: Array
     share: float
+    moved: Array | None = None
 
 
 class Weighed(NamedTuple):
@@ -151,19 +154,19 @@ def with_prior(information: Array) -> Array:
     return information
 
 
-def hidden(columns: Array, frames: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def hidden(rows: Rows, frames: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """
     Return which coordinates no data like these could show, shape (P,).
 
     Parameters
     ----------
-    columns : array, shape (P, rows)
     frames : array of bool, shape (P,)
         Coordinates of fitted frames.
 
     """
+    columns = rows.columns
     basis = np.linalg.svd(columns[frames], full_matrices=False)[2]
-    own = np.linalg.norm(columns, axis=1)
+    own = np.linalg.norm(columns, axis=1) if rows.moved is None else rows.moved
     remaining = np.linalg.norm(columns - (columns @ basis.T) @ basis, axis=1)
     return np.asarray(~frames & (remaining <= OPEN * own))
 
@@ -195,7 +198,7 @@ class _Chain:
         unit = rows.columns * prior.width[:, None]
         self.normal, self.right = rows.share * unit @ unit.T, rows.share * unit @ rows.residual
         self.middle = prior.middle / prior.width
-        self.hidden = hidden(unit, prior.group < 0)
+        self.hidden = hidden(rows, prior.group < 0)
         self.small = (prior.group >= 0) & ~self.hidden
         self.size, self.noise = np.where(self.small, SIZES[2], 1.0), self.expected
         self.belief = np.tile(BELIEF, (prior.gears.size, 1))

@@ -67,6 +67,8 @@ def model(
 
     Parameters
     ----------
+    study : Study
+    tolerances : sequence of Tolerance
     exact : bool
         Run every draw exactly: those of nothing but DH values by `kernels.draws`, all others
         through the twin.
@@ -111,6 +113,7 @@ def exact_deviations(study: Study, tolerances: Sequence[Tolerance], draws: Array
 
     Parameters
     ----------
+    study : Study
     tolerances : sequence of Tolerance, length P
     draws : array, shape (D, P)
         In the units of the tolerances.

@@ -50,6 +50,7 @@ def scenario_deviations(study: Study, sizes: Sizes | None = None) -> dict[str, A
 
     Parameters
     ----------
+    study : Study
     sizes : Sizes, optional
         Left out, those of the paper.
 
@@ -73,6 +74,7 @@ def spread_of_passes(study: Study, deviations: Array) -> Array:
 
     Parameters
     ----------
+    study : Study
     deviations : array, shape (..., N, 3) [m]
 
     """

@@ -70,6 +70,7 @@ def sweep(study: Study, tolerance: Tolerance, values: Array) -> Sweep:
 
     Parameters
     ----------
+    study : Study
     tolerance : Tolerance
         Says which parameter of which effect.
     values : array, shape (V,)
@@ -85,6 +86,7 @@ def together(study: Study, tolerances: Sequence[Tolerance], values: Array, name:
 
     Parameters
     ----------
+    study : Study
     tolerances : sequence of Tolerance
         All of one unit.
     values : array, shape (V,)
@@ -116,6 +118,7 @@ def default_values(tolerance: Tolerance, count: int = 25) -> Array:
 
     Parameters
     ----------
+    tolerance : Tolerance
     count : int
         How many sizes, evenly spread.
 
@@ -133,6 +136,8 @@ def end_of_linearity(study: Study, tolerance: Tolerance, largest: float = 1.0) -
 
     Parameters
     ----------
+    study : Study
+    tolerance : Tolerance
     largest : float
         Where the search ends, in the unit of the parameter.
 

@@ -55,6 +55,33 @@ def test_a_step_of_four_standard_errors_is_found_within_three_recordings(seed):
     assert found[0].std < error
 
 
+@pytest.mark.parametrize('seed', range(4))
+def test_what_stays_as_it_is_makes_diagnoses_comparable(seed):
+    # Of ten coordinates each diagnosis sees hardly more than what they come to together with the
+    # others; those others are no different in the next one.
+    steady = frozenset(NAMES[10:])
+    alike = [(place, place + 10) for place in range(10)]
+    error = np.sqrt(np.diag(year(seed)[0].covariance))[10:]
+    place, size = int(np.argmin(error)), 10.0 * float(error.min())
+    moved = [
+        replace(each, steady=steady)
+        for each in year(seed, only(place, size, 1), weeks=2, same=alike)
+    ]
+    found = changes(moved)
+    assert [each.name for each in found] == [NAMES[place]]
+    assert abs(found[0].size - size) < 4.0 * found[0].std
+    own = [
+        Observation(o.day, NAMES[:10], o.value[:10], o.covariance[:10, :10], o.prior_std[:10])
+        for o in moved
+    ]
+    assert changes(own) == ()
+    without = replace(
+        moved[1], names=NAMES[:15], value=moved[1].value[:15], prior_std=np.ones(15),
+        covariance=moved[1].covariance[:15, :15],
+    )  # fmt: skip
+    assert [each.name for each in changes([moved[0], without])] == [NAMES[place]]
+
+
 def test_a_trend_is_no_step_and_has_its_rate():
     found = changes(year(3, lambda week: 0.1 * (np.arange(COUNT) == 5) * max(week - 20, 0)))
     assert [(each.name, each.kind) for each in found] == [(NAMES[5], 'trend')]

@@ -23,6 +23,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from ..arrays import Array
@@ -115,7 +116,7 @@ def changes(
     if series.days.size < 2:
         return ()
     shapes = _shapes(series.days)
-    tests = len(shapes) * len(series.names)
+    tests = len(shapes) * series.changing.size
     sooner = np.array(
         [NAMED * (name in named) + LIKELY * (name in likely) for name in series.names]
     )
@@ -153,12 +154,15 @@ class _Look(NamedTuple):
     def next(self, result: Sequence[Found]) -> tuple[Found, Change] | None:
         """Return what explains most beside what was found, None if it is no more than chance."""
         system = _System(self.series, result)
-        gain = np.array([system.gains(shape) for shape in self.shapes]) / system.scatter
+        gain = np.array([system.gains(shape) for shape in self.shapes])
         row, column = np.unravel_index(int(np.argmax(gain - self.bar)), gain.shape)
         best = int(row), int(column)
+        # Beside the change: without it, the change itself would count as scatter.
+        scatter = _System(self.series, [*result, Found(self.shapes[best[0]], best[1])]).scatter
+        gain /= scatter
         if gain[best] <= self.bar[best]:
             return None
-        return _told(self.series, system, self.shapes, gain, best, self.sooner)
+        return _told(self.series, system, self.shapes, gain, best, self.sooner, scatter)
 
     def settled(self, taken: list[tuple[Found, Change]]) -> list[tuple[Found, Change]]:
         """
@@ -213,9 +217,9 @@ class _System:
         blocks = [[first + np.diag(series.prior)]]
         right = [series.told.sum(axis=0)]
         for each in result:
-            cross, _, reported = self._against(each.shape)
-            blocks.append([cross[..., each.place], *self._among(each)])
-            right.append(reported[:, each.place])
+            cross, _, reported = self._against(each.shape, np.array([each.place]))
+            blocks.append([cross[..., 0], *self._among(each)])
+            right.append(reported[:, 0])
         self._matrix = _symmetric(blocks)
         self._right = np.concatenate([np.atleast_1d(r) for r in right])
         self._inverse = np.linalg.inv(self._matrix)
@@ -262,12 +266,12 @@ class _System:
             at += width
         return weights @ self.solution, self.scatter * (weights @ self._inverse @ weights.T)
 
-    def _against(self, shape: Shape) -> tuple[Array, Array, Array]:
-        """Return a shape on every coordinate: against the first state, itself, and the data."""
+    def _against(self, shape: Shape, places: NDArray[np.int_]) -> tuple[Array, Array, Array]:
+        """Return a shape on some coordinates: against the first state, itself, and the data."""
         x, series = shape.columns, self._series
-        cross = np.einsum('wm,wij->mij', x, series.precision)
-        own = np.einsum('wm,wn,wjj->jmn', x, x, series.precision)
-        return cross, own, np.einsum('wm,wj->mj', x, series.told)
+        cross = np.tensordot(x, series.precision[:, :, places], axes=(0, 0))
+        own = np.einsum('wm,wn,wj->jmn', x, x, series.precision[:, places, places])
+        return cross, own, x.T @ series.told[:, places]
 
     def _among(self, one: Found) -> list[Array]:
         """Return the products of a change found with those found before it, and with itself."""
@@ -292,13 +296,14 @@ class _System:
         return self._sizes[key]
 
     def _fitted(self, shape: Shape) -> tuple[Array, Array]:
-        cross, own, reported = self._against(shape)
         series = self._series
-        rows = [np.moveaxis(cross, 0, -1)]  # (P first, P, m)
+        places = series.changing
+        cross, own, reported = self._against(shape, places)
+        rows = [np.moveaxis(cross, 0, -1)]  # (P first, C, m)
         for each in self._found:
-            between = series.precision[:, each.place, :]
+            between = series.precision[:, each.place, places]
             rows.append(np.einsum('wa,wm,wj->ajm', each.shape.columns, shape.columns, between))
-        stacked = np.concatenate(rows, axis=0)  # (P + found, P, m)
+        stacked = np.concatenate(rows, axis=0)  # (P + found, C, m)
         solved = np.tensordot(self._inverse, stacked, axes=1)
         information = own - np.einsum('ajm,ajn->jmn', stacked, solved)
         right = reported.T - np.einsum('a,ajm->jm', self.solution, stacked)
@@ -306,7 +311,11 @@ class _System:
         eye = np.eye(own.shape[1])
         floor = 1e-9 * np.maximum(np.trace(own, axis1=1, axis2=2), 1e-300)
         safe = information + floor[:, None, None] * eye
-        return np.linalg.solve(safe, right[..., None])[..., 0], information
+        size = np.zeros((len(series.names), shape.columns.shape[1]))
+        known = np.zeros((*size.shape, size.shape[1]))
+        size[places] = np.linalg.solve(safe, right[..., None])[..., 0]
+        known[places] = information
+        return size, known
 
 
 def _symmetric(blocks: list[list[Array]]) -> Array:
@@ -328,6 +337,7 @@ def _told(
     gain: Array,
     best: tuple[int, int],
     sooner: Array,
+    scatter: float,
 ) -> tuple[Found, Change]:
     """
     Return the simplest change that explains as much as the best, and what else would.
@@ -340,7 +350,9 @@ def _told(
     most = gain[same].max(axis=0)
     alike = np.flatnonzero(most > top - ALIKE)
     at = {int(j): same[int(np.argmax(gain[same][:, j]))] for j in alike}
-    odds = {j: _odds(series, system, shapes[k], j) + float(sooner[j]) for j, k in at.items()}
+    odds = {
+        j: _odds(series, system, shapes[k], j, scatter) + float(sooner[j]) for j, k in at.items()
+    }
     place = max(odds, key=lambda j: odds[j])
     shape = shapes[at[place]]
     mean, information = system.sizes(shape)
@@ -357,7 +369,7 @@ def _told(
             float(series.days[max(near)]),
         ),
         float(np.hypot(*mean[place])) if season else float(mean[place, 0]),
-        float(np.sqrt(system.scatter / np.linalg.eigvalsh(information[place])[0])),
+        float(np.sqrt(scatter / np.linalg.eigvalsh(information[place])[0])),
         0.5 * float(most[place]),
         tuple(series.names[k] for k in others),
         _slowly(series, shapes, gain[:, place], top) if kind == 'step' else None,
@@ -374,10 +386,10 @@ def _slowly(series: Series, shapes: Sequence[Shape], gain: Array, top: float) ->
     return float(series.days[min(begins)]) if begins else None
 
 
-def _odds(series: Series, system: _System, shape: Shape, place: int) -> float:
+def _odds(series: Series, system: _System, shape: Shape, place: int, scatter: float) -> float:
     """Return the logarithm of the odds of a shape on a coordinate against none, its prior in."""
     mean, information = system.sizes(shape)
-    known = information[place] / system.scatter
+    known = information[place] / scatter
     # What was believed of a value holds for how far it moves over the recordings.
     prior = series.prior[place] * np.diag(np.ptp(shape.columns, axis=0) ** 2)
     reported = known @ mean[place]

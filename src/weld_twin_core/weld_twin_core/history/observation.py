@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array, readonly
 from ..errors import DataError
@@ -43,6 +44,12 @@ class Observation:
     """Shape (P, P)."""
     prior_std: Array
     """What was believed of each before the data, about zero, shape (P,)."""
+    steady: frozenset[str] = frozenset()
+    """
+    Those that stay as they are, such as the unevenness of gears; no change of them is looked for.
+    That they are the same in all diagnoses is what makes these comparable: left open in each, a
+    curve of a gear takes the place of a zero that was moved.
+    """
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -91,6 +98,8 @@ class Series:
     """Precision times value, shape (W, P)."""
     prior: Array
     """Precision of what was believed before any of them, shape (P,)."""
+    changing: NDArray[np.int_]
+    """Places of the coordinates that may change, shape (C,)."""
 
 
 def series_of(observations: Sequence[Observation]) -> Series:
@@ -98,7 +107,7 @@ def series_of(observations: Sequence[Observation]) -> Series:
     Return observations over all their coordinates.
 
     An effect that only some diagnoses name is taken to be zero in the others, as surely as three
-    standard errors of those that name it.
+    standard errors of those that name it. Of what is steady, one that lacks it says nothing.
 
     Raises DataError: there are none, or two are of the same instant.
     """
@@ -120,8 +129,10 @@ def series_of(observations: Sequence[Observation]) -> Series:
         width[at] = np.maximum(width[at], each.prior_std)
         for k, std in zip(at, np.sqrt(np.diag(each.covariance)), strict=True):
             error[k].append(float(std))
-    for k, name in enumerate(names):
+    steady = frozenset().union(*(each.steady for each in ordered))
+    changing = [k for k, name in enumerate(names) if name not in steady]
+    for k in changing:
         for w, each in enumerate(ordered):
-            if name not in each.names:
+            if names[k] not in each.names:
                 precision[w, k, k] += 1.0 / (ABSENT * float(np.median(error[k]))) ** 2
-    return Series(days, names, precision, reported, 1.0 / width**2)
+    return Series(days, names, precision, reported, 1.0 / width**2, np.array(changing, dtype=int))

@@ -46,6 +46,8 @@ tracker, and on sealed cases whose cause has no formula, by 1.0 to 3.0."""
 SETTLED = 1e-13
 """Share of the largest variance, coordinates at unit size, below which a direction is certain."""
 AXES = ('x', 'y', 'z', 'turn_x', 'turn_y', 'turn_z')
+CURVE = 'curve of '
+"""How the names of a curve's heights begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +101,12 @@ class Directions:
         return self.frame_count + sum(self.sizes) + sum(k.size for k in self.knots)
 
     def names(self) -> list[str]:
-        """Return a name for every coordinate: 'base 0.x', 'joint_offset elbow_joint 0'."""
+        """
+        Return a name for every coordinate: 'base 0.x', 'joint_offset elbow_joint 0'.
+
+        Waves are named by their order and curves by their place, so that a name means the same in
+        every diagnosis of an arm.
+        """
         out = []
         if 'base' in self.frames:
             out += [f'base {k}.{axis}' for k in range(self.setups) for axis in AXES]
@@ -110,9 +117,13 @@ class Directions:
             # Two couplings of one joint differ in the joint that they come from.
             source = effect.to_mapping().get('source')
             where += f'<{source}' if source else ''
-            out += [f'{effect.name}{where} {k}' for k in range(size)]
+            parts: list[str] = [str(k) for k in range(size)]
+            if effect.traits.waves is not None:
+                parts = [f'{n:g} {of}' for n in effect.search.orders() for of in ('sin', 'cos')]
+            out += [f'{effect.name}{where} {part}' for part in parts]
         for joint, knots in enumerate(self.knots):
-            out += [f'curve of joint {joint + 1} at {place:.3f}' for place in knots]
+            step = f' by {knots[1] - knots[0]:g}' if knots.size > 1 else ''
+            out += [f'{CURVE}joint {joint + 1} at {place:.3f}{step}' for place in knots]
         return out
 
     def fitted(self) -> Array:

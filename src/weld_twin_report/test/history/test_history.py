@@ -13,8 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import weld_twin_core as wt
 from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.bags import write_recording
 from weld_twin_nodes.cli import main
+from weld_twin_nodes.cli.in_process import weld_twin
 from weld_twin_report.history import Database, entry_of, observations
 
 pytest.importorskip('sqlalchemy', reason='the history is an extra')
@@ -145,3 +148,39 @@ def test_what_is_no_history_is_refused(tmp_path, capsys):
     (tmp_path / 'notes.txt').write_text('not a database, but long enough to look like one' * 40)
     assert main(['history', 'show', '--db', str(tmp_path / 'notes.txt')]) == 2
     assert 'cannot be used' in capsys.readouterr().err
+
+
+@pytest.fixture(scope='module')
+def checked(tmp_path_factory):
+    """Return the diagnoses of two checks of an arm; its elbow moves by 0.3 mrad between them."""
+    place = tmp_path_factory.mktemp('checks')
+    robot, rng = wt.load('ur5'), np.random.default_rng(11)
+    sag = wt.effects.JointCompliance('elbow_joint', compliance=2e-6)
+    for check, offset in enumerate((-1e-3, -1.3e-3)):
+        twin = wt.Twin(robot, [sag, wt.effects.JointOffset('elbow_joint', offset=offset)])
+        q = np.array([0.2, -1.3, 1.5, -1.8, -1.5, 0.1]) + rng.uniform(-1.2, 1.2, (50, 6))
+        stations = wt.Recording('check', wt.JointMotion(10.0 * np.arange(50), q, static=True))
+        true = twin.poses(stations).position
+        seen = wt.Measurements(stations.joints.t, true + rng.normal(scale=2e-5, size=true.shape))
+        write_recording(place / f'rec{check}', stations.with_measured(seen), robot)
+        said = weld_twin(
+            'diagnose', place / f'rec{check}', '--robot', 'ur5', '--align', 'base,tool',
+            '--out', place / f'found{check}',
+        )  # fmt: skip
+        assert said.code == 0, said.err
+    return place
+
+
+def test_a_zero_that_slipped_between_two_checks_is_as_sure_as_their_recordings_make_it(
+    checked, url, capsys
+):
+    # Either diagnosis alone leaves it open what is a zero and what unevenness of the gear, by more
+    # than the zero moved; but the gear is the same in both.
+    for k, day in enumerate(('2026-01-05', '2026-03-05')):
+        words = ['history', 'add', str(checked / f'found{k}'), '--cell', 'c', '--at', day]
+        assert main([*words, '--db', url]) == 0
+    capsys.readouterr()
+    assert main(['history', 'changed', '--cell', 'c', '--db', url, '--json']) == 0
+    (change,) = json.loads(capsys.readouterr().out)['changes']
+    assert (change['effect'], change['joint']) == ('joint_offset', 'elbow_joint')
+    assert abs(change['size'] + 3e-4) < 3.0 * change['std'] and change['std'] < 3e-5

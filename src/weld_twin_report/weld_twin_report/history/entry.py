@@ -23,9 +23,8 @@ FIRST_YEAR = 2000
 ROUNDING = 1e-6
 """By how much a covariance may miss being one, in units of its own standard deviations: digits of a
 file. What a wrong sign or a damaged number makes is far beyond it."""
-PASSING = ('base ', 'curve of ', 'transmission_ripple ')
-"""Coordinates that are of one set-up or one diagnosis only: where the instrument stood, curves on the
-angles that were visited, and waves along a gear, whose orders differ from diagnosis to diagnosis."""
+PASSING = 'base '
+"""Coordinates that are of one set-up only: where the instrument stood."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.history import Change, Observation, changes
+from weld_twin_core.twin.posterior import CURVE
 
 from .entry import Entry
 
@@ -37,9 +38,16 @@ def observations(entries: Sequence[Entry]) -> list[Observation]:
             _moved(entry, first),
             entry.covariance,
             entry.prior_std,
+            frozenset(name for name in entry.names if _steady(name)),
         )
         for entry in entries
     ]
+
+
+def _steady(name: str) -> bool:
+    """Return whether a coordinate is the unevenness of a gear: a curve over its angle, or waves."""
+    effect = REGISTRY.get(name.split(' ')[0])
+    return name.startswith(CURVE) or (effect is not None and effect.traits.waves is not None)
 
 
 def named(entries: Sequence[Entry]) -> set[str]:

@@ -29,10 +29,9 @@ SPACING = 0.1
 """Least distance of the knots of a joint's fine curve [rad or m], and distance beyond what was
 recorded at which nothing is known of it: orders above four bend within some tenths of a radian."""
 KNOTS = 8
-"""Most intervals of a joint's fine curve. It is there for joints that hardly moved, where a gear's
-fine error looks like a slope that it is not; over a wide range it averages out."""
-LEAST_RANGE = 1e-3
-"""Range of a curve [rad or m] on a joint that did not move."""
+"""Most spacings that a recorded range may take on a joint's fine curve. It is there for joints that
+hardly moved, where a gear's fine error looks like a slope that it is not; over a wide range it averages
+out."""
 FINE = 1e-4
 """Usual height of the fine curve [rad]: ripple of the orders above four."""
 MOST = 24
@@ -129,13 +128,20 @@ def sizes(robot: Robot, effect: Effect) -> Array:
 
 
 def fine_knots(motions: Sequence[Array]) -> tuple[Array, ...]:
-    """Return knots along every joint's recorded range, one array (K,) for each joint [rad, m]."""
+    """
+    Return knots along every joint's recorded range, one array (K,) for each joint [rad, m].
+
+    They are multiples of `SPACING`, or of it times a power of two, so that recordings of much the
+    same range have the same knots and can be compared.
+    """
     q = np.concatenate(motions)
-    out = []
-    for low, high in zip(q.min(axis=0), q.max(axis=0), strict=True):
-        count = int(np.clip(np.ceil((high - low) / SPACING), 1, KNOTS))
-        out.append(np.linspace(low, max(high, low + LEAST_RANGE), count + 1))
-    return tuple(out)
+    low, high = q.min(axis=0), q.max(axis=0)
+    doubled = np.ceil(np.log2(np.maximum(high - low, SPACING) / (SPACING * KNOTS)))
+    steps = SPACING * 2.0 ** np.maximum(doubled, 0.0)
+    first, last = np.floor(low / steps), np.floor(high / steps) + 1.0
+    return tuple(
+        step * np.arange(a, b + 1.0) for step, a, b in zip(steps, first, last, strict=True)
+    )
 
 
 def discrepancy(robot: Robot, rest: Rest, fine: Array, result: Sequence[Effect]) -> Discrepancy:

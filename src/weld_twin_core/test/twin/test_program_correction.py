@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 import weld_twin_core as wt
 from weld_twin_core.motion.programs import Move, MoveProgram, Use, travel
-from weld_twin_core.twin.drawn import Drawn
+from weld_twin_core.twin.posterior import Drawn
 from weld_twin_core.twin.program_accuracy import accuracy
 from weld_twin_core.twin.program_correction import Caps, correct_program
 from weld_twin_core.twin.program_model import ProgramModel
@@ -112,7 +112,7 @@ def test_a_move_from_rest_to_rest_takes_as_long_as_its_speed_says(ur5):
 
 def test_the_model_that_was_found_lies_within_what_is_expected():
     # Every drawn model is off by a millimetre; the one found is not, and is allowed as well.
-    off = np.zeros((1, 50, 3))
+    off = np.zeros((1, 2, 50, 3))
     off[..., 0] = 1e-3
-    found = accuracy([np.zeros((4, 6))], [Drawn(np.zeros(4, dtype=int), off, off)])
+    found = accuracy([np.zeros((4, 6))], [Drawn(np.zeros(4, dtype=int), off)])
     assert (found.low, found.high) == (0.0, pytest.approx(1e-3))

@@ -24,11 +24,10 @@ from ..errors import DataError
 from ..recording import JointMotion, Recording
 from .commandable import commandable
 from .compensation import compensate
-from .drawn import Drawn
 from .features import Features
 from .goal_motion import Course, Goal, course, fine_times
 from .poses import missing
-from .posterior import pose_covariances
+from .posterior import Drawn, pose_covariances
 from .program_accuracy import accuracy
 from .program_correction import BETTER, NOTHING
 from .program_model import ProgramModel
@@ -374,12 +373,9 @@ class _Work:
         edges = np.flatnonzero((turned[1:] != turned[:-1]).any(axis=1))
         places = np.unique(np.concatenate([self._places, edges, edges + 1]))
         seen = Features(self.real, recording, way.t[places])
-        same, own = (
-            posterior.drawn(seen, self.model.setup, framed=framed) for framed in (True, False)
-        )
         # Where joints turn around more is left than beside, and few places would miss that.
         near = np.searchsorted(places, np.arange(len(after))).clip(max=places.size - 1)
-        result = accuracy([after], [Drawn(near, same, own)])
+        result = accuracy([after], [Drawn(near, posterior.drawn(seen, self.model.setup))])
         return None if result is None else result.likely_within(HOLDS)
 
     def _added(self, result: Goal, at: Array) -> Array:

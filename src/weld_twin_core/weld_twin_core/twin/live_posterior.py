@@ -64,42 +64,26 @@ class LivePosterior:
         """
         since = t - self._time
         if self._q is None or since < 0.0:
-            self._look(twin, q, np.zeros_like(q), wrench, wrench_frame, temperature, effort)
+            speed = np.zeros_like(q)
         elif since >= EVERY and (self._moving or np.abs(q - self._q).max() > MOVED):
             speed = (q - self._q) / since
             self._moving = bool(np.abs(q - self._q).max() > MOVED)
-            self._look(twin, q, speed, wrench, wrench_frame, temperature, effort)
         else:
             return self._covariance
         self._time, self._q = t, np.array(q)
-        return self._covariance
-
-    def _look(
-        self,
-        twin: Twin,
-        q: Array,
-        speed: Array,
-        wrench: Array | None,
-        wrench_frame: str,
-        temperature: float | None,
-        effort: Array | None,
-    ) -> None:
-        motion = JointMotion(LEAD, q + LEAD[:, None] * speed, np.tile(speed, (LEAD.size, 1)))
         now = LEAD[-1:]
+        pull = None if wrench is None else wrench[None]
+        warm = None if temperature is None else np.array([temperature])
         recording = Recording(
             'live',
-            motion,
+            JointMotion(LEAD, q + LEAD[:, None] * speed, np.tile(speed, (LEAD.size, 1))),
             None,
-            None if wrench is None else Signal(now, wrench[None]),
+            None if pull is None else Signal(now, pull),
             wrench_frame,
-            None if temperature is None else Signal(now, np.array([temperature])),
+            None if warm is None else Signal(now, warm),
             effort=None if effort is None else JointSignal(now, effort[None]),
         )
         self._covariance = self.posterior.pose_covariance(Features(twin, recording, now))[0]
-        result = self.posterior.domain.outside(
-            q[None],
-            speed[None],
-            None if wrench is None else wrench[None],
-            None if temperature is None else np.array([temperature]),
-        )
-        self._outside = tuple(item.why for item in result)
+        outside = self.posterior.domain.outside(q[None], speed[None], pull, warm)
+        self._outside = tuple(item.why for item in outside)
+        return self._covariance

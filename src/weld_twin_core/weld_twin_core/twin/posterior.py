@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,8 @@ from .twin import Twin
 
 DRAWS = 400
 """Models drawn: enough for the 5th and 95th of a hundred to be steady within a few per cent."""
+PLACES = 300
+"""Places of a motion at which models are drawn; between them what a model is off by hardly changes."""
 SEED = 0
 """Of the draws: every promise is made of the same models."""
 CHUNK = 2000
@@ -132,21 +134,20 @@ class Directions:
         own = [effect.fit.coordinates() for effect in self.effects]
         return np.concatenate([np.zeros(self.frame_count), *own, np.zeros(curves)])
 
-    def columns(self, features: Features, setup: int, *, framed: bool = True) -> Array:
+    def columns(self, features: Features, setup: int) -> Array:
         """
         Return d pose / d coordinate, shape (P, 6, M), linear part first [m, rad].
 
-        Without frames the arm alone counts: between its own base and its own flange. Effects that
-        the recording cannot show (no load, no temperature) have columns of zero.
+        Effects that the recording cannot show (no load, no temperature) have columns of zero.
         """
         out = np.zeros((self.count, 6, features.at.size))
         at = 0
         if 'base' in self.frames:
-            for k in range(6 * framed):
+            for k in range(6):
                 out[6 * setup + k] = features.column(('base', k))
             at += 6 * self.setups
         if 'tool' in self.frames:
-            for k in range(6 * framed):
+            for k in range(6):
                 out[at + k] = features.column(('tool', k))
         for effect, here in zip(self.effects, self.own, strict=True):
             if effect.applicable(features.view, effect.site) is None:
@@ -475,16 +476,14 @@ class Posterior:
             self, mean=np.zeros_like(self.mean), covariance=0.5 * (remaining + remaining.T)
         )
 
-    def drawn(
-        self, features: Features, setup: int = 0, *, framed: bool = True, count: int = DRAWS
-    ) -> Array:
+    def drawn(self, features: Features, setup: int = 0, count: int = DRAWS) -> Array:
         """
-        Return by how much the true position is off the twin's, shape (M, count, 3) [m].
+        Return by how much the true position is off the twin's, shape (M, 2, count, 3) [m].
 
         Under as many models as are drawn, the same ones for every motion: each is off alike over a
-        path, as far as what it is off by shows there alike. Their second moment is that of
-        `pose_covariance`. ``framed`` counts what was measured, with the frames that were fitted to it;
-        without, the arm counts between its own base and flange, which such frames hide.
+        path, as far as what it is off by shows there alike. First in the set-up that was recorded,
+        with the frames that were fitted to it: their second moment is that of `pose_covariance`. Then
+        of the arm between its own base and flange, which such frames hide.
 
         Raises
         ------
@@ -495,14 +494,17 @@ class Posterior:
         unit = np.random.default_rng(SEED).standard_normal
         own, joints = unit((count, 3)), unit((count, features.twin.robot.n))
         steps = self.mean + unit((count, self.factor.shape[1])) @ self.factor.T
-        columns = self._columns(features, setup, framed=framed)[:, :3]
+        columns, frames = self._columns(features, setup)[:, :3], self.directions.frame_count
         levers, beyond, turned = self._levers(features)
         everywhere, gears = self.discrepancy.sizes(beyond, turned)
-        return np.asarray(
-            np.tensordot(columns, steps, axes=(0, 1)).transpose(1, 2, 0)
-            + np.tensordot(levers[:, :3] * gears[:, None], joints, axes=(0, 1)).transpose(1, 2, 0)
+        moved = levers[:, :3] * gears[:, None]
+        of_arm = (
+            np.tensordot(columns[frames:], steps[:, frames:], axes=(0, 1)).transpose(1, 2, 0)
+            + np.tensordot(moved, joints, axes=(0, 1)).transpose(1, 2, 0)
             + everywhere[:, None, :3] * own
         )
+        of_frames = np.tensordot(columns[:frames], steps[:, :frames], axes=(0, 1))
+        return np.stack([of_arm + of_frames.transpose(1, 2, 0), of_arm], axis=1)
 
     def at_rest(self, twin: Twin, q: Array) -> Recording:
         """
@@ -525,10 +527,10 @@ class Posterior:
         springs = (effect.twin.by_effort for effect in twin.effects if effect.twin.by_effort)
         return with_expected_effort(stations, twin.robot, next(springs, 0.0))
 
-    def _columns(self, features: Features, setup: int, *, framed: bool = True) -> Array:
+    def _columns(self, features: Features, setup: int) -> Array:
         if 'base' in self.directions.frames and not 0 <= setup < self.directions.setups:
             raise ModelError(f'the posterior has no base frame {setup}')
-        return self.directions.columns(features, setup, framed=framed)
+        return self.directions.columns(features, setup)
 
     def _levers(self, features: Features) -> tuple[Array, Array, NDArray[np.bool_]]:
         """
@@ -543,6 +545,34 @@ class Posterior:
         if np.any(self.discrepancy.turns):
             turned = just_turned(motion, at)
         return np.stack(joints), self.domain.beyond(q), turned
+
+
+class Drawn(NamedTuple):
+    """
+    By how much the models that the recordings allow are off the fitted one along a motion.
+
+    Attributes
+    ----------
+    near : array of int, shape (N,)
+        The nearest of some places of the motion for every sample.
+    off : array, shape (K, 2, D, 3) [m]
+        At the places, as `Posterior.drawn` returns it.
+
+    """
+
+    near: NDArray[np.int_]
+    off: Array
+
+    def where(self, keep: NDArray[np.bool_]) -> Drawn:
+        """Return some of the samples."""
+        return self._replace(near=self.near[keep])
+
+
+def places(count: int) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Return the samples at which models are drawn, shape (K,), and `Drawn.near`, shape (count,)."""
+    at = np.unique(np.linspace(0, count - 1, min(PLACES, count)).round().astype(int))
+    middles = 0.5 * (at[1:] + at[:-1])
+    return at, np.searchsorted(middles, np.arange(count))
 
 
 def pose_covariances(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
-from .drawn import Drawn
+from .posterior import Drawn
 from .program_correction import ProgramCorrection
 
 SPAN = (5.0, 95.0)
@@ -105,8 +105,9 @@ def accuracy(
     if len(known) < len(drawn):
         return Accuracy(rms, worst)
     pairs = [(g[:, :3], d) for g, d in zip(gaps, known, strict=True)]
-    same = _drawn([(g, d.near, d.same) for g, d in pairs], share)
-    own = _drawn([(g, d.near, d.own) for g, d in pairs], share)
+    same, own = (
+        _drawn([(g, d.near, d.off[:, where]) for g, d in pairs], share) for where in (0, 1)
+    )
     # Drawn models are off by something everywhere. The one that was found, which may be off by
     # nothing, is allowed as well.
     low, high = np.percentile([same[0], own[0]], SPAN, axis=1)

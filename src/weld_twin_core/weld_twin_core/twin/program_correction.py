@@ -29,9 +29,8 @@ from ..motion.inverse.newton import chain_jacobian, least_step
 from ..motion.programs import MoveProgram, Piece, Travel, Use, travel
 from ..motion.programs.repeated import repeated, unrelenting
 from ..recording import JointMotion
-from .drawn import Drawn
 from .poses import missing
-from .posterior import largest_sigma
+from .posterior import Drawn, largest_sigma
 from .program_model import ProgramModel
 
 ROUNDS = 5

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +18,8 @@ from ..motion.programs import Move, Piece
 from ..recording import JointMotion, Recording, Signal
 from .commandable import acts, commandable
 from .domain import Domain, Outside
-from .drawn import Drawn, places
 from .features import Features
-from .posterior import Posterior, pose_covariances
+from .posterior import Drawn, Posterior, places, pose_covariances
 from .twin import Twin
 
 SAME_TOOL = 1e-5
@@ -131,15 +129,11 @@ class ProgramModel:
         posterior, recording = self.posterior, self.recording(motion)
         at, near = places(motion.t.size)
 
-        def off(tool: Array, framed: bool) -> Array:
+        def off(tool: Array) -> Array:
             seen = Features(self.twin(tool), recording, motion.t[at])
-            result = posterior.drawn(seen, self.setup, framed=framed)
-            return np.asarray(result @ self.robot.T_world_base[:3, :3])
+            return np.asarray(posterior.drawn(seen, self.setup) @ self.robot.T_world_base[:3, :3])
 
-        same, own = (
-            self._by_tool(piece, partial(off, framed=framed), at) for framed in (True, False)
-        )
-        return Drawn(near, same, own)
+        return Drawn(near, self._by_tool(piece, off, at))
 
     def outside(self, motion: JointMotion) -> list[Outside]:
         """Return the stretches of a motion outside what was recorded."""

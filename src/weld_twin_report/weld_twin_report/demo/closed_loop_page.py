@@ -83,12 +83,8 @@ def closed_loop_page(robot: str, seams: tuple[Seam, Seam], how: str, noise: floa
     )
     body = tag(
         'main',
-        tag(
-            'header',
-            tag('p', 'Closed loop', class_='kind'),
-            tag('p', robot, class_='subject'),
-        ),
-        tag('section', tag('h1', head), _figures(before, after), id_='verdict'),
+        tag('header', tag('p.kind', 'Closed loop'), tag('p.subject', robot)),
+        tag('section#verdict', tag('h1', head), _figures(before, after)),
         section(
             'Along the seam',
             *_charts(before, after),

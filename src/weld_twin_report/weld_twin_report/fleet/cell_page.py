@@ -17,7 +17,18 @@ from ..history.entry import Entry
 from ..history.runs import NEWEST, Run, Runs
 from ..history.words import HEADS, causes_of, coordinate, row
 from ..report.charts import Axis
-from ..report.html import Child, Figure, Html, document, figures, section, sentences, table, tag
+from ..report.html import (
+    Child,
+    Figure,
+    Html,
+    columns,
+    document,
+    figures,
+    section,
+    sentences,
+    table,
+    tag,
+)
 from .control_chart import control_chart
 
 CHARTS = 8
@@ -48,7 +59,7 @@ def cell_page(
     body = tag(
         'main',
         _head(cell, home, ways, f'{entries[-1].robot} · {_span(entries)}'),
-        tag('section', tag('h1', _headline(entries, changes)), _figures(entries), id_='verdict'),
+        tag('section#verdict', tag('h1', _headline(entries, changes)), _figures(entries)),
         _changed(changes),
         _charts(entries, changes),
         _diagnoses(entries),
@@ -65,7 +76,7 @@ def page_of(
         return cell_page(database, cell, home, ways)
     except Damaged as error:
         why = tag('p', str(error))
-        said = tag('section', tag('h1', 'This cell cannot be read.'), why, id_='damaged')
+        said = tag('section#damaged', tag('h1', 'This cell cannot be read.'), why)
         return document(
             f'{cell} · history', tag('main', _head(cell, home, ways), said), style=STYLE
         )
@@ -75,8 +86,8 @@ def _head(cell: str, home: str | None, ways: Html | None, subject: str | None = 
     return tag(
         'header',
         ways,
-        tag('p', 'History of ', tag('b', cell), class_='kind'),
-        tag('p', subject, class_='subject') if subject else None,
+        tag('p.kind', 'History of ', tag('b', cell)),
+        tag('p.subject', subject) if subject else None,
         tag('p', tag('a', 'All cells', href=home)) if home else None,
     )
 
@@ -180,14 +191,10 @@ def troubles_section(
     """Return the recordings without a verdict, and why; None for none."""
     if not troubles:
         return None
-    rows = [
-        (
-            tag('a', run.cell, href=link(run.cell)) if link else run.cell,
-            run.recording.rsplit('/', 1)[-1],
-            run.state,
-            run.sentence,
-        )
-        for run in troubles
-    ]
-    heads = ('cell', 'recording', 'state', 'why')
-    return section('Recordings without a verdict', table(heads, rows), id_='troubles')
+    shown: dict[str, Callable[[Run], Child]] = {
+        'cell': lambda run: tag('a', run.cell, href=link(run.cell)) if link else run.cell,
+        'recording': lambda run: run.recording.rsplit('/', 1)[-1],
+        'state': lambda run: run.state,
+        'why': lambda run: run.sentence,
+    }
+    return section('Recordings without a verdict', columns(troubles, shown), id_='troubles')

@@ -12,7 +12,7 @@ from weld_twin_nodes.wording.quantities import counted, millimetres
 from ..history.database import Database
 from ..history.runs import Run, Runs
 from ..history.words import causes_of
-from ..report.html import Child, Figure, Html, document, figures, section, table, tag
+from ..report.html import Child, Figure, Html, columns, document, figures, section, table, tag
 from .cell_page import STYLE, troubles_section
 
 ROWS = 500
@@ -41,13 +41,8 @@ def ranking_page(database: Database, link: Callable[[str], str], ways: Html | No
     troubles = runs.troubles()
     body = tag(
         'main',
-        tag(
-            'header',
-            ways,
-            tag('p', 'All cells', class_='kind'),
-            tag('p', _span(rows), class_='subject'),
-        ),
-        tag('section', tag('h1', _headline(rows)), _figures(rows, troubles), id_='verdict'),
+        tag('header', ways, tag('p.kind', 'All cells'), tag('p.subject', _span(rows))),
+        tag('section#verdict', tag('h1', _headline(rows)), _figures(rows, troubles)),
         _cells(rows, link),
         _damaged(damaged),
         troubles_section(troubles[:TROUBLES]),
@@ -89,24 +84,22 @@ def _figures(rows: Sequence[Mapping[str, Any]], troubles: Sequence[Run]) -> Html
 
 
 def _cells(rows: Sequence[Mapping[str, Any]], link: Callable[[str], str]) -> Html:
-    heads = ('cell', 'verdict', 'gap', 'left', 'causes', 'last change', 'recorded', 'robot')
+    shown: dict[str, Callable[[Any], Child]] = {
+        'cell': lambda row: tag('a', row['name'], href=link(row['name'])),
+        'verdict': lambda row: tag(f'span.status.{row["status"]}', row['status']),
+        'gap': lambda row: millimetres(row['gap_m']),
+        'left': lambda row: millimetres(row['unexplained_m']),
+        'causes': lambda row: causes_of(row['effects'], 2),
+        'last change': _last_change,
+        'recorded': lambda row: tag('span', row['at'].date(), style='white-space: nowrap'),
+        'robot': lambda row: row['robot'],
+    }
     lead = 'The newest diagnosis of each cell, the largest gap first.'
     if len(rows) > ROWS:
         lead += f' {counted(len(rows) - ROWS, "cell")} with smaller gaps left out.'
-    reported = [_row(row, link) for row in rows[:ROWS]]
-    return section('Cells', table(heads, reported), id_='cells', lead=lead)
+    return section('Cells', columns(rows[:ROWS], shown), id_='cells', lead=lead)
 
 
-def _row(row: Mapping[str, Any], link: Callable[[str], str]) -> tuple[Child, ...]:
-    changes = row['changes'] or []
-    latest = max(changes, key=lambda change: str(change['date']), default=None)
-    return (
-        tag('a', row['name'], href=link(row['name'])),
-        tag('span', row['status'], class_=f'status {row["status"]}'),
-        millimetres(row['gap_m']),
-        millimetres(row['unexplained_m']),
-        causes_of(row['effects'], 2),
-        '' if latest is None else latest['sentence'],
-        tag('span', str(row['at'].date()), style='white-space: nowrap'),
-        row['robot'],
-    )
+def _last_change(row: Mapping[str, Any]) -> str:
+    latest = max(row['changes'] or [], key=lambda change: str(change['date']), default=None)
+    return '' if latest is None else str(latest['sentence'])

@@ -122,14 +122,8 @@ def acceptance_section(diagnosis: Diagnosis, demand: Demand) -> Html | None:
         _field(rule),
         table(heads, _rows(diagnosis, rule), 'acceptance'),
         _more(diagnosis),
-        tag(
-            'p',
-            _REMEDY,
-            class_='note',
-            id_='remedy',
-            hidden=None if rule.judged(before) == OPEN else '',
-        ),
-        tag('p', _rule_words(diagnosis, rule, demand), class_='note'),
+        tag('p#remedy.note', _REMEDY, hidden=None if rule.judged(before) == OPEN else ''),
+        tag('p.note', _rule_words(diagnosis, rule, demand)),
         _standard(diagnosis),
         id_='acceptance',
     )
@@ -139,19 +133,17 @@ def _field(rule: Rule) -> Html:
     value = None if rule.tolerance_m is None else f'{1e3 * rule.tolerance_m:g}'
     # A field of type number drops a comma without a word in some languages: 0,3 becomes 3.
     entry = tag(
-        'input', type='text', id_='tolerance', value=value, size='6', inputmode='decimal',
-        autocomplete='off', aria_describedby='unread',
+        'input#tolerance', type='text', value=value, size='6', inputmode='decimal',
+        autocomplete='off', aria_describedby='unread'
     )  # fmt: skip
     unread = tag(
-        'span',
+        'span#unread.mark.fail',
         'Not understood: write millimetres above 0, such as 0.3 or 0,3.',
-        id_='unread',
-        class_='mark fail',
         role='alert',
         hidden='',
     )
     label = tag('label', 'Tolerance of the tool point: ', entry, ' mm')
-    return tag('p', label, ' ', unread, class_='asked')
+    return tag('p.asked', label, ' ', unread)
 
 
 def _rows(diagnosis: Diagnosis, rule: Rule) -> list[tuple[Html | str, ...]]:
@@ -192,7 +184,7 @@ def _more(diagnosis: Diagnosis) -> Html | None:
         parts.append('Any other combination: tick it under "What if".')
     if switches(diagnosis) and any(unnamed(c) for c in diagnosis.causes if c.members):
         parts.append('Where a cause has no name, mended means: programs corrected by its curve.')
-    return tag('p', ' '.join(parts), class_='note') if parts else None
+    return tag('p.note', ' '.join(parts)) if parts else None
 
 
 def _row(name: str, rms: float, most: float, rule: Rule) -> tuple[Html | str, ...]:
@@ -261,7 +253,7 @@ def _standard(diagnosis: Diagnosis) -> Html | None:
     result = _repeated(diagnosis)
     if result is None:
         text = 'ISO 9283: no pose and no path was repeated, so there are no figures by it.'
-        return tag('p', text, class_='note detail')
+        return tag('p.note.detail', text)
     tables = []
     if result.poses:
         tables.append(table(POSE_HEADS, pose_rows(result)[:_ROWS]))

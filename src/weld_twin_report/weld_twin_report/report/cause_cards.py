@@ -42,7 +42,7 @@ def causes_cards(answer: Answer) -> Html | None:
     return section(
         'What causes it',
         _shares(answer, shown, rest),
-        tag('div', *cards, class_='cards'),
+        tag('div.cards', *cards),
         _smaller(rest),
         id_='cards',
         lead='How much of the gap each cause makes, counted in squares so that all shares, with what '
@@ -75,14 +75,14 @@ def _shares(answer: Answer, shown: list[CauseAnswer], rest: list[CauseAnswer]) -
     items = [
         tag(
             'li',
-            tag('span', label, class_='label'),
-            tag('span', tag('i', style=f'width:{100.0 * share:.2f}%'), class_='track'),
-            tag('span', text, class_='figure'),
+            tag('span.label', label),
+            tag('span.track', tag('i', style=f'width:{100.0 * share:.2f}%')),
+            tag('span.figure', text),
             class_=kind,
         )
         for label, share, text, kind in rows
     ]
-    return tag('ul', *items, class_='bars wide shares')
+    return tag('ul.bars.wide.shares', *items)
 
 
 def _card(answer: Answer, reported: CauseAnswer, rank: int) -> Html:
@@ -99,13 +99,12 @@ def _card(answer: Answer, reported: CauseAnswer, rank: int) -> Html:
         reported.at_the_controller,
     ]
     return tag(
-        'article',
-        tag('h3', tag('span', str(rank), class_='rank'), reported.name),
-        tag('p', tag('b', answer.percent(reported.cause.share)), ' of the gap', class_='share'),
+        'article.card',
+        tag('h3', tag('span.rank', str(rank)), reported.name),
+        tag('p.share', tag('b', answer.percent(reported.cause.share)), ' of the gap'),
         _box(reported),
         _picture(reported),
         pairs(entries),
-        class_='card',
         id_=f'cause-{rank}',
     )
 
@@ -115,16 +114,16 @@ def _box(reported: CauseAnswer) -> Html | None:
     for at, switch in enumerate(switches(reported.diagnosis)):
         if switch.members == (reported.k,):
             box = tag('input', type='checkbox', data_switch=at, checked='')
-            return tag('label', box, ' take as mended', class_='one-switch')
+            return tag('label.one-switch', box, ' take as mended')
     return None
 
 
 def _sure(reported: CauseAnswer) -> Html | None:
     """Return how sure a cause is, and for engineers what each level of it is believed to be."""
     levels = tag('summary', 'place, dependence and name'), reported.levels
-    folded = tag('details', *levels, class_='detail') if reported.levels else None
+    folded = tag('details.detail', *levels) if reported.levels else None
     return (
-        tag('span', *(tag('span', text) for text in reported.sure), folded, class_='lines')
+        tag('span.lines', *(tag('span', text) for text in reported.sure), folded)
         if (reported.sure)
         else None
     )
@@ -134,7 +133,7 @@ def _effect(reported: CauseAnswer) -> Html | None:
     if reported.moves is None:
         return None
     most, ways = reported.moves
-    return joined([most, tag('span', ways, class_='detail') if ways else None])
+    return joined([most, tag('span.detail', ways) if ways else None])
 
 
 def _mended(reported: CauseAnswer, rule: Rule | None) -> Html | None:
@@ -173,8 +172,7 @@ def _smaller(rest: list[CauseAnswer]) -> Html | None:
     if not rest:
         return None
     return tag(
-        'details',
+        'details.detail',
         tag('summary', counted(len(rest), 'smaller cause')),
         table(LEVEL_HEADS, [reported.row for reported in rest], 'levels'),
-        class_='detail',
     )

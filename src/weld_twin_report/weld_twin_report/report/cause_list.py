@@ -99,7 +99,7 @@ def _found(answer: Answer) -> Html | None:
             rows = [[name, parameter_word(parameter), *rest] for name, parameter, *rest in rows]
         parts += [tag('h3', title), table(heads, rows, '' if k else 'effects')]
     if answer.diagnosis.families:
-        parts.insert(2, tag('p', _KINDS, class_='note'))
+        parts.insert(2, tag('p.note', _KINDS))
     return joined(parts)
 
 
@@ -121,14 +121,14 @@ def _candidates(answer: Answer) -> Html | None:
         for group in groups[:_SLOTS]
     ]
     more = sum(map(len, groups)) - sum(len(g[:_CANDIDATES]) for g in groups[:_SLOTS])
-    note = tag('p', f'{more} more in diagnosis.json.', class_='note') if more > 0 else None
+    note = tag('p.note', f'{more} more in diagnosis.json.') if more > 0 else None
     if not named:
         title = 'What fits best, though no cause is named'
         lead = _INSTEAD if carries_curves(diagnosis) else _STAND_IN
     else:
         title = 'Candidates against each other'
         lead = f'{_GROUP if len(groups) > 1 else ""}{_RIVALS}'
-    reported = tag('p', f'{lead} {_BARS}', class_='note')
+    reported = tag('p.note', f'{lead} {_BARS}')
     return joined([tag('h3', title), reported, *parts, note])
 
 
@@ -161,7 +161,7 @@ def _absent(diagnosis: Diagnosis) -> Html | None:
         'details',
         tag('summary', f'Not considered, and why ({len(rows)})'),
         table(('Effect', 'Why'), rows),
-        tag('p', _ENOUGH, class_='note') if any(_STILL in why for _, why in rows) else None,
+        tag('p.note', _ENOUGH) if any(_STILL in why for _, why in rows) else None,
     )
 
 

@@ -106,11 +106,10 @@ def chart(
         'joint': joint,
     }
     return tag(
-        'figure',
+        'figure.chart',
         tag('figcaption', title),
-        tag('div', class_='plot', role='img', aria_label=title, style=f'min-height:{height}px'),
+        tag('div.plot', role='img', aria_label=title, style=f'min-height:{height}px'),
         embedded(spec),
-        class_='chart',
         data_key=key,
     )
 

@@ -97,7 +97,7 @@ def circles_section(diagnosis: Diagnosis) -> Html | None:
     figures = [_figure(diagnosis, k, circle) for k, circle in result]
     return section(
         'The circle',
-        tag('div', *figures, class_='panels'),
+        tag('div.panels', *figures),
         id_='circles',
         lead='How far outside or inside the commanded circle the tool point is, magnified (as in '
         'ISO 230-4).',
@@ -135,7 +135,7 @@ def _key(changes: bool) -> Html:
     items = [
         tag('li', tag('i', class_=f'swatch {colour}'), ' ', reported) for colour, reported in rows
     ]
-    return tag('ul', *items, class_='key')
+    return tag('ul.key', *items)
 
 
 def _radial(circle: Circle, path: Array, deviation: Array) -> Array:

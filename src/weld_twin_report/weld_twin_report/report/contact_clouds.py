@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.result import ContactResult, Diagnosis
+from weld_twin_core.diagnosis.result import ContactResult, Diagnosis, KnownLength
 from weld_twin_nodes.wording.quantities import millimetres
 
-from .html import Html, section, table, tag
+from .html import Html, columns, section, table, tag
 
 _MOST = 24
 """Contacts that are drawn; more would make a page of pictures."""
@@ -29,7 +31,7 @@ def contacts_section(diagnosis: Diagnosis) -> Html | None:
         'Contacts',
         _table(result),
         _lengths(result),
-        tag('div', *_pictures(diagnosis), class_='clouds', style=_GRID),
+        tag('div.clouds', *_pictures(diagnosis), style=_GRID),
         _not_seen(result),
         id_='contacts',
         lead='How far the predicted tool point is from the middle of what it touched, on average. '
@@ -69,25 +71,20 @@ def _table(result: ContactResult) -> Html:
 
 
 def _lengths(result: ContactResult) -> Html | None:
+    shown: dict[str, Callable[[KnownLength], str]] = {
+        'distance': lambda item: ' to '.join(item.between),
+        'known': lambda item: f'{millimetres(item.value)} ± {millimetres(item.sigma)}',
+        'before': lambda item: millimetres(item.before),
+        'after': lambda item: millimetres(item.after),
+    }
     distances = [item for item in result.lengths if item.kind == 'distance']
-    if not distances:
-        return None
-    rows = [
-        (
-            ' to '.join(item.between),
-            f'{millimetres(item.value)} ± {millimetres(item.sigma)}',
-            millimetres(item.before),
-            millimetres(item.after),
-        )
-        for item in distances
-    ]
-    return table(('distance', 'known', 'before', 'after'), rows)
+    return columns(distances, shown) if distances else None
 
 
 def _not_seen(result: ContactResult) -> Html | None:
     if not result.not_seen:
         return None
-    return tag('p', f'No contact shows: {"; ".join(result.not_seen)}.', class_='note')
+    return tag('p.note', f'No contact shows: {"; ".join(result.not_seen)}.')
 
 
 def _pictures(diagnosis: Diagnosis) -> list[Html]:

@@ -4,13 +4,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from weld_twin_msgs_py.files.input_files import InputFile
 
 from .footing import inputs_section
-from .html import Figure, Html, document, figures, main, section, sentences, table, tag
+from .html import (
+    Figure,
+    Html,
+    columns,
+    document,
+    figures,
+    main,
+    section,
+    sentences,
+    table,
+    tag,
+)
 
 ROWS = 500
 """Moves in the table of the page at most; correction.json has them all."""
@@ -165,37 +176,24 @@ def _outside(entry: Mapping[str, Any]) -> Html | None:
 
 
 def _moves(entry: Mapping[str, Any]) -> Html:
-    rows = [
-        (
-            move['where'],
-            move['kind'],
-            move['point'] or '',
-            f'{move["moved_m"] * 1e3:.3f}' if move['corrected'] else 'left',
-            f'{move["turned_rad"] * 57.29578:.4f}' if move['corrected'] else 'left',
-            _millimetres(move['before_m']),
-            _millimetres(move['after_m']),
-            _millimetres(move['sigma_m']),
-        )
-        for move in entry['moves'][:ROWS]
-    ]
-    more = len(entry['moves']) - len(rows)
+    shown: dict[str, Callable[[Any], str]] = {
+        'line': lambda move: move['where'],
+        'move': lambda move: move['kind'],
+        'point': lambda move: move['point'] or '',
+        'moved, mm': lambda m: f'{m["moved_m"] * 1e3:.3f}' if m['corrected'] else 'left',
+        'turned, deg': lambda m: f'{m["turned_rad"] * 57.29578:.4f}' if m['corrected'] else 'left',
+        'before, mm': lambda move: _millimetres(move['before_m']),
+        'after, mm': lambda move: _millimetres(move['after_m']),
+        '±, mm': lambda move: _millimetres(move['sigma_m']),
+    }
+    more = len(entry['moves']) - ROWS
     lead = (
         'How far the place of each move was moved, and how far off the real tool is there by the '
         'model. ±: how sure the model is of that (one standard deviation).'
     )
     if more > 0:
         lead += f' {more} more are in correction.json.'
-    heads = (
-        'line',
-        'move',
-        'point',
-        'moved, mm',
-        'turned, deg',
-        'before, mm',
-        'after, mm',
-        '±, mm',
-    )
-    return section('Moves', table(heads, rows), id_='moves', lead=lead)
+    return section('Moves', columns(entry['moves'][:ROWS], shown), id_='moves', lead=lead)
 
 
 def _millimetres(value: float | None) -> str:

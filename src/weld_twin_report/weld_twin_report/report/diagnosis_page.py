@@ -91,7 +91,7 @@ def report_page(
         ]
     )
     title = f'{answer.status} · {diagnosis.model.robot.name} · diagnosis'
-    foot = tag('div', inputs_section(inputs), class_='detail')
+    foot = tag('div.detail', inputs_section(inputs))
     main = tag('main', Html(renamed(body, sheet.joints)), foot)
     if not answer.sound:
         return document(title, main)
@@ -122,12 +122,11 @@ def _causes(answer: Answer, demand: Demand) -> tuple[Html | None, ...]:
 def _engineers(answer: Answer) -> Html:
     """Return alternatives, changes and how the gap shrinks, for those who want more than an answer."""
     return tag(
-        'details',
+        'details.detail',
         tag('summary', 'For engineers: what else it could be, and how far each effect shrinks it'),
         causes_section(answer),
         changed_section(answer),
         shrink_section(answer.diagnosis),
-        class_='detail',
     )
 
 

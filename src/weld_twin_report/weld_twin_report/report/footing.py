@@ -92,7 +92,7 @@ def _wanted(wanted: dict[str, Any], sites: set[Site]) -> Html:
         rest['tells them apart by'] = f'{sigma} standard deviations, as far as can be foreseen'
     parts = [tag('p', in_words(wanted['sentence'], sites))] if wanted.get('sentence') else []
     why = parts_what(wanted) or (in_words(wanted['reason'], sites) if wanted.get('reason') else '')
-    parts += [tag('p', why, class_='note')] if why else []
+    parts += [tag('p.note', why)] if why else []
     entries = [
         (key.replace('_', ' ').capitalize(), _plain(value))
         for key, value in rest.items()
@@ -135,7 +135,7 @@ def _left_open(answer: Answer, wanted: dict[str, Any]) -> list[Html]:
     reported = 'It is not made to tell whether it is {}: see what to do first.'
     sets = zip(open_sets(answer.diagnosis), answer.open, strict=True)
     return [
-        tag('p', reported.format(names), class_='note')
+        tag('p.note', reported.format(names))
         for group, names in sets
         if not made_for(wanted, group)
     ]
@@ -168,15 +168,11 @@ def checks_section(diagnosis: Diagnosis) -> Html:
         for check in ordered
     ]
     notes = [
-        tag(
-            'li',
-            tag('span', 'note', class_='level note'),
-            tag('span', tag('b', recording.name), ' ', note),
-        )
+        tag('li', tag('span.level.note', 'note'), tag('span', tag('b', recording.name), ' ', note))
         for recording in diagnosis.recordings
         for note in recording.notes
     ]
-    result = tag('ul', *items, *_left_out(diagnosis), *notes, class_='checks')
+    result = tag('ul.checks', *items, *_left_out(diagnosis), *notes)
     return section(
         'Are the data sound',
         result if items or notes else tag('p', 'Nothing stood out.'),
@@ -198,27 +194,20 @@ def _left_out(diagnosis: Diagnosis) -> list[Html]:
                 'pictures are without them. They need not be slips of the instrument: a motion '
                 'that no effect describes looks like this too.'
             )
-            out.append(
-                tag(
-                    'li',
-                    tag('span', 'left out', class_='level note'),
-                    tag('span', text),
-                )
-            )
+            out.append(tag('li', tag('span.level.note', 'left out'), tag('span', text)))
     return out
 
 
 def inputs_section(inputs: Sequence[InputFile]) -> Html:
     """Return inputs and version, so that the answer can be had again."""
     rows: list[list[Child]] = [
-        [item.use, tag('code', item.path), tag('code', item.sha256, class_='hash')]
-        for item in inputs
+        [item.use, tag('code', item.path), tag('code.hash', item.sha256)] for item in inputs
     ]
     return section(
         'Made from',
         table(('Use', 'Path', 'SHA-256'), rows, 'inputs')
         if rows
         else tag('p', 'No files: the recordings were handed over by a program, not read.'),
-        tag('p', f'weld_twin {__version__}', class_='note'),
+        tag('p.note', f'weld_twin {__version__}'),
         id_='inputs',
     )

@@ -51,10 +51,10 @@ def where_section(answer: Answer) -> Html:
         ]
     return section(
         'Where it lies',
-        tag('div', *parts, class_='columns'),
-        tag('p', _whole(answer), class_='note'),
+        tag('div.columns', *parts),
+        tag('p.note', _whole(answer)),
         _stretches(diagnosis),
-        tag('div', _by_itself(diagnosis), class_='detail'),
+        tag('div.detail', _by_itself(diagnosis)),
         id_='where',
     )
 
@@ -133,12 +133,11 @@ def _by_itself(diagnosis: Diagnosis) -> Html | None:
         [
             tag('h3', 'Each joint by itself'),
             tag(
-                'p',
+                'p.note',
                 'What share of the squared gap each joint could explain alone, as a function of '
                 'what, on stretches not used for fitting. Several can explain the same part, so '
                 'cells need not add up, and the darkest need not be the cause: above, all are '
                 'weighed together.',
-                class_='note',
             ),
             picture,
         ]
@@ -161,16 +160,14 @@ def _map(diagnosis: Diagnosis) -> Html | None:
     for i, name in enumerate(robot.joint_names):
         cells = [_cell(float(shares[i, k])) for k in full]
         unit = 'mm' if robot.prismatic[i] else '°'
-        cells.append(tag('td', '', data_joint=i, data_unit=unit, class_='now'))
+        cells.append(tag('td.now', '', data_joint=i, data_unit=unit))
         rows.append(tag('tr', tag('th', name, scope='row'), *cells))
     whole = tag(
-        'div',
-        tag('table', _heads([where.map_regressors[k] for k in full]), tag('tbody', *rows),
-            class_='map'),
-        class_='scroll',
+        'div.scroll',
+        tag('table.map', _heads([where.map_regressors[k] for k in full]), tag('tbody', *rows)),
         tabindex='0',
         role='region',
-        aria_label='Share by joint and regressor',
+        aria_label='Share by joint and regressor'
     )  # fmt: skip
     empty = [
         _DIRECTION.get(name, name.replace(', ', ' of '))
@@ -180,22 +177,20 @@ def _map(diagnosis: Diagnosis) -> Html | None:
     blank = 'A cell is blank below 0.5 %.' if full else ''
     none = f'No joint alone could explain 0.5 % by {listed(empty, "or")}.' if empty else ''
     note = ' '.join(filter(None, [blank, none]))
-    return joined([whole, tag('p', note, class_='note') if note else None])
+    return joined([whole, tag('p.note', note) if note else None])
 
 
 def _heads(names: Sequence[str]) -> Html:
     heads = [tag('th', tag('span', _DIRECTION.get(name, name)), scope='col') for name in names]
-    heads.append(
-        tag('th', tag('span', 'position at the instant looked at'), scope='col', class_='now')
-    )
-    first = tag('th', 'Joint', tag('span', ' [%]', class_='narrow'), scope='col')
+    heads.append(tag('th.now', tag('span', 'position at the instant looked at'), scope='col'))
+    first = tag('th', 'Joint', tag('span.narrow', ' [%]'), scope='col')
     return tag('thead', tag('tr', first, *heads))
 
 
 def _cell(share: float) -> Html:
     strength = min(max(share, 0.0), 1.0)
     number, gap, unit = percent(share).rpartition('\N{NO-BREAK SPACE}')
-    text = (number, tag('span', gap, unit, class_='unit')) if share >= _VISIBLE else ()
+    text = (number, tag('span.unit', gap, unit)) if share >= _VISIBLE else ()
     return tag('td', *text, style=f'--share:{strength:.3f}')
 
 
@@ -226,7 +221,7 @@ def _worst(diagnosis: Diagnosis) -> Html | None:
     if sides := sides_words(parts[sample]):
         reported += f': {sides}'
     keys = 'Left is as seen from the tool, looking along it; out is away from the flange.'
-    return tag('p', f'{reported}. {keys}', class_='note')
+    return tag('p.note', f'{reported}. {keys}')
 
 
 def _stretches(diagnosis: Diagnosis) -> Html | None:
@@ -251,11 +246,7 @@ def _stretches(diagnosis: Diagnosis) -> Html | None:
     )
     return _part(
         'Along the recording',
-        tag(
-            'div',
-            *(tag('ol', *cells, class_='strip') for cells in strips.values()),
-            tag('p', note, class_='note'),
-        ),
+        tag('div', *(tag('ol.strip', *cells) for cells in strips.values()), tag('p.note', note)),
     )
 
 
@@ -288,8 +279,8 @@ def _stretch(
         when = f'{first} to {final}'
     return tag(
         'li',
-        tag('span', '▼ ' if most else '', millimetres(rms), class_='figure'),
-        tag('span', when, class_='when'),
+        tag('span.figure', '▼ ' if most else '', millimetres(rms)),
+        tag('span.when', when),
         style=f'--share:{rms / largest:.3f};flex-grow:{max(end - start, 1e-3):.3f}',
         title=f'{when}: {millimetres(rms)}, {percent(share)} of the squared gap',
         class_='most' if most else None,

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
+from typing import Any
 
 _EMPTY = frozenset({'br', 'meta', 'input'})
 
@@ -21,14 +22,17 @@ class Html(str):
 Child = str | None
 
 
-def tag(name: str, *children: Child, **attributes: str | float | None) -> Html:
+def tag(kind: str, *children: Child, **attributes: str | float | None) -> Html:
     """
-    Return an element.
+    Return an element, such as ``tag('p#own.note', text, data_run=1)``: its name, id and classes.
 
     Attribute names take ``_`` for ``-``, and a trailing one keeps a name off Python's keywords;
     attributes and children that are None are left out.
     """
+    name, *classes = kind.split('.')
+    name, _, id_ = name.partition('#')
     parts = [f'<{name}']
+    attributes = {'id': id_ or None, 'class': ' '.join(classes) or None, **attributes}
     for key, value in attributes.items():
         if value is not None:
             parts.append(f' {key.rstrip("_").replace("_", "-")}="{escape(str(value))}"')
@@ -51,7 +55,7 @@ def joined(children: Iterable[Child]) -> Html:
 
 def section(title: str, *children: Child, id_: str, lead: str | None = None) -> Html:
     """Return a section with its heading and a sentence that says how to read it."""
-    opening = tag('p', lead, class_='lead') if lead else None
+    opening = tag('p.lead', lead) if lead else None
     return tag('section', tag('h2', title), opening, *children, id_=id_)
 
 
@@ -64,7 +68,14 @@ def table(heads: Iterable[str], rows: Iterable[Iterable[Child]], class_: str = '
     top = tag('tr', *(tag('th', head, scope='col') for head in heads))
     whole = tag('table', tag('thead', top), tag('tbody', *body), class_=class_ or None)
     # A table that is wider than a phone scrolls, also by the keyboard.
-    return tag('div', whole, class_='scroll', tabindex='0')
+    return tag('div.scroll', whole, tabindex='0')
+
+
+def columns(
+    items: Iterable[Any], shown: Mapping[str, Callable[[Any], Child]], class_: str = ''
+) -> Html:
+    """Return a table with a row for each item: what every column shows of it stands by its head."""
+    return table(shown, ([show(item) for show in shown.values()] for item in items), class_)
 
 
 def bars(rows: Iterable[tuple[str, float, str]], class_: str = '') -> Html:
@@ -75,9 +86,9 @@ def bars(rows: Iterable[tuple[str, float, str]], class_: str = '') -> Html:
         out.append(
             tag(
                 'li',
-                tag('span', label, class_='label'),
-                tag('span', tag('i', style=width), class_='track'),
-                tag('span', text, class_='figure'),
+                tag('span.label', label),
+                tag('span.track', tag('i', style=width)),
+                tag('span.figure', text),
             )
         )
     return tag('ul', *out, class_=f'bars {class_}'.strip())
@@ -90,27 +101,27 @@ Figure = tuple[str, Child, Child]
 def figures(cells: Iterable[Figure]) -> Html:
     """Return the few large figures at the top of a page."""
     reported = [
-        tag('div', tag('dt', name), tag('dd', value), tag('dd', note, class_='note'))
+        tag('div', tag('dt', name), tag('dd', value), tag('dd.note', note))
         for name, value, note in cells
     ]
-    return tag('dl', *reported, class_='figures')
+    return tag('dl.figures', *reported)
 
 
 def pairs(rows: Iterable[tuple[str, Child]]) -> Html:
     """Return heads and what belongs to each; what is empty is left out."""
     reported = [part for head, text in rows if text for part in (tag('dt', head), tag('dd', text))]
-    return tag('dl', *reported, class_='pairs')
+    return tag('dl.pairs', *reported)
 
 
 def sentences(texts: Iterable[Child]) -> Html:
     """Return sentences below each other as a list."""
-    return tag('ul', *(tag('li', text) for text in texts), class_='sentences')
+    return tag('ul.sentences', *(tag('li', text) for text in texts))
 
 
 def lines(texts: Iterable[Child]) -> Html | None:
     """Return texts below each other in a cell; None without any."""
     reported = [tag('span', text) for text in texts]
-    return tag('span', *reported, class_='lines') if reported else None
+    return tag('span.lines', *reported) if reported else None
 
 
 def main(
@@ -130,10 +141,8 @@ def main(
 
     """
     bold = tag('b', kind[1]) if kind[1] else None
-    head = tag(
-        'header', tag('p', kind[0], bold, class_='kind'), tag('p', subject, class_='subject')
-    )
-    return tag('main', head, tag('section', tag('h1', headline), cells, id_='verdict'), *sections)
+    head = tag('header', tag('p.kind', kind[0], bold), tag('p.subject', subject))
+    return tag('main', head, tag('section#verdict', tag('h1', headline), cells), *sections)
 
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'"

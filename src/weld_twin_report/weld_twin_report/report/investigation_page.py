@@ -98,8 +98,8 @@ def _tree(state: Mapping[str, Any]) -> Html:
             nodes.append(_asked(step, after))
     if state['state'] != 'open':
         end = tag('p', tag('b', str(state['state'])), f': {state["why"]}')
-        nodes.append(tag('li', tag('h3', 'Ended'), end, class_='end'))
-    return tag('ol', *nodes, class_='way')
+        nodes.append(tag('li.end', tag('h3', 'Ended'), end))
+    return tag('ol.way', *nodes)
 
 
 def _believed(number: int, step: Round) -> Html:
@@ -109,7 +109,7 @@ def _believed(number: int, step: Round) -> Html:
     sure = '' if belief['confidence'] is None else f', {odds(belief["confidence"])} sure'
     named = listed([_name(effect) for effect in belief['effects']]) or _without_name(belief)
     alike = [
-        tag('p', f'Not told apart: {listed([_name(item) for item in group])}.', class_='note')
+        tag('p.note', f'Not told apart: {listed([_name(item) for item in group])}.')
         for group in belief['indistinguishable']
         if len(group) > 1
     ]
@@ -119,12 +119,11 @@ def _believed(number: int, step: Round) -> Html:
         if (item['probability'] or 0.0) >= LEAST
     ]
     return tag(
-        'li',
+        'li.believed',
         tag('h3', f'{came}: {listed(names)}'),
         tag('p', tag('b', f'Believed, {belief["status"]}: '), f'{named}{sure}.'),
         *alike,
         bars(rows[:SHOWN], 'wide') if rows else None,
-        class_='believed',
         id_=f'round-{number}',
     )
 
@@ -155,13 +154,12 @@ def _asked(step: Round, after: Round | None) -> Html:
     }
     answer = 'Not back yet.' if after is None else verdicts[asked['decided']]
     return tag(
-        'li',
+        'li.asked',
         tag('h3', f'Asked, {asked["minutes"]:.1f} minutes'),
         text,
-        tag('p', _foreseen(asked), class_='note'),
+        tag('p.note', _foreseen(asked)),
         _fork(asked, after) if asked['between'] else None,
         tag('p', tag('b', answer)),
-        class_='asked',
     )
 
 
@@ -186,10 +184,10 @@ def _fork(asked: Mapping[str, Any], after: Round | None) -> Html:
         stays = None if after is None else _left(side, against, after['believed'])
         name = ' with '.join(_name(item, against) for item in side) or 'neither of that'
         word: Child = {None: None, True: 'left', False: 'ruled out'}[stays]
-        mark = tag('span', word, class_='level') if word else None
+        mark = tag('span.level', word) if word else None
         class_ = {None: None, True: 'stays', False: 'gone'}[stays]
         sides.append(tag('li', tag('span', name), mark, class_=class_))
-    return tag('ul', *sides, class_='fork')
+    return tag('ul.fork', *sides)
 
 
 Side = Sequence[Mapping[str, Any]]

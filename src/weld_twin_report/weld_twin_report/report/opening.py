@@ -86,8 +86,8 @@ WORDS = (
 
 def header(answer: Answer) -> Html:
     """Return what was diagnosed."""
-    kind = tag('p', 'Positional accuracy ', tag('b', 'diagnosis'), class_='kind')
-    return tag('header', kind, tag('p', answer.subject, class_='subject'))
+    kind = tag('p.kind', 'Positional accuracy ', tag('b', 'diagnosis'))
+    return tag('header', kind, tag('p.subject', answer.subject))
 
 
 def opening(answer: Answer, judged: Html | None = None) -> Html:
@@ -95,14 +95,13 @@ def opening(answer: Answer, judged: Html | None = None) -> Html:
     first, second = answer.verdict
     reported = (figures, _holds, _actions, causes_table, _words) if answer.sound else ()
     return tag(
-        'section',
+        'section#verdict',
         tag('p', answer.status, class_=f'status {answer.diagnosis.status}'),
         judged,
         tag('h1', first),
-        tag('p', second, class_='second'),
+        tag('p.second', second),
         _mended(answer),
         *(part(answer) for part in reported),
-        id_='verdict',
     )
 
 
@@ -111,7 +110,7 @@ def _mended(answer: Answer) -> Html | None:
     if not answer.mended:
         return None
     items = tag('ul', *(tag('li', sentence) for sentence in answer.mended))
-    return tag('div', tag('h2', 'Mended before the diagnosis'), items, class_='actions mended')
+    return tag('div.actions.mended', tag('h2', 'Mended before the diagnosis'), items)
 
 
 def _actions(answer: Answer) -> Html | None:
@@ -119,7 +118,7 @@ def _actions(answer: Answer) -> Html | None:
         return None
     items = tag('ol', *(tag('li', *warned(action)) for action in answer.to_do))
     title = 'What to do, in this order' if len(answer.to_do) > 1 else 'What to do'
-    return tag('div', tag('h2', title), items, class_='actions')
+    return tag('div.actions', tag('h2', title), items)
 
 
 def _holds(answer: Answer) -> Html | None:
@@ -132,12 +131,7 @@ def _holds(answer: Answer) -> Html | None:
 
 def _words(_: Answer) -> Html:
     """Return what the words of the page mean, folded."""
-    return tag(
-        'details',
-        tag('summary', 'What the words on this page mean'),
-        pairs(WORDS),
-        class_='detail',
-    )
+    return tag('details.detail', tag('summary', 'What the words on this page mean'), pairs(WORDS))
 
 
 def figures(answer: Answer) -> Html:
@@ -285,10 +279,9 @@ def causes_table(answer: Answer) -> Html | None:
         rows.append(_together(diagnosis, rule))
     top = tag('tr', *(tag('th', head, scope='col') for head in _HEADS))
     return tag(
-        'div',
-        tag('table', tag('thead', top), tag('tbody', *rows), class_='glance'),
-        tag('p', _more(diagnosis), class_='note'),
-        class_='detail',
+        'div.detail',
+        tag('table.glance', tag('thead', top), tag('tbody', *rows)),
+        tag('p.note', _more(diagnosis)),
     )
 
 
@@ -324,9 +317,9 @@ def _together(diagnosis: Diagnosis, rule: Rule) -> Html:
     return tag(
         'tr',
         tag('th', 'All mended', scope='row'),
-        *(tag('td', '', class_='blank') for _ in range(3)),
+        *(tag('td.blank', '') for _ in range(3)),
         tag('td', reported, data_head='If all are mended'),
-        tag('td', '', class_='blank')
+        tag('td.blank', '')
         if len(advised(diagnosis)) == len(switches(diagnosis))
         else tag('td', 'not advised', data_head=_HEADS[-1]),
     )

@@ -36,11 +36,7 @@ def printed_section(answer: Answer, inputs: Sequence[InputFile], judged: Html | 
     lines = [tag('span', text) for text in ('Checked by', 'Date', 'Signature')]
     status = tag('span', answer.status, class_=f'status {diagnosis.status}')
     return tag(
-        'section',
-        pairs(rows),
-        tag('div', status, judged),
-        tag('p', *lines, class_='signatures'),
-        class_='printed',
+        'section.printed', pairs(rows), tag('div', status, judged), tag('p.signatures', *lines)
     )
 
 
@@ -60,4 +56,4 @@ def _files(inputs: Sequence[InputFile]) -> Html:
     reported = [f'{PurePath(item.path).name} (SHA-256 {item.sha256[:_SHORT]}…)' for item in inputs]
     more = [f'{len(reported) - _FILES} more'] if len(reported) > _FILES else []
     named = '; '.join([*reported[:_FILES], *more, f'weld_twin {__version__}'])
-    return tag('span', named, tag('span', id_='printed-at'))
+    return tag('span', named, tag('span#printed-at'))

@@ -47,7 +47,7 @@ def seam_section(diagnosis: Diagnosis) -> Html:
         _figures(diagnosis) if switches(diagnosis) else None,
         tag('div', *_panels(diagnosis, changes), class_='panels' if changes else 'panels one'),
         _controls(stations),
-        tag('p', class_='instant', id_='instant'),
+        tag('p#instant.instant'),
         tag('noscript', tag('p', 'The pictures need scripts switched on.')),
         _charts(diagnosis),
         id_='seam',
@@ -70,11 +70,7 @@ def _switches(diagnosis: Diagnosis) -> Html | None:
         for text, value in (('as it is', 'off'), ('all mended', 'on'))
     ]
     return tag(
-        'fieldset',
-        tag('legend', 'Take as mended:'),
-        *boxes,
-        tag('span', *buttons, class_='views'),
-        class_='switches',
+        'fieldset.switches', tag('legend', 'Take as mended:'), *boxes, tag('span.views', *buttons)
     )
 
 
@@ -85,16 +81,15 @@ def _figures(diagnosis: Diagnosis) -> Html:
     cells: tuple[tuple[str, str, str, Child], ...] = (
         ('Left then', 'now-rms', millimetres(remaining.rms_after), 'RMS, on data not used for fitting'),
         ('At the worst spot', 'now-max', millimetres(remaining.largest_after), joined([
-            f'of {_counting(diagnosis)}', tag('span', id_='now-verdict', data_before=': ')])),
+            f'of {_counting(diagnosis)}', tag('span#now-verdict', data_before=': ')])),
         ('Of the gap', 'now-share', percent(share, int(share < _TENTH)), 'of its RMS is left'),
     )  # fmt: skip
     return tag(
-        'dl',
+        'dl.figures',
         *(
-            tag('div', tag('dt', name), tag('dd', value, id_=key), tag('dd', note, class_='note'))
+            tag('div', tag('dt', name), tag('dd', value, id_=key), tag('dd.note', note))
             for name, key, value, note in cells
         ),
-        class_='figures',
     )
 
 
@@ -121,7 +116,7 @@ def _panels(diagnosis: Diagnosis, changes: bool) -> list[Html]:
     return [
         tag(
             'figure',
-            tag('figcaption', title, ', deviation ', tag('span', class_='times'), ' larger'),
+            tag('figcaption', title, ', deviation ', tag('span.times'), ' larger'),
             tag('canvas', data_side=side, tabindex='0', role='img', aria_label=label),
         )
         for side, title, label in reported
@@ -136,24 +131,22 @@ def _controls(stations: bool) -> Html:
     slider = tag(
         'label',
         'Deviation drawn ',
-        tag('output', id_='times', class_='times'),
+        tag('output#times.times'),
         ' larger ',
-        tag('input', type='range', id_='stretch', min='0', max='1', step='0.01'),
+        tag('input#stretch', type='range', min='0', max='1', step='0.01'),
     )
     signs = '○ the instant looked at'
     return tag(
-        'div',
-        tag('canvas', id_='legend', role='img', aria_label='Colour scale'),
-        tag('div', *views, class_='views'),
+        'div.controls',
+        tag('canvas#legend', role='img', aria_label='Colour scale'),
+        tag('div.views', *views),
         slider,
         tag(
-            'span',
+            'span.signs',
             signs
             if stations
             else f'▲ direction of travel (both ways where it goes to and fro)   {signs}',
-            class_='signs',
         ),
-        class_='controls',
     )
 
 
@@ -162,7 +155,7 @@ def _charts(diagnosis: Diagnosis) -> Html:
     count = len(diagnosis.traces.t)
     charts = [_chart(diagnosis, k) for k in range(min(count, _RECORDINGS))]
     more = count - len(charts)
-    note = tag('p', f'{more} more recordings are not drawn.', class_='note') if more > 0 else None
+    note = tag('p.note', f'{more} more recordings are not drawn.') if more > 0 else None
     title = 'Deviation by station' if at_rest(diagnosis) else 'Deviation along the recording'
     return joined([tag('h3', title), *charts, note])
 

@@ -50,7 +50,7 @@ def _waterfall(diagnosis: Diagnosis) -> Html:
         before = rms
     floor = diagnosis.gap.noise_floor_m
     rows.append(_step('measuring noise', floor / largest, floor / largest, floor, 'floor'))
-    return tag('ul', *rows, class_='bars waterfall wide')
+    return tag('ul.bars.waterfall.wide', *rows)
 
 
 def _apart(diagnosis: Diagnosis) -> bool:
@@ -89,13 +89,12 @@ def _step(label: str, share: float, before: float, rms: float, class_: str = '')
     fallen = max(before - share, 0.0)
     return tag(
         'li',
-        tag('span', label, class_='label'),
+        tag('span.label', label),
         tag(
-            'span',
+            'span.track',
             tag('i', style=f'width:{100 * share:.2f}%'),
-            tag('i', style=f'width:{100 * fallen:.2f}%', class_='fallen'),
-            class_='track',
+            tag('i.fallen', style=f'width:{100 * fallen:.2f}%'),
         ),
-        tag('span', millimetres(rms), class_='figure'),
+        tag('span.figure', millimetres(rms)),
         class_=class_ or None,
     )

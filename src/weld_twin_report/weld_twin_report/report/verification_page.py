@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from weld_twin_nodes.wording.words import called, cause, listed
 
 from .charts import Axis, Line, chart
 from .footing import inputs_section
-from .html import Html, document, figures, main, section, table, tag
+from .html import Html, columns, document, figures, main, section, tag
 
 _STATES = {
     'gone': 'went away',
@@ -25,8 +25,6 @@ _STATES = {
     'over': 'was corrected too far, or has changed since',
     'open': 'does not show in this recording',
 }
-_SCALE = 1.15
-"""Width of the drawing in units of the largest figure in it."""
 
 
 def headline(result: Verification) -> str:
@@ -92,7 +90,7 @@ def verification_page(result: Verification, robot: str, inputs: Sequence[InputFi
         title,
         headline(result),
         _figures(result),
-        *(tag('p', note, class_='warn') for note in result.notes),
+        *(tag('p.warn', note) for note in result.notes),
         _causes(result),
         _drawn(result),
         inputs_section(inputs),
@@ -121,21 +119,15 @@ def _figures(result: Verification) -> Html:
 def _causes(result: Verification) -> Html | None:
     if not result.causes:
         return None
-    rows = [
-        (
-            _name(remaining),
-            state(result, remaining),
-            '' if remaining.state == 'open' else _share(remaining),
-            millimetres(remaining.rms_m),
-        )
-        for remaining in result.causes
-    ]
-    return section(
-        'What became of the causes',
-        table(('Cause', 'Now', 'Left of it', 'As it was it moves the tool by'), rows),
-        id_='causes',
-        lead='What is left was held against what each cause of the diagnosis does on this motion.',
-    )
+    shown: dict[str, Callable[[Left], str]] = {
+        'Cause': _name,
+        'Now': lambda cause: state(result, cause),
+        'Left of it': lambda cause: '' if cause.state == 'open' else _share(cause),
+        'As it was it moves the tool by': lambda cause: millimetres(cause.rms_m),
+    }
+    lead = 'What is left was held against what each cause of the diagnosis does on this motion.'
+    causes = columns(result.causes, shown)
+    return section('What became of the causes', causes, id_='causes', lead=lead)
 
 
 def _drawn(result: Verification) -> Html:

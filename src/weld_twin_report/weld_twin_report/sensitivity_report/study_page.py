@@ -12,7 +12,7 @@ from weld_twin_core import __version__
 from weld_twin_core.effects.registry import REGISTRY
 from weld_twin_nodes.wording.quantities import millimetres
 
-from ..report.html import Html, bars, document, joined, section, table, tag
+from ..report.html import Html, bars, columns, document, joined, section, table, tag
 from .figures import Drawing
 from .fitter_words import Advice, advised, parameter_words, sized, spread_of
 
@@ -48,7 +48,7 @@ def study_page(
         if study is None
         else (f'Sensitivity of {study["setting"]["robot"]} on {study["setting"]["seam"]}')
     )
-    foot = tag('p', f'weld_twin {__version__}', class_='note')
+    foot = tag('p.note', f'weld_twin {__version__}')
     main = tag('main', tag('h1', title), *parts, foot)
     return document(title, main, allowed=_ALLOWED, style=_STYLE)
 
@@ -77,12 +77,12 @@ def _answer(motion: str, study: dict[str, Any]) -> Html:
     first, *others = advised(study['local']['parameters'], _ADVISED)
     return section(
         'Which tolerance to tighten',
-        tag('p', _told(first), class_='second'),
+        tag('p.second', _told(first)),
         _advised([first, *others]),
         tag('h3', f'What drives the largest deviation, {motion} motion'),
         _bars(rows[:_SHOWN]),
         tag(
-            'p',
+            'p.note',
             f'Total Sobol indices of the largest deviation with 95 % intervals; '
             f'N = {indices["base_samples"]}, {indices["runs"]} runs, seed {indices["seed"]}, '
             f'{settled} (widest half-width '
@@ -90,7 +90,6 @@ def _answer(motion: str, study: dict[str, Any]) -> Html:
             f'{indices["largest_ST_change"]:.3f}); sum of first-order indices '
             f'{indices["sum_S1"]:.2f}. The fast model is within {result["model_error"]:.0e} of the '
             'exact twin.',
-            class_='note',
         ),
         id_='answer',
     )
@@ -105,22 +104,18 @@ def _told(advice: Advice) -> str:
 
 
 def _advised(rows: Sequence[Advice]) -> Html:
-    heads = ('What to do', 'tolerance now', 'to', 'gains', 'deviation then')
-    cells = [
-        [
-            f'{row.instruction[:1].upper()}{row.instruction[1:]}',
-            row.now,
-            row.wanted,
-            millimetres(row.gain_m),
-            f'{millimetres(row.then_m)} RMS',
-        ]
-        for row in rows
-    ]
+    shown = {
+        'What to do': lambda row: f'{row.instruction[:1].upper()}{row.instruction[1:]}',
+        'tolerance now': lambda row: row.now,
+        'to': lambda row: row.wanted,
+        'gains': lambda row: millimetres(row.gain_m),
+        'deviation then': lambda row: f'{millimetres(row.then_m)} RMS',
+    }
     note = (
         'The gain is in the RMS deviation that is to be expected along the seam, if this tolerance '
         'alone is kept five times tighter. Tolerances are independent, so their squares add up.'
     )
-    return joined([table(heads, cells, 'advice'), tag('p', note, class_='note')])
+    return joined([columns(rows, shown, 'advice'), tag('p.note', note)])
 
 
 def _index(row: dict[str, Any]) -> str:
@@ -147,46 +142,38 @@ def _tighten(motions: dict[str, Any]) -> Html:
             for by, outputs in sobol.items()
             if by != 'parameter'
         ]
-        parts.append(tag('div', *columns, class_='columns'))
+        parts.append(tag('div.columns', *columns))
     return section('Groups', *parts, id_='groups')
 
 
 def _stack(motions: dict[str, Any]) -> Html:
     parts: list[Html] = []
     for motion, result in motions.items():
-        stack = result['global']['stack']
-        heads = (
-            'of all runs',
-            *(f'{row["percent"]:.0f} %' for row in stack['percentiles']['max_m']),
-        )
+        stack, halved = result['global']['stack'], result['global']['halved']
+        percentiles, limits = stack['percentiles'], stack['tolerance']
         names = {
             'max_m': 'largest deviation',
             'across_m': 'across the seam',
             'stickout_m': 'stick-out',
         }
         rows = [
-            [name, *(f'{1e3 * row["value"]:.3f} mm' for row in stack['percentiles'][key])]
+            [name, *(f'{1e3 * row["value"]:.3f} mm' for row in percentiles[key])]
             for key, name in names.items()
         ]
-        d_norm = [f'{row["value"]:.2e}' for row in stack['percentiles']['d_norm']]
-        inside = [['as given', *_inside(stack)]]
-        inside += [
-            [f'{k.replace("_", " ")} halved', *_inside(v)]
-            for k, v in result['global']['halved'].items()
-        ]
-        limits = stack['tolerance']
+        rows.append(['D_norm', *(f'{row["value"]:.2e}' for row in percentiles['d_norm'])])
+        inside = {'as given': stack}
+        inside |= {f'{name.replace("_", " ")} halved': half for name, half in halved.items()}
+        heads = (
+            'probability that the whole seam is inside',
+            f'across ± {1e3 * limits["across_m"]:.2f} mm',
+            f'stick-out ± {1e3 * limits["stickout_m"]:.2f} mm',
+            'both',
+        )
+        of_runs = (f'{row["percent"]:.0f} %' for row in percentiles['max_m'])
         parts += [
             tag('h3', f'{motion}, {stack["runs"]} runs'),
-            table(heads, [*rows, ['D_norm', *d_norm]]),
-            table(
-                (
-                    'probability that the whole seam is inside',
-                    f'across ± {1e3 * limits["across_m"]:.2f} mm',
-                    f'stick-out ± {1e3 * limits["stickout_m"]:.2f} mm',
-                    'both',
-                ),
-                inside,
-            ),
+            table(('of all runs', *of_runs), rows),
+            table(heads, ([name, *_inside(one)] for name, one in inside.items())),
         ]
     return section('The tolerance stack', *parts, id_='stack')
 
@@ -199,32 +186,25 @@ def _inside(stack: dict[str, Any]) -> list[str]:
 
 
 def _local(motion: dict[str, Any]) -> Html:
-    heads = (
-        'parameter',
-        'S analytic',
-        'S by difference',
-        'differ by',
-        'at one tolerance',
-        'S of D_norm',
-        'one tolerance makes',
-    )
-    rows = [
-        [
-            parameter_words(r['name']),
-            f'{r["S_analytic_peak_m"]:.4f} m/{r["unit"]}',
-            f'{r["S_difference_peak_m"]:.4f}',
-            f'{r["disagreement"]:.0e}',
-            f'{r["disagreement_at_tolerance"]:.0e}',
-            f'{r["S_norm"]:.3f} /{r["unit"]}',
-            f'{1e3 * r["contribution_m"]:.3f} mm rms',
-        ]
-        for r in motion['local']['parameters']
-    ]
+    shown = {
+        'parameter': lambda r: parameter_words(r['name']),
+        'S analytic': lambda r: f'{r["S_analytic_peak_m"]:.4f} m/{r["unit"]}',
+        'S by difference': lambda r: f'{r["S_difference_peak_m"]:.4f}',
+        'differ by': lambda r: f'{r["disagreement"]:.0e}',
+        'at one tolerance': lambda r: f'{r["disagreement_at_tolerance"]:.0e}',
+        'S of D_norm': lambda r: f'{r["S_norm"]:.3f} /{r["unit"]}',
+        'one tolerance makes': lambda r: f'{_mm(r["contribution_m"])} rms',
+    }
     lead = (
         'Slope of the largest deviation at no error, where D is the tip of a cone and only the '
         'slope to one side exists, and agreement of dD/dp at an error of one tolerance.'
     )
-    return section('One error at a time', table(heads, rows), id_='local', lead=lead)
+    rows = columns(motion['local']['parameters'], shown)
+    return section('One error at a time', rows, id_='local', lead=lead)
+
+
+def _mm(metres: float) -> str:
+    return f'{1e3 * metres:.3f} mm'
 
 
 def _advice(advice: dict[str, Any]) -> Html:
@@ -239,77 +219,47 @@ def _advice(advice: dict[str, Any]) -> Html:
 
 
 def _time_laws(profiles: list[dict[str, Any]]) -> Html:
-    laws = [
-        [
-            r['profile'],
-            f'{r["duration_s"]:.1f} s',
-            f'{1e3 * r["expected_without_lag_m"]:.3f} mm',
-            f'{1e3 * r["expected_m"]:.3f} mm',
-            f'{1e3 * r["same_time_m"]:.3f} mm',
-        ]
-        for r in profiles
-    ]
-    return table(
-        (
-            'time law',
-            'takes',
-            'expected, geometry and play',
-            'and a lag of every joint',
-            'the same, all as slow as the slowest',
-        ),
-        laws,
-    )
+    shown = {
+        'time law': lambda r: r['profile'],
+        'takes': lambda r: f'{r["duration_s"]:.1f} s',
+        'expected, geometry and play': lambda r: _mm(r['expected_without_lag_m']),
+        'and a lag of every joint': lambda r: _mm(r['expected_m']),
+        'the same, all as slow as the slowest': lambda r: _mm(r['same_time_m']),
+    }
+    return columns(profiles, shown)
 
 
 def _placements(placements: list[dict[str, Any]]) -> Html:
     given = placements[0]['expected_m']
-    places = [
-        [
-            r['free'],
-            f'{57.29578 * r["rotation_rad"]:+.1f} deg',
-            f'{1e3 * r["x_m"]:+.0f} mm',
-            f'{1e3 * r["y_m"]:+.0f} mm',
-            f'{57.29578 * r["yaw_rad"]:+.1f} deg',
-            f'{1e3 * r["expected_m"]:.3f} mm',
-            f'{100 * (1 - r["expected_m"] / given):.1f} %',
-        ]
-        for r in placements
-    ]
-    return table(
-        ('free', 'torch about the wire', 'base x', 'base y', 'base yaw', 'expected', 'gain'),
-        places,
-    )
+    shown = {
+        'free': lambda r: r['free'],
+        'torch about the wire': lambda r: f'{57.29578 * r["rotation_rad"]:+.1f} deg',
+        'base x': lambda r: f'{1e3 * r["x_m"]:+.0f} mm',
+        'base y': lambda r: f'{1e3 * r["y_m"]:+.0f} mm',
+        'base yaw': lambda r: f'{57.29578 * r["yaw_rad"]:+.1f} deg',
+        'expected': lambda r: _mm(r['expected_m']),
+        'gain': lambda r: f'{100 * (1 - r["expected_m"] / given):.1f} %',
+    }
+    return columns(placements, shown)
 
 
 def _recorded(recorded: dict[str, Any]) -> Html:
-    below = recorded['share_of_runs_below']
     rows = [
-        [
-            'largest deviation',
-            f'{1e3 * recorded["max_m"]:.3f} mm',
-            f'{100 * below["max"]:.1f} % of the runs stay below',
-        ],
-        [
-            'rms',
-            f'{1e3 * recorded["rms_m"]:.3f} mm',
-            f'{100 * below["rms"]:.1f} % of the runs stay below',
-        ],
-        [
-            'across the seam',
-            f'{1e3 * recorded["across_m"]:.3f} mm',
-            'inside' if recorded['inside']['across'] else 'outside the tolerance',
-        ],
-        [
-            'stick-out',
-            f'{1e3 * recorded["stickout_m"]:.3f} mm',
-            'inside' if recorded['inside']['stickout'] else 'outside the tolerance',
-        ],
+        (name, _mm(recorded[f'{key}_m']), f'{100 * below:.1f} % of the runs stay below')
+        for name, key, below in (
+            ('largest deviation', 'max', recorded['share_of_runs_below']['max']),
+            ('rms', 'rms', recorded['share_of_runs_below']['rms']),
+        )
     ]
-    return section(
-        'What was recorded',
-        table(('what', 'recorded', 'beside the tolerances'), rows),
-        id_='recorded',
-    )
+    rows += [
+        (name, _mm(recorded[f'{key}_m']), 'inside' if inside else 'outside the tolerance')
+        for name, key, inside in (
+            ('across the seam', 'across', recorded['inside']['across']),
+            ('stick-out', 'stickout', recorded['inside']['stickout']),
+        )
+    ]
+    heads = ('what', 'recorded', 'beside the tolerances')
+    return section('What was recorded', table(heads, rows), id_='recorded')
 
 
 def _figure(drawing: Drawing) -> Html:
@@ -320,41 +270,39 @@ def _figure(drawing: Drawing) -> Html:
 
 
 def _claims(claims: dict[str, Any]) -> Html:
-    rows = [
-        [c['statement'], c['where'], f'{c["held"]} of {c["cases"]}', c['verdict'], c['reason']]
-        for c in claims['claims']
-    ]
-    heads = ('claim', 'in the paper', 'holds as written', 'verdict', 'why, as measured')
+    shown = {
+        'claim': lambda c: c['statement'],
+        'in the paper': lambda c: c['where'],
+        'holds as written': lambda c: f'{c["held"]} of {c["cases"]}',
+        'verdict': lambda c: c['verdict'],
+        'why, as measured': lambda c: c['reason'],
+    }
     lead = f'Measured on {", ".join(claims["robots"])}; seams {", ".join(claims["seams"])}.'
-    content = table(heads, rows, 'claims')
+    content = columns(claims['claims'], shown, 'claims')
     return section('The claims of the paper', content, id_='claims', lead=lead)
 
 
 def _setting(setting: dict[str, Any]) -> Html:
-    tolerances = [
-        [
-            parameter_words(_name_of(t)),
-            sized(spread_of(t), _unit_of(t)),
-            t['distribution'],
-        ]
-        for t in setting['tolerances']
-    ]
+    shown = {
+        'tolerance': lambda t: parameter_words(_name_of(t)),
+        'size': lambda t: sized(spread_of(t), _unit_of(t)),
+        'distribution': lambda t: t['distribution'],
+    }
     plain = [
         [_ASKED.get(k, k.replace('_', ' ')), _plain(k, v)]
         for k, v in setting.items()
         if k != 'tolerances'
     ]
+    note = (
+        'The size is the standard deviation of a normal distribution, and half the width of a uniform '
+        'one.'
+    )
     return section(
         'What was asked',
         table(('asked', 'value'), plain),
-        tag('h3', f'The {len(tolerances)} tolerances'),
-        table(('tolerance', 'size', 'distribution'), tolerances),
-        tag(
-            'p',
-            'The size is the standard deviation of a normal distribution, and half the width of '
-            'a uniform one.',
-            class_='note',
-        ),
+        tag('h3', f'The {len(setting["tolerances"])} tolerances'),
+        columns(setting['tolerances'], shown),
+        tag('p.note', note),
         id_='setting',
     )
 

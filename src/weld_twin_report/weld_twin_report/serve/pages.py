@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from time import localtime, strftime
@@ -13,7 +13,7 @@ from urllib.parse import quote
 
 from weld_twin_msgs_py.robots import robot_names
 
-from ..report.html import Child, Html, document, section, table, tag
+from ..report.html import Child, Html, columns, document, section, table, tag
 from .fields import CORRECT, FIELDS, sentence
 from .job import DONE, NO_ROBOT, OPEN, PROGRAM, RUNNING, UNSOUND, Asked, Job
 from .queue import NOT_ADDED
@@ -82,7 +82,7 @@ class Site(NamedTuple):
 def page(title: str, *body: Child, site: Site, refresh: int | None = None) -> str:
     """Return a whole page with the way to the others."""
     again = None if refresh is None else tag('meta', http_equiv='refresh', content=refresh)
-    name = tag('p', tag('b', 'weld_twin'), ' · ', title, class_='kind')
+    name = tag('p.kind', tag('b', 'weld_twin'), ' · ', title)
     head = tag('header', name, site.ways())
     return document(title, again, tag('main', head, *body), allowed=ALLOWED, style=_style())
 
@@ -90,55 +90,57 @@ def page(title: str, *body: Child, site: Site, refresh: int | None = None) -> st
 def start_page(site: Site, said: str = '') -> str:
     """Return the page on which a recording is dropped."""
     robots = [('', 'choose, or drop its file'), *((n, n) for n in robot_names())]
-    form = tag(
-        'form',
-        tag(
-            'label',
-            'Recording',
-            _small(
-                'Drop it here: a table (.csv), or a bag (.mcap, or all its files). The file of your own '
-                'robot (.urdf, .yaml) goes with it.'
-            ),
-        ),
-        tag('input', type='file', name_='files', multiple='', id='files', aria_label='Recording'),
-        tag('label', 'Or a folder', _small('of a bag, with its metadata.yaml'), for_='folder'),
-        tag('input', type='file', name_='files', webkitdirectory='', id='folder', class_='folder'),
-        tag(
-            'div',
-            _choice('robot', 'Robot', robots, ''),
-            *_fields(FIRST, {}),
-            class_='fields',
-        ),
+    hint = (
+        'Drop it here: a table (.csv), or a bag (.mcap, or all its files). The file of your own '
+        'robot (.urdf, .yaml) goes with it.'
+    )
+    form = _form(
+        '/recordings',
+        tag('label', 'Recording', tag('small', hint)),
+        tag('input#files', type='file', name_='files', multiple='', aria_label='Recording'),
+        _label('folder', 'Or a folder', 'of a bag, with its metadata.yaml'),
+        tag('input#folder.folder', type='file', name_='files', webkitdirectory=''),
+        tag('div.fields', _choice('robot', 'Robot', robots, ''), *_fields(FIRST, {})),
         _details(Asked('')),
-        tag('button', 'Diagnose', type='submit', class_='main'),
-        action='/recordings',
-        method='post',
-        enctype='multipart/form-data',
+        _submit('Diagnose'),
     )
     lead = 'Joint angles and measured positions of one robot, recorded together.'
     body = section('Where does the real robot differ?', form, id_='drop', lead=lead)
     return page('new recording', _said(said), body, site=site)
 
 
+def _form(place: str, *children: Child, kind: str = 'form') -> Html:
+    """Return a form that is sent to a place of this server."""
+    return tag(kind, *children, action=place, method='post', enctype='multipart/form-data')
+
+
+def _submit(text: str) -> Html:
+    return tag('button.main', text, type='submit')
+
+
+def _button(text: str, place: str) -> Html:
+    """Return a button that changes something."""
+    return _form(place, tag('button', text, type='submit'), kind='form.small')
+
+
 def _details(asked: Asked) -> Html:
     """Return the fields that most people leave alone."""
     hint = 'such as 2026-03-31T14:05 (UTC unless it says +02:00); empty: as its stamps say'
-    return tag(
-        'details',
-        tag('summary', 'Tolerance, controller, signs; table units, and history'),
-        tag(
-            'div',
-            *_fields(MORE, asked.told),
-            _field('cell', 'Cell', 'its name, to keep the result in its history', asked.cell),
-            _field('at', 'Recorded', hint, asked.at),
-            *_fields(COUNTING, asked.told),
-            class_='fields',
-        ),
+    return _folded(
+        'Tolerance, controller, signs; table units, and history',
+        *_fields(MORE, asked.told),
+        _field('cell', 'Cell', 'its name, to keep the result in its history', asked.cell),
+        _field('at', 'Recorded', hint, asked.at),
+        *_fields(COUNTING, asked.told),
     )
 
 
-def _small(text: str) -> Html:
-    return tag('small', text)
+def _folded(title: str, *fields: Html) -> Html:
+    return tag('details', tag('summary', title), tag('div.fields', *fields))
+
+
+def _label(name: str, title: str, hint: str) -> Html:
+    return tag('label', title, tag('small', hint), for_=name)
 
 
 def _choice(name: str, title: str, choices: Sequence[tuple[str, str]], chosen: str) -> Html:
@@ -150,11 +152,8 @@ def _choice(name: str, title: str, choices: Sequence[tuple[str, str]], chosen: s
 
 
 def _field(name: str, title: str, hint: str, value: str = '') -> Html:
-    return tag(
-        'div',
-        tag('label', title, _small(hint), for_=name),
-        tag('input', name_=name, id=name, value=value or None, maxlength=80, autocomplete='off'),
-    )
+    entry = tag(f'input#{name}', name_=name, value=value or None, maxlength=80, autocomplete='off')
+    return tag('div', _label(name, title, hint), entry)
 
 
 def _fields(names: Sequence[str], reported: Mapping[str, str]) -> list[Html]:
@@ -165,53 +164,30 @@ def _fields(names: Sequence[str], reported: Mapping[str, str]) -> list[Html]:
         if field.choices:
             out.append(_choice(name, field.title, field.choices, value))
         elif field.lines:
-            label = tag('label', field.title, _small(field.hint), for_=name)
-            out.append(tag('div', label, tag('textarea', value, name_=name, id=name, rows='2')))
+            entry = tag(f'textarea#{name}', value, name_=name, rows='2')
+            out.append(tag('div', _label(name, field.title, field.hint), entry))
         else:
             out.append(_field(name, field.title, field.hint, value))
     return out
 
 
 def _said(text: str, command: str = '') -> Html | None:
-    return tag('p', sentence(text, command), class_='said', role='alert') if text else None
+    return tag('p.said', sentence(text, command), role='alert') if text else None
 
 
 def recordings_page(jobs: Sequence[Job], site: Site) -> str:
     """Return the list of a user's recordings."""
-    rows = [
-        (
-            tag(
-                'a',
-                _when(job),
-                href=f'/recordings/{job.key}',
-                class_='date',
-            ),
-            ', '.join(job.names[:2]) + (' ...' if len(job.names) > 2 else ''),
-            job.state,
-            sentence(job.said, job.command),
-            _button('Delete', f'/recordings/{job.key}/delete'),
-        )
-        for job in jobs
-    ]
-    heads = ('dropped', 'files', 'state', 'said', '')
-    body = table(heads, rows) if rows else tag('p', 'None yet.')
+    shown: dict[str, Callable[[Job], Child]] = {
+        'dropped': lambda job: tag('a.date', _when(job), href=f'/recordings/{job.key}'),
+        'files': lambda job: ', '.join(job.names[:2]) + ' ...' * (len(job.names) > 2),
+        'state': lambda job: job.state,
+        'said': lambda job: sentence(job.said, job.command),
+        '': lambda job: _button('Delete', f'/recordings/{job.key}/delete'),
+    }
+    body = columns(jobs, shown) if jobs else tag('p', 'None yet.')
     again = LOOK if any(job.state in OPEN for job in jobs) else None
     mine = section('My recordings', body, id_='mine')
     return page('my recordings', mine, site=site, refresh=again)
-
-
-def _button(text: str, place: str, **fields: str) -> Html:
-    """Return a button that changes something."""
-    hidden = [tag('input', type='hidden', name_=n, value=v) for n, v in fields.items()]
-    return tag(
-        'form',
-        *hidden,
-        tag('button', text, type='submit'),
-        action=place,
-        method='post',
-        enctype='multipart/form-data',
-        class_='small',
-    )
 
 
 def job_page(
@@ -220,15 +196,8 @@ def job_page(
     """
     Return the page of a recording or program: its place, its progress, its question or its sheet.
 
-    Parameters
-    ----------
-    ahead : int
-        How many come before it.
-    reported : mapping, optional
-        Its diagnosis.json, where there is one.
-    files : sequence of str
-        What may be fetched.
-
+    So many come ahead of it; ``reported`` is its diagnosis.json, where there is one, and ``files`` may
+    be fetched.
     """
     if job.state in OPEN:
         return page('in work', _progress(job, ahead), refresh=REFRESH, site=site)
@@ -247,8 +216,8 @@ def _progress(job: Job, ahead: int) -> Html:
         text = f'In work: {job.said or "starting"}.'
     else:
         text = f'Waiting: {ahead} before it.' if ahead else 'Waiting: it is next.'
-    names = tag('p', ', '.join(job.names), class_='note')
-    status = tag('p', text, class_='second', id_='progress', role='status')
+    names = tag('p.note', ', '.join(job.names))
+    status = tag('p#progress.second', text, role='status')
     return section('Your recording', status, names, id_='work')
 
 
@@ -258,27 +227,24 @@ def _result(job: Job, files: Sequence[str]) -> tuple[Child, ...]:
     known = dict(PROGRAM_FILES if job.kind == PROGRAM else FILES)
     links = [
         tag(
-            'li',
-            tag(
-                'a',
-                known.get(name, f'the corrected program, {name}'),
-                href=f'{place}/{quote(name)}',
-                download=None if name.endswith('.html') else name,
-            ),
+            'a',
+            known.get(name, f'the corrected program, {name}'),
+            href=f'{place}/{quote(name)}',
+            download=None if name.endswith('.html') else name,
         )
         for name in files
     ]
     sheet = tag('iframe', src=f'{place}/report.html', title='the sheet', sandbox='allow-scripts')
     said = f'{sentence(job.said)}. ' if job.said else ''
     alone = tag('a', 'Open the sheet alone', href=f'{place}/report.html')
-    note = tag('p', alone, f', to print it. {said}It took {job.seconds:.0f} s.', class_='note')
+    note = tag('p.note', alone, f', to print it. {said}It took {job.seconds:.0f} s.')
     more = None
     if job.said.startswith(NOT_ADDED):
         more = _button('Add it to the history', f'{place}/history')
     title = 'Correction' if job.kind == PROGRAM else 'Verdict'
     out: list[Child] = [
         section(title, note, more, sheet, id_='result'),
-        section('Files', tag('ul', *links), id_='files'),
+        section('Files', tag('ul', *(tag('li', link) for link in links)), id_='files'),
     ]
     if job.kind != PROGRAM:
         way = tag('a', 'Correct a program by it', href=f'/program?of={job.key}')
@@ -293,31 +259,21 @@ def _question(job: Job, reported: Mapping[str, Any]) -> tuple[Child, ...]:
         for each in reported.get('unsound') or []
         for joined in (
             _said(str(each['sentence'])),
-            tag('p', sentence(str(each.get('remedy') or '')), class_='note'),
+            tag('p.note', sentence(str(each.get('remedy') or ''))),
         )
     ]
-    mend = tag(
-        'form',
-        *_hidden(job.asked, apply='yes'),
-        tag('button', 'Correct it and go on', type='submit', class_='main'),
-        action=f'/recordings/{job.key}/again',
-        method='post',
-        enctype='multipart/form-data',
+    told = {**job.asked.told, 'robot': job.asked.robot, 'cell': job.asked.cell, 'at': job.asked.at}
+    mend = _form(
+        f'/recordings/{job.key}/again',
+        *(
+            tag('input', type='hidden', name_=n, value=v)
+            for n, v in (told | {'apply': 'yes'}).items()
+        ),
+        _submit('Correct it and go on'),
     )
     sheet = tag('p', tag('a', 'Read the sheet', href=f'/recordings/{job.key}/report.html'))
     body = section('Data or set-up are wrong', *wrong, mend, sheet, id_='question')
     return body, _ask_again(job)
-
-
-def _hidden(asked: Asked, **other: str) -> list[Html]:
-    fields = {
-        **asked.told,
-        'robot': asked.robot,
-        'cell': asked.cell,
-        'at': asked.at,
-        **other,
-    }
-    return [tag('input', type='hidden', name_=name, value=value) for name, value in fields.items()]
 
 
 def _ask_again(job: Job) -> Html:
@@ -325,20 +281,17 @@ def _ask_again(job: Job) -> Html:
     asked = job.asked
     if job.kind == PROGRAM:
         own = [(asked.robot, asked.robot)] if asked.robot not in robot_names() else []
-        more: list[Child] = [tag('div', *_fields(HOW, asked.told), class_='fields')]
+        more: list[Child] = [tag('div.fields', *_fields(HOW, asked.told))]
     else:
         own = [(n, n) for n in job.names if n == asked.robot]
-        more = [tag('div', *_fields(FIRST, asked.told), class_='fields'), _details(asked)]
+        more = [tag('div.fields', *_fields(FIRST, asked.told)), _details(asked)]
     robots = [*own, *((n, n) for n in robot_names())]
     robots = robots if asked.robot else [('', 'choose'), *robots]
-    form = tag(
-        'form',
-        tag('div', _choice('robot', 'Robot', robots, asked.robot), class_='fields'),
+    form = _form(
+        f'/recordings/{job.key}/again',
+        tag('div.fields', _choice('robot', 'Robot', robots, asked.robot)),
         *more,
-        tag('button', 'Try again', type='submit', class_='main'),
-        action=f'/recordings/{job.key}/again',
-        method='post',
-        enctype='multipart/form-data',
+        _submit('Try again'),
     )
     if job.state == DONE:
         what = tag('details', tag('summary', 'Ask in another way'), form)
@@ -350,49 +303,27 @@ def program_page(jobs: Sequence[Job], of: str, site: Site, said: str = '') -> st
     """
     Return the page on which a program is dropped.
 
-    Parameters
-    ----------
-    jobs : sequence of Job
-        Of the user; a program may be corrected by any that has a diagnosis.
-    of : str
-        Key of the one that is chosen first.
-    said : str
-        Why it was refused before.
-
+    Any of the user's jobs that has a diagnosis may correct it; ``of`` is the key of the one that is
+    chosen first. What was said when it was refused before stands above.
     """
     models = _models(jobs)
     robots = [('', "the diagnosis', or the file dropped"), *((n, n) for n in robot_names())]
-    form = tag(
-        'form',
-        tag(
-            'label',
-            'Program',
-            _small('as the controller has it (.src with its .dat, .mod, .ls, .jbi, .script, ...)'),
-            for_='files',
-        ),
-        tag('input', type='file', name_='files', multiple='', id='files'),
+    hint = 'as the controller has it (.src with its .dat, .mod, .ls, .jbi, .script, ...)'
+    with_it = 'diagnosis.json, and the file of the robot if it is none of the list'
+    form = _form(
+        '/program',
+        _label('files', 'Program', hint),
+        tag('input#files', type='file', name_='files', multiple=''),
         _choice('of', 'Diagnosis', models, of if of in dict(models) else ''),
         tag(
             'details',
             tag('summary', 'A diagnosis of elsewhere'),
-            tag(
-                'label',
-                'Its files',
-                _small('diagnosis.json, and the file of the robot if it is none of the list'),
-                for_='model',
-            ),
-            tag('input', type='file', name_='model', multiple='', id='model', class_='folder'),
+            _label('model', 'Its files', with_it),
+            tag('input#model.folder', type='file', name_='model', multiple=''),
             _choice('robot', 'Robot', robots, ''),
         ),
-        tag(
-            'details',
-            tag('summary', 'Tools, bases, limits'),
-            tag('div', *_fields(HOW, {}), class_='fields'),
-        ),
-        tag('button', 'Correct', type='submit', class_='main'),
-        action='/program',
-        method='post',
-        enctype='multipart/form-data',
+        _folded('Tools, bases, limits', *_fields(HOW, {})),
+        _submit('Correct'),
     )
     lead = 'Its points are moved so that the real tool goes where the program means it.'
     body = section('Correct a program', form, id_='drop', lead=lead)
@@ -417,44 +348,26 @@ def _when(job: Job) -> str:
 
 def me_page(key: str, site: Site, said: str = '') -> str:
     """Return the page of a user's key: take it elsewhere, log out, delete everything."""
-    shown = section(
-        'My key',
-        tag(
-            'p',
-            'This browser keeps it for a year from your last visit. Whoever has it sees and deletes '
-            'what is yours: keep it as a password.',
-        ),
-        tag('p', tag('code', key, id='own')),
-        id_='mine',
+    keep = (
+        'This browser keeps it for a year from your last visit. Whoever has it sees and deletes '
+        'what is yours: keep it as a password.'
     )
-    enter = tag(
-        'form',
-        _field('key', 'I have a key', 'of another browser; what this one has stays under its own'),
-        tag('button', 'Go on with it', type='submit', class_='main'),
-        action='/me',
-        method='post',
-        enctype='multipart/form-data',
-    )
-    leave = section(
-        'Log out',
-        tag(
-            'p', 'The recordings stay here; only your key leads to them again. Note it down first.'
-        ),
-        _button('Log out', '/me/leave'),
-        id_='leave',
-    )
-    sure = tag('input', type='checkbox', name_='sure', value='yes', id='sure')
-    delete = tag(
-        'form',
+    other = 'of another browser; what this one has stays under its own'
+    note = 'The recordings stay here; only your key leads to them again. Note it down first.'
+    sure = tag('input#sure', type='checkbox', name_='sure', value='yes')
+    enter = _form('/me', _field('key', 'I have a key', other), _submit('Go on with it'))
+    delete = _form(
+        '/me/delete',
         tag('label', sure, ' all my recordings, programs and my history; it cannot be undone'),
         tag('button', 'Delete all that is mine', type='submit'),
-        action='/me/delete',
-        method='post',
-        enctype='multipart/form-data',
     )
-    gone = section('Delete', delete, id_='delete')
-    elsewhere = section('On another browser', enter, id_='enter')
-    return page('my key', _said(said), shown, elsewhere, leave, gone, site=site)
+    parts = (
+        section('My key', tag('p', keep), tag('p', tag('code#own', key)), id_='mine'),
+        section('On another browser', enter, id_='enter'),
+        section('Log out', tag('p', note), _button('Log out', '/me/leave'), id_='leave'),
+        section('Delete', delete, id_='delete'),
+    )
+    return page('my key', _said(said), *parts, site=site)
 
 
 def message_page(title: str, text: str, site: Site) -> str:

@@ -19,7 +19,6 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.history import Observation
 from weld_twin_report.history import Entry, observations
-from weld_twin_report.history.plain_entry import entry
 from weld_twin_report.history.tracking import likely, named
 
 from .life import Event, Year, moved, year
@@ -39,7 +38,7 @@ def cheap_year(seed: int, number: int, bases: Sequence[Mapping[str, Any]]) -> di
 
     """
     rng = np.random.default_rng([seed, 1_000_000 + number])
-    checks = _common([entry(base) for base in bases])
+    checks = _common([Entry.of_plain(base) for base in bases])
     lived = year(checks[0], rng)
     # What the first check leaves open, the arm may have: its values are drawn from what it says.
     arm = rng.multivariate_normal(checks[0].value, checks[0].covariance, method='eigh')

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.history import Observation
-from weld_twin_report.history import observations
-from weld_twin_report.history.plain_entry import entry, plain
+from weld_twin_report.history import Entry, observations
 from weld_twin_report.history.tracking import likely, named
 
 from .life import Year, cause, moved, year
@@ -35,12 +34,12 @@ def base(seed: int, number: int, check: int) -> dict[str, Any]:
     drawn = int(rng.integers(2**31))
     with tempfile.TemporaryDirectory(prefix='years-') as place:
         found = diagnosed(yearly, causes, check, drawn, Path(place) / 'check', FIRST)
-    return plain(found)
+    return found.plain()
 
 
 def lived(seed: int, number: int, first: Mapping[str, Any]) -> Year:
     """Return what happens on a cell in the year that is diagnosed in full."""
-    return year(entry(first), np.random.default_rng([seed, 2_000_000 + number]))
+    return year(Entry.of_plain(first), np.random.default_rng([seed, 2_000_000 + number]))
 
 
 def check(seed: int, number: int, week: int, set_up_number: int, first: Mapping[str, Any]) -> Any:
@@ -54,7 +53,7 @@ def check(seed: int, number: int, week: int, set_up_number: int, first: Mapping[
     with tempfile.TemporaryDirectory(prefix='years-') as place:
         stations = set_up_number % CHECKS
         found = diagnosed(yearly, causes, stations, drawn, Path(place) / 'check', at)
-    return plain(found)
+    return found.plain()
 
 
 def _together(causes: Sequence[Cause]) -> list[Cause]:
@@ -78,7 +77,7 @@ def scored(
     seed: int, number: int, first: Mapping[str, Any], kept: Sequence[Mapping[str, Any]]
 ) -> dict[str, Any]:
     """Return what the weekly looks at a year of diagnoses came to."""
-    entries = [entry(each) for each in kept]
+    entries = [Entry.of_plain(each) for each in kept]
     start = FIRST.timestamp() / 86_400.0
     seen = [
         Observation(o.day - start, o.names, o.value, o.covariance, o.prior_std)

@@ -14,8 +14,7 @@ from weld_twin_msgs_py.bags import BagReader, provenance
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.offline.seam_motion import plan_motion, stamps
-from weld_twin_nodes.offline.simulated_bag import write_simulation
-from weld_twin_nodes.offline.simulation import Simulation
+from weld_twin_nodes.offline.simulation import Simulation, write_simulation
 from weld_twin_nodes.offline.told_twin import build_twin
 
 pytestmark = pytest.mark.cells

@@ -26,7 +26,7 @@ from weld_twin_msgs_py.messages.topics import (
 )
 from weld_twin_nodes.live.diagnosis_window import LONGEST, Window
 from weld_twin_nodes.live.diagnosis_worker import Finding, Job, Worker, find
-from weld_twin_nodes.offline.told_cameras import told_cameras
+from weld_twin_nodes.offline.told_twin import told_cameras
 
 START = 1_700_000_000_000_000_000
 ONE_JOINT = Robot.from_mapping(

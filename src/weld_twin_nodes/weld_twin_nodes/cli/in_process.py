@@ -23,15 +23,7 @@ def weld_twin(*words: object) -> Said:
     """
     Run ``weld-twin`` with the words given, in this process, and return what it said.
 
-    Parameters
-    ----------
-    *words : object
-        The command's words; paths and numbers are written out.
-
-    Returns
-    -------
-    Said
-
+    ``words``: the command's words; paths and numbers are written out.
     """
     out, err = StringIO(), StringIO()
     with redirect_stdout(out), redirect_stderr(err):

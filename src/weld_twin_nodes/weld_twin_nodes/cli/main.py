@@ -61,12 +61,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     Run the command line.
 
-    Returns
-    -------
-    int
-        0 on success, 2 on a usage or input error, 3 where a diagnosis found data or set-up
-        wrong, 4 where a correction did not keep its promise, 130 when interrupted.
-
+    Return 0 on success, 2 on a usage or input error, 3 where a diagnosis found data or set-up
+    wrong, 4 where a correction did not keep its promise, 130 when interrupted.
     """
     if argv is None:  # as a program: what it started ends with it, and nothing is loaded yet
         signal.signal(signal.SIGTERM, _end)
@@ -128,11 +124,7 @@ def parser_of(words: Sequence[str] = ()) -> Parser:
     """
     Return the parser; only the command in use is loaded with its options.
 
-    Parameters
-    ----------
-    words : sequence of str
-        As they were typed, old spellings included.
-
+    ``words``: as they were typed, old spellings included.
     """
     parser = Parser(
         prog='weld-twin',

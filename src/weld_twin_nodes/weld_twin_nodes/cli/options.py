@@ -159,7 +159,7 @@ def say_doubts(twin: Twin, path: str) -> None:
 
 def cameras_of(args: argparse.Namespace) -> tuple[tuple[Camera, ...], tuple[Target, ...]]:
     """Return the cameras and targets that the options describe."""
-    from ..offline.told_cameras import told_cameras
+    from ..offline.told_twin import told_cameras
 
     return told_cameras(args.camera, args.target)
 

@@ -21,8 +21,7 @@ from weld_twin_msgs_py.messages.topics import (
     TopicNames,
 )
 
-from ..offline.told_cameras import told_cameras
-from ..offline.told_twin import build_twin
+from ..offline.told_twin import build_twin, told_cameras
 from .cell_frames import placed_twin
 from .diagnosis_window import SIGNALS, Window
 from .diagnosis_worker import Finding, Job, Worker

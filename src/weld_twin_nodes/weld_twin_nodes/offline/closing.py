@@ -85,11 +85,7 @@ def closes(result: Mapping[str, Any]) -> str:
     """
     Return why a diagnosis closes the question by itself; empty where it does not.
 
-    Parameters
-    ----------
-    result : mapping
-        The content of diagnosis.json.
-
+    ``result``: the content of diagnosis.json.
     """
     verdict = result['verdict']
     if not is_sure(verdict) or verdict['status'] not in STATED:
@@ -102,11 +98,7 @@ def is_sure(verdict: Mapping[str, Any]) -> bool:
     """
     Return whether an answer is told as sure.
 
-    Parameters
-    ----------
-    verdict : mapping
-        Of diagnosis.json, of either schema.
-
+    ``verdict``: of diagnosis.json, of either schema.
     """
     reported = verdict.get('sure')
     return float(verdict['confidence'] or 0.0) >= OLDER if reported is None else bool(reported)
@@ -116,11 +108,7 @@ def belief(result: Mapping[str, Any], other: Mapping[str, Any]) -> float:
     """
     Return how probable it is that an answer is right, with another of most of the same measurements.
 
-    Parameters
-    ----------
-    found, other
-        As `signs` takes them.
-
+    ``found`` and ``other``: as `signs` takes them.
     """
     own, same, against = signs(result, other)
     total = OWN * own + FOR * same + AGAINST * against + BEGIN
@@ -134,11 +122,7 @@ def signs(result: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float, f
     The other counts where it is likelier right than wrong. What it leaves unknown speaks for nothing:
     it may be what poor recordings hide.
 
-    Parameters
-    ----------
-    result, other : mapping
-        The contents of two diagnosis.json.
-
+    ``result`` and ``other``: the contents of two diagnosis.json.
     """
     stated = other['verdict']['status'] in STATED
     heard = max(_log_odds(other), 0.0) if stated else 0.0

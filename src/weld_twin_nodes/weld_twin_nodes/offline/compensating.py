@@ -19,11 +19,11 @@ from weld_twin_core.twin.compensation import Compensation, compensate
 from weld_twin_core.twin.posterior import Posterior
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import write_recording
-from weld_twin_msgs_py.files.diagnosis_model import mended_source, read_diagnosis, read_model
+from weld_twin_msgs_py.files.diagnosis_model import mended_source, read_model
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 
 from .prediction import Predictor, Stretch, beside_bag
-from .told_twin import build_twin
+from .told_twin import build_twin, diagnosis_of
 
 WHOLE = 0.999
 """Share of a correction that counts as all of it."""
@@ -59,11 +59,7 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
     """
     Return the commands for a model file, less corrected where the model knows less.
 
-    Raises
-    ------
-    ModelError
-        The file is of no use.
-
+    Raises ModelError: the file is of no use.
     """
     twin = build_twin(robot, path, mended=True)
     model = Predictor(twin, _posterior(robot, path))
@@ -98,9 +94,7 @@ def _as_given(motion: JointMotion, stored: Model) -> JointMotion:
 
 def _model(robot: Robot, path: Path | str) -> Model | None:
     """Return what a diagnosis holds; None for an effects file or a diagnosis without a model."""
-    if Path(path).suffix.lower() != '.json' or 'model' not in read_diagnosis(path):
-        return None
-    return read_model(robot, path)
+    return read_model(robot, path) if 'model' in diagnosis_of(path) else None
 
 
 def write_compensated(
@@ -109,11 +103,7 @@ def write_compensated(
     """
     Write the commands, where the model has the tool under them, and how sure it is.
 
-    Raises
-    ------
-    DataError
-        The path exists or cannot be written.
-
+    Raises DataError: the path exists or cannot be written.
     """
     twin = made.model.twin
     commands = replace(recording, joints=made.result.motion, measured=None)
@@ -148,4 +138,4 @@ def told_trust(made: Compensated) -> list[str]:
 
 
 def _posterior(robot: Robot, path: Path | str) -> Posterior | None:
-    return read_posterior(robot, path) if Path(path).suffix.lower() == '.json' else None
+    return read_posterior(robot, path) if diagnosis_of(path) else None

@@ -21,11 +21,7 @@ def digest(*values: Any) -> str:
     Arrays, numbers, strings, None, mappings, sequences, classes, functions and dataclasses of
     these.
 
-    Raises
-    ------
-    DataError
-        A value is none of them.
-
+    Raises DataError: a value is none of them.
     """
     state = hashlib.sha256()
     for value in values:

@@ -22,7 +22,7 @@ from weld_twin_core.motion.programs.repeated import repeated
 from weld_twin_core.twin.program_accuracy import Accuracy, along_seams
 from weld_twin_core.twin.program_correction import Caps, ProgramCorrection, correct_program
 from weld_twin_core.twin.program_model import ProgramModel
-from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis, read_model
+from weld_twin_msgs_py.files.diagnosis_model import load_model, read_model
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 from weld_twin_msgs_py.programs import (
     Context,
@@ -34,7 +34,7 @@ from weld_twin_msgs_py.programs import (
 )
 from weld_twin_msgs_py.programs.source import Source
 
-from .told_twin import build_twin
+from .told_twin import build_twin, diagnosis_of
 
 SCHEMA = 'weld_twin/correction/1'
 TOOL_LEFT = (
@@ -101,9 +101,8 @@ def program_model(
         The file is of no use, of another robot, or its data were unsound.
 
     """
-    if Path(path).suffix.lower() == '.json' and (
-        'model' in read_diagnosis(path) or read_diagnosis(path).get('unsound')
-    ):
+    content = diagnosis_of(path)
+    if 'model' in content or content.get('unsound'):
         placed, model = load_model(robot, path, setup).robot, read_model(robot, path)
         result, posterior = model.found, read_posterior(robot, path)
         if posterior is not None:

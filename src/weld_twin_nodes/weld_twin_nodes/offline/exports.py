@@ -89,13 +89,8 @@ def write_all(
     """
     Write the model in every form.
 
-    Parameters
-    ----------
-    notes : sequence of str
-        Where it holds.
-    given : GivenUrdf, optional
-        The URDF that the robot was read from, whose names the corrected one keeps.
-
+    ``notes``: where it holds. ``given``: the URDF that the robot was read from, whose names the
+    corrected one keeps.
     """
     for name, write in FORMATS.values():
         write(directory / name, model, notes)

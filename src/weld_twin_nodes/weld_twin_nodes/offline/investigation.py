@@ -10,7 +10,6 @@ when the recording has come in.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from weld_twin_core.diagnosis.advice.chosen_pieces import LEAST, NOTHING
 from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.input_files import hashed
-from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.json_file import read_json, write_json
 
 from .closing import ALIKE, closes
 
@@ -65,39 +64,24 @@ def read_state(directory: Path) -> State:
     """
     Return the state of an investigation.
 
-    Raises
-    ------
-    DataError
-        There is none, or it cannot be read.
-
+    Raises DataError: there is none, or it cannot be read.
     """
-    path = directory / STATE
-    try:
-        content = json.loads(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise DataError(f"'{path}' cannot be read: {error.strerror}") from None
-    except ValueError as error:
-        raise DataError(f"'{path}' is not JSON: {error}") from None
-    if not isinstance(content, dict) or content.get('schema') != SCHEMA:
-        raise DataError(f"'{path}' is no investigation")
+    content = read_json(directory / STATE)
+    if content.get('schema') != SCHEMA:
+        raise DataError(f"'{directory / STATE}' is no investigation")
     return content
 
 
 def write_state(directory: Path, state: State) -> None:
     """Write the state; it is whole at any time."""
-    text = json.dumps(state, indent=1, allow_nan=False)
-    write_text(directory / STATE, text + '\n', overwrite=True)
+    write_json(directory / STATE, state, overwrite=True)
 
 
 def recordings(state: State) -> tuple[list[str], list[str]]:
     """
     Return the recordings that it began with, and those of the experiments so far.
 
-    Raises
-    ------
-    DataError
-        One of them is gone, or has changed since.
-
+    Raises DataError: one of them is gone, or has changed since.
     """
     first: list[str] = []
     later: list[str] = []
@@ -276,13 +260,8 @@ def decided(asked: Mapping[str, Any], result: Mapping[str, Any]) -> bool | None:
     among those that cannot be told apart. Where still no name fits, it did if the place and the
     dependence of one of the two are found, and those of the other are not.
 
-    Parameters
-    ----------
-    asked : mapping
-        As `question` returned it.
-    result : mapping
-        The content of the diagnosis.json with the new recording.
-
+    ``asked``: as `question` returned it. ``result``: the content of the diagnosis.json with the
+    new recording.
     """
     if not asked.get('between'):
         return None

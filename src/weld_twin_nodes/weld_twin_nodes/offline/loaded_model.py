@@ -14,11 +14,10 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 from weld_twin_core.twin.program_model import ProgramModel
-from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
 
 from ..streams.supervision import Promise
 from .correcting import program_model
-from .told_twin import other_readings
+from .told_twin import diagnosis_of, refuse_mended
 
 DIGITS = 12
 """Of the hash of a file, as it is told: enough for all models of a plant."""
@@ -50,11 +49,7 @@ class LoadedModel:
         """
         Return why the model is not fresh; empty where it is.
 
-        Parameters
-        ----------
-        most_age : float [s]
-            Age of the file above which it is not; 0 for any.
-
+        ``most_age`` [s]: age of the file above which it is not; 0 for any.
         """
         try:
             now = self.path.stat().st_mtime
@@ -82,12 +77,8 @@ def loaded(robot: Robot, path: str) -> LoadedModel:
     """
     Return the model of a file.
 
-    Raises
-    ------
-    ModelError
-        There is none, it is of another robot, its data were unsound, or it counts joints
-        otherwise than they are read.
-
+    Raises ModelError: there is none, it is of another robot, its data were unsound, or it counts
+    joints otherwise than they are read.
     """
     if not path:
         raise ModelError("the compensator needs the parameter 'model': a diagnosis.json")
@@ -96,15 +87,8 @@ def loaded(robot: Robot, path: str) -> LoadedModel:
         modified, digest = file.stat().st_mtime, _digest(file)
     except OSError as error:
         raise ModelError(f"the model '{path}' cannot be read: {error.strerror}") from None
-    content: dict[str, Any] = {}
-    if file.suffix.lower() == '.json':
-        content = read_diagnosis(file)
-        why = other_readings(content)
-        if why:
-            raise ModelError(
-                f"the model of '{path}' takes mended joint positions, and here they come as they "
-                f'are: {why}'
-            )
+    content = diagnosis_of(file)
+    refuse_mended(content, file)
     read = program_model(robot, file)
     return LoadedModel(file, digest, read, _promised(content, read), modified)
 

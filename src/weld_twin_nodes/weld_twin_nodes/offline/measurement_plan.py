@@ -195,13 +195,8 @@ def write_plan(folder: Path, context: Context, language: str | None, plan: Plann
     The table has the joint angles that are asked for, as the pendant shows them; where the arm
     stands at others, those count.
 
-    Parameters
-    ----------
-    context : Context
-        The robot, and how its controller counts.
-    language : str, optional
-        Of the controller, for its names of the joints.
-
+    ``context``: the robot, and how its controller counts. ``language``: of the controller, for its
+    names of the joints.
     """
     robot = context.robot
     t = plan.minutes[len(plan.q)] * 60.0 / len(plan.q) * np.arange(1.0, len(plan.q) + 1.0)

@@ -93,11 +93,6 @@ def write_owned(path: Path | str, text: str) -> None:
     Write a text file into a folder that may be anybody's; what is in the way gets another name.
 
     For what took long to compute: it is never refused.
-
-    Parameters
-    ----------
-    path : Path or str
-
     """
     with new_file(path, force=True) as file:
         write_text(file, text)

@@ -114,13 +114,8 @@ def change_of(folder: Path, made: Mapping[str, str], mark: str, *, adds: bool) -
     """
     Return what is to happen in a folder so that it has the files made.
 
-    Parameters
-    ----------
-    made : mapping of str to str
-        Digests of the new files by name.
-    adds : bool
-        Whether files of this result that were not made again stay.
-
+    ``made``: digests of the new files by name. ``adds``: whether files of this result that were
+    not made again stay.
     """
     own = listed(folder).get(mark, {})
     # The mark comes last: who finds the new one finds all the others.
@@ -156,11 +151,7 @@ def carry_out(folder: Path, scratch: Path, kept: Callable[[str, str], object]) -
     """
     Do what the note of a scratch directory says, as far as it is not done; nothing without a note.
 
-    Parameters
-    ----------
-    kept : callable
-        Told every file that was not ours: its name, and the name that it has now.
-
+    ``kept``: told every file that was not ours: its name, and the name that it has now.
     """
     try:
         change = _decided(scratch / NOTE)
@@ -282,11 +273,7 @@ def refuse(folder: Path, mark: str, names: list[str]) -> None:
     """
     Refuse a change that files are in the way of.
 
-    Raises
-    ------
-    DataError
-        There are some.
-
+    Raises DataError: there are some.
     """
     if names:
         raise DataError(sentence(folder, mark, names))

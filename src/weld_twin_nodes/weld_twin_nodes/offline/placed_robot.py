@@ -29,16 +29,8 @@ def placed(recording: Recording, robot: Robot, align: frozenset[str]) -> tuple[R
     """
     Return the robot in the frame of the measurements, and sentences that say how.
 
-    Parameters
-    ----------
-    align : frozenset of str
-        Frames to fit: 'base', 'tool', both or none.
-
-    Raises
-    ------
-    DataError
-        Nothing was measured, or too few different poses to fit the frames on.
-
+    ``align``: frames to fit: 'base', 'tool', both or none. Raises DataError: nothing was measured,
+    or too few different poses to fit the frames on.
     """
     if not align:
         return robot, ['base and tool are where the robot file has them; nothing was fitted']

@@ -13,7 +13,6 @@ import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.errors import ModelError
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covariances
@@ -24,14 +23,13 @@ from weld_twin_msgs_py.files.diagnosis_model import (
     load_model,
     mended_source,
     one_base,
-    read_diagnosis,
     read_model,
     timed,
 )
 from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 
-from .told_twin import build_twin
+from .told_twin import build_twin, diagnosis_of
 
 BESIDE = 'prediction.json'
 """Beside the bag: the stretches outside what was recorded."""
@@ -142,65 +140,37 @@ def predictor(
         The file is of no use, or it is open which base frame is meant.
 
     """
-    if Path(path).suffix.lower() != '.json' or 'model' not in read_diagnosis(path):
+    content = diagnosis_of(path)
+    if 'model' not in content:
         return Predictor(build_twin(robot, path))
     model = read_model(robot, path)
+    own = hashed('recording', bag).sha256
+    known = [item['sha256'] for item in content.get('inputs', []) if item['use'] == 'recording']
+    place = known.index(own) if own in known else None
     if setup is not None:
         load_model(robot, path, setup - 1)
         chosen = setup - 1
-    elif len(model.bases) == 1:
+    elif place is not None and len(model.bases) > 1:
+        chosen = place
+    elif one_base(model):
         chosen = 0
     else:
-        chosen = _setup_of(path, model, bag)
-    source, reported = mended_source(
-        model, robot, recording, _fitted(path, bag, recording, chosen)
-    )
+        raise ModelError(
+            f"diagnosis '{path}' has a base frame for each of its {len(model.bases)} recordings "
+            f"and '{bag}' is none of them; choose one with --setup 1 to {len(model.bases)}"
+        )
+    # Clocks are apart by another time in every run. Where something was measured, that tells.
+    clocks = place if place is not None else -1 if recording.measured is None else chosen
+    source, reported = mended_source(model, robot, recording, clocks)
     twin = timed(path, model, chosen, source)
     return Predictor(twin, read_posterior(robot, path), chosen, source, reported)
-
-
-def _fitted(path: Path | str, bag: Path | str, recording: Recording, chosen: int) -> int:
-    """
-    Return which recording of a diagnosis has the clocks of this one, -1 for none.
-
-    Clocks are apart by another time in every run. Where something was measured, that tells.
-    """
-    known = _recorded(path)
-    own = hashed('recording', bag).sha256
-    if own in known:
-        return known.index(own)
-    return -1 if recording.measured is None else chosen
-
-
-def _recorded(path: Path | str) -> list[str]:
-    """Return the hashes of the recordings that a diagnosis was made from."""
-    inputs = read_diagnosis(path).get('inputs', [])
-    return [item['sha256'] for item in inputs if item['use'] == 'recording']
-
-
-def _setup_of(path: Path | str, model: Model, bag: Path | str) -> int:
-    """Return which recording of a diagnosis with several base frames a bag is."""
-    known = _recorded(path)
-    own = hashed('recording', bag).sha256
-    if own in known:
-        return known.index(own)
-    if one_base(model):
-        return 0
-    raise ModelError(
-        f"diagnosis '{path}' has a base frame for each of its {len(model.bases)} recordings "
-        f"and '{bag}' is none of them; choose one with --setup 1 to {len(model.bases)}"
-    )
 
 
 def on_one_clock(recording: Recording) -> Recording:
     """
     Return a recording whose measurements have some time in common with the joint states.
 
-    Raises
-    ------
-    DataError
-        They have none.
-
+    Raises DataError: they have none.
     """
     if recording.measured is not None and not recording.joints.static:
         refuse_apart(recording.joints, recording.measured)
@@ -220,11 +190,7 @@ def write_prediction(
 
     The stretches outside what was recorded go into `BESIDE`, in the bag's directory.
 
-    Raises
-    ------
-    DataError
-        The path exists or cannot be written.
-
+    Raises DataError: the path exists or cannot be written.
     """
     twin = model.twin
     poses = twin.poses(recording, recording.joints.t)

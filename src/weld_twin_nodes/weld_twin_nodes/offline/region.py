@@ -46,11 +46,8 @@ def anywhere(robot: Robot, spread: float) -> tuple[Array, Array]:
     """
     Return postures of the whole reach that judge it, shape (K, n), and stations clear of the floor.
 
-    Parameters
-    ----------
-    spread : float [rad]
-        Half the range of every joint about the posture of a usual seam, for the stations.
-
+    ``spread`` [rad]: half the range of every joint about the posture of a usual seam, for the
+    stations.
     """
     return postures_within_limits(robot, ANYWHERE), clear_postures(robot, spread)[:POSTURES]
 

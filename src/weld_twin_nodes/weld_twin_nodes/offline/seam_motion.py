@@ -58,11 +58,7 @@ def joint_motion(
     """
     Return the motion of a file of kind 'joints', or the planned one along a seam.
 
-    Raises
-    ------
-    DataError, PathError
-        The file cannot be read, or its motion is not one for this robot.
-
+    Raises DataError, PathError: the file cannot be read, or its motion is not one for this robot.
     """
     given = None if path in KINDS else read_joint_motion(path, robot)
     if given is None:
@@ -79,11 +75,7 @@ def plan_through(
     """
     Return the planned motion along the spline through points, shape (N, 3) [m], torch upright.
 
-    Raises
-    ------
-    PathError
-        The seam cannot be reached or followed.
-
+    Raises PathError: the seam cannot be reached or followed.
     """
     seam = from_mapping({'kind': 'points', 'points': points.tolist()})
     return plan(robot, seam, _law(profile, speed), rate, fit=not speed)
@@ -100,13 +92,8 @@ def sampled(robot: Robot, motion: JointMotion, rate: float) -> JointMotion:
     """
     Return a motion at so many samples a second, by cubics through its points.
 
-    Raises
-    ------
-    DataError
-        It leaves the limits of the robot.
-    PathError
-        It would have more samples than make sense.
-
+    Raises DataError: it leaves the limits of the robot. Raises PathError: it would have more
+    samples than make sense.
     """
     refuse_endless(float(motion.t[-1]), 1.0 / rate)
     count = max(round(float(motion.t[-1]) * rate), 1)

@@ -55,11 +55,7 @@ def set_up_change(text: str) -> SetUpChange:
     """
     Return a change from words: 'load=5', 'load=5,0,0,0.1', 'tool' or 'instrument'.
 
-    Raises
-    ------
-    DataError
-        It is none of these.
-
+    Raises DataError: it is none of these.
     """
     kind, _, rest = text.partition('=')
     try:

@@ -1,24 +1,29 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The whole cell offline: what the live nodes publish for a motion, computed in bulk."""
+"""The whole cell offline: what the live nodes publish for a motion, in bulk, and as a bag."""
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from weld_twin_core import __version__
 from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly.frame_names import BASE, WORLD
+from weld_twin_msgs_py.bags import BagWriter
+from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
-from weld_twin_msgs_py.messages.to_messages import Messages
+from weld_twin_msgs_py.messages.to_messages import Messages, bag_messages
 from weld_twin_msgs_py.messages.topics import (
     ACTUAL_JOINT_STATES,
     DEVIATION,
@@ -152,3 +157,37 @@ def _poses(make: Messages, topic: str, stamps: list[int], poses: Poses) -> Itera
 
 def _metrics(make: Messages, stamp: int, values: dict[str, float | int]) -> Entry:
     return Entry(stamp, DEVIATION_METRICS.name, make.diagnostics(stamp, METRICS, values))
+
+
+def write_simulation(
+    path: Path | str,
+    simulation: Simulation,
+    *,
+    storage: str = 'mcap',
+    provenance: Mapping[str, Any] | None = None,
+) -> Mapping[str, float]:
+    """
+    Write a bag with what the live nodes would publish; return the last metrics.
+
+    Raises DataError: the path exists or cannot be written, or no measurement meets the twin.
+    """
+    made = {
+        'version': __version__,
+        'robot': simulation.real.robot.to_mapping(),
+        'effects': [effect.to_mapping() for effect in simulation.real.effects],
+        'twin_effects': [effect.to_mapping() for effect in simulation.twin.effects],
+        'seed': simulation.seed,
+        **(provenance or {}),
+    }
+    metrics: Mapping[str, float] = {}
+    with BagWriter(path, storage=storage, provenance=made) as bag:
+        for stamp, topic, message in simulation.entries(bag_messages()):
+            bag.write(topic, message, stamp)
+            if topic == DEVIATION_METRICS.name:
+                metrics = from_messages.metrics(message)
+        if 'RMS' not in metrics:
+            raise DataError(
+                'no measurement meets a pose of the twin: the effects delay measurements beyond '
+                'the end of the motion; take a shorter delay or a slower motion'
+            )
+    return metrics

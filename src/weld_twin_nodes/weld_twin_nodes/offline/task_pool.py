@@ -88,11 +88,7 @@ class Runner:
         """
         Return the results in the order of the tasks.
 
-        Parameters
-        ----------
-        meanwhile : callable, optional
-            What this process does once others have the tasks.
-
+        ``meanwhile``: what this process does once others have the tasks.
         """
         results: list[Plain] = [None] * len(tasks)
         waiting = []

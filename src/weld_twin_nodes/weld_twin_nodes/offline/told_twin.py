@@ -1,19 +1,20 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A twin as parameters and the command line describe it: effects file, diagnosis, text."""
+"""A twin, and cameras, as parameters and the command line describe them: files and texts."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.cameras import Camera, Target
 from weld_twin_core.effects import Effect, effects_from_list
 from weld_twin_core.effects.joint_compliance import LOAD_OF_EFFORT
 from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.effects.setup_motion import of_the_robot
-from weld_twin_core.errors import ModelError
+from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.files.diagnosis_model import load_model, read_diagnosis
 from weld_twin_msgs_py.files.effects_file import read_effects
@@ -59,40 +60,42 @@ def build_twin(
         _possible(robot, more, 'effects')
     if not str(model):
         return Twin(robot, more)
-    if Path(model).suffix.lower() != '.json':
+    content = diagnosis_of(model)
+    if not content:
         read = read_effects(model, robot)
         if not implausible:
             _possible(robot, read, f"effects file '{model}'")
         return Twin(robot, read + more)
-    why = '' if mended else other_readings(read_diagnosis(model))
-    if why:
+    if not mended:
+        refuse_mended(content, model)
+    known = _diagnosed(robot, model, content)
+    return Twin(known.robot, of_the_robot(known.effects) + more)
+
+
+def diagnosis_of(path: Path | str) -> dict[str, Any]:
+    """Return the content of a diagnosis.json; empty for an effects file."""
+    return read_diagnosis(path) if Path(path).suffix.lower() == '.json' else {}
+
+
+def refuse_mended(content: Mapping[str, Any], path: Path | str) -> None:
+    """Refuse a model that takes mended joint positions, where they come as they are."""
+    if why := other_readings(content):
         raise ModelError(
-            f"the model of '{model}' takes mended joint positions, and here they come as they are: "
+            f"the model of '{path}' takes mended joint positions, and here they come as they are: "
             f'{why}'
         )
-    known = _diagnosed(robot, model)
-    return Twin(known.robot, of_the_robot(known.effects) + more)
 
 
 def by_effort(path: Path | str) -> bool:
     """
     Return whether springs of a model file take the measured efforts of the joints.
 
-    Parameters
-    ----------
-    path : Path or str
-        diagnosis.json, or an effects file.
-
-    Raises
-    ------
-    ModelError
-        The file cannot be read.
-
+    ``path``: diagnosis.json, or an effects file. Raises ModelError: the file cannot be read.
     """
-    if Path(path).suffix.lower() == '.json':
-        model = read_diagnosis(path).get('model')
-        entries = [*model.get('known', ()), *model.get('found', ())] if model else []
-    else:
+    content = diagnosis_of(path)
+    model = content.get('model') or {}
+    entries = [*model.get('known', ()), *model.get('found', ())]
+    if not content:
         entries = read_yaml(path, 'effects file') or []
     return any(
         isinstance(entry, dict) and entry.get('statics') in LOAD_OF_EFFORT for entry in entries
@@ -132,9 +135,8 @@ def _possible(robot: Robot, effects: Sequence[Effect], source: str) -> None:
                 raise ModelError(f'{source}: {_doubt(effect, parameter, value, limit)}')
 
 
-def _diagnosed(robot: Robot, path: Path | str) -> Twin:
+def _diagnosed(robot: Robot, path: Path | str, data: Mapping[str, Any]) -> Twin:
     """Return the model of a diagnosis, or the effects of its verdict where it holds no model."""
-    data = read_diagnosis(path)
     if 'model' in data:
         return load_model(robot, path)
     try:
@@ -152,3 +154,27 @@ def _flat(entry: Mapping[str, Any]) -> dict[str, Any]:
     if known.get('joint') is None:
         known.pop('joint', None)
     return {**known, **entry['parameters']}
+
+
+def told_cameras(
+    cameras: Iterable[str], targets: Iterable[str]
+) -> tuple[tuple[Camera, ...], tuple[Target, ...]]:
+    """
+    Return the cameras and targets of texts such as ``left=left.yaml``.
+
+    Raises DataError, ModelError: a text is no NAME=FILE, or a file cannot be read.
+    """
+    # Tables load much that a node without cameras has no use for.
+    from weld_twin_msgs_py.tables import read_camera, read_target
+
+    lenses = tuple(read_camera(*_named(text, 'camera')) for text in cameras)
+    # What a camera on the tool looks at stands still, where nothing else is said.
+    other = 'world' if {camera.mount for camera in lenses} == {'tool'} else 'tool'
+    return lenses, tuple(read_target(*_named(text, 'target'), other) for text in targets)
+
+
+def _named(text: str, what: str) -> tuple[str, str]:
+    name, mark, path = text.partition('=')
+    if not (name and mark and path):
+        raise DataError(f"a {what} is given as NAME=FILE, got '{text}'")
+    return name, path

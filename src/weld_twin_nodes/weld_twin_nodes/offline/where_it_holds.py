@@ -65,11 +65,7 @@ def file_alone(alone: Alone, *, left: bool) -> list[str]:
     """
     Return what a robot file leaves by itself, beside the whole model, in sentences for its head.
 
-    Parameters
-    ----------
-    left : bool
-        Whether the model has effects that the file cannot hold.
-
+    ``left``: whether the model has effects that the file cannot hold.
     """
     by_itself = (
         f'{_mm(alone.recorded_m)} where it was recorded and {_mm(alone.unseen_m)} on data that were '

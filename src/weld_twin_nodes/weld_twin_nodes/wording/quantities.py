@@ -202,13 +202,7 @@ def short_rows(
     """
     Return the parameters of an effect as `in_short`; of a vector the axes that count.
 
-    Parameters
-    ----------
-    std : dict
-        Standard errors by parameter.
-    robot : Robot, optional
-        Tells which joints slide; left out, all turn.
-
+    ``std``: standard errors by parameter. ``robot``: tells which joints slide; left out, all turn.
     """
     if isinstance(effect, TransmissionRipple):
         return _orders(effect, std, slides=robot is not None and effect.on_slide(robot))
@@ -247,11 +241,7 @@ def parameter_rows(
     """
     Return name and value of every parameter of an effect; a ripple has a row per order.
 
-    Parameters
-    ----------
-    effect, std, robot
-        As for `short_rows`.
-
+    ``effect`` and ``std`` and ``robot``: as for `short_rows`.
     """
     if isinstance(effect, TransmissionRipple):
         return _orders(effect, std, slides=robot is not None and effect.on_slide(robot))

@@ -22,8 +22,7 @@ from weld_twin_report.report.controllers import correction
 from weld_twin_report.report.curve_plot import furthest
 from weld_twin_report.report.diagnosis_page import Sheet
 from weld_twin_report.report.footing import next_section, parts_what
-from weld_twin_report.report.to_do import worth_doing
-from weld_twin_report.report.warned import warned
+from weld_twin_report.report.to_do import warned, worth_doing
 
 CIRCLE = diagnoses.circle()
 

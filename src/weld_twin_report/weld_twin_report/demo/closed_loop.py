@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -16,6 +15,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import TwinError
 from weld_twin_core.motion.inverse.newton import polish
 from weld_twin_core.twin.goal_motion import Goal, course
+from weld_twin_msgs_py.files.json_file import write_json
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.messages import from_messages
@@ -51,7 +51,7 @@ def close_loop(job: Job, progress: Progress) -> None:
         'before': {'rms_m': before, 'worst_m': seams[0].worst},
         'after': {'rms_m': after, 'worst_m': seams[1].worst},
     }
-    write_text(job.folder / RESULT, json.dumps(content, indent=1) + '\n')
+    write_json(job.folder / RESULT, content)
     job.lines += [
         '',
         f'The same seam with the loop closed: {before * 1e3:.3f} mm RMS as it is, '

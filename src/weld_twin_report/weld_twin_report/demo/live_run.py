@@ -28,12 +28,8 @@ def run_live(job: Job, progress: Progress) -> None:
     """
     Run the motion through the nodes, at the speed they keep up with, and record it.
 
-    Raises
-    ------
-    TwinError
-        A node failed or stood still, or the recording is not complete; the message says what is
-        missing.
-
+    Raises TwinError: a node failed or stood still, or the recording is not complete; the message
+    says what is missing.
     """
     job.bag = job.folder / 'bag'
     samples = job.plan.motion.t.size

@@ -21,14 +21,11 @@ from weld_twin_core.effects import effects_from_list
 from weld_twin_nodes.offline.output_directory import new_directory
 from weld_twin_nodes.offline.seam_motion import plan_motion
 
-from .analysis import analyse
+from .analysis import MARK, analyse, draw, rank, write_table
 from .closed_loop import close_loop
 from .demo_diagnosis import find_causes, leave_open
-from .deviation_table import MARK, write_table
 from .hand_over import Job, Step
 from .live_run import run_live
-from .picture import draw
-from .ranking import rank
 
 ROBOT = 'ur5'
 SEAM = 'polyline'

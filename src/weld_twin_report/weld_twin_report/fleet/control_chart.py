@@ -47,13 +47,8 @@ def baseline(values: Array, before: int | None = None) -> Baseline | None:
     """
     Return what is usual of a value; None where there are too few.
 
-    Parameters
-    ----------
-    values : array, shape (N,)
-        In the order of time; what is not finite does not count.
-    before : int, optional
-        Number of diagnoses before the first change.
-
+    ``values`` (shape (N,)): in the order of time; what is not finite does not count. ``before``:
+    number of diagnoses before the first change.
     """
     first = values[: min(FIRST, values.size if before is None else before)]
     first = first[np.isfinite(first)]

@@ -91,11 +91,7 @@ def read_list(path: Path | str) -> list[Listed]:
     """
     Return the lines of a list.
 
-    Raises
-    ------
-    DataError
-        It is no table with these columns; the sentence names line and column.
-
+    Raises DataError: it is no table with these columns; the sentence names line and column.
     """
     file = Path(path)
     names = [field.name for field in fields(Listed)]

@@ -17,7 +17,6 @@ from weld_twin_nodes.offline.output_directory import new_directory
 
 from ..guarded import Guarded, Limits, Outcome
 from ..history import entry_of
-from ..history.plain_entry import plain
 from ..history.runs import DONE, FAILED, REFUSED, UNSOUND, Run
 from ..report.diagnosis_files import RESULT
 from .listed import Listed
@@ -31,13 +30,7 @@ def diagnosed(listed: Listed, key: str, limits: Limits, keep: str) -> dict[str, 
     """
     Return how a recording went, and its entry.
 
-    Parameters
-    ----------
-    key : str
-        Of the run.
-    keep : str
-        Directory for what the command wrote; empty to keep nothing.
-
+    ``key``: of the run. ``keep``: directory for what the command wrote; empty to keep nothing.
     """
     done, entry = Outcome(-1, '', 0.0), None
     try:
@@ -71,7 +64,7 @@ def _read(listed: Listed, done: Outcome, out: Path) -> tuple[str, str, dict[str,
         entry = entry_of(out, listed.date)
     except TwinError as error:
         return REFUSED, str(error).replace(f'{out}/diagnosis.json', listed.recording), None
-    return state, entry.status, plain(entry)
+    return state, entry.status, entry.plain()
 
 
 def _unsound(out: Path) -> str:

@@ -25,13 +25,7 @@ def ranking_page(database: Database, link: Callable[[str], str], ways: Html | No
     """
     Return the page that ranks cells by the gap of their newest diagnosis.
 
-    Parameters
-    ----------
-    link : callable
-        Address of the page of a cell.
-    ways : Html, optional
-        The way to other pages.
-
+    ``link``: address of the page of a cell. ``ways``: the way to other pages.
     """
     runs = Runs(database)
     newest = runs.newest()

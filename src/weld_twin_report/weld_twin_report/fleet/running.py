@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
@@ -21,13 +22,12 @@ from pathlib import Path
 from typing import Any
 
 from weld_twin_core.errors import DataError
-from weld_twin_nodes.offline.task_pool import Pool, Task
+from weld_twin_nodes.offline.task_pool import Pool, Task, available_cores, call
 
-from ..guarded import Limits
+from ..guarded import Guarded, Limits
 from ..history import Unavailable
 from ..history.database import Database
 from ..history.entry import Entry
-from ..history.plain_entry import entry
 from ..history.runs import DONE, FAILED, Run, Runs
 from .listed import Listed
 from .one_recording import diagnosed
@@ -108,7 +108,7 @@ class _Writing:
     def take(self, result: Mapping[str, Any]) -> Iterator[Run | None]:
         """Write a result, and those that wait; yield what was written, None for what was there."""
         before = len(self._waiting)
-        reported = entry(result['entry']) if result['entry'] else None
+        reported = Entry.of_plain(result['entry']) if result['entry'] else None
         self._waiting.append((Run(**result['run']), reported))
         # Once patience was in vain, results do not each wait for it again.
         yield from self._write(None if before == 0 else 0.0)
@@ -146,3 +146,35 @@ def _tasks(
         if key not in known:
             known.add(key)
             yield Task(diagnosed, (each, key, limits, str(keep) if keep else ''), each.recording)
+
+
+class Threads:
+    """
+    Runs tasks that let a process do their work.
+
+    Parameters
+    ----------
+    workers : int
+        0 means one for every core.
+
+    """
+
+    def __init__(self, workers: int = 0) -> None:
+        if workers < 0:
+            raise DataError(f'the number of workers must not be negative, got {workers}')
+        self._pool = ThreadPoolExecutor(workers or available_cores())
+
+    def run(self, tasks: Sequence[Task]) -> Iterator[tuple[int, str]]:
+        """Yield the number of each task and its result, in order of completion."""
+        futures: dict[Future[str], int] = {
+            self._pool.submit(call, task.function, task.arguments): k
+            for k, task in enumerate(tasks)
+        }
+        for future in as_completed(futures):
+            yield futures.pop(future), future.result()
+
+    def close(self) -> None:
+        """Begin nothing more, and end what runs."""
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        Guarded.end_all()
+        self._pool.shutdown()

@@ -23,10 +23,10 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-from .entry import Entry
+from .entry import ARRAYS, Entry
 from .opening import WRITES, alone, bring_up, engine_of, refuse_missing, version_of
 from .passing import Unavailable, passes, unavailable, waits
-from .schema import ARRAYS, VERSION, not_a_cell, schema, stored
+from .schema import VERSION, not_a_cell, schema, stored
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection, Engine, Row
@@ -106,16 +106,8 @@ class Database:
         """
         Add a diagnosis to a cell; return whether it was new.
 
-        Parameters
-        ----------
-        cell : str
-            A new name makes a new cell.
-
-        Raises
-        ------
-        DataError
-            The cell has another robot, or a diagnosis of that instant already.
-
+        ``cell``: a new name makes a new cell. Raises DataError: the cell has another robot, or a
+        diagnosis of that instant already.
         """
         return self.write(lambda connection: self.put(connection, cell, entry)) is not None
 
@@ -123,11 +115,7 @@ class Database:
         """
         Add a diagnosis within a transaction; return its number, None if it was there already.
 
-        Raises
-        ------
-        Refused
-            As of `add`; nothing is written then, if the caller lets it through.
-
+        Raises Refused: as of `add`; nothing is written then, if the caller lets it through.
         """
         sql, verdicts = self.sql, self.table('verdicts')
         number = self._number(connection, cell, entry)

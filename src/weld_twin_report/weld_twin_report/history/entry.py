@@ -1,12 +1,12 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One diagnosis as it stands in the history."""
+"""One diagnosis as it stands in the history, and as plain data that can be sent and kept."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ FIRST_YEAR = 2000
 ROUNDING = 1e-6
 """By how much a covariance may miss being one, in units of its own standard deviations: digits of a
 file. What a wrong sign or a damaged number makes is far beyond it."""
+ARRAYS = ('value', 'prior_std', 'covariance', 'tool')
 PASSING = 'base '
 """Coordinates that are of one set-up only: where the instrument stood."""
 
@@ -67,16 +68,28 @@ class Entry:
     covariance: Array
     tool: Array
 
+    def plain(self) -> dict[str, Any]:
+        """Return it as what JSON can hold."""
+        out = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {
+            **{k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in out.items()},
+            'at': self.at.isoformat(),
+            'names': list(self.names),
+        }
+
+    @classmethod
+    def of_plain(cls, data: Mapping[str, Any]) -> Entry:
+        """Return what `plain` made plain."""
+        arrays = {name: np.array(data[name], float) for name in ARRAYS}
+        at = datetime.fromisoformat(data['at'])
+        return cls(**{**data, **arrays, 'at': at, 'names': tuple(data['names'])})
+
 
 def instant(text: str) -> datetime:
     """
     Return the instant that a text names, UTC where it does not say.
 
-    Raises
-    ------
-    DataError
-        It is no date.
-
+    Raises DataError: it is no date.
     """
     try:
         # Python 3.10 does not read the Z that others write for UTC.
@@ -165,11 +178,7 @@ def date_of_stamp(epoch_ns: int, file: Path) -> datetime:
     """
     Return the date of a stamp [ns].
 
-    Raises
-    ------
-    DataError
-        It is counted from the start of a machine.
-
+    Raises DataError: it is counted from the start of a machine.
     """
     at = datetime.fromtimestamp(epoch_ns // NANOSECONDS, timezone.utc)
     if at.year < FIRST_YEAR:

@@ -64,11 +64,7 @@ def refuse_missing(address: Any, shown: str) -> None:
     """
     Refuse to read an SQLite file that is not there, which opening would make.
 
-    Raises
-    ------
-    DataError
-        There is no such file.
-
+    Raises DataError: there is no such file.
     """
     name = address.database or ''
     plain = address.get_backend_name() == 'sqlite' and not name.startswith('file:')
@@ -126,13 +122,7 @@ def bring_up(connection: Connection, tables: MetaData, version: int) -> None:
     """
     Make the tables, or bring those of an older version to this one.
 
-    Parameters
-    ----------
-    connection : Connection
-        In a transaction that writes.
-    version : int
-        What `version_of` told.
-
+    ``connection``: in a transaction that writes. ``version``: what `version_of` told.
     """
     import sqlalchemy
 

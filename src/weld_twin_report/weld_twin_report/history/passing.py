@@ -39,13 +39,8 @@ def passes(error: Exception, *, connecting: bool = False) -> bool:
     """
     Return whether an error of SQLAlchemy is likely to be gone with the next attempt.
 
-    Parameters
-    ----------
-    error : Exception
-        Of SQLAlchemy.
-    connecting : bool
-        Whether it comes from the first connection: a server that is not there is then told at once.
-
+    ``error``: of SQLAlchemy. ``connecting``: whether it comes from the first connection: a server
+    that is not there is then told at once.
     """
     from sqlalchemy.exc import DBAPIError, OperationalError
 

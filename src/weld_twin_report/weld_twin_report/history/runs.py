@@ -190,11 +190,7 @@ class Runs:
         """
         Return what changed on a cell; worked out once for the diagnoses it has.
 
-        Parameters
-        ----------
-        entries : sequence of Entry, optional
-            Its newest diagnoses, where they are there already.
-
+        ``entries``: its newest diagnoses, where they are there already.
         """
         sql, findings = self._database.sql, self._database.table('findings')
         number, newest, count = self._state(cell)

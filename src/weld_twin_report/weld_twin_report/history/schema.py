@@ -7,6 +7,7 @@ from __future__ import annotations
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
+from .entry import ARRAYS
 from .migrations import STEPS
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ VERSION = 1 + len(STEPS)
 """Of the schema; an older database is brought to it, a newer one is refused."""
 NAME = 200
 """Characters of the name of a cell or a robot; PostgreSQL refuses longer ones."""
-ARRAYS = ('value', 'prior_std', 'covariance', 'tool')
 
 
 def stored(at: datetime) -> datetime:

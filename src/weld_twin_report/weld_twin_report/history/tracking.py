@@ -24,11 +24,7 @@ def observations(entries: Sequence[Entry]) -> list[Observation]:
     """
     Return entries as observations, the tool counted from that of the first.
 
-    Parameters
-    ----------
-    entries : sequence of Entry
-        Of one cell, in the order of time.
-
+    ``entries``: of one cell, in the order of time.
     """
     first = entries[0].tool if entries else np.eye(4)
     return [
@@ -67,13 +63,7 @@ def changed(entries: Sequence[Entry], seen: Sequence[Observation]) -> tuple[Chan
     """
     Return what changed on a cell, the surest first.
 
-    Parameters
-    ----------
-    entries : sequence of Entry
-        Of one cell, in the order of time.
-    seen : sequence of Observation
-        What `observations` made of them.
-
+    ``entries``: of one cell, in the order of time. ``seen``: what `observations` made of them.
     """
     return changes(seen, named=named(entries), likely=likely(entries))
 

@@ -52,11 +52,7 @@ def verified_of(path: Path | str, at: datetime | None = None) -> Verified | None
     """
     Return the verification that a file or a folder holds; None where it holds none.
 
-    Raises
-    ------
-    DataError
-        It cannot be read, or its stamps are no dates and none is given.
-
+    Raises DataError: it cannot be read, or its stamps are no dates and none is given.
     """
     file = Path(path)
     file = file / FILE if file.is_dir() else file
@@ -78,11 +74,7 @@ def put_verified(
     """
     Add a verification within a transaction; return its number, None if it was there already.
 
-    Raises
-    ------
-    DataError
-        There is no such cell yet, or it has another robot.
-
+    Raises DataError: there is no such cell yet, or it has another robot.
     """
     sql, cells, rows = database.sql, database.table('cells'), database.table('verifications')
     # Whoever writes to the same cell waits here, and then sees what was written.

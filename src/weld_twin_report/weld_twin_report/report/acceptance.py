@@ -20,7 +20,7 @@ from weld_twin_nodes.wording.words import listed, unnamed
 
 from .directions import worst
 from .html import Html, joined, section, table, tag
-from .performance_table import PATH_HEADS, POSE_HEADS, path_row, pose_rows
+from .performance_page import PATH_HEADS, POSE_HEADS, path_row, pose_rows
 from .seam_view import at_rest, instant
 
 WORDS = {

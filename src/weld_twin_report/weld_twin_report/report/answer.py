@@ -42,7 +42,7 @@ from weld_twin_nodes.wording.words import (
 
 from .cause_answer import CauseAnswer
 from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows
-from .remainder import places, remainder
+from .page_data import places, remainder
 from .to_do import worth_doing
 from .untried import weighed
 

@@ -38,8 +38,8 @@ from weld_twin_nodes.wording.words import (
     unnamed,
 )
 
-from .cause_values import values
 from .controllers import BRANDS, UNCHECKED, UNNAMED, correction, gearing
+from .curve_plot import values
 from .directions import components, rms_words, sides_words
 from .seam_view import seen_at
 from .to_do import TOGETHER

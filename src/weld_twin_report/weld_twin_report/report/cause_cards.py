@@ -18,7 +18,7 @@ from .curve_plot import curve_figure, furthest_off
 from .html import Child, Html, joined, lines, pairs, section, table, tag
 from .page_data import along, drawn, static
 from .seam_view import at_rest
-from .warned import warned
+from .to_do import warned
 
 _TRIVIAL = 1e-4
 """Share of the squared gap below which a cause has no card: it moves nothing anybody sees."""

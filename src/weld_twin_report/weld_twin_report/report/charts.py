@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from weld_twin_core.arrays import Array
+from weld_twin_msgs_py.files.json_file import plain as finite
 
 from .html import Html, tag
 
@@ -120,16 +121,8 @@ def embedded(data: Any, id_: str | None = None) -> Html:
 
     What is not finite is null: JSON has no other word for it.
     """
-    text = json.dumps(_finite(data), separators=(',', ':')).replace('<', '\\u003c')
+    text = json.dumps(finite(data), separators=(',', ':')).replace('<', '\\u003c')
     return tag('script', Html(text), type='application/json', id_=id_)
-
-
-def _finite(data: Any) -> Any:
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
-    return None if isinstance(data, float) and not isfinite(data) else data
 
 
 def plain(values: Array) -> list[float | None]:
@@ -143,11 +136,7 @@ def thinned(rows: Sequence[Array], most: int = POINTS) -> np.ndarray:
     """
     Return an index of at most so many samples, the largest of every row among them.
 
-    Parameters
-    ----------
-    rows : sequence of array, shape (N,)
-        What must keep its peaks; at least one.
-
+    ``rows`` (shape (N,)): what must keep its peaks; at least one.
     """
     count = rows[0].size
     if count <= most:

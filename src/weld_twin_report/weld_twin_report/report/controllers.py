@@ -121,13 +121,8 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
     """
     Return where this maker's controller takes the correction, or why there is nothing to enter.
 
-    Parameters
-    ----------
-    brand : str or None
-        One of `BRANDS`; None where the maker is not known.
-    robot : Robot, optional
-        Tells which joints slide; left out, all turn.
-
+    ``brand``: one of `BRANDS`; None where the maker is not known. ``robot``: tells which joints
+    slide; left out, all turn.
     """
     kind = effect.traits.entered
     if kind == 'ratio':

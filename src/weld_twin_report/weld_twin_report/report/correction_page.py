@@ -31,11 +31,7 @@ def correction_page(entry: Mapping[str, Any], inputs: Sequence[InputFile] = ()) 
     """
     Return the page.
 
-    Parameters
-    ----------
-    entry : mapping
-        The content of correction.json.
-
+    ``entry``: the content of correction.json.
     """
     title = f'{entry["program"]} · {entry["robot"]}'
     reported = tolerance_told(entry)

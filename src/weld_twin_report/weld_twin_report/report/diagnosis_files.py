@@ -4,19 +4,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from weld_twin_core import __version__
 from weld_twin_core.diagnosis.result import Diagnosis
 from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
+from weld_twin_msgs_py.files.json_file import json_text
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
 from weld_twin_nodes.offline.exports import write_all
@@ -82,7 +79,7 @@ def diagnosis_text(diagnosis: Diagnosis, inputs: Sequence[InputFile]) -> str:
         content['candidates'] = _candidates(diagnosis, content['candidates'])
     content['inputs'] = [item.as_dict() for item in inputs]
     content['version'] = __version__
-    return json.dumps(_plain(content), indent=1, allow_nan=False) + '\n'
+    return json_text(content)
 
 
 def _candidates(diagnosis: Diagnosis, reported: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -99,15 +96,3 @@ def _candidates(diagnosis: Diagnosis, reported: list[dict[str, Any]]) -> list[di
         for own, item in zip(diagnosis.candidates, reported, strict=True)
         if own in tried or own.site in named
     ]
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not isfinite(value):
-        return None
-    return value

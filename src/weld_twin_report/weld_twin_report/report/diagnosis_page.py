@@ -29,13 +29,12 @@ from .charts import embedded
 from .circle_plot import circle_data, circles_section
 from .contact_clouds import contacts_section
 from .controllers import brand_of
-from .footing import checks_section, inputs_section, next_section
+from .footing import checks_section, inputs_section, next_section, printed_section
 from .gap_location import where_section
 from .html import Html, document, joined, own_file, tag
 from .joint_names import renamed
 from .opening import header, opening
 from .page_data import page_data
-from .printed import printed_section
 from .seam_view import left_out, seam_section
 from .shrinking import shrink_section
 
@@ -69,11 +68,7 @@ def report_page(
     """
     Return the page.
 
-    Parameters
-    ----------
-    inputs : sequence of InputFile
-        What it was made from, as the page lists it.
-
+    ``inputs``: what it was made from, as the page lists it.
     """
     sheet = sheet or Sheet()
     rule = rule_of(diagnosis, sheet.demand)

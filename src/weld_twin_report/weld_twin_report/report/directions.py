@@ -33,13 +33,7 @@ def components(diagnosis: Diagnosis, k: int, vectors: Array) -> Array | None:
     As the bars of the gap have them: along is the direction of travel, the tool's axis z is made
     square to it. None for stations at rest, which have no direction of travel.
 
-    Parameters
-    ----------
-    k : int
-        The recording.
-    vectors : array, shape (M, 3) [m]
-        One at every stamp of its traces.
-
+    ``k``: the recording. ``vectors`` (shape (M, 3) [m]): one at every stamp of its traces.
     """
     traces, model = diagnosis.traces, diagnosis.model
     if static(diagnosis, k) or k >= len(diagnosis.recordings) or len(vectors) < 3:

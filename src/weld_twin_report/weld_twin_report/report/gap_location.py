@@ -18,7 +18,7 @@ from .answer import Answer
 from .cause_answer import CauseAnswer
 from .directions import components, sides_words, worst
 from .html import Html, bars, joined, section, tag
-from .remainder import SEEN
+from .page_data import SEEN
 from .seam_view import at_rest, seen_at
 
 _FRAMED = (

@@ -35,11 +35,7 @@ def investigation_page(state: Mapping[str, Any]) -> str:
     """
     Return the page.
 
-    Parameters
-    ----------
-    state : mapping
-        The content of investigation.json.
-
+    ``state``: the content of investigation.json.
     """
     body = main(
         ('Investigation ', str(state['state'])),

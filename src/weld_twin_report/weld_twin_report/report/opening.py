@@ -33,7 +33,7 @@ from .directions import components, sides_words, worst
 from .html import Child, Figure, Html, joined, lines, pairs, tag
 from .html import figures as drawn
 from .seam_view import at_rest, instant, left_out
-from .warned import warned
+from .to_do import warned
 
 _CAUSES = 4
 """Causes in the table; the cards have more."""

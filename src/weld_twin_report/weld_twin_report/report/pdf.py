@@ -22,11 +22,7 @@ def browser() -> str:
     """
     Return the browser to print with.
 
-    Raises
-    ------
-    DataError
-        There is none.
-
+    Raises DataError: there is none.
     """
     result = next(filter(None, map(shutil.which, BROWSERS)), None)
     if result is None:
@@ -41,11 +37,7 @@ def print_page(page: Path, out: Path) -> None:
     """
     Print a page to a PDF.
 
-    Raises
-    ------
-    DataError
-        There is no browser, or it did not print.
-
+    Raises DataError: there is no browser, or it did not print.
     """
     program = browser()
     with tempfile.TemporaryDirectory() as profile:

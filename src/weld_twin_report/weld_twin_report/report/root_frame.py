@@ -73,11 +73,7 @@ def old_and_new(effect: RootPose, brand: str, robot: Robot) -> str:
     """
     Return old and new value of a positioner's root frame as its controller writes them.
 
-    Parameters
-    ----------
-    brand : str
-        'kuka', 'abb' or 'fanuc'.
-
+    ``brand``: 'kuka', 'abb' or 'fanuc'.
     """
     form = _FRAMES[brand]
     world, begins = world_of(robot, form.language)

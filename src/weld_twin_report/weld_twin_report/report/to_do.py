@@ -1,9 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What to do, in its order: at the top of the page and on the terminal."""
+"""What to do, in its order, in words and as markup: at the top of the page and on the terminal."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -30,6 +31,7 @@ from weld_twin_nodes.wording.words import (
 )
 
 from .controllers import gearing
+from .html import Child, tag
 
 _LARGEST = 3
 """Actions told; the others are counted."""
@@ -196,3 +198,17 @@ def _proposed(diagnosis: Diagnosis) -> str:
     """Return the file that holds the next experiment."""
     touches = (diagnosis.next_experiment or {}).get('kind') == 'touches'
     return 'next_touches.csv' if touches else 'next_experiment.yaml'
+
+
+_DEGREES = re.compile(r'(?<=\d) deg\b')
+_NOT = re.compile(
+    r'((?:Do not correct programs|Not this alone)\b[^.]*(?:\.\d[^.]*)*\.'
+    r'|Its curve [^.]*: do not correct programs by it\.)'
+)
+"""What a reader is told not to do."""
+
+
+def warned(reported: str) -> list[Child]:
+    """Return an action as markup: what not to do stands out, and degrees have their sign."""
+    parts = _NOT.split(_DEGREES.sub('°', reported))
+    return [tag('strong', text) if k % 2 else text for k, text in enumerate(parts) if text]

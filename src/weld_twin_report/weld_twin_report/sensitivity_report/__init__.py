@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The sensitivity study as files: results, figures with their data, claims table, a page."""
 
-from .make_study import make_figures, make_study
 from .setting import Effort, Setting
+from .study_files import make_figures, make_study
 
 __all__ = ['Effort', 'Setting', 'make_figures', 'make_study']

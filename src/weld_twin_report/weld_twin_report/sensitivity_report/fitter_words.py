@@ -78,11 +78,8 @@ def advised(parameters: Sequence[dict[str, Any]], most: int) -> list[Advice]:
     Tolerances are independent, so their squares add up: one that is tightened takes its square
     off the square of the whole.
 
-    Parameters
-    ----------
-    parameters : sequence of dict
-        Of the local study, with ``contribution_m``: what one tolerance makes, RMS along the seam.
-
+    ``parameters``: of the local study, with ``contribution_m``: what one tolerance makes, RMS
+    along the seam.
     """
     whole = sum(row['contribution_m'] ** 2 for row in parameters)
     out = []

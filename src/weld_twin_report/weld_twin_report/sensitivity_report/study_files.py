@@ -1,26 +1,30 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The files of a study, each written whole; a study that was stopped finds its results again."""
+"""A study run, and its files, each written whole; one that was stopped finds its results again."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
-from math import isfinite
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from weld_twin_core import __version__
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import DataError
 from weld_twin_core.sensitivity import Tolerance
 from weld_twin_msgs_py.files.csv_text import csv_text
+from weld_twin_msgs_py.files.json_file import write_json
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
+from weld_twin_nodes.offline.output_directory import new_directory
+from weld_twin_nodes.offline.task_pool import Pool, Runner, Tell
 
-from .claims_table import cases_csv, claims_csv, claims_markdown
-from .figures import Drawing
+from .claims_table import SEAMS, cases_csv, claims_csv, claims_markdown, run_claims
+from .figures import Drawing, draw, drawable
+from .setting import Setting
+from .study_page import study_page
+from .whole import run_study
 
 RESULT, CLAIMS, PAGE = 'sensitivity.json', 'claims.json', 'sensitivity.html'
 TASKS, FIGURES = 'tasks', 'figures'
@@ -30,11 +34,7 @@ def study_directory(path: Path | str) -> Path:
     """
     Return the directory of a study, with a place for the results of its tasks.
 
-    Raises
-    ------
-    DataError
-        It holds something else.
-
+    Raises DataError: it holds something else.
     """
     place = Path(path)
     if place.exists() and not place.is_dir():
@@ -60,7 +60,7 @@ def write_study(place: Path, result: dict[str, Any], tolerances: Sequence[Tolera
     entries = [tolerance.to_mapping() for tolerance in tolerances]
     write_text(place / 'tolerances.yaml', yaml_text(entries), overwrite=True)
     write_text(place / 'indices.csv', indices_csv(result), overwrite=True)
-    write_text(place / RESULT, json_text(result), overwrite=True)
+    write_json(place / RESULT, {**result, 'version': __version__}, overwrite=True)
 
 
 def write_claims(place: Path, result: dict[str, Any]) -> None:
@@ -68,22 +68,7 @@ def write_claims(place: Path, result: dict[str, Any]) -> None:
     write_text(place / 'claims.csv', claims_csv(result), overwrite=True)
     write_text(place / 'claims-cases.csv', cases_csv(result), overwrite=True)
     write_text(place / 'claims.md', claims_markdown(result), overwrite=True)
-    write_text(place / CLAIMS, json_text(result), overwrite=True)
-
-
-def json_text(value: dict[str, Any]) -> str:
-    """Return JSON text; what is not a finite number is null."""
-    return json.dumps(_finite({**value, 'version': __version__}), indent=1) + '\n'
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [_finite(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not isfinite(value) else value
+    write_json(place / CLAIMS, {**result, 'version': __version__}, overwrite=True)
 
 
 def indices_csv(result: dict[str, Any]) -> str:
@@ -99,3 +84,70 @@ def _rows(result: dict[str, Any]) -> Iterator[list[Any]]:
                 for row in indices['indices']:
                     values = [row[key] for key in ('name', 'S1', 'S1_half', 'ST', 'ST_half')]
                     yield [motion, by, output, *values]
+
+
+def make_study(
+    out: Path | str,
+    pool: Pool,
+    setting: Setting | None,
+    *,
+    claims_on: Sequence[Robot] = (),
+    seams: Sequence[str] = SEAMS,
+    tell: Tell | None = None,
+    seed: int = 0,
+    force: bool = False,
+) -> Path:
+    """
+    Run a study, the claims, or both, write the results and return the page.
+
+    Parameters
+    ----------
+    out : Path or str
+        Directory of the results; one that was begun is continued.
+    pool : Pool
+        Where tasks run.
+    setting : Setting, optional
+        Left out, only the claims are studied.
+    claims_on : sequence of Robot
+        Robots the claims are measured on; none for no claims.
+    seams : sequence of str
+        Bundled seams the claims are measured on.
+    tell : callable, optional
+        Told about progress.
+    seed : int
+        Of the claims.
+    force : bool
+        As `new_directory` takes it.
+
+    """
+    place = study_directory(out)
+    drawings: list[Drawing] = []
+    with study_files(place, force) as made:
+
+        def draw_all() -> None:
+            assert setting is not None
+            drawings.extend(make_figures(made / FIGURES, setting, drawable(setting)))
+
+        with Runner(pool, place / TASKS, tell) as runner:
+            study = None if setting is None else run_study(setting, runner, draw_all)
+            claims = run_claims(runner, claims_on, seams, seed) if claims_on else None
+        if setting is not None and study is not None:
+            write_study(made, study, setting.tolerances)
+        if claims is not None:
+            write_claims(made, claims)
+        write_text(made / PAGE, study_page(study, claims, drawings))
+    return place / PAGE
+
+
+def study_files(place: Path, force: bool) -> AbstractContextManager[Path]:
+    """Return where to make files of a study; those that it has already, and does not make, stay."""
+    return new_directory(place, mark=PAGE, force=force, adds=True, shared=True)
+
+
+def make_figures(place: Path, setting: Setting, keys: Sequence[str]) -> list[Drawing]:
+    """Draw figures and write them with their data."""
+    result = [draw(setting, key) for key in keys]
+    drawings = [drawing for drawing in result if drawing is not None]
+    for drawing in drawings:
+        write_drawing(place, drawing)
+    return drawings

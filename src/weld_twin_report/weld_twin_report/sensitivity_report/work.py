@@ -175,13 +175,8 @@ def run_all(
     """
     Return what the runs of every job come to with the largest error of its model, and the pieces.
 
-    Parameters
-    ----------
-    pieces : sequence of Task
-        Begun first, the longest in front: what is left for the end is short then.
-    meanwhile : callable, optional
-        What this process does once the workers have their tasks.
-
+    ``pieces``: begun first, the longest in front: what is left for the end is short then.
+    ``meanwhile``: what this process does once the workers have their tasks.
     """
     tasks, owners = list(pieces), []
     for label, (study, tolerances, design, drawn) in jobs.items():

@@ -17,10 +17,9 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 
-from .bodies import Bodies, Body, Receive, TooSlow
+from .bodies import Bodies, Body, Rates, Receive, TooSlow
 from .connections import Doors
 from .people import People
-from .rates import Rates
 from .settings import LOOPBACK, Settings
 
 USER, TOKEN = 'weld_twin_user', 'weld_twin_token'

@@ -57,13 +57,8 @@ def make_app(settings: Settings, queue: Queue, doors: Doors, live: Said = lambda
     """
     Return the application.
 
-    Parameters
-    ----------
-    doors : Doors
-        Told when requests begin and end.
-    live : callable
-        Returns the last verdict of running nodes.
-
+    ``doors``: told when requests begin and end. ``live``: returns the last verdict of running
+    nodes.
     """
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     people = People(settings.directory, queue.has)

@@ -21,7 +21,8 @@ from ..report.controllers import BRANDS
 IMPORT, DIAGNOSE, CORRECT = 'import', 'diagnose', 'correct'
 LONGEST = 2000
 """Characters of a field."""
-Choices = tuple[tuple[str, str], ...]
+Check = Callable[[str], str]
+"""Returns what the command is given, or raises a ValueError."""
 
 
 class Field(NamedTuple):
@@ -30,47 +31,45 @@ class Field(NamedTuple):
 
     Attributes
     ----------
-    commands : tuple of str
-        Those that take it.
     check : callable, optional
-        Returns what the command is given, or raises a ValueError; not needed for choices.
+        Not needed for choices.
     choices : tuple of pairs
         Value and text; empty where anything may be written.
     option : str
         Of the commands; empty where it is called as the field.
     lines : bool
         Whether every line is given by itself.
+    commands : tuple of str
+        Those that take it.
 
     """
 
     title: str
-    hint: str
-    commands: tuple[str, ...]
-    check: Callable[[str], str] | None = None
-    choices: Choices = ()
+    hint: str = ''
+    check: Check | None = None
+    choices: tuple[tuple[str, str], ...] = ()
     option: str = ''
     lines: bool = False
+    commands: tuple[str, ...] = ()
 
 
-def _millimetres(text: str) -> str:
-    value = float(text.replace(',', '.').removesuffix('mm'))
-    if not 0.0 < value < 1000.0:
-        raise ValueError
-    return f'{value:g}'
+def _between(low: float, high: float, unit: str = '') -> Check:
+    def check(text: str) -> str:
+        value = float(text.replace(',', '.').removesuffix(unit))
+        if not low < value < high:
+            raise ValueError
+        return f'{value:g}'
+
+    return check
 
 
-def _degrees(text: str) -> str:
-    value = float(text.replace(',', '.').removesuffix('deg'))
-    if not 0.0 < value < 360.0:
-        raise ValueError
-    return f'{value:g}'
+def _kept(right: Callable[[str], object]) -> Check:
+    def check(text: str) -> str:
+        if not right(text):
+            raise ValueError
+        return text
 
-
-def _celsius(text: str) -> str:
-    value = float(text.replace(',', '.'))
-    if not -100.0 < value < 200.0:
-        raise ValueError
-    return f'{value:g}'
+    return check
 
 
 def _signs(text: str) -> str:
@@ -84,18 +83,6 @@ def _numbers(text: str) -> str:
     return ','.join(f'{float(part):g}' for part in re.split(r'[,;\s]+', text))
 
 
-def _coupled(text: str) -> str:
-    if not re.fullmatch(r'\d+[+-]\d+', text):
-        raise ValueError
-    return text
-
-
-def _name(text: str) -> str:
-    if not text.isprintable():
-        raise ValueError
-    return text
-
-
 def _frames(text: str) -> str:
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     if not all(line.isprintable() and '=' in line for line in lines):
@@ -103,117 +90,96 @@ def _frames(text: str) -> str:
     return '\n'.join(lines)
 
 
+_millimetres, _degrees, _celsius = (
+    _between(0, 1000, 'mm'),
+    _between(0, 360, 'deg'),
+    _between(-100, 200),
+)
+_coupled, _name = _kept(re.compile(r'\d+[+-]\d+').fullmatch), _kept(str.isprintable)
 _AS_TABLE = ('', 'as the table says')
-FIELDS: dict[str, Field] = {
-    'align': Field(
-        'What is not known?',
-        '',
-        (DIAGNOSE,),
-        choices=(
-            ('', 'nothing: base and tool are known'),
-            ('base', 'where the instrument stood (base)'),
-            ('tool', 'where the reflector sits (tool)'),
-            ('base,tool', 'neither of the two (base and tool)'),
-        ),
-    ),
-    'tolerance': Field(
-        'Tolerance', 'largest deviation allowed, in mm, such as 0.5', (DIAGNOSE,), _millimetres
-    ),
+_FRAMES = (
+    ('', 'nothing: base and tool are known'),
+    ('base', 'where the instrument stood (base)'),
+    ('tool', 'where the reflector sits (tool)'),
+    ('base,tool', 'neither of the two (base and tool)'),
+)
+_LANGUAGES = ((name, f'{one.maker} ({name})') for name, one in LANGUAGES.items())
+_OF_DIAGNOSES = {
+    'align': Field('What is not known?', choices=_FRAMES),
+    'tolerance': Field('Tolerance', 'largest deviation allowed, in mm, such as 0.5', _millimetres),
     'uncertainty': Field(
         'Uncertainty of the instrument',
         'standard uncertainty in mm, from its certificate',
-        (DIAGNOSE,),
         _millimetres,
     ),
     'controller': Field(
-        'Controller',
-        '',
-        (DIAGNOSE,),
-        choices=(('', 'as the name of the robot tells'), *BRANDS.items()),
+        'Controller', choices=(('', 'as the name of the robot tells'), *BRANDS.items())
     ),
-    'length_unit': Field(
-        'Lengths of a table', '', (IMPORT,), choices=(_AS_TABLE, ('mm', 'mm'), ('m', 'm'))
-    ),
+}
+_OF_TABLES = {
+    'length_unit': Field('Lengths of a table', choices=(_AS_TABLE, ('mm', 'mm'), ('m', 'm'))),
     'angle_unit': Field(
-        'Angles of a table',
-        '',
-        (IMPORT,),
-        choices=(_AS_TABLE, ('deg', 'degrees'), ('rad', 'radians')),
+        'Angles of a table', choices=(_AS_TABLE, ('deg', 'degrees'), ('rad', 'radians'))
     ),
     'joint_signs': Field(
         'Signs of the joints of a table',
         'such as 1,-1,-1,1,-1,1, where the controller counts the other way',
-        (IMPORT,),
         _signs,
     ),
     'joint_offsets': Field(
         'Offsets of the joints of a table',
         'added to each, in degrees, such as 0,-90,90,0,0,0',
-        (IMPORT,),
         _numbers,
     ),
     'coupled': Field(
-        'Coupled joints of a table',
-        '3+2 where joint 3 counts from the ground',
-        (IMPORT,),
-        _coupled,
+        'Coupled joints of a table', '3+2 where joint 3 counts from the ground', _coupled
     ),
-    'base_link': Field(
-        'First link', "of the arm's chain in a URDF", (IMPORT, DIAGNOSE, CORRECT), _name
-    ),
-    'tip_link': Field('Last link', 'of it', (IMPORT, DIAGNOSE, CORRECT), _name),
-    'flange_link': Field(
-        'Flange', 'the link of a URDF where tools begin', (DIAGNOSE, CORRECT), _name
-    ),
+}
+_OF_CHAINS = {
+    'base_link': Field('First link', "of the arm's chain in a URDF", _name),
+    'tip_link': Field('Last link', 'of it', _name),
+}
+_OF_FLANGES = {'flange_link': Field('Flange', 'the link of a URDF where tools begin', _name)}
+_OF_PROGRAMS = {
     'language': Field(
         'Language of the program',
-        '',
-        (CORRECT,),
-        choices=(
-            ('', 'as the file tells'),
-            *((name, f'{one.maker} ({name})') for name, one in LANGUAGES.items()),
-        ),
+        choices=(('', 'as the file tells'), *_LANGUAGES),
         option='controller',
     ),
     'tool': Field(
         'Tools that the program only names',
         'one a line: NAME=X,Y,Z,... as the controller shows them',
-        (CORRECT,),
         _frames,
         lines=True,
     ),
-    'base': Field(
-        'Bases that the program only names', 'the same', (CORRECT,), _frames, lines=True
-    ),
+    'base': Field('Bases that the program only names', 'the same', _frames, lines=True),
     'start': Field(
-        'Joints before the first move', 'in degrees, such as 0,-90,90,0,90,0', (CORRECT,), _numbers
+        'Joints before the first move', 'in degrees, such as 0,-90,90,0,90,0', _numbers
     ),
     'temperature': Field(
-        'Temperature of the arm', 'in degrees Celsius, when the program runs', (CORRECT,), _celsius
+        'Temperature of the arm', 'in degrees Celsius, when the program runs', _celsius
     ),
-    'pulses_per_degree': Field(
-        'Pulses per degree', 'of every axis of a Yaskawa arm', (CORRECT,), _numbers
-    ),
-    'external': Field(
-        'External axes', 'which joint each is, such as E1=rail,E2=-tilt', (CORRECT,), _name
-    ),
+    'pulses_per_degree': Field('Pulses per degree', 'of every axis of a Yaskawa arm', _numbers),
+    'external': Field('External axes', 'which joint each is, such as E1=rail,E2=-tilt', _name),
     'on_positioner': Field(
-        'Bases on the positioner',
-        'names of bases that go along with it, or none',
-        (CORRECT,),
-        _name,
+        'Bases on the positioner', 'names of bases that go along with it, or none', _name
     ),
-    'world': Field(
-        'Where the track begins', 'X,Y,Z,... in the world of the controller', (CORRECT,), _numbers
-    ),
-    'max_length': Field(
-        'Farthest that a point may be moved', 'in mm; empty: 2 mm', (CORRECT,), _millimetres
-    ),
-    'max_angle': Field(
-        'Most that a point may be turned', 'in degrees; empty: 1 degree', (CORRECT,), _degrees
-    ),
+    'world': Field('Where the track begins', 'X,Y,Z,... in the world of the controller', _numbers),
+    'max_length': Field('Farthest that a point may be moved', 'in mm; empty: 2 mm', _millimetres),
+    'max_angle': Field('Most that a point may be turned', 'in degrees; empty: 1 degree', _degrees),
 }
-"""In the order in which they are shown."""
+FIELDS = {
+    name: field._replace(commands=commands)
+    for fields, commands in (
+        (_OF_DIAGNOSES, (DIAGNOSE,)),
+        (_OF_TABLES, (IMPORT,)),
+        (_OF_CHAINS, (IMPORT, DIAGNOSE, CORRECT)),
+        (_OF_FLANGES, (DIAGNOSE, CORRECT)),
+        (_OF_PROGRAMS, (CORRECT,)),
+    )
+    for name, field in fields.items()
+}
+"""By their names, in the order in which they are shown."""
 LARGEST = {'max_length': ('2', 'mm'), 'max_angle': ('1', 'deg')}
 """The two fields that are one option, `--max-correction`, and what they are unless told."""
 ELSEWHERE = {
@@ -234,11 +200,7 @@ def given(form: Mapping[str, str], commands: Iterable[str]) -> dict[str, str]:
     """
     Return the fields of a form that some commands take, checked.
 
-    Raises
-    ------
-    DataError
-        A field holds what it cannot.
-
+    Raises DataError: a field holds what it cannot.
     """
     wanted, out = set(commands), {}
     for name, field in FIELDS.items():
@@ -279,11 +241,8 @@ def sentence(text: str, command: str = '') -> str:
     """
     Return what a command says as somebody without a command line reads it.
 
-    Parameters
-    ----------
-    command : str
-        The one that says it, where two fields are called alike; empty for those of a recording.
-
+    ``command``: the one that says it, where two fields are called alike; empty for those of a
+    recording.
     """
     titles = {
         (field.option or name).replace('_', '-'): field.title

@@ -129,11 +129,7 @@ class Job:
         """
         Return the job of a folder.
 
-        Raises
-        ------
-        DataError
-            Its file is damaged, or a newer version wrote it.
-
+        Raises DataError: its file is damaged, or a newer version wrote it.
         """
         try:
             if not (folder / FILE).is_file():  # a pipe would be waited for
@@ -168,11 +164,7 @@ class Job:
         """
         Write it into its folder, whole.
 
-        Raises
-        ------
-        OSError
-            The disk is full, or does not take it.
-
+        Raises OSError: the disk is full, or does not take it.
         """
         try:
             write_text(folder / FILE, json.dumps(asdict(self)) + '\n', overwrite=True)

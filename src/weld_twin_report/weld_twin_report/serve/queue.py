@@ -108,11 +108,7 @@ class Queue:
         """
         Refuse a job more where too many wait.
 
-        Raises
-        ------
-        Full
-            Too many of this user, of the new ones of his address, or of all.
-
+        Raises Full: too many of this user, of the new ones of his address, or of all.
         """
         with self._news:
             self._check_room(job)
@@ -137,13 +133,8 @@ class Queue:
         """
         Take a new job whose files are in its folder; it waits from now on.
 
-        Raises
-        ------
-        Full, NoRoom
-            Too many wait, or too much is kept.
-        OSError
-            It cannot be written.
-
+        Raises Full, NoRoom: too many wait, or too much is kept. Raises OSError: it cannot be
+        written.
         """
         size, allowed = size_of(self.folder(job)), self._settings.disk
         with self._news:

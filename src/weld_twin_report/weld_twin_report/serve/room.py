@@ -42,11 +42,7 @@ def refuse_full(directory: Path, length: int) -> None:
     """
     Refuse an upload that the disk has no room for.
 
-    Raises
-    ------
-    NoRoom
-        There is none.
-
+    Raises NoRoom: there is none.
     """
     if shutil.disk_usage(directory).free < length + min(SPARE, _tenth(directory)):
         raise NoRoom(NO_ROOM)

@@ -43,16 +43,8 @@ async def save(uploads: Sequence[Upload], place: Path, most: int) -> tuple[str, 
     """
     Write the files of a recording into a new folder of their title, and return their names.
 
-    Parameters
-    ----------
-    most : int
-        Files allowed.
-
-    Raises
-    ------
-    DataError
-        There are none, too many, or one is of no kind that is read.
-
+    ``most``: files allowed. Raises DataError: there are none, too many, or one is of no kind that
+    is read.
     """
     names = _names(uploads, BAGS + TABLES + OTHERS, 'a bag, a table nor a robot file', most)
     if not names:
@@ -135,16 +127,7 @@ def asked_of(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
     """
     Return what a form asks of a recording; its robot is empty where none was chosen.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of the files dropped.
-
-    Raises
-    ------
-    DataError
-        A field holds something that is no choice.
-
+    ``names``: of the files dropped. Raises DataError: a field holds something that is no choice.
     """
     reported = given(_texts(form), (IMPORT, DIAGNOSE))
     tables = [name for name in names if name.lower().endswith(TABLES)]
@@ -163,16 +146,8 @@ def asked_of_program(form: Mapping[str, Any], names: Sequence[str]) -> Asked:
     """
     Return what a form asks of a program.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of the files of its model.
-
-    Raises
-    ------
-    DataError
-        A field holds something that is no choice.
-
+    ``names``: of the files of its model. Raises DataError: a field holds something that is no
+    choice.
     """
     return Asked(_robot(form, names), told=given(_texts(form), (CORRECT,)))
 

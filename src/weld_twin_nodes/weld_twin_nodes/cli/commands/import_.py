@@ -99,9 +99,9 @@ def _touched(
 
 
 def _write_deviations(args: argparse.Namespace, recording: Recording, off: Array) -> None:
-    from ...offline import station_table
+    from ...offline import pose_tables
 
     if args.table:
-        station_table.write_table(args.table, recording, off)
+        pose_tables.write_table(args.table, recording, off)
     if args.picture:
-        station_table.draw(args.picture, recording, off)
+        pose_tables.draw(args.picture, recording, off)

@@ -80,8 +80,7 @@ def run(args: argparse.Namespace) -> int:
 def _simulate(args: argparse.Namespace) -> int:
     """Write the bag of a seam and print the deviation."""
     from ...offline.seam_motion import plan_motion, stamps
-    from ...offline.simulated_bag import write_simulation
-    from ...offline.simulation import Simulation
+    from ...offline.simulation import Simulation, write_simulation
 
     if args.start_stamp <= 0 or args.seed < 0:
         raise DataError('--start-stamp must be positive and --seed not negative')
@@ -109,8 +108,8 @@ def _predict(args: argparse.Namespace) -> int:
     """Write the bag; say how far measured and twin are apart where something was measured."""
     from weld_twin_msgs_py.bags import read_recording
 
+    from ...offline.pose_tables import write_prediction_table
     from ...offline.prediction import on_one_clock, predictor, told_sureness, write_prediction
-    from ...offline.prediction_table import write_prediction_table
 
     if not args.model:
         raise DataError('say with --model which effects the twin of a recording has')

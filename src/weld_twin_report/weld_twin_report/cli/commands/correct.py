@@ -10,7 +10,6 @@ BAG with nominal joint commands, a bag is written with those that put the real t
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -117,6 +116,7 @@ def _corrected_bag(args: argparse.Namespace) -> int:
 
 def _corrected_program(args: argparse.Namespace) -> int:
     """Read, correct, write; say what is expected."""
+    from weld_twin_msgs_py.files.json_file import write_json
     from weld_twin_msgs_py.programs import read_program
     from weld_twin_msgs_py.programs.languages import language_of
     from weld_twin_msgs_py.programs.source import read_source
@@ -130,14 +130,14 @@ def _corrected_program(args: argparse.Namespace) -> int:
     with output(args, RESULT) as place:
         entry = {'schema': 'weld_twin/correction/1', 'program': program.sources[0].name}
         _write_texts(place, program, [source.text for source in program.sources])
-        _write_entry(place, entry | {'language': language, 'model': None})
+        write_json(place / RESULT, entry | {'language': language, 'model': None})
     print(f'{args.out}: {len(program.steps)} moves in {language}, unchanged; no model was given')
     return 0
 
 
 def _by_model(args: argparse.Namespace, context: Context, program: Program) -> int:
     from weld_twin_core.twin.program_correction import Caps
-    from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
+    from weld_twin_msgs_py.files.json_file import write_json
     from weld_twin_msgs_py.files.whole_files import write_text
     from weld_twin_nodes.offline.correcting import (
         corrected_program,
@@ -146,7 +146,7 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
         program_model,
         way,
     )
-    from weld_twin_nodes.offline.told_twin import other_readings
+    from weld_twin_nodes.offline.told_twin import diagnosis_of, other_readings
     from weld_twin_nodes.offline.tolerances import tolerance_entry
 
     from ...report.correction_page import correction_page, headline, tolerance_told
@@ -155,7 +155,7 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
     robot = context.robot
     setup = 0 if args.setup is None else args.setup - 1
     model = program_model(robot, args.model, args.temperature, setup)
-    content = read_diagnosis(args.model) if Path(args.model).suffix.lower() == '.json' else {}
+    content = diagnosis_of(args.model)
     made = corrected_program(
         program, context, model, caps, start_of(args, robot), other_readings(content)
     )
@@ -168,7 +168,7 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
     with output(args, RESULT) as place:
         _write_texts(place, program, made.texts)
         write_text(place / PAGE, correction_page(entry, inputs))
-        _write_entry(place, entry)
+        write_json(place / RESULT, entry)
     print(f'{Path(args.out) / program.sources[0].name}: {headline(entry)}')
     print(*tolerance_told(entry), sep='\n', end='\n' if args.tolerance else '')
     _tell(entry)
@@ -205,9 +205,3 @@ def _tell(entry: dict[str, Any]) -> None:
 def _write_texts(place: Path, program: Program, texts: Sequence[str]) -> None:
     for source, text in zip(program.sources, texts, strict=True):
         (place / source.name).write_bytes(text.encode('latin-1'))
-
-
-def _write_entry(place: Path, entry: dict[str, object]) -> None:
-    from weld_twin_msgs_py.files.whole_files import write_text
-
-    write_text(place / RESULT, json.dumps(entry, indent=1, allow_nan=False) + '\n')

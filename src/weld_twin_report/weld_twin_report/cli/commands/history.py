@@ -236,7 +236,7 @@ def run(args: argparse.Namespace) -> int:
 def _pool(args: argparse.Namespace) -> Pool:
     from weld_twin_nodes.offline.task_pool import Cluster
 
-    from ...fleet.threads import Threads
+    from ...fleet.running import Threads
 
     return Cluster(args.scheduler) if args.scheduler else Threads(args.workers)
 

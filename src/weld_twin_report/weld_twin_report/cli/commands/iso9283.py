@@ -9,7 +9,6 @@ Writes iso9283.json and a page to read (report.html) to the directory.
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -81,6 +80,7 @@ def _write(
     args: argparse.Namespace,
 ) -> None:
     from weld_twin_core import __version__
+    from weld_twin_msgs_py.files.json_file import write_json
     from weld_twin_msgs_py.files.whole_files import write_text
 
     from ...report.performance_page import performance_page
@@ -97,7 +97,7 @@ def _write(
         'inputs': [item.as_dict() for item in inputs],
     }
     write_text(place / PAGE, performance_page(outcome, recording, robot.name, notes, inputs))
-    write_text(place / RESULT, json.dumps(result, indent=1, allow_nan=False) + '\n')
+    write_json(place / RESULT, result)
 
 
 def _warnings(result: Performance, align: frozenset[str]) -> list[str]:
@@ -115,7 +115,7 @@ def _warnings(result: Performance, align: frozenset[str]) -> list[str]:
 def _print(result: Performance, notes: Sequence[str], console: Console) -> None:
     from rich.table import Table
 
-    from ...report.performance_table import PATH_HEADS, POSE_HEADS, path_row, pose_rows, sentence
+    from ...report.performance_page import PATH_HEADS, POSE_HEADS, path_row, pose_rows, sentence
 
     console.print(sentence(result))
     paths = [] if result.path is None else [path_row(result.path)]

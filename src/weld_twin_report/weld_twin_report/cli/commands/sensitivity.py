@@ -72,8 +72,7 @@ def run(args: argparse.Namespace) -> int:
     setting = _setting(args)
     if args.figure:
         from ...sensitivity_report import make_figures
-        from ...sensitivity_report.make_study import study_files
-        from ...sensitivity_report.study_files import FIGURES, study_directory
+        from ...sensitivity_report.study_files import FIGURES, study_directory, study_files
 
         assert setting is not None
         place = study_directory(args.out)

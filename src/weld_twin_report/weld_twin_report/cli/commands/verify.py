@@ -11,7 +11,6 @@ kept, with 4 where it was not.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,6 +92,7 @@ def _write(
     args: argparse.Namespace, content: dict[str, Any], epoch_ns: int, result: Verification
 ) -> None:
     """Write verification.json and the page."""
+    from weld_twin_msgs_py.files.json_file import write_json
     from weld_twin_msgs_py.files.whole_files import write_text
 
     from ...report.verification_page import verification_page
@@ -106,7 +106,7 @@ def _write(
     }
     with output(args, RESULT) as place:
         write_text(place / PAGE, verification_page(result, str(entry['robot']), inputs))
-        write_text(place / RESULT, json.dumps(entry, indent=1, allow_nan=False) + '\n')
+        write_json(place / RESULT, entry)
     print(f'report: {Path(args.out) / PAGE}')
 
 
@@ -128,15 +128,12 @@ def _robot(args: argparse.Namespace, content: dict[str, Any]) -> Robot:
 
 
 def _correction(folder: str) -> dict[str, Any]:
+    from weld_twin_msgs_py.files.json_file import read_json
+
     path = Path(folder)
     path = path / CORRECTION if path.is_dir() else path
-    try:
-        content = json.loads(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise DataError(f"'{path}' cannot be read: {error.strerror}") from None
-    except ValueError:
-        content = None
-    if not isinstance(content, dict) or not isinstance(content.get('expected'), dict):
+    content = read_json(path)
+    if not isinstance(content.get('expected'), dict):
         raise DataError(
             f"'{path}' is no correction; give the folder that weld-twin correct --model wrote"
         )

@@ -41,11 +41,7 @@ def draw(setting: Setting, key: str) -> Drawing | None:
     """
     Return a figure; None where the recording holds no measurements to draw.
 
-    Raises
-    ------
-    DataError
-        There is no such figure, or not for this setting.
-
+    Raises DataError: there is no such figure, or not for this setting.
     """
     if key not in FIGURES:
         raise DataError(f'no figure is called {key!r}; there are ' + ', '.join(FIGURES))

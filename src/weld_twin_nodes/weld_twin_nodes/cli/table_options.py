@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .options import cameras_of
 
@@ -67,9 +67,10 @@ def table_of(args: argparse.Namespace, robot: Robot, file: str) -> Table:
         read_two_tables,
     )
 
-    options = TableOptions(
-        **{f.name: getattr(args, f.name) or f.default for f in fields(TableOptions)}
-    )
+    given: dict[str, Any] = {
+        f.name: getattr(args, f.name) or f.default for f in fields(TableOptions)
+    }
+    options = TableOptions(**given)
     if args.contacts:
         return read_contacts(file, robot, read_artefact(args.contacts), options)
     if args.clamped:

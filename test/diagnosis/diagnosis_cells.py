@@ -23,6 +23,16 @@ from weld_twin_lab.plant.tracker import Tracker
 
 SIGMA = 2e-5
 SIGMA_TURN = 5e-5
+ELSE = (
+    'transmission_ripple',
+    'bearing_tilt',
+    'joint_coupling',
+    'friction',
+    'hysteresis',
+    'vibration',
+)
+ELSE += ('gear_ratio_by_direction', 'loaded_play', 'hose_pull', 'pedestal_tilt', 'servo_lag')
+"""Kinds of causes that need not be tried where it is about others: the fewer, the sooner."""
 HOME = (0.1, -1.2, 1.5, -1.0, -1.4, 0.3, 0.2)
 
 

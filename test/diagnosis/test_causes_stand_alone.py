@@ -26,6 +26,8 @@ TRUE = (
     {'effect': 'joint_compliance', 'joint': 'joint_a2', 'compliance': 1.2e-5},
     {'effect': 'gear_ratio', 'joint': 'joint_a5', 'scale': 6e-4},
 )
+WAVES = ('transmission_ripple', 'bearing_tilt', 'joint_coupling')
+"""What need not be tried where it is about parts that predict each other."""
 NOISE = float(np.sqrt(3.0)) * SIGMA
 
 
@@ -72,10 +74,9 @@ def test_each_cause_says_which_effect_it_is_and_the_shares_make_a_whole():
     assert told['learned'] == told['confidence'] and told['sure'] in (True, False)
 
 
-@pytest.mark.parametrize('back', [0])
-def test_what_is_found_given_back_as_known_leaves_the_rest_as_told_as_before(back):
+def test_what_is_found_given_back_as_known_leaves_the_rest_as_told_as_before():
     whole = found()
-    known = whole.effects[back].effect
+    known = whole.effects[0].effect
     rest = diagnose([cell()], load(ARM), align='base,tool', known=[known], experiment=False)
     before = [group for group in sites(whole) if (known.name, known.site) not in group]
     assert rest.status in NAMING
@@ -99,7 +100,7 @@ def test_short_recordings_with_bases_of_their_own_predict_each_other():
         cell(few, static=count, seed=seed, name=f'part {seed}')
         for seed, count in ((1, 16), (2, 5), (3, 20))
     ]
-    told = diagnose(parts, load(ARM), align='base,tool', experiment=False)
+    told = diagnose(parts, load(ARM), align='base,tool', exclude=WAVES, experiment=False)
     assert told.status in NAMING
     assert told.shrink.rms_after_m < 1.7 * NOISE
 

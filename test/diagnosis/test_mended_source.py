@@ -12,6 +12,7 @@ import json
 
 import numpy as np
 import pytest
+from diagnosis_cells import ELSE
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.recording import JointMotion, Measurements, Recording
@@ -34,17 +35,7 @@ def run(*words):
 
 
 def diagnosed(words, out):
-    # Fewer kinds of causes are sooner tried; what is mended comes before all of them.
-    few = (
-        'transmission_ripple',
-        'bearing_tilt',
-        'joint_coupling',
-        'friction',
-        'hysteresis',
-        'vibration',
-    )
-    few += ('gear_ratio_by_direction', 'loaded_play', 'hose_pull', 'pedestal_tilt', 'servo_lag')
-    return run('diagnose', *words, '--apply', '--exclude-effect', *few, '--out', out)
+    return run('diagnose', *words, '--apply', '--exclude-effect', *ELSE, '--out', out)
 
 
 def true_points(q):

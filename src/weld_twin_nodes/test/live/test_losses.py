@@ -64,6 +64,9 @@ class Bench:
     def number(self, node, topic, key):
         return int(self.values(node, topic).get(key, 0))
 
+    def lost(self, node, topic):
+        return self.number(node, topic, 'lost')
+
     def apart(self):
         """Return how many poses came here, and are not counted by the analyzer as received."""
         return len(self.poses) - self.number(ANALYZER, '/twin/tool_pose', 'received')
@@ -115,8 +118,8 @@ def bench(tmp_path_factory, robot):
 def test_a_burst_that_overruns_a_node_is_told_with_the_number_and_its_end(bench):
     bench.steady(KEPT)
     topic = JOINT_STATES.name
-    bench.early = bench.settled(bench.unheard)  # what was sent before the two had met
-    assert bench.number(TWIN, topic, 'lost') == 0
+    # What was sent before the two had met is none of what is lost, be it on a busy machine.
+    bench.early = bench.settled(lambda: bench.unheard() - bench.lost(TWIN, topic))
     bench.overrun(bench.twin)
     bench.wait_said(bench.twin, 'missing messages, by the gaps between its stamps')
     told = bench.health.told[f'/{TWIN}']
@@ -126,28 +129,33 @@ def test_a_burst_that_overruns_a_node_is_told_with_the_number_and_its_end(bench)
 
 def test_what_one_node_of_the_project_sends_and_another_does_not_get_is_counted(bench):
     topic = '/twin/tool_pose'
-    before = bench.settled(bench.apart)  # one of the two may have met the twin a little later
-    assert bench.number(ANALYZER, topic, 'lost') == 0
+    # One of the two may have met the twin a little later, and a burst of it may have been too much.
+    before = bench.settled(lambda: bench.apart() - bench.lost(ANALYZER, topic))
+    had = bench.lost(ANALYZER, topic)
     bench.overrun(bench.analyzer)
     bench.wait_said(bench.analyzer, f'messages that /{TWIN} sent did not arrive')
 
     def counted():  # the tap of this process keeps up, and has all that was sent
-        lost = bench.number(ANALYZER, topic, 'lost')
-        return lost == bench.apart() - before > 0
+        return bench.lost(ANALYZER, topic) == bench.apart() - before > had
 
     bench.cell.wait(counted, 'the number')
 
 
 def test_the_end_of_a_loss_is_told_with_what_is_missing_in_all(bench):
     topic = JOINT_STATES.name
-    bench.wait_said(bench.twin, f'{topic}: no more messages go missing')
-    lost = bench.number(TWIN, topic, 'lost')
-    assert lost == bench.unheard() - bench.early
-    assert lost > BURST // 4
-    assert f'no more messages go missing; {lost:,} are missing in all' in bench.twin.log
-    # Each loss is told once when it begins and once when it is over, however many a busy machine has.
-    told = bench.twin.log.count('by the gaps')
-    assert told == bench.twin.log.count('no more messages go missing')
+
+    def over():
+        # Each loss is told when it begins and when it is over, however many a busy machine has.
+        log, lost = bench.twin.log, bench.lost(TWIN, topic)
+        all_there = lost == bench.unheard() - bench.early > BURST // 4
+        ends = log.count(f'{topic}: no more messages go missing')
+        return (
+            all_there
+            and ends == log.count('by the gaps') > 0
+            and f'no more messages go missing; {lost:,} are missing in all' in log
+        )
+
+    bench.cell.wait(over, lambda: f'the end: {bench.unheard()}, {bench.values(TWIN, topic)}')
 
 
 def ended(process):

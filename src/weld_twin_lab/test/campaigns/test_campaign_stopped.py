@@ -44,17 +44,15 @@ def until(condition, what: str) -> None:
         time.sleep(0.1)
 
 
-@pytest.fixture(params=['by hand', 'in the background'])
-def started(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Start processes as a terminal does, or as a script's job in the background, deaf to SIGINT."""
-    before = signal.getsignal(signal.SIGINT)
-    if request.param == 'in the background':
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+@pytest.fixture
+def in_the_background() -> Iterator[None]:
+    """Start processes as a script's job in the background: deaf to SIGINT, unlike a terminal's."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     yield
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.mark.usefixtures('started')
+@pytest.mark.usefixtures('in_the_background')
 def test_sigterm_ends_the_nodes_too(tmp_path: Path) -> None:
     out = tmp_path / 'soak.json'
     words = ['campaign', 'soak', '--minutes', '5', '--rate', '50', '--out', str(out)]

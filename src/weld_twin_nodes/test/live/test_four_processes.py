@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm import catalog
-from weld_twin_msgs_py.bags import BagReader, provenance
+from weld_twin_msgs_py.bags import BagReader, bag_info, provenance
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.offline.seam_motion import plan_motion, stamps
@@ -146,6 +146,17 @@ def test_the_recorded_bag_says_how_it_came_about(live_and_offline):
     assert made['version']
     assert made['effects'] == provenance(offline)['effects']
     assert made['effects'][0]['effect'] == 'backlash'
+    sent = len(content(live)['/joint_states'][0])
+    whole = {'sent': sent, 'recorded': sent, 'missing': 0}
+    for topic in (
+        '/joint_states',
+        '/actual/joint_states',
+        '/measured/tool_pose',
+        '/twin/tool_pose',
+    ):
+        assert made['completeness'][topic] == whole
+    assert made['completeness']['/deviation']['missing'] == 0
+    assert bag_info(live).incomplete == ()
 
 
 def test_another_tool_opens_the_recorded_bag(live_and_offline):

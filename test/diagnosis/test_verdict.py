@@ -1,9 +1,8 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The verdict on evidence given by hand, and what is left that no effect explains."""
+"""What can be looked for in data, and what is left that no effect explains."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,70 +12,9 @@ from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.library import build
-from weld_twin_core.diagnosis.hypotheses.rivals import Rival
-from weld_twin_core.diagnosis.result import Site
-from weld_twin_core.diagnosis.unseen.leftover_structure import Structure, structure
+from weld_twin_core.diagnosis.unseen.leftover_structure import structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
-from weld_twin_core.diagnosis.verdict.decision import decide
-from weld_twin_core.diagnosis.verdict.evidence import Evidence
 from weld_twin_core.recording import Measurements
-
-PLAY, OFFSET = Site('backlash', 'elbow_joint'), Site('joint_offset', 'wrist_1_joint')
-NOTHING_LEFT = Structure(3.5e-5, 0.0, 0.0, ())
-ELBOW_LEFT = Structure(2e-5, 0.5, 9.0, ('the angle of elbow_joint',))
-
-
-def slot(*pairs):
-    return tuple(Rival(site, 0.0, SimpleNamespace(), probability) for site, probability in pairs)
-
-
-def evidence(slots=(), loose=NOTHING_LEFT, after=3.5e-5, parts=None, fitted=None):
-    parts = (1.0 / max(len(slots), 1),) * len(slots) if parts is None else parts
-    fitted = after if fitted is None else fitted
-    believed = (0.9,) * len(slots)
-    return Evidence(slots, loose, 2e-4, after, 3.5e-5, fitted, True, parts, believed=believed)
-
-
-def test_a_sure_leader_is_named_alone():
-    verdict = decide(evidence((slot((PLAY, 0.97), (OFFSET, 0.03)),)))
-    assert verdict.status == 'identified'
-    assert verdict.sets == ((PLAY,),)
-
-
-def test_rivals_as_probable_are_named_together():
-    verdict = decide(evidence((slot((PLAY, 0.6), (OFFSET, 0.395), (Site('drift', None), 0.005)),)))
-    assert verdict.status == 'ambiguous'
-    assert verdict.sets == ((PLAY, OFFSET),)
-
-
-def test_no_effect_and_nothing_left_is_none():
-    alone = Evidence((), NOTHING_LEFT, 3.5e-5, 3.5e-5, 3.5e-5, 3.5e-5, True, ())
-    assert decide(alone).status == 'none'
-
-
-def test_what_stands_above_an_independent_floor_is_unknown():
-    verdict = decide(evidence(after=1.8e-4))
-    assert (verdict.status, verdict.sets) == ('unknown', ())
-
-
-def test_a_floor_taken_from_the_model_itself_proves_nothing():
-    shared = Evidence((), NOTHING_LEFT, 3.5e-5, 5e-5, 3.5e-5, 5e-5, False, ())
-    verdict = decide(shared)
-    assert verdict.status == 'none'
-
-
-def test_a_structure_that_a_few_stretches_hold_counts_when_it_is_large():
-    step = Structure(2e-5, 0.8, 2.5, ('time',))
-    verdict = decide(Evidence((), step, 6e-5, 6e-5, 3.5e-5, 6e-5, False, ()))
-    assert verdict.status == 'unknown'
-    assert 'time' in verdict.reasons[0]
-
-
-def test_an_effect_smaller_than_what_remains_is_told_beside_it():
-    slots = (slot((PLAY, 1.0)), slot((OFFSET, 1.0)))
-    verdict = decide(evidence(slots, after=1.5e-4, parts=(0.9, 0.1)))
-    assert verdict.status == 'unknown'
-    assert verdict.sets == ((PLAY,), (OFFSET,))
 
 
 def with_bend(size):

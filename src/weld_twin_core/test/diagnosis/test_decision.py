@@ -10,7 +10,6 @@ that a belief which moves by a quarter makes a test fail.
 from dataclasses import replace
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from weld_twin_core.diagnosis.beliefs import Beliefs
@@ -22,11 +21,7 @@ from weld_twin_core.diagnosis.verdict.evidence import Evidence
 
 ELBOW, WRIST = 'elbow_joint', 'wrist_1_joint'
 PLAY, OFFSET = Site('backlash', ELBOW), Site('joint_offset', WRIST)
-GEAR, SPRING, DRIFT = (
-    Site('gear_ratio', WRIST),
-    Site('joint_compliance', ELBOW),
-    Site('drift', None),
-)
+GEAR, DRIFT = Site('gear_ratio', WRIST), Site('drift', None)
 FLOOR = 3.5e-5
 
 
@@ -60,12 +55,6 @@ def evidence(*slots, **changes):
     return replace(usual, **changes)
 
 
-def remaining(share, *slots, **changes):
-    """Return evidence that leaves a share of the gap above a floor taken from the model."""
-    after = float(np.sqrt(FLOOR**2 + share**2 * (1e-6 - FLOOR**2)))
-    return evidence(*slots, **{'after': after, 'fitted': after, 'independent': False, **changes})
-
-
 def structured(left, *slots, **changes):
     """Return evidence of which a structure takes that share of the squared gap above the floor."""
     return evidence(
@@ -90,15 +79,11 @@ SURE = slot((PLAY, 1.0))
 
 @pytest.mark.parametrize(
     ('probability', 'status', 'named'),
-    [(0.86, 'identified', (PLAY,)), (0.84, 'ambiguous', (PLAY, OFFSET))],
+    [(0.85, 'identified', (PLAY,)), (0.84, 'ambiguous', (PLAY, OFFSET))],
 )
 def test_a_leader_is_named_alone_from_85_percent_on(probability, status, named):
     verdict = decide(evidence(slot((PLAY, probability), (OFFSET, 1.0 - probability))))
     assert (verdict.status, verdict.sets) == (status, (named,))
-
-
-def test_a_leader_of_exactly_85_percent_is_sure():
-    assert decide(evidence(slot((PLAY, 0.85), (OFFSET, 0.15)))).status == 'identified'
 
 
 @pytest.mark.parametrize(('probability', 'listed'), [(0.031, True), (0.03, True), (0.029, False)])
@@ -125,7 +110,7 @@ def test_where_all_is_told_apart_no_reason_is_given():
 def test_beliefs_that_are_given_decide():
     told = evidence(slot((PLAY, 0.9), (OFFSET, 0.1)))
     assert decide(told).status == 'identified'
-    assert decide(told, replace(Beliefs(), sure=0.95)).status == 'ambiguous'
+    assert decide(told, Beliefs(sure=0.95)).status == 'ambiguous'
 
 
 @pytest.mark.parametrize(('errors', 'structured'), [(2.9, False), (3.1, True)])
@@ -389,12 +374,6 @@ def test_kinds_are_told_and_the_status_says_if_they_are_all(believed, left, stat
 
 
 # The beliefs themselves -------------------------------------------------------------------------
-
-
-def test_other_beliefs_draw_another_verdict_from_the_same_evidence():
-    told = evidence(slot((PLAY, 0.8), (OFFSET, 0.2)))
-    assert decide(told).status == 'ambiguous'
-    assert decide(told, Beliefs(sure=0.75)).status == 'identified'
 
 
 def test_beliefs_cannot_be_changed_by_accident():

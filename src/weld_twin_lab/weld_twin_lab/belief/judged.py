@@ -22,8 +22,6 @@ AS_WELL = 0.05
 """Share of the noise by which a member of a set may leave more than the cause at work does."""
 AS_GOOD = 1.05
 """RMS left over what the true causes leave, up to which an answer predicts as the truth does."""
-CURVES = ('joint_curve', 'frame_curve')
-
 
 LARGE = 0.1
 """Share of the squared gap from which on a cause that is not told is missing, if it is no noise."""

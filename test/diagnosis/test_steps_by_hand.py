@@ -21,8 +21,9 @@ from weld_twin_core.diagnosis.soundness import base_change
 from weld_twin_core.diagnosis.soundness.computed import _noise, _paired
 from weld_twin_core.diagnosis.soundness.efforts import _Loads
 from weld_twin_core.diagnosis.soundness.lag import lag
-from weld_twin_core.diagnosis.soundness.mixups import _base, _fixture
+from weld_twin_core.diagnosis.soundness.mixups import _fixture
 from weld_twin_core.diagnosis.soundness.slips import _Seen
+from weld_twin_core.diagnosis.soundness.suspicions import turned_base
 from weld_twin_core.diagnosis.unseen.leftover_structure import _motion, _padded
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
@@ -55,12 +56,12 @@ def test_what_settles_begins_at_one_and_has_fallen_by_its_constant():
 )
 def test_a_turned_base_is_told_by_its_axis(ur5, turn, told):
     matrix = Rotation.from_rotvec(turn, degrees=True).as_matrix()
-    assert told in _base(ur5, matrix, 'nothing is left').sentence
+    assert told in turned_base(ur5, matrix).sentence
 
 
 def test_a_base_turned_about_no_axis_is_told_by_all_three(ur5):
     matrix = Rotation.from_rotvec([40.0, 40.0, 0.0], degrees=True).as_matrix()
-    assert 'about its axis (+1, +1, +0)' in _base(ur5, matrix, 'nothing is left').sentence
+    assert 'about its axis (+1, +1, +0)' in turned_base(ur5, matrix).sentence
 
 
 def test_the_side_of_stations_stands_where_paths_have_their_direction(ur5):

@@ -17,39 +17,36 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from ...arrays import Array
 from ...effects.hysteresis import SLIDING, Hysteresis
 from ...effects.loaded_play import SHARES
 from ...effects.measurement_scale import MeasurementScale
+from ...effects.plausible import plausible
 from ...effects.thermal_growth import ThermalGrowth
 from ...twin.features import Features
 from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
 from .lag import KEPT
-from .limits import TINY
+from .limits import FEW, ROWS, TINY, WIDER
 
-GEOMETRY = ('theta', 'd', 'a', 'alpha', 'beta')
-WIDE = 0.9
-"""Quantile of the residuals that noise is taken from, as that of a Gaussian."""
-MOST_ROWS = 18000
-"""Rows on which changes in time are looked for: three thousand poses, enough for any instant."""
-LOOSE = (3e-3, 1e-2)
-"""Prior spread of the arm's own errors [m, rad]."""
+GEOMETRY = {
+    'theta': ('joint_offset', 'offset'),
+    'd': ('link_offset', 'dd'),
+    'a': ('link_length', 'da'),
+    'alpha': ('link_twist', 'dalpha'),
+    'beta': ('axis_parallelism', 'dbeta'),
+}
+"""Channels of a row, and the error that displaces each."""
 LOOPS = (0.02, 0.1)
 """Travels [rad] over which loops of lost motion close, between a gap and a tenth of a turn."""
-GROWN = 1e-4
-"""Prior spread of a link's growth [1/K], as loose as the others: aluminium grows by 2.4e-5."""
-UNIT_OFF = 1e-3
-"""Prior spread of the instrument's unit of length: half of what is plausible at all."""
-ACTIVE = 0.05
-"""Share of a shape's largest value from which a sample takes part in it."""
 FEWEST = 12.0
 """Independent rows that are counted at the least: two frames have as many numbers."""
 TIED = 1e-6
 """Pull of a change to zero, in units of its columns: decides what data leave open."""
-CONSTANTS = np.geomspace(0.05, 0.7, 7)
+CONSTANTS = np.geomspace(0.05, 0.7, 13)
 """Time constants of settling, as shares of the recording."""
 
 
@@ -149,7 +146,7 @@ class Change:
 
     def size(self, shape: Array) -> float:
         """Return the RMS motion [m] of the measured points for the fitted change."""
-        active = np.abs(shape) > ACTIVE * np.abs(shape).max()
+        active = 2.0 * np.abs(shape) > FEW * np.abs(shape).max()
         moved = self.metres[active] @ _solved(*self._summed(shape[None]))[0]
         return float(np.sqrt((moved**2).sum(axis=1).mean()))
 
@@ -212,7 +209,7 @@ def rest_of(parts: list[Array], problem: Problem, model: Model) -> Rest:
 
 def thinned(problem: Problem, parts: list[Array]) -> tuple[Problem, list[Array]]:
     """Return fewer measurements and their residuals, where there are too many."""
-    few = problem.thinned(MOST_ROWS)
+    few = problem.thinned(ROWS)
     out = []
     for whole, thin, part in zip(problem.recordings, few.recordings, parts, strict=True):
         out.append(part[:, np.isin(whole.seen.t, thin.seen.t)])
@@ -226,7 +223,8 @@ def _scale(parts: list[Array]) -> Scale:
     A robust fit sides with the longer part, and a median with it; nine samples in ten do not.
     """
     size = [
-        float(np.quantile(np.abs(np.concatenate([p[rows].ravel() for p in parts])), WIDE)) / 1.645
+        float(np.quantile(np.abs(np.concatenate([p[rows].ravel() for p in parts])), 1.0 - FEW))
+        / ndtri(1.0 - FEW / 2.0)
         if any(p[rows].size for p in parts)
         else 1.0
         for rows in (slice(0, 3), slice(3, 6))
@@ -259,11 +257,12 @@ def _arm(maker: Features, rows: int) -> Array:
     view, robot = maker.view, maker.twin.robot
     out = []
     for i in range(robot.n):
-        joint = maker.column(('q', i))[:rows] * LOOSE[0 if robot.prismatic[i] else 1]
-        out += [
-            maker.column((key, i))[:rows] * LOOSE[0 if key in ('d', 'a') else 1]
-            for key in GEOMETRY
-        ]
+        name = robot.joint_names[i]
+        spread = {
+            key: WIDER * plausible(robot, *error, name).sd for key, error in GEOMETRY.items()
+        }
+        joint = maker.column(('q', i))[:rows] * spread['theta']
+        out += [maker.column((key, i))[:rows] * sd for key, sd in spread.items()]
         signals = [np.sin(view.q[:, i]), np.cos(view.q[:, i]), view.q[:, i]]
         signals += [view.shift[('tau', i)], view.qd[:, i], np.sign(view.qd[:, i])]
         side = np.sign(np.gradient(view.q[:, i])) if view.static else 0.0 * view.q[:, i]
@@ -302,12 +301,14 @@ def _grown(maker: Features, rows: int) -> Array:
     if view.temperature is None:
         return np.zeros((robot.n, rows, view.q.shape[0]))
     growths = [ThermalGrowth(links=(name,)) for name in robot.joint_names]
-    return np.stack([GROWN * maker.columns(one, atoms=False)[0, :rows] for one in growths])
+    spread = WIDER * plausible(robot, 'thermal_growth', 'coefficient').sd
+    return np.stack([spread * maker.columns(one, atoms=False)[0, :rows] for one in growths])
 
 
 def _scaled(maker: Features, rows: int) -> Array:
     """Return the column of an instrument that reads too long, shape (1, rows, M)."""
-    return UNIT_OFF * maker.columns(MeasurementScale(), atoms=False)[:, :rows]
+    spread = WIDER * plausible(maker.twin.robot, 'measurement_scale', 'scale').sd
+    return spread * maker.columns(MeasurementScale(), atoms=False)[:, :rows]
 
 
 def _basis(arm: Array, frames: Array) -> Array:

@@ -16,28 +16,31 @@ from ...effects.frame_errors import ToolPose
 from ..algebra.problem import Change, Model
 from .evidence import Case, Finding, mistake, note, warning
 from .lengths import falls, instant, length, listed
-from .limits import HALVED, NOISE, PARTED_TURN
+from .limits import FEW, HALVED, NOISE, PARTED, WRONG
 from .mending import differing
-from .orientation import WRONG, disagreement
+from .orientation import disagreement
 from .slips import KNOCKED, Settling, Slip
 from .snapshot import Arm, Snapshot
 
-SEEN = 2.0
-"""
-A change this many times as large as the largest gaps did not happen: whatever is aligned, one side
-of a step keeps half of it. A strong shake makes such steps that other columns undo.
-"""
+TORCH = 0.1
+"""Distance [m] at which a turn of the tool is compared with a shift: a marker's, a torch's."""
 
 
 def setup(case: Case) -> Sequence[Finding]:
-    """Return steps and settling of the set-up; those that are dated are causes, and told there."""
-    most = SEEN * case.largest
+    """
+    Return steps and settling of the set-up; those that are dated are causes, and told there.
+
+    A change twice as large as the largest gaps did not happen: whatever is aligned, one side of a
+    step keeps half of it. A strong shake makes such steps that other columns undo.
+    """
     out = []
     for each in case.changes:
-        if isinstance(each, Settling) and each.size < most:
+        if each.size > 2.0 * case.largest:
+            continue
+        if isinstance(each, Settling):
             out.append(note(_settled(case, each)))
-        elif isinstance(each, Slip) and each.kind == KNOCKED and each.size < most:
-            out += [] if case.slips else [warning(_moved(case, each))]
+        elif each.kind == KNOCKED and not case.slips:
+            out.append(warning(_moved(case, each)))
     return out
 
 
@@ -66,14 +69,6 @@ def _settled(case: Case, result: Settling) -> str:
     )
 
 
-MUCH = 0.2
-"""Share of the largest difference from which a recording is named."""
-TORCH = 0.1
-"""Distance [m] at which a turn of the tool is compared with a shift: a marker's, a torch's."""
-TURN_TOLD = 1e-3
-"""Turn [rad] from which it is told: a twentieth of a degree."""
-
-
 def parted(case: Case) -> Sequence[Finding]:
     """Return which recordings have a tool of their own, where that explains what is left."""
     reported = any(change.effect.traits.fitted_with == 'tool' for change in case.model.changes)
@@ -82,17 +77,18 @@ def parted(case: Case) -> Sequence[Finding]:
     shot = case.snapshot
     before = shot.arm()
     turn = disagreement(shot, before.model)
-    if before.gap < NOISE and turn < TURN_TOLD:
+    if before.gap < NOISE and turn < PARTED:
         return ()
     apart = _with_tools(shot)
     own = apart.arm()
     after = disagreement(apart, own.model)
-    shifted = HALVED * own.gap < before.gap and before.gap > NOISE
-    turned = HALVED * after < turn and turn > PARTED_TURN
-    if not (shifted or turned):
+    fallen = []
+    if before.gap > NOISE and HALVED * own.gap < before.gap:
+        fallen.append(falls(before.gap, own.gap))
+    if turn > PARTED and HALVED * after < turn:
+        fallen.append(f'that of the turns from {_angle(turn)} to {_angle(after)}')
+    if not fallen:
         return ()
-    fallen = [falls(before.gap, own.gap)] * shifted
-    fallen += [f'that of the turns from {_angle(turn)} to {_angle(after)}'] * turned
     sentence = f'{_words(case, own)}; so told, {listed(fallen)}.'
     remedy = (
         'Tell it (--may-change tool_pose, or --changed BAG tool), or diagnose the recordings one '
@@ -134,9 +130,11 @@ def _words(case: Case, own: Arm) -> str:
     # A turn counts by what it does at the reach of a torch.
     sizes = {k: way + TORCH * turn for k, (way, turn) in far.items()}
     worst = max(sizes, key=lambda k: sizes[k])
-    names = [case.recordings[k].name for k, size in sizes.items() if size > MUCH * sizes[worst]]
+    names = [
+        case.recordings[k].name for k, size in sizes.items() if size > 2.0 * FEW * sizes[worst]
+    ]
     way, turn = far[worst]
-    angle = f' and turned by {_angle(turn)}' if turn > TURN_TOLD else ''
+    angle = f' and turned by {_angle(turn)}' if turn > PARTED else ''
     most = f', {case.recordings[worst].name} most' if len(names) > 1 else ''
     return (
         f'The tool or its reflector of {listed(names)} sits elsewhere than that of '

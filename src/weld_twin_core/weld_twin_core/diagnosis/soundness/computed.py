@@ -17,33 +17,18 @@ import numpy as np
 from ...arrays import Array
 from ...recording import JointMotion, Recording
 from ..algebra.fit import fit
-from ..algebra.independent_rows import NORMAL
+from ..algebra.independent_rows import robust_spread
 from ..algebra.noise_floor import SAME_STATION
 from ..algebra.prior import effect_precision
 from ..algebra.problem import FRAMES, Model, Problem, Scale
 from ..frames.changes import constant_errors
 from .evidence import Case, Finding, mistake, note
 from .lengths import length
-from .limits import COMPUTED, ROUNDED, UNEXPLAINED
+from .limits import CLEAR, COMPUTED, ENOUGH, MOVED, SAMPLES, STEPS, UNEXPLAINED, WORTH
+from .stamps import written
 
-SAMPLES = 120
-"""Postures compared: several times the numbers that a rigid arm has."""
-ENOUGH = 2.0
-"""Numbers that must be measured for every one that is fitted: fewer agree with any arm."""
-NEAR = 2e-4
-"""Gap [m] that a first, linear step must leave at most; errors of a degree leave less."""
-GRIDS = (1e-5, 1e-6)
-"""Steps [m] to which positions are rounded where hundredths of a millimetre or less are written."""
-ANGLES = (*(10.0**-k for k in (3, 4, 5, 6)), *(np.radians(10.0**-k) for k in (2, 3, 4)))
-"""Steps [rad] to which joint positions are rounded where they are written, in radians or degrees."""
-ON_GRID = 1e-3
-"""Share of a step within which a number lies on it."""
-OVER = 1.3
-"""What is left over what rounding alone leaves, at most."""
 SMOOTH = 2e-8
 """Noise of a joint position [rad, m] below which no encoder has seen it."""
-STATES = 50
-"""Samples below which noise of an encoder cannot be measured."""
 
 
 def computed(case: Case) -> Sequence[Finding]:
@@ -56,7 +41,7 @@ def computed(case: Case) -> Sequence[Finding]:
 
 
 def _told(recording: Recording, remaining: float) -> Finding:
-    much = 'to the last digit' if remaining < 1e-7 else f'to {length(max(remaining, 1e-6))}'
+    much = f'to {length(remaining)}'.replace('to less than 0.001 mm', 'to the last digit')
     return mistake(
         f'The poses of {recording.name} agree with a rigid arm {much}, with no noise: they were '
         'computed from these joint positions, as the controller does, and not measured.',
@@ -75,21 +60,15 @@ def _left(case: Case, k: int) -> float | None:
     robot = case.model.robot
     known = case.model.known + case.model.changed(k)
     nominal = Model(robot, (case.model.bases[k],), known)
-    paired = list(_paired(case, k))
     # Of few postures only the arm as it was given can be told from one bent to agree.
     for model in (nominal, nominal.with_found(constant_errors(robot))):
-        tried = [_stations(recording, model) for recording in paired]
-        near = [
-            (one, started)
-            for one in tried
-            if one is not None and (started := _near(one, model)) is not None
-        ]
-        if not near:
-            continue
-        problem, (start, _) = min(near, key=lambda pair: pair[1][1])
-        remaining = _gap(problem, _fitted(problem, start, 12))
-        if remaining < max(COMPUTED, _rounding(problem, start)):
-            return remaining
+        tried = [_stations(recording, model) for recording in _paired(case, k)]
+        trials = [(one, _fitted(one, model, 1)) for one in tried if one is not None]
+        if trials:
+            problem, start = min(trials, key=lambda pair: _gap(*pair))
+            remaining = _gap(problem, _fitted(problem, start, 2 * STEPS))
+            if remaining < max(COMPUTED, _rounding(problem, start)):
+                return remaining
     return None
 
 
@@ -116,20 +95,16 @@ def _stations(recording: Recording, model: Model) -> Problem | None:
     seen, q = recording.seen, recording.joints.q
     _, first = np.unique(np.round(q / SAME_STATION), axis=0, return_index=True)
     first = np.sort(first)
-    pick = first[np.unique(np.linspace(0, first.size - 1, SAMPLES).round().astype(int))]
-    some = Recording(
-        recording.name, JointMotion(seen.t[pick], q[pick], static=True), seen.take(pick)
-    )
-    problem = Problem((some,), frozenset(FRAMES))
-    fitted = problem.frame_count + problem.shared_count + effect_precision(model).size
-    return problem if 3 * pick.size > ENOUGH * fitted else None
+    pick = first[np.unique(np.linspace(0, first.size - 1, 2 * SAMPLES).round().astype(int))]
+    motion = JointMotion(seen.t[pick], q[pick], static=True)
+    problem = Problem((Recording(recording.name, motion, seen.take(pick)),), frozenset(FRAMES))
+    # Twice as many numbers as are fitted: fewer agree with any arm.
+    return problem if 3 * pick.size > 2 * _count(problem, model) else None
 
 
-def _near(problem: Problem, model: Model) -> tuple[Model, float] | None:
-    """Return the model after one step, and what it leaves; None where that is far off."""
-    stepped = _fitted(problem, model, 1)
-    remaining = _gap(problem, stepped)
-    return (stepped, remaining) if remaining < NEAR else None
+def _count(problem: Problem, model: Model) -> int:
+    """Return how many numbers are fitted."""
+    return problem.frame_count + problem.shared_count + effect_precision(model).size
 
 
 def _fitted(problem: Problem, model: Model, iterations: int) -> Model:
@@ -140,29 +115,21 @@ def _fitted(problem: Problem, model: Model, iterations: int) -> Model:
 def _gap(problem: Problem, model: Model) -> float:
     """Return the median distance that is left [m], made up for what the fit took."""
     (part,) = problem.residuals(model)
-    shared = problem.frame_count + problem.shared_count
-    taken = (shared + effect_precision(model).size) / problem.size
+    taken = _count(problem, model) / problem.size
     return float(np.median(np.linalg.norm(part[:3], axis=0))) / float(np.sqrt(1.0 - taken))
 
 
 def _rounding(problem: Problem, model: Model) -> float:
     """Return the distance [m] that rounding of the numbers leaves, where that is little; else 0."""
     (recording,), (maker,) = problem.recordings, problem.features(model)
-    turning = ~model.robot.prismatic
-    step, angle = _grid(recording.seen.position, GRIDS), _grid(recording.joints.q, ANGLES)
+    q, turning = recording.joints.q, ~model.robot.prismatic
+    step = written(recording.seen.position)
+    angle = max(written(q), np.radians(written(np.degrees(q))))
     reach = [maker.column(('q', i))[:3] for i in np.flatnonzero(turning).tolist()]
     squares = np.sum([(column**2).sum(axis=0).mean() for column in reach])
-    out = OVER * float(np.sqrt((3.0 * step**2 + squares * angle**2) / 12.0))
-    return out if out < ROUNDED else 0.0
-
-
-def _grid(values: Array, steps: Sequence[float]) -> float:
-    """Return the coarsest step that all numbers are whole multiples of, or 0."""
-    for step in sorted(steps, reverse=True):
-        counts = values / step
-        if np.abs(counts - counts.round()).max() < ON_GRID:
-            return float(step)
-    return 0.0
+    # A number that is rounded is off by the root of a twelfth of the step.
+    out = float(np.sqrt((3.0 * step**2 + squares * angle**2) / 12.0)) / WORTH
+    return out if out < CLEAR * COMPUTED else 0.0
 
 
 def source(case: Case) -> Iterator[Finding]:
@@ -176,14 +143,15 @@ def source(case: Case) -> Iterator[Finding]:
 
 
 def _commanded(joints: JointMotion) -> bool:
-    if joints.static or joints.t.size < STATES:
+    if joints.static or joints.t.size < ENOUGH:
         return False
     noise = _noise(joints.q)
-    moving = np.ptp(joints.q, axis=0) > 1e-3
+    moving = np.ptp(joints.q, axis=0) > MOVED
     return bool(moving.any() and noise[moving].max() < SMOOTH)
 
 
 def _noise(q: Array) -> Array:
     """Return the noise of every joint from its fifth differences, which a smooth path has not."""
-    fifth = np.diff(q, n=5, axis=0)
-    return np.asarray(NORMAL * np.median(np.abs(fifth), axis=0) / np.sqrt(252.0))
+    differences = np.poly(np.ones(5))
+    fifth = [np.convolve(column, differences, mode='valid') for column in q.T]
+    return np.array([robust_spread(each) for each in fifth]) / np.linalg.norm(differences)

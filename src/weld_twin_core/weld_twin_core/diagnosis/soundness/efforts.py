@@ -24,28 +24,15 @@ from ...recording import Recording
 from ...twin.expected_effort import with_expected_effort
 from ..result import EffortCause, Efforts, JointEffort
 from .evidence import Case, Finding, note, warning
+from .limits import CLEAR, FEW, SAMPLES
 
-ROWS = 400
-"""Samples of a recording that are compared; neighbours of a moving arm say the same."""
-CLEAR = 0.5
-"""Correlation of all joints together from which a sign is told: rough masses keep 0.9, chance on
-some twenty postures stays below 0.3."""
-LOADED = 0.2
-"""Share of the largest load's spread below which a joint's own load tells nothing of units."""
-SHAPED = 0.8
-"""Correlation from which a joint's effort has the shape of its load, whatever the masses."""
-FACTOR = 4.0
-"""Factor between effort and load beyond which the unit is another: masses of links are known within
-a half, payloads add as much again; currents and per cent are off by tens."""
-MILLI = (250.0, 4000.0)
-"""Factors that N mm in the place of N m make, with masses as uncertain as above."""
+SHAPED = 1.0 - 2.0 * FEW
+"""Correlation from which a joint's effort has the shape of its load, whatever the masses. A sign is
+told from 0.5 of all joints together: rough masses keep 0.9, chance on some twenty postures stays
+below 0.3."""
 AGREES = 0.02
-"""Share of the load's RMS below which effort and statics agree: what torque sensors are good for."""
-EXPLAINS = 0.02
-"""
-Share of the squared difference, without what all causes together leave, that one may leave and be
-told: a seventh of its RMS.
-"""
+"""Share of the load's RMS below which effort and statics agree, which is what torque sensors are good
+for; and of the squared difference, that one cause may leave beside what all causes together leave."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +84,7 @@ def with_sign(recordings: Sequence[Recording], robot: Robot) -> tuple[Recording,
     loads = _loads(recordings, _weighing(robot))
     if robot.mass is not None:
         _refuse_units(loads)
-    if loads.correlation() > -CLEAR:
+    if 2.0 * loads.correlation() > -1.0:
         return tuple(recordings)
     return tuple(replace(r, effort_holds=not r.effort_holds) for r in recordings)
 
@@ -153,7 +140,7 @@ def _told_differences(result: Efforts) -> Iterator[Finding]:
 
 def _told_sign(result: Efforts) -> Finding:
     meaning = 'what holds the load' if result.holds else 'the load itself, not what holds it'
-    if abs(result.correlation) < CLEAR:
+    if 2.0 * abs(result.correlation) < 1.0:
         return warning(
             f'Springs take the measured efforts as {meaning}, and nothing confirms that: with '
             f'gravity on the links they correlate by {result.correlation:.2f}.'
@@ -200,7 +187,7 @@ def _of_one(recording: Recording, robot: Robot) -> tuple[Array, ...]:
     motion = recording.joints
     expected = with_expected_effort(recording, robot, recording.load_of_effort).effort
     assert expected is not None and recording.effort is not None
-    at = np.unique(np.linspace(0, motion.t.size - 1, ROWS).round().astype(int))
+    at = np.unique(np.linspace(0, motion.t.size - 1, 2 * SAMPLES).round().astype(int))
     sign = recording.load_of_effort
     measured = sign * recording.effort.at(motion.t[at]).T
     chain = frames(robot, motion.q[at])
@@ -227,7 +214,7 @@ def _of_links(robot: Robot, chain: Frames) -> Array:
 def _factors(loads: _Loads, size: Array) -> dict[int, float]:
     """Return measured load for each N m of the statics, of joints that the statics load."""
     out = {}
-    for i in np.flatnonzero(size > LOADED * size.max()):
+    for i in np.flatnonzero(size > 2.0 * FEW * size.max()):
         slope, _ = np.polyfit(loads.statics[i], loads.measured[i], 1)
         out[int(i)] = float(slope)
     return out
@@ -238,9 +225,9 @@ def _refuse_units(loads: _Loads) -> None:
     size = loads.statics.std(axis=1)
     for i, factor in _factors(loads, size).items() if size.max() > 0.0 else ():
         alike = np.corrcoef(loads.statics[i], loads.measured[i])[0, 1]
-        if not abs(alike) > SHAPED or 1.0 / FACTOR <= abs(factor) <= FACTOR:
+        if not abs(alike) > SHAPED or 1.0 / CLEAR <= abs(factor) <= CLEAR:
             continue
-        milli = MILLI[0] <= abs(factor) <= MILLI[1]
+        milli = 1e3 / CLEAR <= abs(factor) <= 1e3 * CLEAR
         unit = 'N mm in the place of N m' if milli else 'per cent, or the currents of motors'
         raise DataError(
             f'the effort of {loads.robot.joint_names[i]} is {abs(factor):.3g} times the torque that '
@@ -265,7 +252,7 @@ def _causes(loads: _Loads, gap: Array) -> tuple[EffortCause, ...]:
     noise = _left(every, gap)[2]
     for name, joint, columns in offered:
         values, spread, remaining = _left(np.concatenate([columns, nuisance]), gap)
-        if remaining - noise < EXPLAINS * (before - noise):
+        if remaining - noise < AGREES * (before - noise):
             value = float(values[0]) + (name != 'payload')
             result.append(EffortCause(name, joint, value, float(spread[0]), remaining / before))
     return tuple(sorted(result, key=lambda cause: cause.left))

@@ -18,19 +18,10 @@ from ..frames.alignment import refined
 from ..result import Unsound
 from .base_change import Rest, rest_of, thinned
 from .lag import Lag, lag
-from .limits import BY_ITSELF, HELD, LATE_LEFT, LATE_WORTH, RATE_MOST, TINY, UNEXPLAINED
+from .limits import ENOUGH, FAR, FEW, HALVED, SOUND, TINY, UNEXPLAINED, WORTH
 from .mending import Mend, as_entry
 from .slips import Settling, Slip, changes
 from .snapshot import Snapshot, snapshot
-
-ENOUGH = 30
-"""Joint states from which a motion has a shape in time."""
-HINT = 0.9
-"""What the gap must fall to for a lag to be looked into, and"""
-EXPLAINED = 0.35
-"""for it to be believed once the frames are fitted with it."""
-LARGEST = 0.99
-"""Quantile of the gaps that stands for the largest."""
 
 
 class Finding(NamedTuple):
@@ -90,54 +81,40 @@ class Case:
         """Return whether the tool is where the chain begins, as two arms hold one bar."""
         still = all((np.ptp(r.seen.position, axis=0) < TINY).all() for r in self.recordings)
         widest = max(float(np.ptp(q, axis=0).max()) for q in self.motions)
-        return still and self.gap < HELD * widest
+        return still and self.gap < FAR * widest
 
     @cached_property
     def lags(self) -> list[Lag | None]:
         """
         Return how late the measurements are; None where no lag explains the gap.
 
-        Frames fitted at a wrong lag hide it, so they are fitted again with the lag undone.
+        Where nobody could use the data as they are, the clocks may be far apart. Of a gap that a
+        sound arm may leave, a lag must explain more than the arm's own errors could: on a way out and
+        back play is late both times, and later where the arm is slower.
         """
-        result = self._explained(self._lags(self.model))
-        if any(result) or self.gap < UNEXPLAINED:
-            return self._beyond_arm(result)
-        # Nothing near explains what nobody could use: the clocks may be far apart.
-        return self._explained(self._lags(self.model, wide=True), wide=True)
-
-    def _beyond_arm(self, result: list[Lag | None]) -> list[Lag | None]:
-        """
-        Return the lags that explain more than the arm's own errors could.
-
-        On a way out and back play is late both times, and later where the arm is slower.
-        """
-        if self.gap > BY_ITSELF or not any(result):
+        result = self._explained(wide=False)
+        if not any(result) and self.gap > UNEXPLAINED:
+            result = self._explained(wide=True)
+        if not any(result) or self.gap > SOUND:
             return result
         rest = self.rest[1]
         return [
-            late if late is not None and late.after < LATE_WORTH * rest.left(k) else None
+            late if late is not None and late.after < WORTH * rest.left(k) else None
             for k, late in enumerate(result)
         ]
 
-    def _explained(self, first: Sequence[Lag | None], *, wide: bool = False) -> list[Lag | None]:
-        late = [f if f is not None and f.after < HINT * f.before else None for f in first]
+    def _explained(self, *, wide: bool) -> list[Lag | None]:
+        """Return lags that explain the gap, with frames fitted anew: at a wrong lag they hide it."""
+        first = self._lags(self.model, wide=wide)
+        late = [f if f is not None and f.after < (1.0 - FEW) * f.before else None for f in first]
         if not any(late):
             return [None] * len(late)
         shot = snapshot(self.problem, self.model, self._motions(late))
-        again = self._lags(
-            refined(replace(shot.problem, align=self.problem.align), shot.model), wide=wide
-        )
-        return [
-            new
-            if old is not None
-            and new is not None
-            and abs(new.rate) < RATE_MOST
-            and new.after < min(EXPLAINED * old.before, LATE_LEFT)
-            else None
-            for old, new in zip(late, again, strict=True)
-        ]
+        model = refined(replace(shot.problem, align=self.problem.align), shot.model)
+        pairs = zip(late, self._lags(model, wide=wide), strict=True)
+        return [new if _believed(old, new) else None for old, new in pairs]
 
-    def _lags(self, model: Model, *, wide: bool = False) -> list[Lag | None]:
+    def _lags(self, model: Model, *, wide: bool) -> list[Lag | None]:
         out: list[Lag | None] = []
         for k, recording in enumerate(self.recordings):
             t, seen = recording.joints.t, recording.seen
@@ -174,7 +151,7 @@ class Case:
     @cached_property
     def largest(self) -> float:
         """Return how far the largest gaps are [m]; the last per cent may be outliers."""
-        return max(float(np.quantile(distance(part), LARGEST)) for part in self.residuals)
+        return max(float(np.quantile(distance(part), 1.0 - FEW**2)) for part in self.residuals)
 
     @property
     def slips(self) -> list[Slip]:
@@ -185,6 +162,13 @@ class Case:
     def snapshot(self) -> Snapshot:
         """Return a few samples of every recording as stations, for trials."""
         return snapshot(self.problem, self.model, self.motions)
+
+
+def _believed(before: Lag | None, after: Lag | None) -> bool:
+    """Return whether a lag explains most of the gap before it, and is one of clocks."""
+    if before is None or after is None or abs(after.rate) > FEW:
+        return False
+    return HALVED * after.after < before.before and after.after < UNEXPLAINED
 
 
 Checker = Callable[[Case], Iterable[Finding]]

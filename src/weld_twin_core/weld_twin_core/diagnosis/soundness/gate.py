@@ -28,7 +28,7 @@ from .computed import computed, source
 from .efforts import efforts
 from .evidence import Case, Checker, Finding, mistake
 from .images import images
-from .limits import ENDS
+from .limits import FEW, MOST, ROWS
 from .mending import Given, as_entry
 from .mixups import mixups
 from .orientation import gravity, orientation
@@ -38,11 +38,6 @@ from .slips import Slip
 from .stamps import clocks, stamps, streams, velocities_checked
 from .stuck import stuck
 from .touches import touches
-
-ROUNDS = 4
-"""So often the checks are made anew after a mistake was undone; each finds what the last hid."""
-FIT_ROWS = 6000
-"""Rows on which the frames are fitted that the checks start from."""
 
 CHECKS: dict[str, tuple[Checker, str]] = {
     'quantity': (quantity, 'There is enough to work on.'),
@@ -160,7 +155,7 @@ def examine(
 
     """
     trial, mistakes, look = given, list[Finding](), _Look()
-    for _ in range(ROUNDS):
+    for _ in range(MOST + 1):  # what is undone shows what it hid
         result = streams(trial)
         look = _Look()
         if not result:
@@ -245,7 +240,7 @@ def _checked(
 ) -> tuple[list[Check], list[Finding], tuple[Slip, ...]]:
     """Return what the checks say, the mistakes among it, and what gave way; a mistake ends it."""
     if problem.align:
-        model = refined(problem.thinned(FIT_ROWS), model)
+        model = refined(problem.thinned(ROWS), model)
     case = Case(problem, model)
     out: list[Check] = []
     for name, (look, passed) in CHECKS.items():
@@ -260,7 +255,7 @@ def _checked(
 def _same(slip: Slip, other: Slip, problem: Problem) -> bool:
     """Return whether two steps of one recording are as near as one instant can be told."""
     t = problem.recordings[slip.recording].seen.t
-    near = abs(slip.time - other.time) <= ENDS * float(np.ptp(t))
+    near = 2.0 * abs(slip.time - other.time) <= FEW * float(np.ptp(t))
     return slip.recording == other.recording and near
 
 

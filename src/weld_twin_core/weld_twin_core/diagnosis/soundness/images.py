@@ -22,19 +22,29 @@ from ...cameras.located import located
 from ...cameras.sightings import Fitted
 from ...errors import DataError
 from .evidence import Case, Finding, mistake
-from .limits import (
-    BEHIND,
-    IMAGE_ALIKE,
-    IMAGE_FAR,
-    IMAGE_UNDONE,
-    LENS_DOUBT,
-    LENS_FAR,
-    TARGET_EXPLAINS,
-    TARGET_SCALE,
-)
+from .limits import ENOUGH, FEW, HALVED, ROWS, STRAY, WORTH
 
-LOOKED = 20
-"""Images in which it is looked whether a board is seen from behind."""
+IMAGE_FAR = 1.5
+"""
+Noise of a pixel [px] from which images are looked into.
+
+Corners of boards are found within 0.05 to 0.5 px, circles of markers within 1 px.
+"""
+DOUBT = STRAY / 2.0
+"""
+How far a lens may be from its calibration, in spreads between calibrations of one lens, before it is
+looked into; twice as far it is another one.
+
+Calibrations with few images of a board are off by two or three of them; another lens, or another
+zoom, by ten and more.
+"""
+TARGET_SCALE = 6e-3
+"""
+Share by which all that cameras measure may be too large for the way of the arm.
+
+Links off by some millimetres in a metre make half of it; a printer that fits the page makes 2 % and
+more.
+"""
 CALIBRATE = 'calibrate the camera, at the focus and zoom that it is used with'
 
 
@@ -67,7 +77,7 @@ def _by_themselves(seen: Sightings) -> Iterator[Finding]:
             )
             return
     far = float(np.abs(fitted.off).max())
-    if fitted.pixel < IMAGE_FAR and far < LENS_DOUBT:
+    if fitted.pixel < IMAGE_FAR and far < DOUBT:
         return
     for kind, at, words, remedy, trial in _trials(seen):
         try:
@@ -81,7 +91,7 @@ def _by_themselves(seen: Sightings) -> Iterator[Finding]:
             )
             yield _mistake(kind, at, sentence, remedy)
             return
-    if far >= LENS_FAR:
+    if far >= STRAY:
         c = int(np.abs(fitted.off).max(axis=1).argmax())
         yield _mistake(
             'intrinsics',
@@ -94,11 +104,11 @@ def _by_themselves(seen: Sightings) -> Iterator[Finding]:
 
 def _undone(before: Fitted, then: Fitted) -> bool:
     """Return whether images agree much better with what they were said to be."""
-    if float(np.abs(then.off).max()) > LENS_DOUBT:
+    if float(np.abs(then.off).max()) > DOUBT:
         return False
     nearer = float((before.off**2).sum() - (then.off**2).sum())
-    return then.pixel < IMAGE_UNDONE * before.pixel or (
-        then.pixel < IMAGE_ALIKE * before.pixel and nearer > LENS_DOUBT**2
+    return HALVED * then.pixel < before.pixel or (
+        WORTH * then.pixel < before.pixel and nearer > DOUBT**2
     )
 
 
@@ -131,19 +141,19 @@ def _trials(seen: Sightings) -> Iterator[tuple[str, str, str, str, Sightings]]:
 def _from_behind(seen: Sightings, k: int) -> bool:
     """Return whether a board shows its back in most images that show it well."""
     sides = []
-    for image in np.unique(seen.image[seen.target == k])[:LOOKED]:
+    for image in np.unique(seen.image[seen.target == k])[:ENOUGH]:
         for c, camera in enumerate(seen.cameras):
             rows = (seen.image == image) & (seen.camera == c) & (seen.target == k)
             points = seen.targets[k].points[seen.point[rows]]
             pose = located(camera.lens, points, seen.pixel[rows])
             if pose is not None:
                 sides.append(float(pose[:3, 2] @ pose[:3, 3]))
-    return bool(sides) and float(np.mean(np.array(sides) < 0.0)) > BEHIND
+    return bool(sides) and float(np.mean(np.array(sides) < 0.0)) > 1.0 - 2.0 * FEW
 
 
 def _beside_the_arm(case: Case) -> Iterator[Finding]:
     """Report what is measured too large, or too far from the camera, for the way of the arm."""
-    problem = case.problem.thinned(2000).of_frames()
+    problem = case.problem.thinned(ROWS).of_frames()
     scale = problem.unit_scale()
     parts, _ = problem.frame_columns(problem.features(case.model))
     remaining = problem.whitened(problem.residuals(case.model), scale)
@@ -170,7 +180,7 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
         share = float(column @ remaining) / size
         reported.append((share**2 * size / float(remaining @ remaining), share, kind))
     explained, share, kind = max(reported, default=(0.0, 0.0, ''))
-    if abs(share) > TARGET_SCALE and explained > TARGET_EXPLAINS:
+    if abs(share) > TARGET_SCALE and HALVED * explained > 1.0:
         yield _too_large(case, kind, share)
 
 

@@ -11,19 +11,14 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ..frames.in_turn import nearest_rotation
+from .limits import ENOUGH, FEW, STEPS, WORTH
 
 MOST_LAG = 2.0
 """Lags up to this [s] are looked at, and up to a tenth of the recording."""
 WIDEST = 0.4
 """Share of the recording up to which lags are looked at where nothing else can be wrong."""
-COARSE, STEP = 0.02, 0.01
-"""Spacing of the lags tried first, and of the differences that give velocities [s]."""
-SAMPLES = 300
-"""Samples compared at each lag: enough for one number, quick enough for a hundred lags."""
-ROUNDS = 6
-"""Steps from the best lag tried to the best there is."""
-APART = 0.6
-"""What clocks that run apart must leave of what a constant lag leaves."""
+TRIED = 300
+"""Lags tried first, and samples compared at each: enough for one number, and quick."""
 KEPT = 0.8
 """Share of the samples that count: the worst may be outliers."""
 
@@ -56,28 +51,23 @@ def lag(
     is needed. Where ``wide``, lags up to `WIDEST` of the recording are looked at.
     """
     span = float(np.ptp(t))
-    most = WIDEST * span if wide else min(MOST_LAG, 0.1 * span)
+    most = WIDEST * span if wide else min(MOST_LAG, FEW * span)
     index = np.flatnonzero((t > joints[0] + most) & (t < joints[-1] - most))
-    if index.size < 20:
+    if index.size < ENOUGH:
         return None
-    index = index[np.linspace(0, index.size - 1, min(SAMPLES, index.size)).round().astype(int)]
+    index = index[np.linspace(0, index.size - 1, min(TRIED, index.size)).round().astype(int)]
     stamps, seen = t[index], position[index]
-    middle = float(stamps.mean())
-    coarse = max(COARSE, most / 300.0) if wide else COARSE
-    grid = np.arange(-most, most + coarse, coarse)
+    none = Lag(0.0, 0.0, float(stamps.mean()))
+    grid = np.linspace(-most, most, TRIED + 1)
     costs = _misfits(seen, _along(path, joints, stamps - grid[:, None]))
-    start = Lag(_nearest(grid, costs), 0.0, middle)
+    start = none._replace(late=_nearest(grid, costs))
     constant = _polished(start, joints, path, stamps, seen, free=1)
     drifting = _polished(constant, joints, path, stamps, seen, free=2)
-    trials = (Lag(0.0, 0.0, middle), constant, drifting)
-    late = np.stack([trial.at(stamps) for trial in trials])
-    remaining = [float(v) for v in _misfits(seen, _along(path, joints, stamps - late))]
-    best, after = (
-        (drifting, remaining[2])
-        if remaining[2] < APART * remaining[1]
-        else (constant, remaining[1])
-    )
-    return best._replace(before=remaining[0], after=after)
+    late = np.stack([trial.at(stamps) for trial in (none, constant, drifting)])
+    before, after, apart = _misfits(seen, _along(path, joints, stamps - late)).tolist()
+    if apart < WORTH * after:
+        constant, after = drifting, apart
+    return constant._replace(before=before, after=after)
 
 
 def _along(path: Array, joints: Array, t: Array) -> Array:
@@ -87,18 +77,18 @@ def _along(path: Array, joints: Array, t: Array) -> Array:
 def _nearest(lags: Array, costs: Array) -> float:
     """Return the smallest lag among the best minima; a periodic motion has many."""
     padded = np.pad(costs, 1, constant_values=np.inf)
-    lowest = (costs <= padded[:-2]) & (costs <= padded[2:]) & (costs <= 1.3 * costs.min())
+    lowest = (costs <= padded[:-2]) & (costs <= padded[2:]) & (WORTH * costs <= costs.min())
     good = lags[lowest]
     return float(good[np.abs(good).argmin()])
 
 
 def _polished(start: Lag, joints: Array, path: Array, t: Array, seen: Array, free: int) -> Lag:
     """Return the lag after Gauss-Newton steps of its first one or two numbers."""
-    now = start
-    for _ in range(ROUNDS):
+    now, velocity = start, np.gradient(path, joints, axis=0)
+    for _ in range(STEPS):
         here = _along(path, joints, t - now.at(t))
         turn, keep = _aligned(seen, here)
-        speed = (_along(path, joints, t - now.at(t) + STEP) - here) @ turn.T / -STEP
+        speed = -_along(velocity, joints, t - now.at(t)) @ turn.T
         columns = [speed, speed * (t - now.middle)[:, None]][:free]
         system = np.stack([_centred(c, keep)[keep].ravel() for c in columns], axis=1)
         gap = _centred(seen, keep) - _centred(here, keep) @ turn.T

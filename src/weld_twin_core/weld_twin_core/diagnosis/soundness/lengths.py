@@ -10,19 +10,13 @@ import numpy as np
 
 from ...recording import Recording
 
-_LEAST = 5e-7
-"""Length [m] below which it reads 0.000 mm."""
-_FINE = 1e-4
-"""Length [m] below which three digits of mm are told, which no instrument is better than."""
-
 
 def length(value: float) -> str:
-    """Return a length [m] as people read it."""
+    """Return a length [m] as people read it: no finer than instruments are."""
     if value >= 1.0:
         return f'{value:.3g} m'
-    if value < _LEAST:
-        return 'less than 0.001 mm'
-    return f'{value * 1e3:.3g} mm' if value >= _FINE else f'{value * 1e3:.3f} mm'
+    millimetres = round(value * 1e3, 3)
+    return f'{millimetres:.3g} mm' if millimetres > 0.0 else 'less than 0.001 mm'
 
 
 def falls(before: float, after: float) -> str:

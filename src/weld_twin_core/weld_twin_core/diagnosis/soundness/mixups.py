@@ -26,28 +26,20 @@ from ..algebra.problem import Model, Problem
 from .evidence import Case, Finding, mistake
 from .lengths import falls, length, listed
 from .limits import (
-    BESIDE,
-    EXPLAINED,
+    CLEAR,
     FAR,
     HALVED,
     LARGE,
-    LINKS_APART,
     MOST,
     SHORTLIST,
-    SIBLING,
-    TURNED,
     UNDONE,
     UNEXPLAINED,
+    WIDER,
     WORTH,
 )
-from .mending import base_turned, frames_fitted
-from .snapshot import FRAMES, Arm, Snapshot, bent, gap, rough_models
-from .suspicions import AXES, doubles, robots, suspicions
-
-LENGTHS = ('link_length', 'link_offset')
-"""The lengths of a link."""
-HALF_TURN = 179.0
-"""Turn [degrees] from which its sense is rounding."""
+from .mending import frames_fitted
+from .snapshot import FRAMES, LENGTHS, Arm, Snapshot, bent, gap, rough_models
+from .suspicions import doubles, robots, suspicions, turned_bases
 
 
 def mixups(case: Case) -> Sequence[Finding]:
@@ -89,7 +81,8 @@ def _told(tried: _Tried, before: float, after: float) -> Finding:
         words += f'; undone, {falls(before, after)}'
     if others:
         words += f'. As well it may be that {" or that ".join(o.sentence for o in others)}'
-    return one._replace(sentence=f'{words}.', alike=tuple((o.kind, o.at) for o in others))
+    alike = (*one.alike, *((o.kind, o.at) for o in others))
+    return one._replace(sentence=f'{words}.', alike=alike)
 
 
 def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list[_Tried], Arm]:
@@ -103,7 +96,7 @@ def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list
                 break
             result.append(best)
             trial, arm, look = best.undone, best.arm, suspicions
-        factor = EXPLAINED if shot.possible or not trial.possible else HALVED
+        factor = CLEAR if shot.possible or not trial.possible else HALVED
         reported = arm.off < start.off / factor or _as_given(shot, trial, start, align)
         # What is shrunk leaves less of everything; it must leave less for its size as well.
         size = trial.shrunk(shot)
@@ -130,7 +123,7 @@ def _as_given(shot: Snapshot, trial: Snapshot, start: Arm, align: frozenset[str]
     On short motions free frames and a bent arm take up much of any mistake.
     """
     remaining = trial.gap_with(align)
-    return remaining < WORTH * start.gap and remaining < shot.gap_with(align) / EXPLAINED
+    return remaining < WORTH * start.gap and remaining < shot.gap_with(align) / CLEAR
 
 
 def _best(
@@ -155,7 +148,7 @@ def _best(
             if k not in fitted:
                 fitted[k] = _Tried(tried[k][0], shots[k], shots[k].arm())
         least = min(each.off for each in fitted.values())
-        if least < before.off / EXPLAINED:
+        if least < before.off / CLEAR:
             break
     if least > WORTH * before.off:
         return None
@@ -172,11 +165,10 @@ def _best(
 
 
 def _frames(case: Case, before: float) -> Sequence[Finding]:
-    """Frames that were not to be fitted may be to blame; name them."""
+    """Frames that were not to be fitted may be to blame, or what looks like it; name them."""
     if before < FAR:
         return ()
-    given = case.problem.align
-    shot = case.snapshot
+    given, shot = case.problem.align, case.snapshot
     for more in ({'base'}, {'tool'}, {'base', 'tool'}):
         if not more - given:
             continue
@@ -185,25 +177,28 @@ def _frames(case: Case, before: float) -> Sequence[Finding]:
         if remaining < UNEXPLAINED:
             if _plausible(shot.robot, model):
                 return ()
-            framed = _framed(shot, model, frozenset(more - given), before, remaining)
-            own = None if framed.kind == 'base_turned' else _within(shot, before, remaining, given)
-            if own and framed.kind == 'wrong_fixture' and own.at == shot.robot.joint_names[:1]:
-                # A fixture that is turned about the positioner's last axis is one with its zero.
-                own = own._replace(alike=(*own.alike, (framed.kind, framed.at)))
-            return [own or framed]
+            own = _within(shot, before, remaining, given, more - given)
+            return [own or _framed(shot, model, more - given, before, remaining)]
     return ()
 
 
 def _within(
-    shot: Snapshot, before: float, remaining: float, align: frozenset[str]
+    shot: Snapshot, before: float, remaining: float, align: frozenset[str], more: set[str]
 ) -> Finding | None:
-    """Return the mix-up that explains as much with no more frames fitted than were to be."""
+    """Return the mix-up that explains as much as more frames would, with those that are aligned."""
+    # Beside a turn a base may stand elsewhere as well, within what nobody looks at.
+    fixture = shot.robot.behind and more == {'base'}
+    turned = turned_bases(shot.robot) if more == {'base'} and not fixture else ()
     most = min(max(LARGE, 2.0 * remaining), UNDONE)
-    for suspicion in suspicions(shot.robot):
+    every = [*((each, FAR) for each in turned), *((each, most) for each in suspicions(shot.robot))]
+    for suspicion, limit in every:
         assert suspicion.mend is not None
         undone = shot.mended(suspicion.mend)
         gap = undone.gap_with(align)
-        if gap < min(most, before / EXPLAINED):
+        if gap < min(limit, before / CLEAR):
+            if fixture and suspicion.at == shot.robot.joint_names[:1]:
+                # A fixture that is turned about the positioner's last axis is one with its zero.
+                suspicion = suspicion._replace(alike=(('wrong_fixture', ('base',)),))
             return _told(_Tried(suspicion, undone, Arm(shot.model, gap, np.zeros(0))), before, gap)
     return None
 
@@ -223,13 +218,10 @@ def _plausible(robot: Robot, model: Model) -> bool:
 
 
 def _framed(
-    shot: Snapshot, model: Model, more: frozenset[str], before: float, remaining: float
+    shot: Snapshot, model: Model, more: set[str], before: float, remaining: float
 ) -> Finding:
     if more == {'base'} and shot.robot.behind:
         return _fixture(shot.robot, model.bases, falls(before, remaining))
-    turn = _turned(shot.robot.T_world_base, model.bases[0]) if more == {'base'} else None
-    if turn is not None:
-        return _base(shot.robot, turn, falls(before, remaining))
     names = listed(sorted(more))
     return mistake(
         f'The gap of {length(before)} is almost only one of frames: with the {names} fitted '
@@ -238,33 +230,7 @@ def _framed(
         tuple(sorted(more)),
         f'Have the {names} aligned (--align) if the instrument stands anywhere, or the tool '
         'centre point was never measured',
-        partial(frames_fitted, frames=more),
-    )
-
-
-def _base(robot: Robot, turn: Array, reported: str) -> Finding:
-    """Return the mistake that a base is that stands turned, shape (3, 3)."""
-    vector = np.degrees(rotation_vector(turn))
-    k, angle = int(np.abs(vector).argmax()), float(np.linalg.norm(vector))
-    if abs(abs(vector[k]) - angle) < 1.0:
-        about, size = f'{AXES[k]} axis', float(vector[k])
-    else:
-        parts = ', '.join(f'{part:+.0f}' for part in vector / np.abs(vector).max())
-        about, size = f'axis ({parts})', angle
-    size = abs(size) if angle > HALF_TURN else size
-    first = robot.joint_names[0]
-    # About its own first axis an arm cannot tell its base from the zero of its first joint.
-    either = k == 2 and about.startswith('z') and not robot.prismatic[0]
-    words = f'; a joint {first} whose zero is off by as much would look the same'
-    return mistake(
-        f'The base of the robot stands turned by {size:.0f} degrees about its {about} against '
-        f'the frame that was given; turned back, {reported}.',
-        'base_turned',
-        ('base',),
-        'Use the axes of the robot base that the controller counts in (for a UR: base or '
-        f'base_link), or add the turn to the base frame{words if either else ""}',
-        partial(base_turned, turn=turn),
-        alike=(('constant_angle', (first,)),) if either else (),
+        partial(frames_fitted, frames=frozenset(more)),
     )
 
 
@@ -291,27 +257,13 @@ def _fixture(robot: Robot, bases: Sequence[Array], reported: str) -> Finding:
     return mistake(words, 'wrong_fixture', ('base',), remedy, mend)
 
 
-def _turned(given: Array, fitted: Array) -> Array | None:
-    """Return by which turn a base stands that has axes along those given, where it is nearby."""
-    off = np.linalg.inv(given) @ fitted
-    if np.linalg.norm(off[:3, 3]) > BESIDE:
-        return None
-    # Of all turns that lead axes onto axes the nearest has ones where the turn is largest.
-    turn = np.zeros((3, 3))
-    rows = np.abs(off[:3, :3]).argmax(axis=1)
-    turn[np.arange(3), rows] = np.sign(off[np.arange(3), rows])
-    if len(set(rows.tolist())) < 3 or np.linalg.det(turn) < 0.0 or np.array_equal(turn, np.eye(3)):
-        return None
-    return turn if np.linalg.norm(rotation_vector(turn.T @ off[:3, :3])) < TURNED else None
-
-
 # Nothing known ---------------------------------------------------------------------------------
 
 
 def _links(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     """Return that free frames and a bent arm took up what are the links of another one."""
     align = case.problem.align
-    result = _other_links(shot, align) if case.gap >= SIBLING else None
+    result = _other_links(shot, align) if case.gap >= UNDONE else None
     if result is None:
         return ()
     reported, remaining = result
@@ -338,7 +290,7 @@ def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
         )
         return (mistake(words, 'other', (), remedy),)
     # Links and zeros bend to whatever else is wrong; only what explains the gap is believed.
-    if arm.gap > LARGE or arm.gap > shot.gap(shot.framed()) / EXPLAINED or case.slips:
+    if arm.gap > LARGE or arm.gap > shot.gap(shot.framed()) / CLEAR or case.slips:
         return ()
     worst = arm.model.found[int(arm.strain.argmax())]
     if isinstance(worst, RootPose):
@@ -387,13 +339,11 @@ def _other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Finding, float]
     own = [*given, *_of_joints(shot, (JointOffset, LinkTwist))]
     own += [RootPose()] if shot.robot.behind else []
 
-    def fitted(errors: Sequence[Effect], spread: float = 0.0) -> tuple[Model, float]:
-        """Return the fit of errors by their own priors, lengths by a spread [m], and its gap."""
+    def fitted(errors: Sequence[Effect], wider: float = 1.0) -> tuple[Model, float]:
+        """Return the fit of errors by their priors, those of lengths so much wider, and its gap."""
         model = start.with_found(tuple(errors))
-        precision = effect_precision(model)
-        if spread > 0.0:
-            names = np.concatenate([np.repeat(e.name, e.fit.coordinates().size) for e in errors])
-            precision = np.where(np.isin(names, LENGTHS), spread**-2.0, precision)
+        own = [np.full(e.fit.coordinates().size, e.name in LENGTHS) for e in errors]
+        precision = effect_precision(model) / np.where(np.concatenate(own), wider**2, 1.0)
         # What an arm can have leaves less: more is no noise that would excuse anything.
         model = bent(problem, model, precision, LARGE)
         return model, gap(problem, model)
@@ -401,10 +351,10 @@ def _other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Finding, float]
     remaining = fitted([*own, *_of_joints(shot, (JointCompliance,))])[1]
     if remaining < LARGE:
         return None
-    for spread in LINKS_APART:
-        arm, after = fitted([*own, *_of_joints(shot, (LinkLength, LinkOffset))], spread)
+    for wider in (WIDER, WIDER**3):  # within a family, and of an arm of another size
+        arm, after = fitted([*own, *_of_joints(shot, (LinkLength, LinkOffset))], wider)
         if HALVED * after < remaining:
-            if _moved(problem, arm) <= SIBLING:
+            if _moved(problem, arm) <= UNDONE:
                 return None
             lengths = [e for e in arm.found if e.name in LENGTHS]
             worst = max(lengths, key=lambda e: abs(float(e.vector()[0])))

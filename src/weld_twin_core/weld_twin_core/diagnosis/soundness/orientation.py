@@ -5,19 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
 from ...arrays import Array
 from ..algebra.problem import Model
-from .evidence import Case, Finding, mistake, warning
-from .limits import EXPLAINED, TILTED, UNEXPLAINED
-from .mending import WAYS, turns_as
+from .evidence import Case, Finding, warning
+from .limits import CLEAR, TILTED, UNEXPLAINED, WRONG
 from .snapshot import Snapshot
-
-WRONG = 0.05
-"""Median angle [rad] from which orientations do not belong to the joints."""
+from .suspicions import conventions
 
 
 def orientation(case: Case) -> Sequence[Finding]:
@@ -29,13 +25,12 @@ def orientation(case: Case) -> Sequence[Finding]:
     points = shot.pointed()
     if turned < WRONG or points.gap(points.framed()) > UNEXPLAINED:
         return ()
-    for way, (words, _) in WAYS.items():
-        mend = partial(turns_as, way=way)
-        trial = shot.mended(mend)
-        if EXPLAINED * disagreement(trial, trial.framed()) < turned:
-            sentence = f'{words}; undone, they agree with the joints.'
-            remedy = 'Mend the convention where the orientations are exported'
-            return (mistake(sentence, 'other', ('instrument',), remedy, mend),)
+    for suspicion in conventions():
+        assert suspicion.mend is not None
+        trial = shot.mended(suspicion.mend)
+        if CLEAR * disagreement(trial, trial.framed()) < turned:
+            sentence = f'{suspicion.sentence}; undone, they agree with the joints.'
+            return (suspicion._replace(sentence=sentence),)
     return (
         warning(
             f'Measured orientations disagree with the joints by {np.degrees(turned):.3g} degrees '

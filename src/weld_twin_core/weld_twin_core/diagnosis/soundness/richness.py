@@ -12,16 +12,12 @@ from ...errors import DataError
 from ..frames.open_directions import shown
 from .evidence import Case, Finding, note
 from .lengths import listed
-from .limits import MOVED, TINY
+from .limits import ENOUGH, MOVED, NOISE
 
 TWO_ARMS = 12
 """Turning joints from which a chain holds two arms: of six each. An arm on a gantry that welds on a
 positioner has nine, or ten with seven axes."""
 AXES = ('x', 'y', 'z', 'turn about x', 'turn about y', 'turn about z')
-STILL = 1e-5
-"""A spread [m, rad] below which nothing moved."""
-FEW_STATIONS = 20
-"""Stations below which it is told: sixty coordinates for the some thirty of a geometric fit."""
 
 
 def motion(case: Case) -> Sequence[Finding]:
@@ -64,11 +60,8 @@ def _one_way(case: Case) -> Iterator[Finding]:
         return
     turned = np.zeros(case.model.robot.n, dtype=bool)
     for q in case.motions:
-        moved = np.diff(q, axis=0)
-        travel = np.maximum(np.abs(moved).sum(axis=0), TINY)
-        one_way = np.abs(moved.sum(axis=0))
-        turned |= one_way < 0.999 * travel
-        turned |= travel < MOVED
+        travel = np.abs(np.diff(q, axis=0)).sum(axis=0)
+        turned |= (travel < MOVED) | (travel - np.abs(q[-1] - q[0]) > MOVED)
     names = [
         repr(name) for name, t in zip(case.model.robot.joint_names, turned, strict=True) if not t
     ]
@@ -117,18 +110,18 @@ def quantity(case: Case) -> Sequence[Finding]:
         )
     spread = max(float(np.ptp(q, axis=0).max()) for q in case.motions)
     seen = max(float(np.ptp(r.seen.position, axis=0).max()) for r in case.recordings)
-    if spread < STILL:
+    if spread < NOISE:
         raise DataError(
             'the joints do not move in any recording; '
             + (
                 'there is nothing to compare'
-                if seen < STILL
+                if seen < NOISE
                 else 'the tool does, so these are not its joint states'
             )
         )
-    if seen < STILL and not case.held:
+    if seen < NOISE and not case.held:
         raise DataError('the joints move, but the measured tool never does; is the topic right?')
     total = sum(problem.samples)
-    if problem.at_rest and total < FEW_STATIONS:
+    if problem.at_rest and total < ENOUGH:
         return (note(f'With {total} stations few causes can be told apart.'),)
     return ()

@@ -24,23 +24,10 @@ from ...recording import Recording
 from ..algebra.problem import Problem
 from .base_change import CONSTANTS, Change, Rest, other_shapes, smooth_shapes
 from .lengths import instant, length
-from .limits import (
-    DATED,
-    DATED_MOVING,
-    DATED_SHARE,
-    DATED_SIZE,
-    ENDS,
-    LEFT_ALIKE,
-    MARGIN,
-    MOST_SLIPS,
-    NEARLY,
-    TINY,
-)
+from .limits import FEW, MARGIN, MOST, TINY
 
 SLOW = 2.0
 """Seconds below which nothing warms up; what dies away faster is a transient of the arm."""
-NEIGHBOURS = np.geomspace(0.8, 1.25, 7)
-"""Factors on a rough time constant that are tried about it."""
 KNOCKED, JUMPED, SLIPPED = 'instrument_knocked', 'reflector_jumped', 'joint_slipped'
 _AGAIN = 'and measure again; or split the recording there and have the'
 _WORDS = {
@@ -151,7 +138,7 @@ def changes(
     out: list[Slip | Settling] = []
     taken: list[tuple[int, int]] = []
     whole = rest.far
-    for _ in range(MOST_SLIPS):
+    for _ in range(MOST):
         seen = _Seen(problem, rest, joints, taken)
         best = seen.best()
         if best is None:
@@ -162,8 +149,9 @@ def changes(
             out += [] if named is None else [named]
             continue
         taken.append((best.slip.recording, best.at))
-        seldom = before - rest.far > DATED_SHARE * whole
-        dated = seldom and best.slip.size < DATED_SIZE * largest
+        # Effects that no formula holds exactly leave small steps here and there; and no step is twice
+        # as large as the largest gaps: one frame that is fitted takes up half of it.
+        dated = before - rest.far > FEW * whole and best.slip.size < 2.0 * largest
         out.append(replace(best.slip, dated=dated))
     return out
 
@@ -196,14 +184,13 @@ class _Seen:
     def best(self) -> _Trial | None:
         """Return the step or smooth change with most evidence; None where nothing is sure."""
         trials = []
-        for k, recording in enumerate(self.problem.recordings):
-            sure = DATED if recording.joints.static else DATED_MOVING
+        for k in range(len(self.problem.recordings)):
             smooth = max(self._smooth(k), key=_nats)
             steps = list(self._steps(k))
             step, surest = _simplest(steps), max((t.nats for t in steps), default=0.0)
-            if step is not None and surest > max(sure, MARGIN + smooth.nats):
+            if step is not None and surest > MARGIN + max(smooth.nats, 0.0):
                 trials.append(step._replace(nats=surest))
-            elif smooth.nats > sure:
+            elif smooth.nats > MARGIN:
                 trials.append(smooth)
         return max(trials, key=_nats, default=None)
 
@@ -231,7 +218,8 @@ class _Seen:
 
     def _steps(self, k: int) -> Iterator[_Trial]:
         t = self.problem.recordings[k].seen.t
-        edge = max(3, int(ENDS * t.size))
+        # At the ends of a recording a step cannot be told from the end's own troubles.
+        edge = max(3, int(FEW * t.size / 2.0))
         allowed = np.zeros(t.size, dtype=bool)
         allowed[edge : t.size - edge] = True
         for recording, at in self.taken:
@@ -263,10 +251,8 @@ class _Seen:
         def settled(constant: float) -> Array:
             return self._placed(np.exp(-age / constant), k)
 
-        def gain(constant: float) -> float:
-            return float(self._base.gains(settled(constant)[None])[0])
-
-        constant = float(max(max(CONSTANTS, key=gain) * NEIGHBOURS, key=gain))
+        best = self._base.best([settled(constant) for constant in CONSTANTS])
+        constant = next(c for c in CONSTANTS if np.array_equal(settled(c), best))
         shape, late = settled(constant), constant * float(np.ptp(t))
         log_bayes_factor = self._base.nats(shape)
         slow = self.problem.recordings[k].joints.static or late > SLOW
@@ -304,7 +290,7 @@ def _simplest(trials: Sequence[_Trial]) -> _Trial | None:
         return None
     most = max(trial.gain for trial in trials)
     whole = float((trials[0].change.rest.residual ** 2).sum())
-    least = max(NEARLY * most, whole - LEFT_ALIKE * (whole - most))
+    least = max((1.0 - FEW) * most, whole - 2.0 * (whole - most))
     enough = [trial for trial in trials if trial.gain >= least > 0.0]
     if not enough:  # nothing to explain, so no number explains it
         return None

@@ -15,35 +15,25 @@ from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
+from ...effects.plausible import ranges
 from ...effects.root_pose import RootPose
 from ...recording import JointMotion, Measurements, Recording
 from ..algebra.fit import fit, robust_scale
+from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem, Scale
 from ..frames.alignment import initial_frames, refined, rough_frames, tracks
-from .limits import (
-    BEYOND,
-    LARGE,
-    LINK_MOST,
-    LINK_SPREAD,
-    OFFSET_MOST,
-    OFFSET_SPREAD,
-    ROOT_MOST,
-    ROOT_SPREAD,
-    SOFT,
-    TINY,
-    TWIST_MOST,
-    TWIST_SPREAD,
-    UNLIKE,
-)
+from .limits import CLEAR, ENOUGH, LARGE, MOST, SAMPLES, STEPS, TINY, WIDER
 from .mending import Given, Mend
 
-SAMPLES = 60
-"""Samples of a snapshot in all: enough for every error of an arm, few enough for fits at once."""
-ROUNDS, STEPS = 3, 6
-"""Fits of an arm, each with the weights of the last, and the steps of each."""
 FRAMES = frozenset({'base', 'tool'})
 KINDS = (JointOffset, LinkLength, LinkOffset, LinkTwist)
 """Errors that a plausible arm has on every joint."""
+LENGTHS = ('link_length', 'link_offset')
+"""The lengths of a link; those of another arm differ in several, so they count together."""
+SOFT = LARGE / CLEAR
+"""Noise [m, rad] that trial fits assume at least, so that what an arm can have keeps its weight."""
+BEYOND = 1.0
+"""Reading [rad, m] beyond a joint's range that no controller gives, whatever its zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +57,8 @@ class Snapshot:
         """Return the snapshot after a correction."""
         out = mend(Given(self.recordings, self.robot, FRAMES))
         model = replace(self.model, robot=out.robot)
+        if (out.robot.T_world_base != self.robot.T_world_base).any():
+            model = replace(model, bases=(out.robot.T_world_base,) * len(model.bases))
         if out.robot.joint_names != self.robot.joint_names:
             # What is known of a joint, or differs at it, means nothing on another robot.
             frames = tuple(c for c in model.changes if c.effect.site is None)
@@ -97,7 +89,7 @@ class Snapshot:
             self.model.twin(k).poses(recording, recording.seen.t).position
             for k, recording in enumerate(self.recordings)
         ]
-        return max(1.0, _spread(twins) / (UNLIKE * max(self.spread, TINY)))
+        return max(1.0, _spread(twins) / (CLEAR * max(self.spread, TINY)))
 
     def shrunk(self, before: Snapshot) -> float:
         """Return by what factor the measurements spread less than before, or 1."""
@@ -149,20 +141,13 @@ class Snapshot:
 
     def arm(self) -> Arm:
         """Return the frames and a plausible arm that fit best, and how far off they leave it."""
-        usual = (OFFSET_SPREAD, LINK_SPREAD, LINK_SPREAD, TWIST_SPREAD)
-        bounds = (OFFSET_MOST, LINK_MOST, LINK_MOST, TWIST_MOST)
-        spread, most = np.repeat(usual, self.robot.n), np.repeat(bounds, self.robot.n)
-        straight = np.flatnonzero(self.robot.prismatic)
-        spread[straight], most[straight] = LINK_SPREAD, LINK_MOST
         errors: list[Effect] = [kind(name) for kind in KINDS for name in self.robot.joint_names]
-        if self.robot.behind:
-            root = RootPose()
-            errors.append(root)
-            spread = np.append(spread, np.full(root.vector().size, ROOT_SPREAD))
-            most = np.append(most, ROOT_MOST)
+        errors += [RootPose()] if self.robot.behind else []
         start = self.framed().with_found(tuple(errors))
-        trial = bent(self.problem, start, spread**-2.0)
-        strain = np.array([np.abs(e.vector()).max() for e in trial.found]) / most
+        trial = bent(self.problem, start, effect_precision(start) / WIDER**2)
+        most = [ranges(self.robot, error)[1] for error in trial.found]
+        pairs = zip(trial.found, most, strict=True)
+        strain = np.array([np.abs(error.vector() / high).max() for error, high in pairs])
         return Arm(trial, self.gap(trial), strain)
 
 
@@ -179,12 +164,8 @@ class Arm(NamedTuple):
 
     @property
     def off(self) -> float:
-        """
-        Return how much is wrong: the gap or the strain in units of their limits, the worst.
-
-        Lengths of links count together: those of another arm differ in several.
-        """
-        lengths = np.array([e.name in ('link_length', 'link_offset') for e in self.model.found])
+        """Return how much is wrong: the gap or the strain in units of their limits, the worst."""
+        lengths = np.array([error.name in LENGTHS for error in self.model.found])
         together = float(np.sqrt((self.strain[lengths] ** 2).sum()))
         return max(self.gap / LARGE, together, float(self.strain.max()))
 
@@ -195,7 +176,7 @@ def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
 
     ``motions`` are the joint positions at the measurements, (M, n) [rad or m], one per recording.
     """
-    share = max(12, SAMPLES // len(problem.recordings))
+    share = max(ENOUGH, SAMPLES // len(problem.recordings))
     out = []
     for recording, q in zip(problem.recordings, motions, strict=True):
         seen = recording.seen
@@ -212,8 +193,8 @@ def bent(problem: Problem, start: Model, precision: Array, noise: float = np.inf
     ``precision``, (K,), is the prior precision of every coordinate of the errors; at most
     ``noise`` [m] of what is left counts as noise.
     """
-    least, model = Scale(*SOFT, problem.unit_scale().weights), start
-    for _ in range(ROUNDS):
+    least, model = Scale(SOFT, SOFT, problem.unit_scale().weights), start
+    for _ in range(MOST):
         scale = robust_scale(problem, problem.residuals(model), least)
         scale = replace(scale, position=min(scale.position, noise))
         model = fit(problem, model, scale, precision, iterations=STEPS).model

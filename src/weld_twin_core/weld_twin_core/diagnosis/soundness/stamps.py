@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...bursts import Bursts, bursts, evenly
+from ...effects.plausible import plausible
 from ...recording import Recording
 from ...two_clocks import ONE_CLOCK
 from ..algebra.independent_rows import robust_spread
@@ -21,11 +22,8 @@ from ..frames.aligned import aligned
 from .evidence import Case, Finding, mistake, note, warning
 from .lag import Lag
 from .lengths import falls, listed
-from .limits import HALVED, LATE, LIKE_LENGTH, MOVED, NOISE, RATE, TINY
+from .limits import CLEAR, ENOUGH, FEW, HALVED, LATE, MOVED, NOISE, TINY
 from .mending import Given, Mend, stamped_evenly, stamps_as, velocities_left_out
-
-ROUNDS = 2
-"""Times that frames and delay are found in turn; a third changes nothing."""
 
 
 def streams(given: Given) -> list[Finding]:
@@ -80,7 +78,8 @@ def _apart(recording: Recording, k: int) -> Iterator[Finding]:
     spans = float(np.ptp(t)), float(np.ptp(seen))
     late = float(seen[0] - t[0])
     mend = None
-    if min(spans) > LIKE_LENGTH * max(spans):
+    # Streams of one recording are started by one command, and end together.
+    if min(spans) > (1.0 - 2.0 * FEW) * max(spans):
         mend = partial(stamps_as, k=k, late=late, rate=0.0, middle=float(seen[0]))
     yield mistake(
         f'No measurement of {recording.name} lies inside its joint stream '
@@ -124,7 +123,7 @@ def _evenly(given: Given, k: int, result: Bursts) -> tuple[float, Bursts, float]
     alone = replace(given, recordings=(given.recordings[k],))
     count = given.recordings[k].seen.t.size
     even = result
-    for _ in range(ROUNDS):
+    for _ in range(2):  # frames and delay in turn; a third time changes nothing
         (late,) = _posed(_stamped(even, 0, count)(alone)).lags
         if late is None:
             break
@@ -146,20 +145,6 @@ def _posed(given: Given) -> Case:
     return Case(*aligned(given.recordings, given.robot, FRAMES, ()))
 
 
-GAP = 4.5
-"""A step of so many usual steps is a gap."""
-MISSING = 0.2
-"""Share of lost messages from which a note becomes a warning."""
-JITTER = 0.3
-"""Spread of the steps between stamps, as a share of the usual step, from which it is told."""
-GRIDS = (1e-2, 1e-3)
-"""Grids [s] that clocks are rounded to: hundredths and milliseconds."""
-ENOUGH = 20
-"""Stamps below which their steps say nothing."""
-FEW = 3.0
-"""A lag of fewer samples is left to the fit."""
-
-
 def stamps(case: Case) -> Iterator[Finding]:
     """Yield gaps, jitter and rounding of the joint and measurement stamps."""
     for recording in case.recordings:
@@ -176,53 +161,51 @@ def _stream(t: Array, name: str) -> Iterator[Finding]:
         return
     steps = np.diff(t)
     usual = float(np.median(steps))
-    gaps = steps > GAP * usual
+    gaps = steps > CLEAR * usual
     if gaps.any():
         lost = float((steps[gaps] / usual - 1.0).sum())
-        level = 'warning' if lost > MISSING * (t.size + lost) else 'note'
+        level = 'warning' if lost > 2.0 * FEW * (t.size + lost) else 'note'
         at = float(t[:-1][gaps][steps[gaps].argmax()])
         yield Finding(
             level,
             f'{name} have {int(gaps.sum())} gap(s), the longest {steps.max():.3g} s at '
             f't = {at:.3g} s; about {lost:.0f} messages are missing.',
         )
-    grid = _grid(t)
-    if grid is not None:
+    grid = written(t - t[0])
+    counts = np.rint(steps / max(grid, TINY))
+    # Dropped messages make whole multiples of the usual step, rounding makes one more or less.
+    uneven = np.abs(counts - np.median(counts)) == 1.0
+    if grid > FEW * usual and np.median(counts) > 1.0 and 2.0 * uneven.mean() > FEW:
         yield note(
             f'{name} are stamped in whole {grid * 1e3:g} ms; positions are '
             f'uncertain by the way made in {grid * 5e2:g} ms.'
         )
         return
     spread = robust_spread(steps[~gaps] - usual)
-    if spread > JITTER * usual:
+    if spread > 2.0 * FEW * usual:
         yield note(
             f'{name} come irregularly: every {usual * 1e3:.3g} ms, give or take '
             f'{spread * 1e3:.2g} ms.'
         )
 
 
-def _grid(t: Array) -> float | None:
-    """Return the grid that stamps were rounded to; a grid of the rate itself rounds nothing."""
-    for grid in GRIDS:
-        counts = (t - t[0]) / grid
-        if np.abs(counts - counts.round()).max() > 1e-4:
-            continue
-        steps = np.diff(counts).round()
-        usual = np.median(steps)
-        # Dropped messages make whole multiples of the usual step, rounding makes one more or less.
-        uneven = np.abs(steps - usual) == 1
-        return grid if uneven.mean() > 0.05 and usual > 1 else None
-    return None
+def written(values: Array) -> float:
+    """Return the power of ten to which numbers were rounded; 0 where they were not, or finely."""
+    for digits in range(2, 7):
+        if np.abs(values - values.round(digits)).max() < TINY:
+            return float(10.0**-digits)
+    return 0.0
 
 
 def clocks(case: Case) -> Iterator[Finding]:
     """Yield how late the measurements of a moving arm are, where that explains the gap."""
     for k, late in enumerate(case.lags):
         if late is not None:
-            yield from _recording(case.recordings[k], late, k)
+            yield from _late_by(case, late, k)
 
 
-def _recording(recording: Recording, lag: Lag, k: int) -> Iterator[Finding]:
+def _late_by(case: Case, lag: Lag, k: int) -> Iterator[Finding]:
+    recording, rate = case.recordings[k], plausible(case.model.robot, 'clock_rate', 'rate')
     t = recording.seen.t
     step = max(float(np.median(np.diff(s))) for s in (t, recording.joints.t))
     start, end = (float(lag.at(edge)) for edge in (t[0], t[-1]))
@@ -232,8 +215,8 @@ def _recording(recording: Recording, lag: Lag, k: int) -> Iterator[Finding]:
             f'The clocks of {recording.name} run apart by {lag.rate * 1e6:.0f} ppm: the '
             f'measurements are {_late(start)} at the start and {_late(end)} at the end.'
         )
-        wrong = abs(lag.rate) > RATE
-    elif abs(lag.late) > FEW * step:
+        wrong = not rate.low <= lag.rate <= rate.high
+    elif abs(lag.late) > 3 * step:
         cause = ', or commanded joints were recorded and the arm lags behind'
         sentence = (
             f'The measurements of {recording.name} are {_late(lag.late)} against the joint states:'

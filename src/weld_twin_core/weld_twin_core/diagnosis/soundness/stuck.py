@@ -12,32 +12,14 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...recording import JointMotion, Recording
+from ...twin.features import Features
 from ..algebra.problem import Model
 from ..frames.alignment import refined
 from .evidence import Case, Finding, distance, mistake
 from .lengths import length
-from .limits import (
-    BY_ITSELF,
-    STUCK_AFTER,
-    STUCK_EXPLAINED,
-    STUCK_LEAST,
-    STUCK_STATIONS,
-    STUCK_STRAYS,
-    TINY,
-)
+from .limits import CLEAR, ENOUGH, FEW, LATE, MOST, ROWS, RUN, SOUND
 
-ROUNDS = 12
-"""Newton steps that find where a joint really stood; it may have gone on by a radian."""
-STEP = 1e-5
-"""Step [rad, m] of the derivative by a joint's position."""
-REFITS = 3
-"""Standing stretches, the longest, that frames are fitted without: arms that rest have dozens."""
-FIT_ROWS = 2000
-"""Rows of such a fit, which has twelve numbers to find."""
-ENOUGH = 12
-"""Measurements that must remain for it."""
-LONGEST_STEP = 0.3
-"""Longest Newton step [rad, m]: farther, the derivative means nothing."""
+REMEDY = 'See to the driver that publishes the joint states, and measure again'
 
 
 def stuck(case: Case) -> Iterator[Finding]:
@@ -57,7 +39,7 @@ def _whole(recording: Recording) -> Finding | None:
         if inside.sum() < 2:
             continue
         way = _way(seen.position[inside])
-        if way > BY_ITSELF:
+        if way > SOUND:
             sentence = (
                 f'The joint positions of {recording.name} stand still {_when(recording, start, end)}'
                 f' while the tool moves by {length(way)}.'
@@ -69,85 +51,62 @@ def _whole(recording: Recording) -> Finding | None:
 def _way(position: Array) -> float:
     """Return how far places (M, 3) lie apart [m], without those that lie farthest out."""
     off = np.linalg.norm(position - np.median(position, axis=0), axis=1)
-    left_out = max(1, round(STUCK_STRAYS * len(off)))
+    left_out = max(1, round(FEW * len(off)))
     kept = position[np.argsort(off)[:-left_out]]
     return float(np.ptp(kept, axis=0).max())
 
 
-REMEDY = 'See to the driver that publishes the joint states, and measure again'
-
-
 def _joints(case: Case, k: int) -> Iterator[tuple[float, Finding]]:
     """Yield joints whose own motion would explain the gap while their reading stands still."""
-    recording, refits = case.recordings[k], 0
-    for start, end, i in _longest(case, k):
+    recording, fits = case.recordings[k], 0
+    joints, names = recording.joints, case.model.robot.joint_names
+    each = range(len(names))
+    runs = [(i, *run) for i in each for run in _runs(joints.q[:, i : i + 1], joints)]
+    for i, start, end in sorted(runs, key=lambda run: run[1] - run[2]):
         inside = _inside(recording, start, end)
-        if inside.sum() < 2 or inside.all():
-            continue
         model, off = case.model, distance(case.residuals[k])
-        if np.median(off[inside]) > max(BY_ITSELF, float(np.median(off[~inside]))):
-            # Frames that were fitted to the stretch as well leave some of its gap elsewhere.
-            if case.problem.align and refits < REFITS and (~inside).sum() > ENOUGH:
-                refits += 1
-                model, off = _unfitted(case, k, inside)
-            result = _freed_there(model, recording, k, i, (start, end), off)
-            if result is not None:
-                yield result
+        if inside.sum() < 2 or inside.all() or not _larger(off, inside, 1.0):
+            continue
+        # Frames that were fitted to the stretch as well leave some of its gap elsewhere; of arms
+        # that rest have dozens, only the longest are looked at so.
+        if case.problem.align and fits < MOST and (~inside).sum() > ENOUGH:
+            fits += 1
+            model, off = _fitted_without(case, k, inside)
+        if not _larger(off, inside, CLEAR):
+            continue
+        gap, remaining = float(np.median(off[inside])), _freed(model, recording, k, i, inside)
+        if CLEAR * remaining < gap:
+            sentence = (
+                f'The reading of joint {names[i]!r} of {recording.name} stands still '
+                f'{_when(recording, start, end)} while the joint moves: the gap there is '
+                f'{length(gap)}, and {length(remaining)} with the joint set free.'
+            )
+            yield gap / remaining, mistake(sentence, 'joints_stuck', (names[i],), REMEDY)
 
 
-def _longest(case: Case, k: int) -> list[tuple[int, int, int]]:
-    """Return first sample, last sample and joint of every standing stretch, long ones first."""
-    joints = case.recordings[k].joints
-    result = [
-        (start, end, i)
-        for i in range(joints.q.shape[1])
-        for start, end in _runs(joints.q[:, i : i + 1], joints)
-    ]
-    return sorted(result, key=lambda run: run[0] - run[1])
+def _larger(off: Array, inside: NDArray[np.bool_], factor: float) -> bool:
+    """Return whether gaps, (M,), are so many times larger inside a stretch than a sound arm's are."""
+    return bool(np.median(off[inside]) > max(SOUND, factor * float(np.median(off[~inside]))))
 
 
-def _unfitted(case: Case, k: int, inside: NDArray[np.bool_]) -> tuple[Model, Array]:
+def _fitted_without(case: Case, k: int, inside: NDArray[np.bool_]) -> tuple[Model, Array]:
     """Return the model with its frames fitted to all but a stretch, and the gaps it leaves."""
     recordings = list(case.recordings)
     recordings[k] = recordings[k].with_measured(recordings[k].seen.take(~inside))
-    problem = replace(case.problem, recordings=tuple(recordings)).thinned(FIT_ROWS)
+    problem = replace(case.problem, recordings=tuple(recordings)).thinned(ROWS)
     model = refined(problem, case.model)
     return model, distance(case.problem.residuals(model)[k])
-
-
-def _freed_there(
-    model: Model, recording: Recording, k: int, i: int, run: tuple[int, int], off: Array
-) -> tuple[float, Finding] | None:
-    """Return that a joint went on while its reading stood still, and how much that explains."""
-    inside, name = _inside(recording, *run), model.robot.joint_names[i]
-    gap, rest = float(np.median(off[inside])), float(np.median(off[~inside]))
-    if gap < max(BY_ITSELF, STUCK_EXPLAINED * rest):
-        return None
-    remaining = _freed(model, recording, k, i, inside)
-    if remaining > gap / STUCK_EXPLAINED:
-        return None
-    sentence = (
-        f'The reading of joint {name!r} of {recording.name} stands still '
-        f'{_when(recording, *run)} while the joint moves: the gap there is '
-        f'{length(gap)}, and {length(remaining)} with the joint set free.'
-    )
-    return gap / remaining, mistake(sentence, 'joints_stuck', (name,), REMEDY)
 
 
 def _runs(q: Array, joints: JointMotion) -> list[tuple[int, int]]:
     """Return first and last sample of every stretch in which q (N, m) does not change at all."""
     still = np.r_[False, (np.diff(q, axis=0) == 0.0).all(axis=1), False]
     edges = np.flatnonzero(np.diff(still.astype(int)))
-    out = []
-    for start, end in zip(edges[::2], edges[1::2], strict=True):
-        enough = (
-            end - start >= STUCK_STATIONS
-            if joints.static
-            else joints.t[end] - joints.t[start] > STUCK_LEAST
-        )
-        if enough:
-            out.append((int(start), int(end)))
-    return out
+    runs = [(int(start), int(end)) for start, end in zip(edges[::2], edges[1::2], strict=True)]
+    if joints.static:
+        return [(start, end) for start, end in runs if end - start >= RUN]
+    # Longer than an arm takes to settle.
+    return [(start, end) for start, end in runs if joints.t[end] - joints.t[start] > 2.0 * LATE]
 
 
 def _inside(recording: Recording, start: int, end: int) -> NDArray[np.bool_]:
@@ -156,30 +115,29 @@ def _inside(recording: Recording, start: int, end: int) -> NDArray[np.bool_]:
     # Between the last still sample and the next the stream is already on its way.
     first, last = joints.t[start], joints.t[end]
     if not joints.static:
-        first, last = first + STUCK_AFTER, joints.t[end - 1]
+        first, last = first + LATE, joints.t[end - 1]
     return np.asarray((t >= first) & (t <= last), dtype=bool)
 
 
 def _freed(model: Model, recording: Recording, k: int, i: int, inside: NDArray[np.bool_]) -> float:
-    """Return the median gap [m] when joint i may stand anywhere at every measurement."""
-    seen = recording.seen.take(inside)
-    q = np.array(recording.joints.at(seen.t)[0])
-    twin = model.twin(k)
+    """
+    Return the median gap [m] when joint i may stand anywhere at every measurement.
 
-    def tip(positions: Array) -> Array:
-        motion = JointMotion(seen.t, positions, static=True)
-        still = replace(recording, joints=motion, measured=seen)
-        return twin.poses(still, seen.t).position
-
-    nudge = np.zeros(q.shape[1])
-    nudge[i] = STEP
-    for _ in range(ROUNDS):
-        here = tip(q)
-        column = (tip(q + nudge) - here) / STEP
-        pull = ((seen.position - here) * column).sum(axis=1)
-        step = pull / np.maximum((column**2).sum(axis=1), TINY)
-        q[:, i] += np.clip(step, -LONGEST_STEP, LONGEST_STEP)
-    return float(np.median(np.linalg.norm(seen.position - tip(q), axis=1)))
+    By itself it moves the tool along a line, or round a circle about its axis.
+    """
+    seen, twin = recording.seen.take(inside), model.twin(k)
+    column = Features(twin, recording, seen.t).column(('q', i)).T
+    away = seen.position - twin.poses(recording, seen.t).position
+    if model.robot.prismatic[i]:
+        along = column[:, :3]
+        off = away - (away * along).sum(axis=1, keepdims=True) * along
+        return float(np.median(np.linalg.norm(off, axis=1)))
+    axis = column[:, 3:]
+    lever = np.cross(column[:, :3], axis)
+    seen_from_axis = away + lever
+    along = (seen_from_axis * axis).sum(axis=1)
+    out = np.linalg.norm(seen_from_axis - along[:, None] * axis, axis=1)
+    return float(np.median(np.hypot(along, out - np.linalg.norm(lever, axis=1))))
 
 
 def _when(recording: Recording, start: int, end: int) -> str:

@@ -8,56 +8,44 @@ A suspicion is a mistake whose sentence is a clause, without capital and full st
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
-from itertools import combinations, product
+from itertools import combinations, permutations, product
 
 import numpy as np
 
 from ...arm import catalog
 from ...arm.robot import Robot
+from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from .evidence import Finding, mistake
-from .mending import joints_as, poses_inverted, positions_as, robot_as
+from .mending import WAYS, base_turned, joints_as, poses_inverted, positions_as, robot_as, turns_as
 
 DEGREE = np.pi / 180.0
-INCH = 0.0254
+MILLIMETRE, INCH = 1e-3, 0.0254
 """Metres."""
 AXES = ('x', 'y', 'z')
-_JOINT_UNITS = {
-    True: (
-        (DEGREE, 'is in degrees among joints in radians'),
-        (1.0 / DEGREE, 'was turned from degrees into radians twice'),
-    ),
-    False: (
-        (1e-3, 'is in millimetres where metres belong'),
-        (1e3, 'was turned from millimetres into metres twice'),
-    ),
-}
-"""What a joint that turns, or slides, has to be multiplied by, and why."""
-_LENGTHS = (
-    (1e-3, 'are in millimetres where metres belong', 'millimetres among metres'),
-    (1e3, 'were turned from millimetres into metres twice', 'metres among millimetres'),
-    (INCH, 'are in inches where metres belong', 'inches among metres'),
+_ANGLES = (
+    (DEGREE, 'in degrees where radians belong'),
+    (1.0 / DEGREE, 'turned from degrees into radians twice'),
 )
-"""The same of measured positions: of all, and of one axis."""
+_LENGTHS = (
+    (MILLIMETRE, 'in millimetres where metres belong'),
+    (1.0 / MILLIMETRE, 'turned from millimetres into metres twice'),
+    (INCH, 'in inches where metres belong'),
+)
+"""What angles and lengths have to be multiplied by, and why."""
 
 
 def suspicions(robot: Robot) -> Iterator[Finding]:
     """Yield every single mistake, common ones first."""
-    yield from _units(robot)
-    yield from _one_apart(robot)
-    yield from _signs(robot)
-    yield from _orders(robot)
+    plain = np.zeros(robot.n)
+    for kind, at, words, remedy, matrix in _columns(robot):
+        yield mistake(words, kind, at, remedy, partial(joints_as, matrix=matrix, offset=plain))
+    for kind, words, remedy, factor in _positions():
+        yield mistake(words, kind, ('instrument',), remedy, partial(positions_as, factor=factor))
     yield from robots(robot)
     yield from _zeros(robot)
-    yield from _couplings(robot)
-    yield _positions(
-        'sign',
-        'the measuring frame is left-handed: one axis of the positions has the wrong sign',
-        'Turn the sign of one axis where the positions are exported',
-        [1.0, -1.0, 1.0],
-    )
     yield mistake(
         'measured poses are those of something fixed seen from the arm (a camera on the arm that '
         'looks at a board), not of the tool',
@@ -70,10 +58,12 @@ def suspicions(robot: Robot) -> Iterator[Finding]:
 
 def doubles(robot: Robot) -> Iterator[Finding]:
     """Yield pairs that hide each other, so that undoing one alone does not help."""
-    for i, j in combinations(range(robot.n), 2):
-        at = (robot.joint_names[i], robot.joint_names[j])
-        words = f'joints {at[0]!r} and {at[1]!r} count the other way round'
-        yield _signed(at, words, _with(np.ones(robot.n), [i, j], -1.0))
+    for pair in combinations(range(robot.n), 2):
+        one, other = at = tuple(robot.joint_names[i] for i in pair)
+        words, remedy = f'joints {one!r} and {other!r} count', f'Turn the sign of {one}, {other}'
+        matrix = np.diag(_with(np.ones(robot.n), list(pair), -1.0))
+        mend = partial(joints_as, matrix=matrix, offset=np.zeros(robot.n))
+        yield mistake(f'{words} the other way round', 'sign', at, remedy, mend)
 
 
 def robots(robot: Robot) -> Iterator[Finding]:
@@ -89,92 +79,131 @@ def robots(robot: Robot) -> Iterator[Finding]:
             )
 
 
-def _units(robot: Robot) -> Iterator[Finding]:
-    names, turning = robot.joint_names, ~robot.prismatic
-    for factor, words, remedy in (
-        (
-            DEGREE,
-            'joint positions are in degrees where radians belong',
+def turned_bases(robot: Robot) -> Iterator[Finding]:
+    """Yield every base that stands turned axis onto axis."""
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        turn = np.diag(signs)[list(order)]
+        if np.linalg.det(turn) > 0.0 and not np.array_equal(turn, np.eye(3)):
+            yield turned_base(robot, turn)
+
+
+def turned_base(robot: Robot, turn: Array) -> Finding:
+    """Return the suspicion that a base stands turned, rotation shape (3, 3), by axis and angle."""
+    vector = np.degrees(rotation_vector(turn))
+    angle, k = float(np.linalg.norm(vector)), int(np.abs(vector).argmax())
+    about = f'axis ({", ".join(f"{part:+.0f}" for part in vector / abs(vector[k]))})'
+    if abs(vector[k]) > angle - 1.0:
+        about, angle = f'{AXES[k]} axis', angle if angle > 179.0 else float(vector[k])
+    # About its own first axis an arm cannot tell its base from the zero of its first joint.
+    first, either = robot.joint_names[0], about == 'z axis' and not robot.prismatic[0]
+    words = f'; a joint {first} whose zero is off by as much would look the same'
+    return mistake(
+        f'the base of the robot stands turned by {angle:.0f} degrees about its {about} against the '
+        'frame that was given',
+        'base_turned',
+        ('base',),
+        'Use the axes of the robot base that the controller counts in (for a UR: base or '
+        f'base_link), or add the turn to the base frame{words if either else ""}',
+        partial(base_turned, turn=turn),
+        alike=(('constant_angle', (first,)),) if either else (),
+    )
+
+
+def conventions() -> Iterator[Finding]:
+    """Yield the ways to write orientations that get mixed up."""
+    for way, (words, _) in WAYS.items():
+        remedy = 'Mend the convention where the orientations are exported'
+        yield mistake(words, 'other', ('instrument',), remedy, partial(turns_as, way=way))
+
+
+def _columns(robot: Robot) -> Iterator[tuple[str, tuple[str, ...], str, str, Array]]:
+    """Yield kind, place, words, remedy and matrix of what columns of joints may be instead."""
+    names, turning, n = robot.joint_names, ~robot.prismatic, robot.n
+    for factor, words in _ANGLES:
+        remedy, every = (
             'Record or import the joint positions in radians',
-        ),
-        (
-            1.0 / DEGREE,
-            'joint positions were turned from degrees into radians twice',
-            'Leave out one of the two conversions',
-        ),
-    ):
-        yield _joints('units', names, words, remedy, np.diag(np.where(turning, factor, 1.0)))
+            np.where(turning, factor, 1.0),
+        )
+        yield 'units', names, f'joint positions are {words}', remedy, np.diag(every)
     for i, name in enumerate(names):
-        for factor, words in _JOINT_UNITS[bool(turning[i])]:
-            matrix = np.diag(_with(np.ones(robot.n), i, factor))
-            yield _joints('units', (name,), f'joint {name!r} {words}', _others(name), matrix)
-    for factor, words, _ in _LENGTHS:
-        remedy = 'Record or import positions in metres'
-        yield _positions('units', f'measured positions {words}', remedy, [factor] * 3)
-    for (k, axis), (factor, _, unit) in product(enumerate(AXES), _LENGTHS):
-        words = f'{axis} of the measured positions is in {unit}'
-        yield _positions('units', words, _others(axis), _with(np.ones(3), k, factor))
+        remedy = f'Give {name} in the unit of the others'
+        for factor, words in _ANGLES if turning[i] else _LENGTHS:
+            scaled = _with(np.eye(n), (i, i), factor)
+            yield 'units', (name,), f'joint {name!r} is {words}', remedy, scaled
+        if turning[i]:  # its own unit was believed for all of them
+            words = f'joint {name!r} is in degrees, the others are not but were read as if'
+            apart = _with(np.where(turning, 1.0 / DEGREE, 1.0), i, 1.0)
+            yield 'units', (name,), words, remedy, np.diag(apart)
+    for i, name in enumerate(names):
+        words, turned = (
+            f'joint {name!r} counts the other way round',
+            _with(np.eye(n), (i, i), -1.0),
+        )
+        yield 'sign', (name,), words, f'Turn the sign of {name}', turned
+    yield 'sign', names, 'all joints count the other way round', 'Turn every sign', -np.eye(n)
+    for at, words, order in _orders(names):
+        remedy = 'Put the names or the columns of the joints in order'
+        yield 'joints_swapped', at, words, remedy, np.eye(n)[order]
+    if n > 2 and turning[1:3].all():
+        _, two, three = names[:3]
+        words = f'joint {three!r} is counted against the ground, not against {two!r}'
+        for sign, way, to in ((1.0, 'Add', 'to'), (-1.0, 'Subtract', 'from')):
+            remedy = (
+                f'{way} the reading of {two} {to} that of {three}, as the pendant of a robot with '
+                'coupled axes needs it'
+            )
+            yield 'coupled_axes', (two, three), words, remedy, _with(np.eye(n), (2, 1), sign)
 
 
-def _one_apart(robot: Robot) -> Iterator[Finding]:
-    """Yield columns of which one had its own unit, and was believed for all of them."""
-    degrees = np.where(robot.prismatic, 1.0, 1.0 / DEGREE)
-    for i in np.flatnonzero(~robot.prismatic).tolist():
-        name, matrix = robot.joint_names[i], np.diag(_with(degrees, i, 1.0))
-        words = f'joint {name!r} is in degrees, the others are not but were read as if'
-        yield _joints('units', (name,), words, _others(name), matrix)
-    for k, axis in enumerate(AXES):
-        words = f'{axis} of the measured positions is in millimetres, the others were read as if'
-        yield _positions('units', words, _others(axis), _with(np.full(3, 1e3), k, 1.0))
-
-
-def _signs(robot: Robot) -> Iterator[Finding]:
-    for i, name in enumerate(robot.joint_names):
-        words = f'joint {name!r} counts the other way round'
-        yield _signed((name,), words, _with(np.ones(robot.n), i, -1.0))
-    yield _signed(robot.joint_names, 'all joints count the other way round', -np.ones(robot.n))
-
-
-def _orders(robot: Robot) -> Iterator[Finding]:
-    names = robot.joint_names
-    straight = list(range(robot.n))
+def _orders(names: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], str, list[int]]]:
+    """Yield orders that joints may be in: which, in words, and what puts them right."""
+    straight = list(range(len(names)))
     for i, j in combinations(straight, 2):
         order = list(straight)
         order[i], order[j] = j, i
-        words = f'joints {names[i]!r} and {names[j]!r} are swapped'
-        yield _ordered((names[i], names[j]), words, order)
+        yield (names[i], names[j]), f'joints {names[i]!r} and {names[j]!r} are swapped', order
     # The k-th column of an alphabetical table belongs to the k-th name of the sorted list.
     alphabet = [sorted(names).index(name) for name in names]
     if alphabet != straight:
-        words = 'joints are in alphabetical order, not in that of the chain'
-        yield _ordered(names, words, alphabet)
-    yield _ordered(names, 'joints are in reverse order', straight[::-1])
+        yield names, 'joints are in alphabetical order, not in that of the chain', alphabet
+    yield names, 'joints are in reverse order', straight[::-1]
     for order in (straight[1:] + straight[:1], straight[-1:] + straight[:-1]):
-        yield _ordered(names, 'joints are shifted by one place', order)
+        yield names, 'joints are shifted by one place', order
 
 
 def _zeros(robot: Robot) -> Iterator[Finding]:
+    """Yield joints that are counted from another quarter of a turn."""
     for i in np.flatnonzero(~robot.prismatic).tolist():
         name = robot.joint_names[i]
-        for turn in (90.0, -90.0, 180.0):
-            words = f'the zero of joint {name!r} lies {turn:+.0f} degrees from that of the model'
-            remedy = f'Add {turn:+.0f} degrees to the readings of {name}, or to its theta_offset'
-            offset = _with(np.zeros(robot.n), i, turn * DEGREE)
-            yield _joints('constant_angle', (name,), words, remedy, np.eye(robot.n), offset)
+        for quarters in (1.0, -1.0, 2.0):
+            offset = _with(np.zeros(robot.n), i, quarters * np.pi / 2.0)
+            turn = f'{np.degrees(offset[i]):+.0f} degrees'
+            words = f'the zero of joint {name!r} lies {turn} from that of the model'
+            remedy = f'Add {turn} to the readings of {name}, or to its theta_offset'
+            mend = partial(joints_as, matrix=np.eye(robot.n), offset=offset)
+            yield mistake(words, 'constant_angle', (name,), remedy, mend)
 
 
-def _couplings(robot: Robot) -> Iterator[Finding]:
-    if robot.n < 3 or robot.prismatic[1:3].any():
-        return
-    _, two, three = robot.joint_names[:3]
-    for sign, way, to in ((1.0, 'Add', 'to'), (-1.0, 'Subtract', 'from')):
-        words = f'joint {three!r} is counted against the ground, not against {two!r}'
-        remedy = (
-            f'{way} the reading of {two} {to} that of {three}, as the pendant of a robot with '
-            'coupled axes needs it'
+def _positions() -> Iterator[tuple[str, str, str, Array]]:
+    """Yield kind, words, remedy and factor of each axis of what positions may be instead."""
+    for factor, words in _LENGTHS:
+        remedy = 'Record or import positions in metres'
+        yield 'units', f'measured positions are {words}', remedy, np.full(3, factor)
+    for k, axis in enumerate(AXES):
+        what, remedy = (
+            f'{axis} of the measured positions is',
+            f'Give {axis} in the unit of the others',
         )
-        matrix = _with(np.eye(robot.n), (2, 1), sign)
-        yield _joints('coupled_axes', (two, three), words, remedy, matrix)
+        for factor, words in _LENGTHS:
+            yield 'units', f'{what} {words}', remedy, _with(np.ones(3), k, factor)
+        apart = _with(np.full(3, 1.0 / MILLIMETRE), k, 1.0)
+        yield 'units', f'{what} in millimetres, the others were read as if', remedy, apart
+    yield (
+        'sign',
+        'the measuring frame is left-handed: one axis of the positions has the wrong sign',
+        'Turn the sign of one axis where the positions are exported',
+        np.array([1.0, -1.0, 1.0]),
+    )
 
 
 def _with(values: Array, at: int | list[int] | tuple[int, int], value: float) -> Array:
@@ -182,34 +211,3 @@ def _with(values: Array, at: int | list[int] | tuple[int, int], value: float) ->
     out = np.array(values)
     out[at] = value
     return out
-
-
-def _others(name: str) -> str:
-    return f'Give {name} in the unit of the others'
-
-
-def _signed(at: tuple[str, ...], words: str, sign: Array) -> Finding:
-    remedy = f'Turn the sign of {", ".join(at)}' if len(at) < len(sign) else 'Turn every sign'
-    return _joints('sign', at, words, remedy, np.diag(sign))
-
-
-def _ordered(at: tuple[str, ...], words: str, order: list[int]) -> Finding:
-    remedy = 'Put the names or the columns of the joints in order'
-    return _joints('joints_swapped', at, words, remedy, np.eye(len(order))[order])
-
-
-def _positions(kind: str, words: str, remedy: str, factor: Array | Sequence[float]) -> Finding:
-    mend = partial(positions_as, factor=np.asarray(factor))
-    return mistake(words, kind, ('instrument',), remedy, mend)
-
-
-def _joints(
-    kind: str,
-    at: tuple[str, ...],
-    words: str,
-    remedy: str,
-    matrix: Array,
-    offset: Array | None = None,
-) -> Finding:
-    shift = np.zeros(len(matrix)) if offset is None else offset
-    return mistake(words, kind, at, remedy, partial(joints_as, matrix=matrix, offset=shift))

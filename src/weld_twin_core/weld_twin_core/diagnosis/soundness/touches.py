@@ -28,34 +28,8 @@ from ..frames.aligned import FEWEST, posed
 from ..hypotheses.library import plain_causes
 from ..result import Unsound
 from .evidence import Finding, mistake
-from .limits import TINY
+from .limits import CLEAR, FEW, LARGE, ROWS, RUN, STRAY, TINY, UNDONE, WORTH
 
-FAR = 8.0
-"""Distance from its contact, in median distances, from which a posture is a slip: of normal errors
-one in ten million is so far off; errors of gears are bounded."""
-LEAST_SLIP = 1e-3
-"""Distance [m] below which nothing is called a slip: gears and hands alone make tenths of it."""
-NEARER = 0.3
-"""A posture belongs to another contact where that is this much nearer than its own."""
-EXPLAINED = 0.75
-"""Share of a contact's squares that a move of its place must explain. What an arm's own errors leave
-follows the order of postures too; of three measured arms they explained up to 0.6."""
-STRETCH = 4
-"""Postures in a row at the least that tell of a place that moved."""
-BROKEN = 10.0
-"""Uncertainties that a known length may be off before files are taken for mixed up, and"""
-LEAST_BROKEN = 5e-3
-"""how far it must be off for that at the least [m]."""
-
-
-ROUNDS = 2
-"""Times that an instrument's noise and that of contacts are told from each other anew; a third
-changes nothing."""
-FIT_ROWS = 6000
-"""Rows of an instrument's recordings that are fitted along with contacts: far more than the errors
-of an arm need."""
-LEFT = 0.1
-"""Share of a place's rows that is left at the least once its place was taken out."""
 SUREST = 1e-6
 """Noise [m] below which none is told from less: no instrument and no socket is better."""
 
@@ -72,7 +46,8 @@ class Touched(NamedTuple):
 def touches(problem: Problem, model: Model) -> Touched:
     """Return contacts as they are, and what was wrong with how they were called."""
     plain = _plain_fit(problem, model)
-    for _ in range(0 if problem.untracked else ROUNDS):
+    # The noise of an instrument and that of contacts are told from each other in turn.
+    for _ in range(0 if problem.untracked else 2):
         problem = replace(problem, loose=_loose(problem, problem.residuals(plain)))
         plain = _plain_fit(problem, plain.with_found(()))
     rows = problem.residuals(plain)
@@ -101,7 +76,7 @@ def touches(problem: Problem, model: Model) -> Touched:
 
 def _plain_fit(problem: Problem, model: Model) -> Model:
     """Return the model with all constant errors and springs fitted, outliers with little weight."""
-    problem = problem.thinned(FIT_ROWS)
+    problem = problem.thinned(ROWS)
     view = problem.features(model)[0].view
     every = plain_causes(model.robot, view, ('constant', 'load'))
     start = model.with_found((*model.found, *every))
@@ -124,7 +99,7 @@ def _loose(problem: Problem, rows: list[Array]) -> tuple[float, ...]:
     for own in of.values():
         every = np.concatenate([rows[k][:3].ravel() for k in own])
         taken = sum(u.freedom for k in own if (u := problem.contact(k)) is not None)
-        remaining = max(1.0 - taken / every.size, LEFT)
+        remaining = max(1.0 - taken / every.size, FEW)
         noise[own] = max(robust_spread(every) / np.sqrt(remaining), SUREST)
     return tuple(float(value) for value in noise / noise.min())
 
@@ -155,7 +130,7 @@ class _Postures:
                 continue
             one, other = tie.between
             result = float(np.linalg.norm(middles[one] - middles[other]))
-            if abs(result - tie.value) < max(BROKEN * tie.sigma, LEAST_BROKEN):
+            if abs(result - tie.value) < max(STRAY * tie.sigma, UNDONE):
                 continue
             yield mistake(
                 f'{one!r} and {other!r} are {tie.value * 1e3:.4g} mm apart by the artefact '
@@ -178,14 +153,14 @@ class _Postures:
         others = {name: middle for name, middle in middles.items() if name != label}
         away = np.linalg.norm(self._points[index] - middles[label], axis=1)
         elsewhere: dict[str, list[int]] = {}
-        for row in np.flatnonzero(away > max(FAR * usual, LEAST_SLIP)).tolist():
+        for row in np.flatnonzero(away > max(STRAY * usual, LARGE)).tolist():
             point = self._points[index[row]]
             apart = {name: float(np.linalg.norm(point - at)) for name, at in others.items()}
             nearest = min(apart, key=lambda name: apart[name], default='')
-            near = bool(nearest) and apart[nearest] < NEARER * away[row]
+            near = bool(nearest) and CLEAR * apart[nearest] < away[row]
             elsewhere.setdefault(nearest if near else '', []).append(row)
         for name, rows in elsewhere.items():
-            if not name and len(rows) >= STRETCH and np.ptp(rows) == len(rows) - 1:
+            if not name and len(rows) >= RUN and np.ptp(rows) == len(rows) - 1:
                 continue
             self._keep[index[rows]] = False
             several = len(rows) > 1
@@ -203,10 +178,12 @@ class _Postures:
 
     def _moved(self, label: str, index: NDArray[np.int_], usual: float) -> Iterator[Unsound]:
         """Give postures in a row that rest together elsewhere a contact of their own."""
-        if index.size < 2 * STRETCH:
+        if index.size < 2 * RUN:
             return
         first, last, shift, explained = _stretch(self._points[index])
-        if explained < EXPLAINED or shift < max(2.0 * usual, LEAST_SLIP):
+        # What an arm's own errors leave follows the order of postures too; of three measured arms they
+        # explained up to 0.6.
+        if explained < WORTH or shift < max(2.0 * usual, LARGE):
             return
         for k in index[first:last]:
             self._labels[k] = f'{label} moved'
@@ -243,8 +220,8 @@ def _stretch(points: Array) -> tuple[int, int, float, float]:
     """Return the postures in a row that lie most apart: first, end, shift [m], share explained."""
     x = points - points.mean(axis=0)
     sums = np.concatenate([np.zeros((1, 3)), np.cumsum(x, axis=0)])
-    i, j = np.triu_indices(len(x) + 1, STRETCH)
-    fair = len(x) - (j - i) >= STRETCH
+    i, j = np.triu_indices(len(x) + 1, RUN)
+    fair = len(x) - (j - i) >= RUN
     i, j = i[fair], j[fair]
     part, each = sums[j] - sums[i], 1.0 / (j - i) + 1.0 / (len(x) - (j - i))
     gain = (part**2).sum(axis=1) * each

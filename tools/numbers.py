@@ -22,7 +22,7 @@ CORE = ROOT / 'src' / 'weld_twin_core' / 'weld_twin_core'
 PLAIN = {0.0, 1.0, 2.0}
 UNITS = {60.0, 100.0, 180.0, 1e3, 1e6, 1e9}
 """Seconds, per cent, degrees, milli, micro and nano."""
-NAMED = {'DEGREE', 'INCH', 'NORMAL'}
+NAMED = {'DEGREE', 'MILLIMETRE', 'INCH', 'NORMAL'}
 """Constants that are a unit, or a number of mathematics."""
 SHAPED = {'eye', 'zeros', 'ones', 'reshape', 'range', 'slice', 'tile', 'diff', 'round'}
 """Functions that are given shapes, places and orders."""
@@ -48,6 +48,10 @@ def _tuned(node: ast.AST, *, bare: bool) -> Iterator[tuple[int, float]]:
     if isinstance(node, ast.Subscript):
         yield from _tuned(node.value, bare=bare)
         return
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+        yield from _tuned(node.right, bare=bare)  # powers of ten are units
+        yield from _tuned(node.left, bare=bare) if not isinstance(node.left, ast.Constant) else ()
+        return
     if isinstance(node, ast.Call) and _name(node.func) in SHAPED:
         yield from _tuned(node.func, bare=False)
         return
@@ -64,7 +68,8 @@ def _is_unit(node: ast.JoinedStr | ast.AnnAssign | ast.Assign) -> bool:
     if isinstance(node, ast.JoinedStr):
         return True
     targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-    return all(_name(target).strip('_') in NAMED for target in targets)
+    names = [name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+    return bool(names) and all(name.strip('_') in NAMED for name in names)
 
 
 def _name(node: ast.AST) -> str:

@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ...recording import JointMotion
 from ..algebra.problem import Model, Problem, Scale
 from .candidates import STAY, Candidate
 from .postures import Limits
-from .separation import Normals, Pair, Side, normals
+from .separation import Parting, Side, partings
 
 DECIDES = 6.0
 """Standard deviations from which a measurement decides between two explanations."""
@@ -35,6 +35,11 @@ AS_IT_WORKS = ('time', 'temperature')
 """Dependences on how long the arm has been at work: a station shows more of them the later it comes."""
 GAIN = 0.05
 """A further piece has to add this share to the decision."""
+NEAREST = 1e-3
+"""Weight of what does not show yet against what does; its square is that of a second."""
+
+
+SAFE = MARGIN * DECIDES
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,26 +52,70 @@ class Plan:
     candidate : Candidate
     chosen : tuple of int
     score : float
-        Sum over the pairs of what it adds, in standard deviations, no more than decides.
-    apart : float
-        The same without that bound.
-    pair : tuple of int, optional
-        The two explanations that it parts most.
-    decided : bool
-        Whether the data at hand part all explanations already.
-    before, after : float
-        How far the data at hand part those two, and what is added.
+        Sum over the explanations of what it adds, in standard deviations, no more than decides.
+    named : int
+        So many explanations, the first ones, are named by the verdict.
+    others : tuple of int
+        Explanations that the first one is to be parted from.
+    known, gains : array, one for each of these
+        How far the data at hand part it from them, and what is added.
 
     """
 
     candidate: Candidate
     chosen: tuple[int, ...]
     score: float = 0.0
-    apart: float = 0.0
-    pair: Pair | None = None
-    before: float = 0.0
-    after: float | None = None
-    decided: bool = False
+    named: int = 1
+    others: tuple[int, ...] = ()
+    known: Array = field(default_factory=lambda: np.zeros(0))
+    gains: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def apart(self) -> float:
+        """Return what it adds in all, without a bound."""
+        return float(self.gains[self.gains > NOTHING].sum())
+
+    @property
+    def _most(self) -> int:
+        """Return which explanation it parts most, of those named if one is parted at all."""
+        named = (np.array(self.others) < self.named) & (self.gains > NOTHING)
+        return int(np.where(named | ~named.any(), self.gains, -np.inf).argmax())
+
+    @property
+    def other(self) -> int:
+        """Return the explanation that the first one is parted from most."""
+        return self.others[self._most]
+
+    @property
+    def before(self) -> float:
+        """Return how far the data at hand part that one."""
+        return float(self.known[self._most])
+
+    @property
+    def after(self) -> float | None:
+        """Return what is added to that; None where nothing is compared."""
+        return float(self.gains[self._most]) if self.others else None
+
+    @property
+    def decided(self) -> bool:
+        """Return whether the data at hand part it already."""
+        return self.before >= SAFE
+
+    @property
+    def enough(self) -> bool:
+        """Return whether every explanation that shows at all is parted safely."""
+        shown = self.gains[self.gains > NOTHING]
+        return bool(shown.size and shown.min() >= SAFE)
+
+    @property
+    def seconds(self) -> float:
+        """Return how long the pieces take [s], without stops on the way."""
+        return sum(self.candidate.pieces[k].seconds for k in self.chosen)
+
+    def open(self, room: float) -> list[int]:
+        """Return the pieces that are not in yet and fit into so many seconds with the others."""
+        pieces, left = self.candidate.pieces, room - self.seconds
+        return [k for k, p in enumerate(pieces) if k not in self.chosen and p.seconds <= left]
 
     @property
     def robot_minutes(self) -> float:
@@ -74,7 +123,7 @@ class Plan:
         if self.candidate.static:
             t = self.motion().t
             return float(t[-1] + self._step) / 60.0
-        return sum(self.candidate.pieces[k].seconds for k in self.chosen) / 60.0
+        return self.seconds / 60.0
 
     @property
     def _step(self) -> float:
@@ -121,112 +170,43 @@ def planned(
     """
     Return the best pieces of a measurement; None where none of them fits into the minutes.
 
-    The first arguments are those of `separation.normals`; ``now`` is what the alternatives say of
+    The first arguments are those of `separation.partings`; ``now`` is what the alternatives say of
     the data at hand, and the first ``named`` alternatives are named by the verdict.
     """
     room = 60.0 * min(limits.minutes - option.set_up, limits.moving)
-    whole = option.whole and sum(piece.seconds for piece in option.pieces) > room
-    if whole or not _open(option, [], room):
+    plan = Plan(option, (), named=named)
+    if (option.whole and sum(p.seconds for p in option.pieces) > room) or not plan.open(room):
         return None
-    reported = normals(problem, model, alternatives, scale, option, now)
-    before = reported.before()
+    every = partings(problem, model, alternatives, scale, option, now)
+    known = np.array([parting.before.mean() for parting in every])
+    # What the data at hand decide already is no question, unless nothing else is left.
+    asked = np.flatnonzero((known < SAFE) | (known >= SAFE).all())
+    plan = replace(
+        plan, others=tuple((asked + 1).tolist()), known=known[asked], gains=np.zeros(asked.size)
+    )
     # Stations are foreseen one after the other; any other choice of them would come sooner.
     in_turn = option.static and any(e.on in AS_IT_WORKS for each in alternatives for e in each)
-    chosen: list[int] = []
-    gains: dict[Pair, float] = {}
-    score = 0.0
-    while True:
-        spent = sum(option.pieces[k].seconds for k in chosen)
-        more = _open(option, chosen, room - spent)[: 1 if in_turn else None]
-        if not more or (spent >= LEAST and _enough(gains)):
+    while more := plan.open(room)[: 1 if in_turn else None]:
+        longer = _longer(plan, [every[k] for k in asked], more)
+        if plan.seconds >= LEAST and (plan.enough or longer.score < (1.0 + GAIN) * plan.score):
             break
-        pick, result, gained = _next(reported, before, chosen, more, option, named)
-        if spent >= LEAST and gained < (1.0 + GAIN) * score:
-            break
-        chosen.append(pick)
-        gains, score = result, max(score, gained)
-    if not chosen:
-        return None
-    plan = _plan(option, chosen, score, before, gains, named)
+        plan = replace(longer, score=max(longer.score, plan.score))
     # Stops on the way take time as well.
     while plan.robot_minutes * 60.0 > room and len(plan.chosen) > 1 and not option.whole:
         plan = replace(plan, chosen=plan.chosen[:-1])
     return plan
 
 
-def _plan(
-    option: Candidate,
-    chosen: Sequence[int],
-    score: float,
-    before: Mapping[Pair, float],
-    gains: Mapping[Pair, float],
-    named: int,
-) -> Plan:
-    first = {
-        pair: gain for pair, gain in gains.items() if _is_named(pair, named) and gain > NOTHING
-    }
-    best = max(first or gains, key=lambda pair: gains[pair])
-    apart = sum(gain for gain in gains.values() if gain > NOTHING)
-    known = _mean(before, best)
-    decided = known >= MARGIN * DECIDES
-    return Plan(option, tuple(chosen), score, apart, best, known, gains[best], decided)
-
-
-def _open(option: Candidate, chosen: Sequence[int], remaining: float) -> list[int]:
-    """Return the pieces that are not in yet and fit into the seconds left."""
-    return [
-        k
-        for k, piece in enumerate(option.pieces)
-        if k not in chosen and piece.seconds <= remaining
-    ]
-
-
-def _next(
-    reported: Normals,
-    before: Mapping[Pair, float],
-    chosen: Sequence[int],
-    more: Sequence[int],
-    option: Candidate,
-    named: int,
-) -> tuple[int, dict[Pair, float], float]:
-    """Return the piece that adds most for its time, what pairs gain with it, and the score."""
-    table: dict[Pair, Array] = {}
-    pairs = sorted({(min(pair), max(pair)) for pair in before})
-    # What the data at hand decide already is no question, unless nothing else is left.
-    asked = [pair for pair in pairs if _mean(before, pair) < MARGIN * DECIDES] or pairs
-    after = reported.added([way for pair in asked for way in (pair, pair[::-1])], chosen, more)
-    for one, other in asked:
-        # The mean over which of the two is true: where one contains the other, as play that may be
-        # zero, only the truth of the larger one shows.
-        ways = [
-            np.sqrt(np.maximum(after[pair] ** 2 - before[pair] ** 2, 0.0))
-            for pair in ((one, other), (other, one))
-        ]
-        table[one, other] = 0.5 * (ways[0] + ways[1])
-    scores = np.zeros(len(more))
-    for pair, values in table.items():
-        weight = NAMED if _is_named(pair, named) else 1.0
-        scores += weight * np.where(values > NOTHING, np.minimum(values, MARGIN * DECIDES), 0.0)
-    # While nothing shows yet, what comes nearest to it.
-    nearest = sum((values for values in table.values()), np.zeros(len(more)))
-    seconds = np.array([option.pieces[k].seconds for k in more])
-    worth = scores + 1e-3 * nearest - 1e-6 * seconds
-    best = int(np.argmax(worth))
-    return more[best], {pair: float(v[best]) for pair, v in table.items()}, float(scores[best])
-
-
-def _is_named(pair: Pair, named: int) -> bool:
-    return max(pair) < named
-
-
-def _enough(gains: Mapping[Pair, float]) -> bool:
-    """Return whether every pair that shows at all is parted safely."""
-    shown = [gain for gain in gains.values() if gain > NOTHING]
-    return bool(shown) and min(shown) >= MARGIN * DECIDES
-
-
-def _mean(before: Mapping[Pair, float], pair: Pair) -> float:
-    return 0.5 * (before[pair] + before[pair[1], pair[0]])
+def _longer(plan: Plan, asked: Sequence[Parting], more: Sequence[int]) -> Plan:
+    """Return the plan with the piece that adds most for its time."""
+    gains = np.array([parting.gained(plan.chosen, more) for parting in asked])
+    weight = np.where(np.array(plan.others) < plan.named, NAMED, 1.0)
+    scores = weight @ np.where(gains > NOTHING, np.minimum(gains, SAFE), 0.0)
+    # While nothing shows yet, what comes nearest to it; of what is alike, the shortest.
+    seconds = np.array([plan.candidate.pieces[k].seconds for k in more])
+    best = int(np.argmax(scores + NEAREST * gains.sum(axis=0) - NEAREST**2 * seconds))
+    chosen = (*plan.chosen, more[best])
+    return replace(plan, chosen=chosen, score=float(scores[best]), gains=gains[:, best])
 
 
 def widening(problem: Problem, options: Sequence[Candidate], limits: Limits) -> Plan:
@@ -235,17 +215,13 @@ def widening(problem: Problem, options: Sequence[Candidate], limits: Limits) -> 
     wanted = ('bidirectional', 'stations') if still else ('path',)
     room = 60.0 * min(limits.minutes, limits.moving)
     for kind in wanted:
-        option = next(option for option in options if option.kind == kind)
-        chosen: list[int] = []
-        spent = 0.0
-        for k in _by_turns(len(option.pieces), option.alone):
-            seconds = option.pieces[k].seconds
-            if spent < 2.0 * LEAST and spent + seconds <= room:
-                chosen.append(k)
-                spent += seconds
-        if chosen:
-            return Plan(option, tuple(chosen))
-    return Plan(option, (0,))
+        plan = Plan(next(option for option in options if option.kind == kind), ())
+        for k in _by_turns(len(plan.candidate.pieces), plan.candidate.alone):
+            if plan.seconds < 2.0 * LEAST and k in plan.open(room):
+                plan = replace(plan, chosen=(*plan.chosen, k))
+        if plan.chosen:
+            return plan
+    return replace(plan, chosen=(0,))
 
 
 def _by_turns(count: int, alone: int) -> list[int]:

@@ -155,8 +155,7 @@ _NARROW = (
 
 
 def _told(plan: Plan, alternatives: Sequence[Explanation], model: Model) -> dict[str, Any]:
-    assert plan.pair is not None
-    one, other = _apart(*(alternatives[k] for k in plan.pair))
+    one, other = _apart(alternatives[0], alternatives[plan.other])
     reported = ' from '.join(filter(None, (_named(one, other), _named(other, one))))
     reason = (
         f'The data at hand tell {reported} by {plan.before:.1f} standard deviations; this would add '

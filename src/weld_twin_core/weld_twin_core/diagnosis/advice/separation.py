@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from ...twin.expected_effort import with_expected_effort
 from ..algebra.fit import design, with_weights
 from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem, Scale
-from .candidates import Candidate
+from .candidates import Candidate, Piece
 
 ROWS = 1200
 """Rows of the data at hand that take part."""
@@ -41,7 +42,6 @@ LOOSE = 1e-10
 """Added to the diagonal of a normal matrix, as a share of it: what is less is rounding."""
 
 Alternative = tuple[Effect, ...]
-Pair = tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,44 +56,42 @@ class Side:
 
 
 @dataclass(frozen=True, eq=False)
-class Normals:
+class Parting:
     """
-    For every pair (true, rival) with the first explanation what the data at hand and each piece say.
+    How far the first explanation is parted from one other, by the data at hand and by each piece.
+
+    Each of the two is taken for true in turn. Where one contains the other, as play that may be zero,
+    only the truth of the larger one shows; so the mean over both counts.
 
     Attributes
     ----------
-    now : dict
-        Normal matrix of the rival's columns and, last, the difference, shape (P, P).
-    pieces : dict
-        The same of every piece, shape (K, P, P).
+    now : list of array, shape (P, P)
+        Normal matrix of the columns of the one that is not true and, last, of the difference.
+    pieces : list of array, shape (K, P, P)
+        The same of every piece.
 
     """
 
-    now: dict[Pair, Array]
-    pieces: dict[Pair, Array]
+    now: list[Array]
+    pieces: list[Array]
 
-    def before(self) -> dict[Pair, float]:
-        """Return by how many standard deviations the data at hand part every pair."""
-        return {pair: float(_left(matrix[None])[0]) for pair, matrix in self.now.items()}
+    @cached_property
+    def before(self) -> Array:
+        """Return by how many standard deviations the data at hand part them, each way, (2,)."""
+        return np.array([_left(matrix[None])[0] for matrix in self.now])
 
-    def added(
-        self, pairs: Sequence[Pair], chosen: Sequence[int], more: Sequence[int]
-    ) -> dict[Pair, Array]:
-        """
-        Return by how many standard deviations pairs part with further pieces, shape (len(more),).
-
-        Each piece of ``more`` is tried beside those that are in already, ``chosen``.
-        """
-        out = {}
-        for pair in pairs:
-            base = self.now[pair] + self.pieces[pair][list(chosen)].sum(axis=0)
-            out[pair] = _left(base + self.pieces[pair][list(more)])
+    def gained(self, chosen: Sequence[int], more: Sequence[int]) -> Array:
+        """Return what each further piece adds to it, beside those chosen, shape (len(more),)."""
+        out: Array = np.zeros(len(more))
+        for before, now, pieces in zip(self.before, self.now, self.pieces, strict=True):
+            after = _left(now + pieces[list(chosen)].sum(axis=0) + pieces[list(more)])
+            out += np.sqrt(np.maximum(after**2 - before**2, 0.0)) / 2.0
         return out
 
 
 def _left(matrices: Array) -> Array:
     """Return what columns leave of the last one, its length, shape (K,)."""
-    size = np.sqrt(np.maximum(np.diagonal(matrices, axis1=1, axis2=2), 1e-300))
+    size = np.sqrt(np.maximum(np.diagonal(matrices, axis1=1, axis2=2), np.finfo(float).tiny))
     scaled = matrices / size[:, :, None]
     scaled /= size[:, None, :]
     each = np.arange(matrices.shape[1] - 1)
@@ -107,16 +105,16 @@ def _left(matrices: Array) -> Array:
         return np.asarray(size[:, -1] * np.sqrt(np.maximum(1.0 - taken, 0.0)))
 
 
-def normals(
+def partings(
     problem: Problem,
     model: Model,
     alternatives: Sequence[Alternative],
     scale: Scale,
     candidate: Candidate,
     now: Side,
-) -> Normals:
+) -> list[Parting]:
     """
-    Return what a candidate's pieces say of every pair of alternatives, beside the data at hand.
+    Return how a candidate's pieces part the first alternative, believed most, from every other.
 
     Parameters
     ----------
@@ -130,29 +128,28 @@ def normals(
         _ahead(problem, candidate, recording, alternatives, scale)
         for recording in candidate.recordings
     ]
-    out = Normals({}, {})
-    # The first is believed most: what parts it from each other decides.
-    others = range(1, len(alternatives))
-    for true, alternative in [pair for k in others for pair in ((0, k), (k, 0))]:
-        names = sorted({n for side in (now, *ahead) for n in side.names[alternative]})
-        held = _held(model.with_found(alternatives[alternative]), names)
-        out.now[true, alternative] = np.diag(held) + _normal(
-            _stacked(now, true, alternative, names)
-        )
-        stacks = [_stacked(side, true, alternative, names) for side in ahead]
-        matrices = []
-        for piece in candidate.pieces:
-            stack, side = stacks[piece.recording], ahead[piece.recording]
-            if piece.rows is not None:
-                at = np.add.outer(np.array(piece.rows) * side.rows, np.arange(side.rows))
-                stack = stack[:, at.ravel()]
-            matrices.append(_normal(stack))
-        out.pieces[true, alternative] = np.array(matrices)
+    out = []
+    for other in range(1, len(alternatives)):
+        parting = Parting([], [])
+        for true, wrong in ((0, other), (other, 0)):
+            names = sorted({n for side in (now, *ahead) for n in side.names[wrong]})
+            held = np.diag(_held(model.with_found(alternatives[wrong]), names))
+            stacks = [_stacked(side, true, wrong, names) for side in (now, *ahead)]
+            pieces = [
+                _of_piece(stacks[p.recording + 1], ahead[p.recording], p) for p in candidate.pieces
+            ]
+            parting.now.append(held + stacks[0] @ stacks[0].T)
+            parting.pieces.append(np.array([piece @ piece.T for piece in pieces]))
+        out.append(parting)
     return out
 
 
-def _normal(stack: Array) -> Array:
-    return np.asarray(stack @ stack.T)
+def _of_piece(stack: Array, side: Side, piece: Piece) -> Array:
+    """Return the rows of one piece of a recording."""
+    if piece.rows is None:
+        return stack
+    at = np.add.outer(np.array(piece.rows) * side.rows, np.arange(side.rows))
+    return stack[:, at.ravel()]
 
 
 def _held(model: Model, names: Sequence[str]) -> Array:

@@ -175,9 +175,9 @@ class Change:
             before, remaining = (float((c.residual[:, part] ** 2).sum()) for c in (rest, after))
             if before > 0.0:
                 count = max(after.share * free * after.residual[:, part].size, FEWEST)
-                fall += 0.5 * count * float(np.log(before / max(remaining, TINY**2 * before)))
+                fall += count * float(np.log(before / max(remaining, TINY**2 * before)))
                 total += count
-        return fall - 0.5 * float(self.columns.shape[2] * np.log(max(total, FEWEST)))
+        return (fall - float(self.columns.shape[2] * np.log(max(total, FEWEST)))) / 2.0
 
 
 def rest_of(parts: list[Array], problem: Problem, model: Model) -> Rest:
@@ -230,7 +230,7 @@ def _scale(parts: list[Array]) -> Scale:
         for rows in (slice(0, 3), slice(3, 6))
     ]
     position, turn = (max(s, TINY) for s in size)
-    off = [np.linalg.norm(p[:3], axis=0) / (np.sqrt(3.0) * position) for p in parts]
+    off = [np.linalg.norm(p[:3], axis=0) / (np.sqrt(3) * position) for p in parts]
     weights = tuple(np.minimum(1.0, (HUBER / np.maximum(o, TINY)) ** 2) for o in off)
     return Scale(position, turn, weights)
 

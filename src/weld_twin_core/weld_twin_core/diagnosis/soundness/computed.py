@@ -127,8 +127,9 @@ def _rounding(problem: Problem, model: Model) -> float:
     angle = max(written(q), np.radians(written(np.degrees(q))))
     reach = [maker.column(('q', i))[:3] for i in np.flatnonzero(turning).tolist()]
     squares = np.sum([(column**2).sum(axis=0).mean() for column in reach])
-    # A number that is rounded is off by the root of a twelfth of the step.
-    out = float(np.sqrt((3.0 * step**2 + squares * angle**2) / 12.0)) / WORTH
+    # A number that is rounded is off by anything up to half a step.
+    evenly = 1.0 / (2.0 * np.sqrt(3))
+    out = evenly * float(np.hypot(np.sqrt(3) * step, np.sqrt(squares) * angle)) / WORTH
     return out if out < CLEAR * COMPUTED else 0.0
 
 

@@ -19,7 +19,7 @@ WIDEST = 0.4
 """Share of the recording up to which lags are looked at where nothing else can be wrong."""
 TRIED = 300
 """Lags tried first, and samples compared at each: enough for one number, and quick."""
-KEPT = 0.8
+KEPT = 1.0 - 2.0 * FEW
 """Share of the samples that count: the worst may be outliers."""
 
 

@@ -93,7 +93,7 @@ def turned_base(robot: Robot, turn: Array) -> Finding:
     angle, k = float(np.linalg.norm(vector)), int(np.abs(vector).argmax())
     about = f'axis ({", ".join(f"{part:+.0f}" for part in vector / abs(vector[k]))})'
     if abs(vector[k]) > angle - 1.0:
-        about, angle = f'{AXES[k]} axis', angle if angle > 179.0 else float(vector[k])
+        about, angle = f'{AXES[k]} axis', angle if np.isclose(angle, 180.0) else float(vector[k])
     # About its own first axis an arm cannot tell its base from the zero of its first joint.
     first, either = robot.joint_names[0], about == 'z axis' and not robot.prismatic[0]
     words = f'; a joint {first} whose zero is off by as much would look the same'

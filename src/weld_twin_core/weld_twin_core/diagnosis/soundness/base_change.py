@@ -4,9 +4,8 @@
 What a change in time of base, tool or a joint would explain, beyond everything that is constant.
 
 Residuals of an arm follow its pose, and poses follow time, so any motion looks a little like a
-change of the frame. Constant frames and a first-order model of the whole arm (geometry, springs,
-play, loops of lost motion, lag of every joint) and of the instrument's scale are therefore projected
-out before a change in time is tried.
+change of the frame. Constant frames, all that the library has of joints and links but changes in time,
+and the instrument's scale are therefore projected out, to first order, before a change is tried.
 """
 
 from __future__ import annotations
@@ -20,28 +19,20 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from ...arrays import Array
-from ...effects.hysteresis import SLIDING, Hysteresis
-from ...effects.loaded_play import SHARES
 from ...effects.measurement_scale import MeasurementScale
-from ...effects.plausible import plausible
-from ...effects.thermal_growth import ThermalGrowth
+from ...effects.plausible import spreads
 from ...twin.features import Features
+from ..algebra.alias import outside, span_of
 from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
+from ..hypotheses.library import plain_causes
+from ..hypotheses.still_joints import moved_most
 from .lag import KEPT
 from .limits import FEW, ROWS, TINY, WIDER
 
-GEOMETRY = {
-    'theta': ('joint_offset', 'offset'),
-    'd': ('link_offset', 'dd'),
-    'a': ('link_length', 'da'),
-    'alpha': ('link_twist', 'dalpha'),
-    'beta': ('axis_parallelism', 'dbeta'),
-}
-"""Channels of a row, and the error that displaces each."""
-LOOPS = (0.02, 0.1)
-"""Travels [rad] over which loops of lost motion close, between a gap and a tenth of a turn."""
+LASTING = ('constant', 'angle', 'direction', 'speed', 'acceleration', 'load', 'temperature')
+"""What errors of an arm depend on that are no change in time."""
 FEWEST = 12.0
 """Independent rows that are counted at the least: two frames have as many numbers."""
 TIED = 1e-6
@@ -58,8 +49,8 @@ class Rest:
     Attributes
     ----------
     residual : array, shape (M, c) in units of noise
-    basis : array, shape (M, c, P)
-        Orthonormal over all rows: what frames and arm can explain.
+    basis : array, shape (P, M c)
+        Orthonormal: what frames and arm can explain.
     things : dict of (array, array), shapes (M, c, k) and (M, 3, k)
         What 'base', 'tool' and 'joints' do to every sample, whitened, and to its position [m].
     rows, samples : tuple of int
@@ -116,7 +107,8 @@ class Change:
         """Return every sample's share of right hand side (M, i), overlap (M, p, i), normal."""
         turned = np.swapaxes(self.columns, 1, 2)
         right = np.matmul(turned, self.rest.residual[:, :, None])[:, :, 0]
-        overlap = np.matmul(np.swapaxes(self.rest.basis, 1, 2), self.columns)
+        basis = self.rest.basis.reshape(-1, *self.rest.residual.shape).transpose(1, 0, 2)
+        overlap = np.matmul(basis, self.columns)
         return right, overlap, np.matmul(turned, self.columns)
 
     def _summed(self, shapes: Array) -> tuple[Array, Array]:
@@ -153,11 +145,9 @@ class Change:
     def taken_out(self, shape: Array) -> Rest:
         """Return what is left once the change is fitted, too."""
         rest = self.rest
-        flat = _flat(self.columns * shape[:, None, None])
-        new = _orthonormal(_projected(flat, _flat(rest.basis)))
-        remaining = _projected(rest.residual.reshape(-1), new).reshape(rest.residual.shape)
-        basis = np.concatenate([_flat(rest.basis), new], axis=1)
-        return replace(rest, residual=remaining, basis=basis.reshape(*remaining.shape, -1))
+        new = span_of(outside(_rows(self.columns * shape[:, None, None]), rest.basis))
+        remaining = outside(rest.residual.reshape(1, -1), new).reshape(rest.residual.shape)
+        return replace(rest, residual=remaining, basis=np.concatenate([rest.basis, new]))
 
     def nats(self, shape: Array) -> float:
         """
@@ -169,7 +159,7 @@ class Change:
         rest, after = self.rest, self.taken_out(shape)
         # Of few stations frames and arm take most rows up; those tell nothing for a change.
         size = float(sum(c * m for c, m in zip(rest.rows, rest.samples, strict=True)))
-        free = max(1.0 - after.basis.shape[2] / size, 0.0)
+        free = max(1.0 - len(after.basis) / size, 0.0)
         total, fall = 0.0, 0.0
         for part in (slice(0, 3), slice(3, 6)):
             before, remaining = (float((c.residual[:, part] ** 2).sum()) for c in (rest, after))
@@ -186,25 +176,38 @@ def rest_of(parts: list[Array], problem: Problem, model: Model) -> Rest:
 
     ``parts`` are the residuals of the model, (c, M), one per recording.
     """
-    scale, n = _scale(parts), model.robot.n
-    pairs = list(zip(problem.features(model), problem.rows, strict=True))
-    arms = [np.concatenate([part(*pair) for part in (_arm, _grown, _scaled)]) for pair in pairs]
-    remaining, arm = (_whitened(each, scale) for each in ([part[None] for part in parts], arms))
+    scale, n, features = _scale(parts), model.robot.n, problem.features(model)
+    remaining = _whitened(problem, [part[None] for part in parts], scale)
+    arm = _whitened(problem, _of_arm(problem, model, features), scale)
     things = {}
     for thing, channel, count in (('base', 'base', 6), ('tool', 'tool', 6), ('joints', 'q', n)):
-        moved = [_moved(maker, channel, count, rows) for maker, rows in pairs]
+        moved = [np.stack([f.column((channel, j)) for j in range(count)]) for f in features]
         metres = np.concatenate([part[:, :3].transpose(2, 1, 0) for part in moved])
-        things[thing] = _whitened(moved, scale), metres
+        own = [problem.seen(k, part) for k, part in enumerate(moved)]
+        things[thing] = _whitened(problem, own, scale), metres
     bases = [things['base'][0]]
     if 'base' in problem.align:
         number = np.repeat(np.arange(len(parts)), problem.samples)
         bases = [bases[0] * (number == k)[:, None, None] for k in range(len(parts))]
-    frames = np.concatenate([*bases, things['tool'][0]], axis=2)
-    arm = arm[..., np.abs(arm).max(axis=(0, 1)) > 0.0]
-    basis = _basis(arm.reshape(remaining.size, -1), frames.reshape(remaining.size, -1))
-    remaining = _projected(remaining.reshape(-1, 1), basis).reshape(remaining.shape[:2])
-    basis = basis.reshape(*remaining.shape, -1)
+    frames = span_of(_rows(np.concatenate([*bases, things['tool'][0]], axis=2)))
+    # Of the arm only what is strong enough to be seen.
+    basis = np.concatenate([frames, _strong(outside(_rows(arm), frames))])
+    remaining = outside(_rows(remaining), basis).reshape(remaining.shape[:2])
     return Rest(remaining, basis, things, problem.rows, problem.samples, scale.position)
+
+
+def _of_arm(problem: Problem, model: Model, features: list[Features]) -> list[Array]:
+    """Return columns of all that an arm and the scale of its instrument do, (P, c, M) per recording."""
+    view = features[moved_most(features, None)].view
+    out: list[list[Array]] = [[] for _ in features]
+    for effect in (*plain_causes(model.robot, view, LASTING), MeasurementScale()):
+        size = WIDER * spreads(model.robot, effect)
+        known = np.isfinite(size)
+        for own, part in zip(
+            out, problem.effect_columns(features, effect, atoms=False), strict=True
+        ):
+            own.append(part[known] * size[known, None, None])
+    return [np.concatenate(own) for own in out]
 
 
 def thinned(problem: Problem, parts: list[Array]) -> tuple[Problem, list[Array]]:
@@ -235,110 +238,24 @@ def _scale(parts: list[Array]) -> Scale:
     return Scale(position, turn, weights)
 
 
-def _moved(maker: Features, name: str, count: int, rows: int) -> Array:
-    return np.stack([maker.column((name, j)) for j in range(count)])[:, :rows]
-
-
-def _whitened(parts: Sequence[Array], scale: Scale) -> Array:
+def _whitened(problem: Problem, parts: Sequence[Array], scale: Scale) -> Array:
     """Return (P, c_k, M_k) columns of all recordings whitened as one array, (M, c, P)."""
-    out = []
-    most = max(part.shape[1] for part in parts)
-    for part, weight in zip(parts, scale.weights, strict=True):
-        unit = np.full(part.shape[1], 1.0 / scale.position)
-        unit[3:] = 1.0 / scale.orientation
-        white = (part * unit[:, None] * np.sqrt(weight)).transpose(2, 1, 0)
-        # Points are filled up with empty rows.
-        out.append(np.pad(white, ((0, 0), (0, most - part.shape[1]), (0, 0))))
-    return np.concatenate(out)
+    most = max(problem.rows)
+    each = [problem.in_noise(k, part, scale).transpose(1, 2, 0) for k, part in enumerate(parts)]
+    # Points are filled up with empty rows.
+    return np.concatenate([np.pad(p, ((0, 0), (0, most - p.shape[1]), (0, 0))) for p in each])
 
 
-def _arm(maker: Features, rows: int) -> Array:
-    """Return columns of everything an arm does by itself, to first order, shape (P, rows, M)."""
-    view, robot = maker.view, maker.twin.robot
-    out = []
-    for i in range(robot.n):
-        name = robot.joint_names[i]
-        spread = {
-            key: WIDER * plausible(robot, *error, name).sd for key, error in GEOMETRY.items()
-        }
-        joint = maker.column(('q', i))[:rows] * spread['theta']
-        out += [maker.column((key, i))[:rows] * sd for key, sd in spread.items()]
-        signals = [np.sin(view.q[:, i]), np.cos(view.q[:, i]), view.q[:, i]]
-        signals += [view.shift[('tau', i)], view.qd[:, i], np.sign(view.qd[:, i])]
-        side = np.sign(np.gradient(view.q[:, i])) if view.static else 0.0 * view.q[:, i]
-        for signal in (*signals, side, *_abrupt(maker, i)):
-            # A joint that rests in one recording and moves in another has the same columns in both.
-            spread = float(np.abs(signal).max())
-            out.append(joint * (signal / spread if spread > TINY else 0.0 * signal))
-    return np.stack(out)
+def _rows(columns: Array) -> Array:
+    """Return (M, c, P) columns as (P, rows)."""
+    return columns.reshape(columns.shape[0] * columns.shape[1], -1).T
 
 
-def _abrupt(maker: Features, i: int) -> list[Array]:
-    """
-    Return what a joint does that looks like a step for a while, arrays (M,) of any size.
-
-    Play falls over where the load changes sides, and loops of lost motion close soon after a turn.
-    """
-    view, name = maker.view, maker.twin.robot.joint_names[i]
-    pull = view.shift[('tau', i)]
-    most = max(float(np.abs(pull).max()), TINY)
-    # A load that stays on one side is as good as constant, and there already.
-    out = [pull / np.hypot(pull, share * most) for share in SHARES]
-    if view.static:  # loops have closed
-        return [*out, *(0.0 * pull for _ in LOOPS)]
-    unit = SLIDING if maker.twin.robot.prismatic[i] else 1.0
-    loops = [Hysteresis(name, 0.0, travel * unit) for travel in LOOPS]
-    return [*out, *(np.asarray(maker.shifts(loop)[0]['q', i]) for loop in loops)]
-
-
-def _grown(maker: Features, rows: int) -> Array:
-    """
-    Return columns of every link that grows with the temperature, shape (n, rows, M).
-
-    Without a temperature they are zero: what grows with an unknown one is a smooth change in time.
-    """
-    robot, view = maker.twin.robot, maker.view
-    if view.temperature is None:
-        return np.zeros((robot.n, rows, view.q.shape[0]))
-    growths = [ThermalGrowth(links=(name,)) for name in robot.joint_names]
-    spread = WIDER * plausible(robot, 'thermal_growth', 'coefficient').sd
-    return np.stack([spread * maker.columns(one, atoms=False)[0, :rows] for one in growths])
-
-
-def _scaled(maker: Features, rows: int) -> Array:
-    """Return the column of an instrument that reads too long, shape (1, rows, M)."""
-    spread = WIDER * plausible(maker.twin.robot, 'measurement_scale', 'scale').sd
-    return spread * maker.columns(MeasurementScale(), atoms=False)[:, :rows]
-
-
-def _basis(arm: Array, frames: Array) -> Array:
-    """Return an orthonormal basis of frames and of all arm errors strong enough to be seen."""
-    frames = _orthonormal(frames)
-    return np.concatenate([frames, _strong(_projected(arm, frames), 1.0)], axis=1)
-
-
-def _orthonormal(columns: Array) -> Array:
-    size = np.linalg.norm(columns, axis=0)
-    columns = columns[:, size > 0.0] / size[size > 0.0]
-    if columns.shape[1] == 0:
-        return columns
-    return _strong(columns, TINY)
-
-
-def _strong(columns: Array, least: float) -> Array:
-    """Return orthonormal directions of columns, those of at least so much strength."""
-    strength, vectors = np.linalg.eigh(columns.T @ columns)
-    seen = strength > least
-    return np.asarray(columns @ vectors[:, seen] / np.sqrt(strength[seen]))
-
-
-def _projected(columns: Array, basis: Array) -> Array:
-    return np.asarray(columns - basis @ (basis.T @ columns))
-
-
-def _flat(columns: Array) -> Array:
-    """Return (M, c, P) columns as (rows, P)."""
-    return columns.reshape(-1, columns.shape[2])
+def _strong(columns: Array) -> Array:
+    """Return orthonormal directions of columns, (P, rows), that are stronger than the noise."""
+    strength, ways = np.linalg.eigh(columns @ columns.T)
+    seen = strength > 1.0
+    return np.asarray((ways[:, seen] / np.sqrt(strength[seen])).T @ columns)
 
 
 def _solved(right: Array, normal: Array) -> Array:

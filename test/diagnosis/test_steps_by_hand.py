@@ -17,7 +17,6 @@ from weld_twin_core.diagnosis.levels.groups import _curved, smooth_field
 from weld_twin_core.diagnosis.levels.placed import _tilt
 from weld_twin_core.diagnosis.predicting.leftover import _middle, _shared
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, weighed
-from weld_twin_core.diagnosis.soundness import base_change
 from weld_twin_core.diagnosis.soundness.computed import _noise, _paired
 from weld_twin_core.diagnosis.soundness.efforts import _Loads
 from weld_twin_core.diagnosis.soundness.lag import lag
@@ -39,12 +38,6 @@ def test_a_recording_of_one_station_is_a_block_of_its_own():
     labels = Problem((one, whole, replace(one, name='another')), frozenset()).block_labels(6)
     assert not set(labels[:3]) & set(labels[3:])
     assert not set(labels[-3:]) & set(labels[:-3])
-
-
-def test_what_settles_begins_at_one_and_has_fallen_by_its_constant():
-    shapes = base_change.smooth_shapes(np.array([0.0, 0.5, 1.0]))
-    for constant, shape in zip(base_change.CONSTANTS, shapes, strict=False):
-        assert shape == pytest.approx([1.0, np.exp(-0.5 / constant), np.exp(-1.0 / constant)])
 
 
 @pytest.mark.parametrize(

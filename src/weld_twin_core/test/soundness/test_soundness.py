@@ -23,8 +23,9 @@ from weld_twin_core.diagnosis.soundness.changed import setup
 from weld_twin_core.diagnosis.soundness.evidence import Case
 from weld_twin_core.diagnosis.soundness.gate import CHECKS, examine
 from weld_twin_core.diagnosis.soundness.mending import Given
-from weld_twin_core.diagnosis.soundness.slips import KNOCKED, Settling, Slip
+from weld_twin_core.diagnosis.soundness.slips import Settling, Slip
 from weld_twin_core.effects import effects_from_list
+from weld_twin_core.effects.dated import InstrumentKnock
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
@@ -291,7 +292,7 @@ def test_a_step_of_the_base_is_found_where_it_happened(ur5, request, kind):
     problem, model = asked(ur5, bad)
     model = initial_frames(problem, model)
     (step,) = Case(problem, model).changes
-    assert step.kind == KNOCKED
+    assert step.kind == 'instrument_knocked'
     assert step.time == pytest.approx(when, abs=0.02 * t[-1])
     assert step.size == pytest.approx(5e-4, rel=0.1)
     (slip,) = looked_at(ur5, bad).slips
@@ -326,7 +327,7 @@ def test_a_set_up_moved_between_recordings_is_named_unless_each_has_its_own_base
 def test_a_step_larger_than_any_gap_shows_did_not_happen(ur5, run, monkeypatch, times, named):
     case = Case(*asked(ur5, spoilt(run, np.full(run.measured.t.size, 5e-4)), align=()))
     largest = float(np.linalg.norm(case.residuals[0][:3], axis=0).max())
-    step = Slip(KNOCKED, None, 0, 5.0, times * largest, 500.0, dated=False)
+    step = Slip(InstrumentKnock(time=5.0), 0, times * largest, 500.0, dated=False)
     monkeypatch.setattr(Case, 'changes', [step])
     assert bool(setup(case)) is named
 

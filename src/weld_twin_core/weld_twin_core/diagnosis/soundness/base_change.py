@@ -273,8 +273,3 @@ def other_shapes(age: Array) -> list[Array]:
     waves = [wave(n * np.pi * age) for n in (1, 2) for wave in (np.sin, np.cos)]
     late = [np.exp(-(1.0 - age) / constant) for constant in CONSTANTS]
     return [age, age**2, *late, *waves]
-
-
-def smooth_shapes(age: Array) -> list[Array]:
-    """Return smooth shapes over age (M,), from 0 to 1, settling among them, each (M,)."""
-    return [*(np.exp(-age / constant) for constant in CONSTANTS), *other_shapes(age)]

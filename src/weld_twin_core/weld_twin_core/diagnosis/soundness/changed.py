@@ -12,6 +12,7 @@ import numpy as np
 
 from ...arm.rotation import rotation_vector
 from ...arrays import Array
+from ...effects.dated import InstrumentKnock
 from ...effects.frame_errors import ToolPose
 from ..algebra.problem import Change, Model
 from .evidence import Case, Finding, mistake, note, warning
@@ -19,7 +20,7 @@ from .lengths import falls, instant, length, listed
 from .limits import FEW, HALVED, NOISE, PARTED, WRONG
 from .mending import differing
 from .orientation import disagreement
-from .slips import KNOCKED, Settling, Slip
+from .slips import Settling, Slip
 from .snapshot import Arm, Snapshot
 
 TORCH = 0.1
@@ -39,7 +40,7 @@ def setup(case: Case) -> Sequence[Finding]:
             continue
         if isinstance(each, Settling):
             out.append(note(_settled(case, each)))
-        elif each.kind == KNOCKED and not case.slips:
+        elif isinstance(each.effect, InstrumentKnock) and not case.slips:
             out.append(warning(_moved(case, each)))
     return out
 

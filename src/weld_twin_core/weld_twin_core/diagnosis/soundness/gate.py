@@ -91,7 +91,7 @@ class Examined:
     def told(self, result: Sequence[Effect]) -> tuple[Unsound, ...]:
         """Return the mistakes, and the slips that a fit has among what it found."""
         kept = {effect.key for effect in result}
-        slips = (slip for slip in self.slips if slip.effect().key in kept)
+        slips = (slip for slip in self.slips if slip.effect.key in kept)
         own = (_gave_way(slip, self.given).told(applied=True) for slip in slips)
         return (*self.unsound, *own)
 
@@ -202,7 +202,7 @@ class _Look(NamedTuple):
         if self.posed is None:
             return None
         alone = len(self.posed[0].recordings) == 1
-        dated = tuple(slip.effect() for slip in self.dated) if alone else ()
+        dated = tuple(slip.effect for slip in self.dated) if alone else ()
         problem = replace(self.posed[0], dated=dated)
         reported = tuple(each.sentence for each in mistakes)
         made = tuple(e for each in mistakes if (e := as_entry(each.mend)) is not None)
@@ -262,4 +262,4 @@ def _same(slip: Slip, other: Slip, problem: Problem) -> bool:
 def _gave_way(slip: Slip, of: Given | Problem) -> Finding:
     """Return the mistake that a slip is; of several recordings, effects count one time for all."""
     sentence = slip.sentence(of.recordings[slip.recording])
-    return mistake(sentence, slip.kind, slip.at, slip.remedy, alike=slip.alike)
+    return mistake(sentence, slip.kind, (slip.effect.at,), slip.remedy, alike=slip.alike)

@@ -18,104 +18,94 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ...effects.dated import InstrumentKnock, JointSlip, ToolSlip
+from ...effects.dated import InstrumentKnock, JointSlip, Sudden, ToolSlip
 from ...effects.effect import Effect
 from ...recording import Recording
 from ..algebra.problem import Problem
-from .base_change import CONSTANTS, Change, Rest, other_shapes, smooth_shapes
+from .base_change import CONSTANTS, Change, Rest, other_shapes
 from .lengths import instant, length
 from .limits import FEW, MARGIN, MOST, TINY
 
 SLOW = 2.0
 """Seconds below which nothing warms up; what dies away faster is a transient of the arm."""
-KNOCKED, JUMPED, SLIPPED = 'instrument_knocked', 'reflector_jumped', 'joint_slipped'
+MOVED_BEFORE = np.inf
+"""Time constant of what moved before a recording, and stays so in all of it."""
 _AGAIN = 'and measure again; or split the recording there and have the'
-_WORDS = {
-    KNOCKED: (
+_WORDS: dict[type[Effect], tuple[str, str, str, str]] = {
+    InstrumentKnock: (
+        'instrument_knocked',
         'Instrument or base were knocked',
         'a knock at instrument or base',
         f'Fasten the instrument and the base, {_AGAIN} base aligned',
     ),
-    JUMPED: (
+    ToolSlip: (
+        'reflector_jumped',
         'The reflector jumped in its nest, or the tool in its holder',
         'a jump of the reflector or the tool',
         f'Fasten the reflector or the tool, {_AGAIN} tool aligned',
     ),
-    SLIPPED: (
+    JointSlip: (
+        'joint_slipped',
         'Joint {0!r} slipped',
         'a slip of joint {0!r}',
         'See to belt, coupling and encoder of {0}, master it and measure again',
     ),
 }
-"""How each kind is told: what happened, how it is called beside others, what to do about it."""
+"""How each is told: its kind, what happened, how it is called beside others, what to do about it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Slip:
     """
-    Something that gave way.
+    Something that gave way: the effect to be fitted, of no size yet, and in which recording.
 
-    Attributes
-    ----------
-    kind : str
-        'instrument_knocked', 'reflector_jumped' or 'joint_slipped'.
-    joint : str or None
-    recording : int
-    time : float [s]
-        Between the last measurement before and the first after.
-    size : float [m]
-        RMS motion of the measured points.
-    nats : float
-        Evidence for it.
-    alike : tuple of (str, tuple of str)
-        Kinds and places of what would explain the same step nearly as well.
-    dated : bool
-        Whether it is more than the small steps that effects of no exact formula leave.
-
+    ``size`` is the RMS motion of the measured points [m], ``log_bayes_factor`` the evidence for it.
+    ``others`` would explain the same step nearly as well. It is ``dated`` where it is more than the
+    small steps that effects of no exact formula leave.
     """
 
-    kind: str
-    joint: str | None
+    effect: Sudden
     recording: int
-    time: float
     size: float
-    nats: float
-    alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    log_bayes_factor: float
+    others: tuple[Sudden, ...] = ()
     dated: bool = True
+
+    @property
+    def kind(self) -> str:
+        """Return what the list of mistakes calls it."""
+        return _WORDS[type(self.effect)][0]
+
+    @property
+    def time(self) -> float:
+        """Return when [s], between the last measurement before and the first after."""
+        return self.effect.instant
+
+    @property
+    def alike(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """Return kind and place of what would explain the same step nearly as well."""
+        return tuple((_WORDS[type(other)][0], (other.at,)) for other in self.others)
 
     def sentence(self, recording: Recording) -> str:
         """Return what happened, in words."""
-        at, what = instant(recording, self.time), _WORDS[self.kind][0].format(self.joint)
-        out = f'{what} at {at} of {recording.name}: the tool is {length(self.size)} off then.'
-        others = ' or '.join(dict.fromkeys(_WORDS[kind][1].format(*at) for kind, at in self.alike))
+        what, when = _WORDS[type(self.effect)][1], instant(recording, self.time)
+        out = f'{what.format(self.effect.at)} at {when} of {recording.name}: the tool is '
+        out += f'{length(self.size)} off then.'
+        others = ' or '.join(_WORDS[type(other)][2].format(other.at) for other in self.others)
         return f'{out} {others[0].upper()}{others[1:]} would look the same.' if others else out
 
     @property
     def remedy(self) -> str:
         """Return what to do about it."""
-        return _WORDS[self.kind][2].format(self.joint)
-
-    def effect(self) -> Effect:
-        """Return the effect to be fitted, of no size yet."""
-        if self.joint is not None:
-            return JointSlip(self.joint, time=self.time)
-        return (InstrumentKnock if self.kind == KNOCKED else ToolSlip)(time=self.time)
-
-    @property
-    def at(self) -> tuple[str, ...]:
-        """Return where it is, as the list of mistakes has it."""
-        if self.joint is not None:
-            return (self.joint,)
-        return ('instrument',) if self.kind == KNOCKED else ('tool',)
+        return _WORDS[type(self.effect)][3].format(self.effect.at)
 
 
 class Settling(NamedTuple):
-    """A settling of the base: where, time constant [s], RMS motion [m] at its start, nats."""
+    """A settling of the base: where, time constant [s], RMS motion [m] at its start."""
 
     recording: int
     time_constant: float
     size: float
-    nats: float
 
 
 def changes(
@@ -144,27 +134,34 @@ def changes(
         if best is None:
             break
         before, rest = rest.far, best.change.taken_out(best.shape)
-        if best.slip is None:
-            named = seen.named(best)
-            out += [] if named is None else [named]
+        if best.effect is None:
+            out += seen.named(best)
             continue
-        taken.append((best.slip.recording, best.at))
+        taken.append((best.recording, best.at))
         # Effects that no formula holds exactly leave small steps here and there; and no step is twice
         # as large as the largest gaps: one frame that is fitted takes up half of it.
-        dated = before - rest.far > FEW * whole and best.slip.size < 2.0 * largest
-        out.append(replace(best.slip, dated=dated))
+        size = best.change.size(best.shape)
+        dated = before - rest.far > FEW * whole and size < 2.0 * largest
+        out.append(Slip(best.effect, best.recording, size, best.sure, best.others, dated))
     return out
 
 
 class _Trial(NamedTuple):
-    """A change of a recording, its evidence, shape in time (M,), and where it is abrupt if it is."""
+    """
+    A change of a recording, its evidence, and its shape in time (M,).
 
-    nats: float
+    Of a step also what it is, the sample that it comes before, and what explains it as well; of a smooth
+    change the time constant as a share of the recording, if it settles.
+    """
+
+    sure: float
     change: Change
     shape: Array
     recording: int
-    slip: Slip | None = None
+    effect: Sudden | None = None
     at: int = -1
+    others: tuple[Sudden, ...] = ()
+    constant: float = 0.0
 
     @property
     def gain(self) -> float:
@@ -185,36 +182,42 @@ class _Seen:
         """Return the step or smooth change with most evidence; None where nothing is sure."""
         trials = []
         for k in range(len(self.problem.recordings)):
-            smooth = max(self._smooth(k), key=_nats)
+            smooth = max(self._smooth(k), key=_sure)
             steps = list(self._steps(k))
-            step, surest = _simplest(steps), max((t.nats for t in steps), default=0.0)
-            if step is not None and surest > MARGIN + max(smooth.nats, 0.0):
-                trials.append(step._replace(nats=surest))
-            elif smooth.nats > MARGIN:
+            step, surest = _simplest(steps), max((t.sure for t in steps), default=0.0)
+            if step is not None and surest > MARGIN + max(smooth.sure, 0.0):
+                trials.append(step._replace(sure=surest))
+            elif smooth.sure > MARGIN:
                 trials.append(smooth)
-        return max(trials, key=_nats, default=None)
+        return max(trials, key=_sure, default=None)
 
     @cached_property
     def _base(self) -> Change:
         return self.rest.change('base')
 
     @cached_property
-    def _kinds(self) -> list[tuple[str, str | None, Change]]:
+    def _kinds(self) -> list[tuple[Sudden, Change]]:
         # Where only points are seen the tool cannot turn.
         tool = self.rest.change('tool', slice(max(self.rest.rows)))
-        own = (self.rest.change('joints', slice(i, i + 1)) for i in range(len(self.joints)))
-        slips = ((SLIPPED, name, one) for name, one in zip(self.joints, own, strict=True))
-        return [(KNOCKED, None, self._base), (JUMPED, None, tool), *slips]
+        own = [self.rest.change('joints', slice(i, i + 1)) for i in range(len(self.joints))]
+        slips = [(JointSlip(name), one) for name, one in zip(self.joints, own, strict=True)]
+        return [(InstrumentKnock(), self._base), (ToolSlip(), tool), *slips]
+
+    def _shapes(self, k: int) -> list[tuple[float, Array]]:
+        """Return smooth changes of a recording, by time constant; 0 where none settles."""
+        age = self._age(k)
+        out = [(constant, np.exp(-age / constant)) for constant in CONSTANTS.tolist()]
+        out += [(0.0, shape) for shape in other_shapes(age)]
+        # It may have moved between recordings, not within one.
+        out += [(MOVED_BEFORE, np.ones(age.size))] if len(self.problem.recordings) > 1 else []
+        return [(constant, self._placed(shape, k)) for constant, shape in out]
 
     def _smooth(self, k: int) -> Iterator[_Trial]:
-        age = self._age(k)
-        possible = smooth_shapes(age)
-        if len(self.problem.recordings) > 1:  # moved between recordings, not within one
-            possible.append(np.ones(age.size))
-        shapes = [self._placed(shape, k) for shape in possible]
-        for _, _, change in self._kinds:
-            shape = change.best(shapes)
-            yield _Trial(change.nats(shape), change, shape, k)
+        shapes = self._shapes(k)
+        for _, change in self._kinds:
+            best = int(change.gains(np.array([shape for _, shape in shapes])).argmax())
+            constant, shape = shapes[best]
+            yield _Trial(change.nats(shape), change, shape, k, constant=constant)
 
     def _steps(self, k: int) -> Iterator[_Trial]:
         t = self.problem.recordings[k].seen.t
@@ -225,48 +228,38 @@ class _Seen:
         for recording, at in self.taken:
             if recording == k:
                 allowed[max(at - edge, 0) : at + edge] = False
-        for kind, joint, change in self._kinds if allowed.any() else ():
+        for effect, change in self._kinds if allowed.any() else ():
             at = int(np.where(allowed, change.step_gains(k), -np.inf).argmax())
             shape = self._placed((np.arange(t.size) >= at).astype(np.float64), k)
             # Every instant was asked; the best of many is better than it should be.
             log_bayes_factor = change.nats(shape) - float(np.log(t.size))
-            time = float(t[at - 1] + t[at]) / 2
-            slip = Slip(kind, joint, k, time, change.size(shape), log_bayes_factor)
+            slip = replace(effect, time=float(t[at - 1] + t[at]) / 2.0)  # type: ignore[type-var]
             yield _Trial(log_bayes_factor, change, shape, k, slip, at)
 
-    def named(self, smooth: _Trial) -> Slip | Settling | None:
-        """Return what a smooth change of the base is by name, where no other shape does as well."""
-        if smooth.change is not self._base:
-            return None
-        k, age = smooth.recording, self._age(smooth.recording)
-        t = self.problem.recordings[k].seen.t
-        if np.array_equal(smooth.shape, self._placed(np.ones(age.size), k)):
-            if not self._surpasses(smooth.nats, smooth.shape, k, smooth_shapes(age)):
-                return None
-            # A move of the set-up before a recording: of the first, before the second.
-            k, size = max(k, 1), self._base.size(smooth.shape)
-            start = float(self.problem.recordings[k].seen.t[0])
-            return Slip(KNOCKED, None, k, start, size, smooth.nats, dated=False)
-
-        def settled(constant: float) -> Array:
-            return self._placed(np.exp(-age / constant), k)
-
-        best = self._base.best([settled(constant) for constant in CONSTANTS])
-        constant = next(c for c in CONSTANTS if np.array_equal(settled(c), best))
-        shape, late = settled(constant), constant * float(np.ptp(t))
-        log_bayes_factor = self._base.nats(shape)
-        slow = self.problem.recordings[k].joints.static or late > SLOW
-        if not slow or not self._surpasses(log_bayes_factor, shape, k, other_shapes(age)):
-            return None
-        return Settling(k, late, self._base.size(shape), log_bayes_factor)
-
-    def _surpasses(
-        self, log_bayes_factor: float, shape: Array, k: int, others: Sequence[Array]
-    ) -> bool:
-        """Return whether a change of the base tells much more than in other shapes, or of joints."""
-        best = self._base.best([self._placed(other, k) for other in others])
-        alternative = max(self._base.nats(best), self.rest.change('joints').nats(shape))
-        return log_bayes_factor > MARGIN + alternative
+    def named(self, smooth: _Trial) -> Iterator[Slip | Settling]:
+        """Yield what a smooth change of the base is by name, where no other shape does as well."""
+        k, base = smooth.recording, self._base
+        others = [
+            shape
+            for constant, shape in self._shapes(k)
+            if constant == 0.0 or (smooth.constant == MOVED_BEFORE != constant)
+        ]
+        recording, size = self.problem.recordings[k], base.size(smooth.shape)
+        late = smooth.constant * float(np.ptp(recording.seen.t))
+        slow = recording.joints.static or late > SLOW
+        if smooth.change is not base or smooth.constant == 0.0 or not slow:
+            return
+        alternative = max(
+            base.nats(base.best(others)), self.rest.change('joints').nats(smooth.shape)
+        )
+        if smooth.sure < MARGIN + alternative:
+            return
+        if smooth.constant == MOVED_BEFORE:  # of the first recording: before the second
+            start = float(self.problem.recordings[max(k, 1)].seen.t[0])
+            knock = InstrumentKnock(time=start)
+            yield Slip(knock, max(k, 1), size, smooth.sure, dated=False)
+        else:
+            yield Settling(k, late, size)
 
     def _age(self, k: int) -> Array:
         """Return time in a recording as a share of it, shape (M,)."""
@@ -295,12 +288,9 @@ def _simplest(trials: Sequence[_Trial]) -> _Trial | None:
     if not enough:  # nothing to explain, so no number explains it
         return None
     fewest = min(trial.change.columns.shape[2] for trial in enough)
-    best = max((t for t in enough if t.change.columns.shape[2] == fewest), key=_nats)
-    if best.slip is None:
-        return best
-    alike = tuple((t.slip.kind, t.slip.at) for t in enough if t is not best and t.slip is not None)
-    return best._replace(slip=replace(best.slip, alike=alike))
+    best = max((t for t in enough if t.change.columns.shape[2] == fewest), key=_sure)
+    return best._replace(others=tuple(t.effect for t in enough if t is not best and t.effect))
 
 
-def _nats(trial: _Trial) -> float:
-    return trial.nats
+def _sure(trial: _Trial) -> float:
+    return trial.sure

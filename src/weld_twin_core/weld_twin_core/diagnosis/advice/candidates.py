@@ -14,7 +14,7 @@ from ...arm.rotation import transform
 from ...arrays import Array
 from ...recording import JointMotion, Recording, Signal
 from ..algebra.problem import Model, Problem
-from .postures import Limits, Room
+from .postures import Limits, Room, joined
 
 NAME = 'next measurement'
 STATIONS = 80
@@ -182,38 +182,41 @@ class _Here:
         )
 
     def pressed(self) -> Candidate:
-        """Return stations with a force on the tool."""
+        """Return stations with a force on the tool, along each axis in turn."""
+        whole = self.spread[: len(self.spread) // 3 * 3]
         made = self._stations(
             'press',
             f'Measure {{count}} stations while the tool is pressed with {PRESS:g} N along x, y and '
             'z in turn.',
-            self.spread,
+            whole,
             group=3,
             set_up=5.0,
         )
-        force = np.zeros((len(self.spread), 6))
-        force[np.arange(len(force)), np.arange(len(force)) % 3] = PRESS
-        recording = made.recordings[0]
+        (recording,) = made.recordings
+        force = np.tile(PRESS * np.eye(3, 6), (len(whole) // 3, 1))
         push = Signal(recording.joints.t, force)
-        pushed = replace(recording, wrench=push, wrench_frame='base')
-        whole = tuple(p for p in made.pieces if p.rows and p.rows[-1] < len(self.spread))
-        return replace(made, recordings=(pushed,), pieces=whole)
+        return replace(made, recordings=(replace(recording, wrench=push, wrench_frame='base'),))
 
     def warm_up(self) -> Candidate:
-        """Return a few stations again and again."""
+        """Return a few stations again and again, while it grows warmer."""
         again = np.concatenate([self.spread[:5]] * 12)
         sentence = 'Measure five stations again and again for an hour while the arm warms up.'
-        made = self._stations('warm_up', sentence, again, len(again), seconds=SOAK, rise=RISE)
+        made = self._stations('warm_up', sentence, again, len(again), seconds=SOAK)
+        (recording,) = made.recordings
+        if recording.temperature is not None:
+            t, first = recording.joints.t, recording.temperature.value[0]
+            ramp = Signal(t, first + np.linspace(0.0, RISE, t.size))
+            made = replace(made, recordings=(replace(recording, temperature=ramp),))
         return replace(made, whole=True)
 
     def changed(self) -> Iterator[Candidate]:
         """Yield the same stations with something changed in the cell."""
         robot, words = self.model.robot, 'Measure {count} stations'
-        kind, more = 'payload_swap', f'{words} with {MASS:g} kg more hung from the tool point.'
+        more = f'{words} with {MASS:g} kg more hung from the tool point.'
         heavy = replace(robot, payload_mass=robot.payload_mass + MASS)
-        made = self._stations(kind, more, self.spread, set_up=20.0)
-        made = replace(made, model=replace(self.model, robot=heavy))
-        yield replace(made, changed=f'load={MASS:g}')
+        made = self._stations('payload_swap', more, self.spread, set_up=20.0)
+        model = replace(self.model, robot=heavy)
+        yield replace(made, model=model, changed=f'load={MASS:g}')
         longer = robot.T_flange_tool @ transform(np.eye(3), np.array([0.0, 0.0, LONGER]))
         yield replace(
             made,
@@ -243,14 +246,10 @@ class _Here:
         group: int = 1,
         set_up: float = 0.0,
         seconds: float = STAY,
-        rise: float = 0.0,
     ) -> Candidate:
-        """Return stations (N, n) every so many seconds, in groups, while it grows warmer [K]."""
+        """Return stations (N, n) every so many seconds, in groups."""
         t = seconds * np.arange(len(q), dtype=np.float64)
         made = _with_sides(self.problem, JointMotion(t, q, static=True))
-        if made.temperature is not None:
-            ramp = made.temperature.value[0] + np.linspace(0.0, rise, t.size)
-            made = replace(made, temperature=Signal(t, ramp))
         first = range(0, len(q), group)
         pieces = tuple(Piece(0, tuple(range(k, k + group)), seconds * group) for k in first)
         return Candidate(kind, sentence, set_up, (made,), pieces, self.model, self.room)
@@ -268,28 +267,18 @@ def _retraced(problem: Problem, room: Room) -> list[JointMotion]:
         return []
     slow = SLOWER * t
     return [
-        _joined(
+        joined(
             room.travel(back[::-1], 1.0), JointMotion(t, seam[::-1]), room.travel(there[::-1], 1.0)
         ),
-        _joined(room.travel(there, 1.0), JointMotion(slow, seam), room.travel(back, 1.0)),
+        joined(room.travel(there, 1.0), JointMotion(slow, seam), room.travel(back, 1.0)),
     ]
-
-
-def _joined(*motions: JointMotion) -> JointMotion:
-    """Return motions one after the other; each begins where the one before ends."""
-    t, q = motions[0].t, motions[0].q
-    for motion in motions[1:]:
-        t = np.concatenate([t, t[-1] + motion.t[1:] - motion.t[0]])
-        q = np.concatenate([q, motion.q[1:]])
-    return JointMotion(t, q)
 
 
 def _alone(room: Room, i: int) -> list[Array]:
     """Return the stops of one joint that moves through its range, as far as it is free."""
     for share in (1.0, 0.5, 0.25, 0.1):
-        ends = [room.home.copy() for _ in range(2)]
-        ends[0][i] += share * (room.high[i] - room.home[i])
-        ends[1][i] += share * (room.low[i] - room.home[i])
+        ends = np.tile(room.home, (2, 1))
+        ends[:, i] += share * (np.array([room.high[i], room.low[i]]) - room.home[i])
         stops = [room.home, *ends, room.home]
         if room.way(stops):
             break

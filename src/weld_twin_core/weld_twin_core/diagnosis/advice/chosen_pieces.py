@@ -14,7 +14,7 @@ from ...effects.effect import Effect
 from ...recording import JointMotion
 from ..algebra.problem import Model, Problem, Scale
 from .candidates import STAY, Candidate
-from .postures import Limits
+from .postures import Limits, joined
 from .separation import Parting, Side, partings
 
 DECIDES = 6.0
@@ -145,16 +145,7 @@ class Plan:
             q = self.candidate.room.linked(joints.q[rows])
             t: Array = self._step * np.arange(len(q), dtype=np.float64)
             return JointMotion(t, q, static=True)
-        times: list[Array] = []
-        places: list[Array] = []
-        start = 0.0
-        for piece in pieces:
-            joints = self.candidate.recordings[piece.recording].joints
-            first = 1 if times else 0
-            times.append(start + joints.t[first:])
-            places.append(joints.q[first:])
-            start += float(joints.t[-1])
-        return JointMotion(np.concatenate(times), np.concatenate(places))
+        return joined(*(self.candidate.recordings[piece.recording].joints for piece in pieces))
 
 
 def planned(

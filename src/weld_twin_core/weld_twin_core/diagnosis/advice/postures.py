@@ -204,6 +204,15 @@ class Room:
         return JointMotion(np.arange(len(q)) / RATE, q)
 
 
+def joined(*motions: JointMotion) -> JointMotion:
+    """Return motions one after the other; each begins where the one before ends."""
+    t, q = motions[0].t, motions[0].q
+    for motion in motions[1:]:
+        t = np.concatenate([t, t[-1] + motion.t[1:] - motion.t[0]])
+        q = np.concatenate([q, motion.q[1:]])
+    return JointMotion(t, q)
+
+
 REACH = 1.3
 """The recorded range of every joint is widened by this factor, within its limits, for touches."""
 LEAST = 0.35

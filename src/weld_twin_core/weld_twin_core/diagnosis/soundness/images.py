@@ -21,6 +21,7 @@ from ...cameras import Sightings
 from ...cameras.located import located
 from ...cameras.sightings import Fitted
 from ...errors import DataError
+from ..algebra.alias import outside, span_of
 from .evidence import Case, Finding, mistake
 from .limits import ENOUGH, FEW, HALVED, ROWS, STRAY, WORTH
 
@@ -68,36 +69,37 @@ def _by_themselves(seen: Sightings) -> Iterator[Finding]:
         return
     for k, target in enumerate(seen.targets):
         if target.facing and _from_behind(seen, k):
-            yield _mistake(
-                'target_mirrored',
-                target.name,
+            yield mistake(
                 f'Board {target.name!r} is seen from behind in every image: its points are '
                 'given, or printed, mirror-wise.',
+                'target_mirrored',
+                (target.name,),
                 'give its points as the camera sees them, or do not mirror the images',
             )
             return
     far = float(np.abs(fitted.off).max())
     if fitted.pixel < IMAGE_FAR and far < DOUBT:
         return
-    for kind, at, words, remedy, trial in _trials(seen):
+    for suspicion, trial in _trials(seen):
         try:
             then = adjusted(trial)
         except DataError:
             continue
         if _undone(fitted, Fitted(then.pixel, then.off)):
             sentence = (
-                f'{words}; undone, points are found within {then.pixel:.2f} px instead of '
-                f'{fitted.pixel:.2f} px, and lenses are as they were calibrated.'
+                f'{suspicion.sentence}; undone, points are found within {then.pixel:.2f} px instead '
+                f'of {fitted.pixel:.2f} px, and lenses are as they were calibrated.'
             )
-            yield _mistake(kind, at, sentence, remedy)
+            yield suspicion._replace(sentence=sentence)
             return
     if far >= STRAY:
         c = int(np.abs(fitted.off).max(axis=1).argmax())
-        yield _mistake(
+        name = seen.cameras[c].name
+        yield mistake(
+            f'The intrinsics of camera {name!r} are not those of its images: they are off by '
+            f'{far:.0f} times what calibrations of one lens differ by.',
             'intrinsics',
-            seen.cameras[c].name,
-            f'The intrinsics of camera {seen.cameras[c].name!r} are not those of its images: they '
-            f'are off by {far:.0f} times what calibrations of one lens differ by.',
+            (name,),
             CALIBRATE,
         )
 
@@ -112,30 +114,23 @@ def _undone(before: Fitted, then: Fitted) -> bool:
     )
 
 
-def _trials(seen: Sightings) -> Iterator[tuple[str, str, str, str, Sightings]]:
-    """Yield mistakes that images show: kind, place, words, remedy, and the images without it."""
+def _trials(seen: Sightings) -> Iterator[tuple[Finding, Sightings]]:
+    """Yield mistakes that images show, and the images without them."""
     for one, other in combinations(range(len(seen.cameras)), 2):
         cameras = list(seen.cameras)
         first, second = cameras[one], cameras[other]
         cameras[one] = replace(first, lens=second.lens, mount=second.mount)
         cameras[other] = replace(second, lens=first.lens, mount=first.mount)
-        yield (
-            'cameras_swapped',
-            first.name,
-            f'Cameras {first.name!r} and {second.name!r} are swapped',
-            'exchange the two names',
-            replace(seen, cameras=tuple(cameras)),
-        )
+        words = f'Cameras {first.name!r} and {second.name!r} are swapped'
+        swapped = mistake(words, 'cameras_swapped', (first.name,), 'exchange the two names')
+        yield swapped, replace(seen, cameras=tuple(cameras))
     for k, target in enumerate(seen.targets):
         targets = list(seen.targets)
         targets[k] = replace(target, points=target.points * [-1.0, 1.0, 1.0])
-        yield (
-            'target_mirrored',
-            target.name,
-            f'The points of target {target.name!r} are given mirror-wise',
-            'give them in a right-handed frame, as the camera sees them',
-            replace(seen, targets=tuple(targets)),
-        )
+        words = f'The points of target {target.name!r} are given mirror-wise'
+        remedy = 'give them in a right-handed frame, as the camera sees them'
+        mirrored = mistake(words, 'target_mirrored', (target.name,), remedy)
+        yield mirrored, replace(seen, targets=tuple(targets))
 
 
 def _from_behind(seen: Sightings, k: int) -> bool:
@@ -158,12 +153,8 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
     parts, _ = problem.frame_columns(problem.features(case.model))
     remaining = problem.whitened(problem.residuals(case.model), scale)
     frames = problem.whitened(parts, scale)
-    basis = (
-        np.linalg.svd(frames.T, full_matrices=False)[0]
-        if frames.size
-        else np.zeros((remaining.size, 0))
-    )
-    remaining = remaining - basis @ (basis.T @ remaining)
+    span = span_of(frames)
+    remaining = outside(remaining[None], span)[0]
     reported: list[tuple[float, float, str]] = []
     for kind, columns in (('target_scale', _larger), ('intrinsics', _farther)):
         each = [columns(r.images, r.seen.position) for r in problem.recordings]
@@ -174,8 +165,7 @@ def _beside_the_arm(case: Case) -> Iterator[Finding]:
         ]
         if len(rows) < len(each):
             continue
-        column = problem.whitened(rows, scale)
-        column = column - basis @ (basis.T @ column)
+        column = outside(problem.whitened(rows, scale)[None], span)[0]
         size = float(column @ column)
         share = float(column @ remaining) / size
         reported.append((share**2 * size / float(remaining @ remaining), share, kind))
@@ -197,26 +187,18 @@ def _farther(seen: Sightings | None, position: Array) -> Array | None:
 
 def _too_large(case: Case, kind: str, share: float) -> Finding:
     seen = next(r.images for r in case.recordings if r.images is not None)
-    size = f'{100.0 * abs(share):.1f} %'
+    size, large = f'{100.0 * abs(share):.1f} %', share > 0.0
     if kind == 'intrinsics':
-        name = seen.cameras[0].name
-        return _mistake(
-            kind,
-            name,
-            f'Camera {name!r} sees everything {size} too {"far" if share > 0.0 else "near"} for '
-            'the way of the arm: its focal length is off by as much.',
-            CALIBRATE,
+        name, remedy = seen.cameras[0].name, CALIBRATE
+        words = (
+            f'Camera {name!r} sees everything {size} too {"far" if large else "near"} for the way of '
+            'the arm: its focal length is off by as much.'
         )
-    name = seen.targets[0].name
-    return _mistake(
-        kind,
-        name,
-        f'All that the cameras measure is {size} too {"large" if share > 0.0 else "small"} for '
-        f'the way of the arm: target {name!r} is {"smaller" if share > 0.0 else "larger"} than '
-        'it was said to be.',
-        'measure it with a calliper and give its true size',
-    )
-
-
-def _mistake(kind: str, at: str, sentence: str, remedy: str) -> Finding:
-    return mistake(sentence, kind, (at,), remedy)
+    else:
+        name, remedy = seen.targets[0].name, 'measure it with a calliper and give its true size'
+        words = (
+            f'All that the cameras measure is {size} too {"large" if large else "small"} for the way '
+            f'of the arm: target {name!r} is {"smaller" if large else "larger"} than it was said to '
+            'be.'
+        )
+    return mistake(words, kind, (name,), remedy)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,9 @@ from ...arm.rotation import matrix_from_quaternion, quaternion_from_matrix
 from ...arrays import Array
 from ...bursts import evenly
 from ...errors import DataError, ModelError
-from ...recording import Measurements, Recording, Signal
+from ...recording import JointSignal, Measurements, Recording, Signal
+
+Sampled = TypeVar('Sampled', Signal, JointSignal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +61,10 @@ def joints_as(given: Given, matrix: Array, offset: Array) -> Given:
     Efforts go with the joints that they are of, in the sense that these are counted in; they keep
     their size where only the unit of the positions was wrong.
     """
-    out = []
+    matrix, out = np.asarray(matrix), []
     for r in given.recordings:
         qd = None if r.joints.qd is None else r.joints.qd @ matrix.T
-        joints = replace(r.joints, q=r.joints.q @ matrix.T + offset, qd=qd)
+        joints = replace(r.joints, q=r.joints.q @ matrix.T + np.asarray(offset), qd=qd)
         effort = r.effort
         if effort is not None:
             working = np.linalg.inv(matrix).T
@@ -82,7 +84,7 @@ def positions_as(given: Given, factor: Array) -> Given:
     def scaled(seen: Measurements) -> Measurements:
         turn = None if np.prod(factor) < 0.0 else seen.rotation
         # How sure they are was told of what has proved to be something else.
-        return Measurements(seen.t, seen.position * factor, turn, seen.sigma)
+        return Measurements(seen.t, seen.position * np.asarray(factor), turn, seen.sigma)
 
     return _seen_as(given, scaled)
 
@@ -113,6 +115,13 @@ WAYS: dict[str, tuple[str, Callable[[Array], Array]]] = {
     ),
 }
 """Ways to write orientations that get mixed up: in words, and what undoes it."""
+
+
+def _with(given: Given, k: int, recording: Recording) -> Given:
+    """Return what was given with another recording in the place of one."""
+    return replace(
+        given, recordings=(*given.recordings[:k], recording, *given.recordings[k + 1 :])
+    )
 
 
 def _rolled(turn: Array, places: int) -> Array:
@@ -175,24 +184,23 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
         The instant that ``late`` belongs to, on the clock of the measurements.
 
     """
-    recordings = list(given.recordings)
-    own = recordings[k]
+    own = given.recordings[k]
 
     def moved(t: Array) -> Array:
         return np.asarray((t + late - rate * middle) / (1.0 - rate))
 
-    def signal(of: Signal | None) -> Signal | None:
+    def signal(of: Sampled | None) -> Sampled | None:
         return None if of is None else replace(of, t=moved(of.t))
 
     qd = None if own.joints.qd is None else own.joints.qd * (1.0 - rate)
-    recordings[k] = replace(
+    stamped = replace(
         own,
         joints=replace(own.joints, t=moved(own.joints.t), qd=qd),
         wrench=signal(own.wrench),
         temperature=signal(own.temperature),
-        effort=None if own.effort is None else replace(own.effort, t=moved(own.effort.t)),
+        effort=signal(own.effort),
     )
-    return replace(given, recordings=tuple(recordings))
+    return _with(given, k, stamped)
 
 
 def stamped_evenly(
@@ -227,9 +235,8 @@ def stamped_evenly(
 
 def velocities_left_out(given: Given, k: int) -> Given:
     """Return what was given without the joint velocities of recording k."""
-    recordings = list(given.recordings)
-    recordings[k] = replace(recordings[k], joints=replace(recordings[k].joints, qd=None))
-    return replace(given, recordings=tuple(recordings))
+    own = given.recordings[k]
+    return _with(given, k, replace(own, joints=replace(own.joints, qd=None)))
 
 
 MENDS: dict[str, Callable[..., Given]] = {
@@ -271,12 +278,7 @@ def _from_entry(entry: Mapping[str, Any]) -> Mend:
         made = MENDS[entry['do']]
     except (KeyError, TypeError, AttributeError):
         raise ModelError(f'no correction of data is known that is {entry!r}') from None
-    lists = {key: np.array(v, dtype=float) for key, v in values.items() if _numbers(v)}
-    return partial(made, **{**values, **lists})
-
-
-def _numbers(value: Any) -> bool:
-    return isinstance(value, list) and not any(isinstance(part, str) for part in value)
+    return partial(made, **values)
 
 
 def replayed(entries: Sequence[Mapping[str, Any]], given: Given, which: int = 0) -> Given:

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How many tuned numbers decide in a room: every literal but 0, 1, 2, units and indices.
 
-    tools/in_env python tools/numbers.py diagnosis/soundness          the sum, file by file
-    tools/in_env python tools/numbers.py diagnosis/soundness --all    every one with its line
+    tools/in_env python tools/numbers_tuned.py diagnosis/soundness          the sum, file by file
+    tools/in_env python tools/numbers_tuned.py diagnosis/soundness --all    every one with its line
 
 Defaults count as well as constants. A unit is a number in a sentence (an f-string), a factor of
 `UNITS`, or a constant whose name is one. An index is what stands in brackets, says an axis or a
@@ -68,7 +68,9 @@ def _is_unit(node: ast.JoinedStr | ast.AnnAssign | ast.Assign) -> bool:
     if isinstance(node, ast.JoinedStr):
         return True
     targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-    names = [name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+    names = [
+        name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)
+    ]
     return bool(names) and all(name.strip('_') in NAMED for name in names)
 
 

@@ -11,7 +11,7 @@ import weld_twin_core as wt
 from weld_twin_core.arm.reaching import reaching
 from weld_twin_core.arm.rotation import rotation_matrix
 from weld_twin_core.contacts import Artefact, Contacts, lengths, places
-from weld_twin_core.diagnosis.frames.aligned import aligned, not_told
+from weld_twin_core.diagnosis.frames.aligned import aligned, other_causes
 from weld_twin_core.errors import DataError
 
 SIZE = [0.3, 0.24, 0.2]
@@ -73,7 +73,7 @@ def test_the_same_block_at_an_unknown_place_says_nothing_of_the_base(robot):
     # A normal may point to either side.
     off = [np.abs(problem.residuals(each)[0]) for each in (model, elsewhere)]
     np.testing.assert_allclose(off[0], off[1], atol=1e-9)
-    assert 'base_pose' in not_told(problem)
+    assert 'base_pose' in other_causes(problem)
     assert problem.align == frozenset()
 
 

@@ -16,7 +16,7 @@ from .algebra.problem import frames_named
 from .answer.answer import answer, refusal
 from .beliefs import Beliefs
 from .calibration.calibrated import stated
-from .frames.aligned import not_told
+from .frames.aligned import other_causes
 from .frames.changes import families_named, settled_between
 from .frames.open_directions import held
 from .hypotheses.search import Search, search
@@ -135,7 +135,7 @@ def diagnose(
     progress('data checked')
     if examined.posed is None:
         return refusal(examined)
-    exclude = (*exclude, *not_told(examined.posed[0]))
+    exclude = (*exclude, *other_causes(examined.posed[0]))
     asked = (limits or Limits()) if experiment else None
     return _explained(examined, exclude, holdout, beliefs, asked, progress)
 

@@ -57,7 +57,7 @@ def test_a_sealed_cell_records_with_what_was_changed():
     pytest.importorskip('mujoco', reason='the plant needs MuJoCo')
     from weld_twin_lab.blind.deck import lots
     from weld_twin_lab.experiments.sealed_cell import SealedCell, stations
-    from weld_twin_nodes.offline.set_up_changes import set_up_change, told
+    from weld_twin_nodes.offline.set_up_changes import set_up_change, with_changes
 
     number, lot = next(
         (k, x) for k, x in enumerate(lots(3, 40, ('single',))) if x.motion == 'stations'
@@ -72,5 +72,5 @@ def test_a_sealed_cell_records_with_what_was_changed():
     step = np.linalg.norm(longer.measured.position - plain.measured.position, axis=1)
     assert np.abs(step - 0.2).max() < 0.01
     assert np.linalg.norm(moved.measured.position - plain.measured.position, axis=1).min() > 0.3
-    (_, back), _ = told([plain, moved], {1: set_up_change('instrument')}, cell.robot)
+    (_, back), _ = with_changes([plain, moved], {1: set_up_change('instrument')}, cell.robot)
     assert np.abs(back.measured.position - plain.measured.position).max() < 0.02

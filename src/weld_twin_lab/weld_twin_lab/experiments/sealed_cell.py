@@ -23,7 +23,7 @@ from weld_twin_core.effects import effects_from_list
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Measurements, Recording
-from weld_twin_nodes.offline.set_up_changes import FRAMES, SetUpChange, set_up_change, told
+from weld_twin_nodes.offline.set_up_changes import FRAMES, SetUpChange, set_up_change, with_changes
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 from ..blind.blind_cell import as_recording, of_motion, record
@@ -129,7 +129,7 @@ class SealedCell:
         """Return the content of diagnosis.json; it is told what was changed for which recording."""
         names = [recording.name for recording in recordings]
         changes = {names.index(name): c for name, c in self._changed.items() if name in names}
-        recordings, may_change = told(recordings, changes, self.robot)
+        recordings, may_change = with_changes(recordings, changes, self.robot)
         found = diagnose(
             recordings,
             self.robot,

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import weld_twin_core as wt
 from weld_twin_core.errors import DataError
-from weld_twin_nodes.offline.set_up_changes import set_up_change, told
+from weld_twin_nodes.offline.set_up_changes import set_up_change, with_changes
 
 SPRING = wt.effects.JointCompliance('shoulder_lift_joint', compliance=1e-5)
 
@@ -35,7 +35,7 @@ def test_a_load_that_is_told_pulls_like_one_in_the_robot_file(ur5, stations, wor
     heavy = replace(
         turned, payload_mass=5.0, payload_com=np.array(change.numbers[1:] or (0, 0, 0))
     )
-    (loaded,), may_change = told([stations], {0: change}, turned)
+    (loaded,), may_change = with_changes([stations], {0: change}, turned)
     sagging = wt.Twin(turned, [SPRING]).poses(loaded)
     assert may_change == ()
     assert np.allclose(
@@ -47,7 +47,7 @@ def test_a_load_that_is_told_pulls_like_one_in_the_robot_file(ur5, stations, wor
 
 def test_a_load_that_was_taken_off_leaves_what_is_still_there(ur5, stations):
     whole = replace(ur5, payload_mass=3.0)
-    (lighter,), _ = told([stations], {0: set_up_change('load=-1.25')}, whole)
+    (lighter,), _ = with_changes([stations], {0: set_up_change('load=-1.25')}, whole)
     left = wt.Twin(replace(ur5, payload_mass=1.75), [SPRING]).poses(stations)
     assert np.allclose(left.position, wt.Twin(whole, [SPRING]).poses(lighter).position, atol=1e-9)
 
@@ -55,7 +55,7 @@ def test_a_load_that_was_taken_off_leaves_what_is_still_there(ur5, stations):
 def test_forces_that_were_measured_hold_the_load_already(ur5, stations):
     pull = wt.Signal(stations.joints.t, np.ones((9, 6)))
     measured = replace(stations, wrench=pull)
-    assert told([measured], {0: set_up_change('load=5')}, ur5)[0][0].wrench is pull
+    assert with_changes([measured], {0: set_up_change('load=5')}, ur5)[0][0].wrench is pull
 
 
 def test_an_instrument_elsewhere_measures_in_the_frame_of_before(ur5, stations):
@@ -66,17 +66,17 @@ def test_an_instrument_elsewhere_measures_in_the_frame_of_before(ur5, stations):
             stations.joints.t, seen.position @ turn.T + [1.5, 0.2, -0.3], turn @ seen.rotation
         )
     )
-    out, may_change = told([stations, elsewhere], {1: set_up_change('instrument')}, ur5)
+    out, may_change = with_changes([stations, elsewhere], {1: set_up_change('instrument')}, ur5)
     assert may_change == ('base_pose',)
     assert np.allclose(out[1].measured.position, seen.position, atol=1e-9)
     assert np.allclose(out[1].measured.rotation, seen.rotation, atol=1e-9)
 
 
 def test_another_tool_may_differ_and_is_left_as_measured(ur5, stations):
-    out, may_change = told([stations, stations], {1: set_up_change('tool')}, ur5)
+    out, may_change = with_changes([stations, stations], {1: set_up_change('tool')}, ur5)
     assert may_change == ('tool_pose',) and out[1] is stations
     with pytest.raises(DataError, match='the first recording is what the others'):
-        told([stations, stations], {0: set_up_change('tool')}, ur5)
+        with_changes([stations, stations], {0: set_up_change('tool')}, ur5)
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,7 @@ def write_compensated(
     )
 
 
-def told_trust(made: Compensated) -> list[str]:
+def trust_sentences(made: Compensated) -> list[str]:
     """Return in words where the commands lie outside what was recorded, and what was held back."""
     if made.model.posterior is None or not made.outside:
         return []

@@ -218,7 +218,7 @@ def _notes(program: Program, context: Context, model: ProgramModel) -> list[str]
     return out
 
 
-def not_told(content: Mapping[str, Any]) -> list[str]:
+def other_causes(content: Mapping[str, Any]) -> list[str]:
     """Return that a promise holds for what a diagnosis names alone, where it could be another cause."""
     verdict = content.get('verdict') or {}
     same = verdict.get('same_on_any_motion') or []

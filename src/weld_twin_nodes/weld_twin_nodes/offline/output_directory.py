@@ -151,12 +151,12 @@ def _rescue(target: Path, tell: Callable[[str], None]) -> Callable[[Path], None]
     def rescue(scratch: Path) -> None:
         if target.is_dir():
             with _alone(target):
-                owned_files.carry_out(target, scratch, _told(tell))
+                owned_files.carry_out(target, scratch, _kept_notice(tell))
 
     return rescue
 
 
-def _told(tell: Callable[[str], None]) -> Callable[[str, str], None]:
+def _kept_notice(tell: Callable[[str], None]) -> Callable[[str, str], None]:
     return lambda name, new: tell(f"'{name}' was not overwritten and is kept as '{new}'")
 
 
@@ -192,7 +192,7 @@ def _install(
             owned_files.refuse(target, mark, list(owned_files.in_the_way(target, change)))
         owned_files.decide(scratch.path, change)
         try:
-            owned_files.carry_out(target, scratch.path, _told(tell))
+            owned_files.carry_out(target, scratch.path, _kept_notice(tell))
         except BaseException:
             scratch.leave()  # the next one ends what is begun
             raise

@@ -232,7 +232,7 @@ def beside_bag(model: Predictor, outside: Sequence[Stretch]) -> dict[str, str]:
     return {BESIDE: json.dumps(content, indent=1) + '\n'}
 
 
-def told_sureness(model: Predictor, got: Written) -> list[str]:
+def sureness_sentences(model: Predictor, got: Written) -> list[str]:
     """Return in words how sure a prediction is, and where it knows nothing."""
     if model.posterior is None or got.sigma_m is None:
         return [

@@ -74,7 +74,7 @@ def set_up_change(text: str) -> SetUpChange:
     return SetUpChange(kind, numbers)
 
 
-def told(
+def with_changes(
     recordings: Sequence[Recording], changes: Mapping[int, SetUpChange], robot: Robot
 ) -> tuple[list[Recording], tuple[str, ...]]:
     """

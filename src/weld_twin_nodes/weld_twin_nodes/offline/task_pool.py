@@ -100,7 +100,7 @@ class Runner:
                 results[k] = json.loads(text)
         done = len(tasks) - len(waiting)
         if done:
-            self._told(done, len(tasks), f'{done} results were there already')
+            self._report(done, len(tasks), f'{done} results were there already')
         coming = self._pool.run([tasks[k] for k in waiting])
         if meanwhile is not None:
             meanwhile()
@@ -109,10 +109,10 @@ class Runner:
             results[k] = json.loads(text)
             self._keep(tasks[k], text)
             done += 1
-            self._told(done, len(tasks), tasks[k].label)
+            self._report(done, len(tasks), tasks[k].label)
         return results
 
-    def _told(self, done: int, total: int, label: str) -> None:
+    def _report(self, done: int, total: int, label: str) -> None:
         if self._tell is not None:
             self._tell(done, total, label)
 

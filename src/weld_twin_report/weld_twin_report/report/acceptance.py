@@ -75,7 +75,7 @@ def on_what(diagnosis: Diagnosis) -> str:
     return f'{"at the stations" if at_rest(diagnosis) else "on the seam"} recorded'
 
 
-def judged_words(rule: Rule, size: float) -> str:
+def judgement(rule: Rule, size: float) -> str:
     """Return the verdict on a largest deviation [m], and where it is open its limits."""
     verdict = rule.judged(size)
     reported = f'{WORDS[verdict]}: {millimetres(size)} of {millimetres(rule.tolerance_m)} allowed'
@@ -161,12 +161,12 @@ def _rows(diagnosis: Diagnosis, rule: Rule) -> list[tuple[Html | str, ...]]:
     for mended in thought_mended(diagnosis):
         remaining = left_with(diagnosis, mended)
         against = '' if set(mended) <= taken else ' (not advised)'
-        reported = f'{_told(diagnosis, mended)}{against}'
+        reported = f'{_mended_words(diagnosis, mended)}{against}'
         out.append(_row(reported, remaining.rms_after, remaining.largest_after, rule))
     return out
 
 
-def _told(diagnosis: Diagnosis, mended: tuple[int, ...]) -> str:
+def _mended_words(diagnosis: Diagnosis, mended: tuple[int, ...]) -> str:
     """Return in words which causes are thought mended."""
     labels = [switch.label for switch in switches(diagnosis)]
     if not mended:

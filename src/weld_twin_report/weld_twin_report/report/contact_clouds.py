@@ -40,7 +40,7 @@ def contacts_section(diagnosis: Diagnosis) -> Html | None:
     )
 
 
-def contacts_told(result: ContactResult) -> str:
+def contacts_sentence(result: ContactResult) -> str:
     """Return how far the tool point is from what it touched, in one sentence."""
     before, after, held = (
         millimetres(v)

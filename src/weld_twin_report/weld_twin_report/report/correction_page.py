@@ -34,7 +34,7 @@ def correction_page(entry: Mapping[str, Any], inputs: Sequence[InputFile] = ()) 
     ``entry``: the content of correction.json.
     """
     title = f'{entry["program"]} · {entry["robot"]}'
-    reported = tolerance_told(entry)
+    reported = tolerance_sentences(entry)
     body = main(
         ('Corrected program ', entry['language']),
         title,
@@ -64,7 +64,7 @@ def headline(entry: Mapping[str, Any]) -> str:
     )
 
 
-def tolerance_told(entry: Mapping[str, Any]) -> list[str]:
+def tolerance_sentences(entry: Mapping[str, Any]) -> list[str]:
     """Return in sentences whether a tolerance is kept; nothing where none was asked for."""
     if 'tolerance' not in entry:
         return []

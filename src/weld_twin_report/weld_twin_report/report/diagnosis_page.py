@@ -15,7 +15,7 @@ from weld_twin_nodes.wording.quantities import counted
 from .acceptance import (
     Demand,
     acceptance_section,
-    judged_words,
+    judgement,
     largest,
     most_data,
     on_what,
@@ -138,7 +138,7 @@ def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
         where += f'; {counted(out, "sample")} {verb} left out of it'
     return tag(
         'p',
-        f'{judged_words(rule, size)}, {where}',
+        f'{judgement(rule, size)}, {where}',
         class_=f'status judged {verdict}',
         hidden='' if rule.tolerance_m is None else None,
         data_top=f'{1e3 * size:.9f}',

@@ -142,7 +142,7 @@ def _without_name(belief: Mapping[str, Any]) -> str:
 def _asked(step: Round, after: Round | None) -> Html:
     """Return a node of the tree: the measurement, what it said beforehand, and its fork."""
     asked = step['asked']
-    text = tag('p', _told(asked['sentence'], step), ' ', _told(asked['reason'], step))
+    text = tag('p', _in_words(asked['sentence'], step), ' ', _in_words(asked['reason'], step))
     verdicts = {
         None: 'It promised to show more, not to decide.',
         True: 'It decided that.',
@@ -218,7 +218,7 @@ def _stands(side: Side, belief: Mapping[str, Any]) -> bool:
     )
 
 
-def _told(text: str, step: Round) -> str:
+def _in_words(text: str, step: Round) -> str:
     """Return a sentence with causes as people say them."""
     items = [item for side in step['asked']['between'] or () for item in side]
     items += step['believed']['candidates']

@@ -40,8 +40,8 @@ def performance_page(
         _figures(result),
         _poses(result),
         None if result.path is None else _path(result.path),
-        _told('What the standard asks for beyond this', result.lacking, 'lacking'),
-        _told('How it was measured', [*notes, *recording.notes], 'notes'),
+        _listed('What the standard asks for beyond this', result.lacking, 'lacking'),
+        _listed('How it was measured', [*notes, *recording.notes], 'notes'),
         section('What the letters mean', pairs(MEANINGS), id_='meanings'),
         inputs_section(inputs),
     )
@@ -95,7 +95,7 @@ def _path(path: PathTest) -> Html:
     )
 
 
-def _told(title: str, texts: Sequence[str], name: str) -> Html | None:
+def _listed(title: str, texts: Sequence[str], name: str) -> Html | None:
     if not texts:
         return None
     return section(title, sentences(f'{t[:1].upper()}{t[1:]}.' for t in texts), id_=name)

@@ -16,7 +16,7 @@ from weld_twin_core.diagnosis.result import Diagnosis
 from .acceptance import Demand, rule_of
 from .answer import Answer
 from .cause_answer import LEVEL_HEADS
-from .contact_clouds import contacts_told
+from .contact_clouds import contacts_sentence
 
 _COLOURS = {
     'identified': 'green',
@@ -68,7 +68,7 @@ def _print_data(diagnosis: Diagnosis, console: Console) -> None:
         for note in () if recording.contacts is not None else recording.notes:
             console.print(f'[dim]note:[/] {escape(recording.name)}: {escape(note)}')
     if diagnosis.contacts is not None:
-        console.print(escape(contacts_told(diagnosis.contacts)))
+        console.print(escape(contacts_sentence(diagnosis.contacts)))
 
 
 def _print_changed(answer: Answer, console: Console) -> None:

@@ -42,12 +42,12 @@ def headline(result: Verification) -> str:
     )
 
 
-def told(result: Verification) -> list[str]:
+def result_lines(result: Verification) -> list[str]:
     """Return the lines of the terminal: the headline, what is wrong, what became of each cause."""
     return [
         headline(result),
         *result.notes,
-        *(_told(result, remaining) for remaining in result.causes),
+        *(_of_cause(result, remaining) for remaining in result.causes),
     ]
 
 
@@ -57,7 +57,7 @@ def _promised(promise: Promise) -> str:
     return f'{millimetres(promise.rms)} RMS ({millimetres(promise.low)} to {millimetres(promise.high)})'
 
 
-def _told(result: Verification, remaining: Left) -> str:
+def _of_cause(result: Verification, remaining: Left) -> str:
     moves = f'as it was it moves the tool by {millimetres(remaining.rms_m)} here'
     if remaining.state == 'open':
         return f'{_name(remaining)}: {_STATES["open"]}; {moves}'

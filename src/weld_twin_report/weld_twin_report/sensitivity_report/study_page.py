@@ -77,7 +77,7 @@ def _answer(motion: str, study: dict[str, Any]) -> Html:
     first, *others = advised(study['local']['parameters'], _ADVISED)
     return section(
         'Which tolerance to tighten',
-        tag('p.second', _told(first)),
+        tag('p.second', _first(first)),
         _advised([first, *others]),
         tag('h3', f'What drives the largest deviation, {motion} motion'),
         _bars(rows[:_SHOWN]),
@@ -95,7 +95,7 @@ def _answer(motion: str, study: dict[str, Any]) -> Html:
     )
 
 
-def _told(advice: Advice) -> str:
+def _first(advice: Advice) -> str:
     text = advice.instruction
     return (
         f'{text[:1].upper()}{text[1:]} first: to {advice.wanted}, gains '

@@ -174,7 +174,7 @@ class _Site:
         result = self._queue.folder(job) / FOUND
         return HTMLResponse(
             pages.job_page(
-                job, ahead, _told(result / DIAGNOSIS), _written(job, result), self._ways
+                job, ahead, _diagnosis_in(result / DIAGNOSIS), _written(job, result), self._ways
             )
         )
 
@@ -318,7 +318,7 @@ def _files(form: FormData, name: str) -> list[UploadFile]:
     return [each for each in form.getlist(name) if isinstance(each, UploadFile)]
 
 
-def _told(file: Path) -> dict[str, Any] | None:
+def _diagnosis_in(file: Path) -> dict[str, Any] | None:
     """Return a diagnosis; None where there is none that can be read."""
     try:
         reported = json.loads(file.read_text(encoding='utf-8'))

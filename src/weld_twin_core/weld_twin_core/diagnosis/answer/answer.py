@@ -17,7 +17,7 @@ from ..algebra.fit import trusted
 from ..algebra.problem import Model
 from ..beliefs import Beliefs
 from ..calibration.calibrated import Stated, calibrated
-from ..frames.aligned import NOT_TOLD, not_told
+from ..frames.aligned import NOT_TOLD, other_causes
 from ..frames.changes import told, untold
 from ..hypotheses.any_motion import never_parted
 from ..hypotheses.rivals import Rival
@@ -141,7 +141,7 @@ def _compared(result: Search, examined: Examined, verdict: Verdict) -> dict[str,
         'efforts': compared(result.problem.recordings, result.baseline.model.robot),
         'recordings': result.problem.recordings,
         'traces': traces(result),
-        'absent': result.library.absent | dict.fromkeys(not_told(result.problem), NOT_TOLD),
+        'absent': result.library.absent | dict.fromkeys(other_causes(result.problem), NOT_TOLD),
         'checks': (*examined.checks, *untold_check(result, named)),
         'changed': changed(result, named),
         'may_change': named,

@@ -178,7 +178,7 @@ def tracked_part(problem: Problem, model: Model) -> tuple[Problem, Model]:
     return part, replace(model, bases=bases, given=given, common=common)
 
 
-def not_told(problem: Problem) -> tuple[str, ...]:
+def other_causes(problem: Problem) -> tuple[str, ...]:
     """
     Return the kinds of effect that no contact tells of; none where an instrument measured.
 

@@ -109,7 +109,7 @@ def _predict(args: argparse.Namespace) -> int:
     from weld_twin_msgs_py.bags import read_recording
 
     from ...offline.pose_tables import write_prediction_table
-    from ...offline.prediction import on_one_clock, predictor, told_sureness, write_prediction
+    from ...offline.prediction import on_one_clock, predictor, sureness_sentences, write_prediction
 
     if not args.model:
         raise DataError('say with --model which effects the twin of a recording has')
@@ -133,6 +133,6 @@ def _predict(args: argparse.Namespace) -> int:
     if got.rms_m is not None:
         line += f'; measured minus twin RMS {got.rms_m * 1e3:.4f} mm'
     print(line)
-    for sentence in told_sureness(model, got):
+    for sentence in sureness_sentences(model, got):
         print(sentence)
     return 0

@@ -84,7 +84,11 @@ def run(args: argparse.Namespace) -> int:
 def _corrected_bag(args: argparse.Namespace) -> int:
     """Write the commands and say what they gain by the model, and where it knows too little."""
     from weld_twin_msgs_py.bags import read_recording
-    from weld_twin_nodes.offline.compensating import compensated, told_trust, write_compensated
+    from weld_twin_nodes.offline.compensating import (
+        compensated,
+        trust_sentences,
+        write_compensated,
+    )
 
     if not args.model:
         raise DataError('say with --model by which effects the commands are corrected')
@@ -106,7 +110,7 @@ def _corrected_bag(args: argparse.Namespace) -> int:
         'this is what the effects in the model do on these commands; the gap of a diagnosis also '
         'holds noise and whatever it left unexplained'
     )
-    for sentence in told_trust(made):
+    for sentence in trust_sentences(made):
         print(sentence)
     if made.result.left_out:
         names = ', '.join(effect.name for effect in made.result.left_out)
@@ -142,14 +146,14 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
     from weld_twin_nodes.offline.correcting import (
         corrected_program,
         correction_entry,
-        not_told,
+        other_causes,
         program_model,
         way,
     )
     from weld_twin_nodes.offline.told_twin import diagnosis_of, other_readings
     from weld_twin_nodes.offline.tolerances import tolerance_entry
 
-    from ...report.correction_page import correction_page, headline, tolerance_told
+    from ...report.correction_page import correction_page, headline, tolerance_sentences
 
     caps = Caps(*_largest(args))
     robot = context.robot
@@ -160,7 +164,7 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
         program, context, model, caps, start_of(args, robot), other_readings(content)
     )
     entry = correction_entry(made, robot, caps) | {'way': way(made, model)}
-    entry['notes'] += not_told(content)
+    entry['notes'] += other_causes(content)
     if args.tolerance:
         entry['tolerance'] = tolerance_entry(made, model, *_allowed(args))
     inputs = inputs_of(program=args.program, model=args.model)
@@ -170,7 +174,7 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
         write_text(place / PAGE, correction_page(entry, inputs))
         write_json(place / RESULT, entry)
     print(f'{Path(args.out) / program.sources[0].name}: {headline(entry)}')
-    print(*tolerance_told(entry), sep='\n', end='\n' if args.tolerance else '')
+    print(*tolerance_sentences(entry), sep='\n', end='\n' if args.tolerance else '')
     _tell(entry)
     print(f'report: {Path(args.out) / PAGE}')
     return 0

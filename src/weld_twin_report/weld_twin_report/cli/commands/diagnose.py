@@ -157,7 +157,7 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
     from weld_twin_core.diagnosis.algebra.problem import frames_named
     from weld_twin_core.diagnosis.frames.changes import families_named
     from weld_twin_nodes.offline.region import region
-    from weld_twin_nodes.offline.set_up_changes import told
+    from weld_twin_nodes.offline.set_up_changes import with_changes
 
     align, excluded = frames_named(args.align, '--align'), _families(args.exclude_effect)
     changing = families_named(args.may_change, '--may-change')
@@ -169,7 +169,7 @@ def _diagnosis(args: argparse.Namespace) -> Diagnosis:
     with _progress() as tell:
         recordings = _read(args, twin.robot, 'base' in align, tell)
         count = len(args.bag)
-        fitted, more = told(_bounded(recordings[:count]), changes, twin.robot)
+        fitted, more = with_changes(_bounded(recordings[:count]), changes, twin.robot)
         result = diagnose(
             fitted,
             twin.robot,

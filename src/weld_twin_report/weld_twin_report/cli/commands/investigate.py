@@ -12,8 +12,7 @@ or when nothing would part what is left, and says which.
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -138,13 +137,8 @@ def _first(
     from weld_twin_nodes.offline.measurement_plan import planned
 
     given = (tolerance, how['noise'], how['spread'])
-    return planned(
-        robot,
-        lambda count: plan_stations(robot, count, *given),
-        how['minutes'],
-        how['seconds'],
-        how['postures'],
-    )
+    time = (how['minutes'], how['seconds'], how['postures'])
+    return planned(robot, lambda count: plan_stations(robot, count, *given), *time)
 
 
 def _more(
@@ -170,9 +164,7 @@ def _more(
     plan = planned(
         robot,
         lambda count: plan_more(posterior, twin, postures, count, wanted),
-        how['minutes'],
-        how['seconds'],
-        how['postures'],
+        *(how['minutes'], how['seconds'], how['postures']),
         least=1,
         offered=len(postures[1]),
     )
@@ -248,209 +240,186 @@ def _investigated(args: argparse.Namespace) -> int:
     if not args.bag and not args.live and args.budget is None:
         print(headline(read_state(directory)))
         return 0
-    state = _continued(args, directory) if begun else _begun(args, directory)
+    going = _Investigation(args, directory, begun)
     if args.bag:
-        state = _round(args, directory, state, args.bag, _changes(args, state))
-        args.changed = ''
+        going.take_in(args.bag, going.changes(args.changed))
     elif args.budget is not None:
-        state = _with_budget(args, directory, state)
-    # What has to be changed by hand is done when the person calls again.
-    done = not args.bag
-    while args.live and state['state'] == 'open' and (done or not _asked(state)['changes']):
-        state = _recorded(args, directory, state)
-        done = False
+        going.plan_anew()
+    if args.live:
+        going.record()
     return 0
 
 
-def _with_budget(
-    args: argparse.Namespace, directory: Path, state: dict[str, Any]
-) -> dict[str, Any]:
-    """Keep another budget; where nothing is asked for, plan anew from what was recorded last."""
-    from weld_twin_nodes.offline.investigation import write_state
+class _Investigation:
+    """An investigation in its folder, as it goes on with what was given."""
 
-    from ...report.investigation_page import headline
+    def __init__(self, args: argparse.Namespace, directory: Path, begun: bool) -> None:
+        self.args, self.directory = args, directory
+        self.state = self._continued() if begun else self._begun()
 
-    *before, last = state['rounds']
-    if last['asked'] is not None:
-        write_state(directory, state)
-        print(headline(state))
+    def _begun(self) -> dict[str, Any]:
+        from weld_twin_nodes.offline.investigation import begin
+        from weld_twin_nodes.offline.measurement_plan import TABLE
+
+        args, place = self.args, self.directory
+        if not args.robot:
+            raise DataError('an investigation begins with --robot')
+        if place.exists() and any(place.iterdir()) and not (place / TABLE).exists():
+            raise DataError(f"'{place}' holds something else already; choose another place")
+        budget = BUDGET if args.budget is None else args.budget
+        if not 0.0 <= budget < 1e6:
+            raise DataError(f'--budget must be minutes, got {budget}')
+        words = [('--align', args.align), ('--effects-known', args.effects_known)]
+        words += [('--cell-box', args.cell_box)]
+        words += zip(CHAIN, (link or '' for link in links_of(args)), strict=True)
+        # A box may begin with a minus, and is then taken for an option unless it is joined.
+        return begin(args.robot, [f'{word}={value}' for word, value in words if value], budget)
+
+    def _continued(self) -> dict[str, Any]:
+        from weld_twin_nodes.offline.investigation import read_state
+
+        state, robot = read_state(self.directory), self.args.robot
+        if robot and robot != state['robot']:
+            raise DataError(
+                f"the investigation is of robot '{state['robot']}', not of '{robot}'; begin another"
+            )
+        if self.args.budget is not None:
+            state |= {'budget_min': self.args.budget, 'state': 'open'}
+        if state['state'] != 'open':
+            raise DataError(
+                f'the investigation has ended, {state["state"]}: {state["why"]}; '
+                'a larger --budget opens it again'
+            )
         return state
-    bags = [str(entry['path']) for entry in last['recordings']]
-    changes = str(last['recordings'][0].get('changed') or '')
-    # The minutes of the experiment that it came from are counted when it is taken in again.
-    counted = float(before[-1]['asked']['minutes']) if before and before[-1].get('asked') else 0.0
-    spent = float(state['spent_min']) - counted
-    return _round(args, directory, {**state, 'rounds': before, 'spent_min': spent}, bags, changes)
 
+    @property
+    def asked(self) -> dict[str, Any]:
+        """Return what was asked for last; nothing before the first round."""
+        rounds = self.state['rounds']
+        return (rounds[-1]['asked'] if rounds else None) or {'changes': ''}
 
-def _asked(state: dict[str, Any]) -> dict[str, Any]:
-    """Return what was asked for last; nothing before the first round."""
-    rounds = state['rounds']
-    return (rounds[-1]['asked'] if rounds else None) or {'changes': ''}
+    def changes(self, told: str = '') -> str:
+        """Return what was changed in the cell for the new bags: as told, or as was asked."""
+        from weld_twin_nodes.offline.set_up_changes import set_up_change
 
+        if not told:
+            return str(self.asked.get('changes') or '')
+        return '' if told == 'nothing' else str(set_up_change(told))
 
-def _changes(args: argparse.Namespace, state: dict[str, Any]) -> str:
-    """Return what was changed in the cell for the new bags."""
-    from weld_twin_nodes.offline.set_up_changes import set_up_change
+    def plan_anew(self) -> None:
+        """Keep another budget; where nothing is asked for, plan anew from what was recorded last."""
+        from weld_twin_nodes.offline.investigation import write_state
 
-    if not args.changed:
-        return str(_asked(state).get('changes') or '')
-    return '' if args.changed == 'nothing' else str(set_up_change(args.changed))
+        from ...report.investigation_page import headline
 
+        *before, last = self.state['rounds']
+        if last['asked'] is not None:
+            write_state(self.directory, self.state)
+            print(headline(self.state))
+            return
+        bags = [str(entry['path']) for entry in last['recordings']]
+        # The minutes of the experiment that it came from are counted when it is taken in again.
+        asked = before[-1].get('asked') if before else None
+        counted = float(asked['minutes']) if asked else 0.0
+        self.state |= {'rounds': before, 'spent_min': float(self.state['spent_min']) - counted}
+        self.take_in(bags, str(last['recordings'][0].get('changed') or ''))
 
-def _recorded(args: argparse.Namespace, directory: Path, state: dict[str, Any]) -> dict[str, Any]:
-    """Run and record what is asked for in the cell that is up, and take it in."""
-    from weld_twin_nodes.harness.recorded_experiment import recorded_experiment
+    def record(self) -> None:
+        """Run and record what is asked for in the cell that is up, until something has to be changed."""
+        from weld_twin_nodes.harness.recorded_experiment import recorded_experiment
 
-    if 'robot_minutes' not in _asked(state):
-        raise DataError(f"nothing is asked for in '{directory}'; go on with a recording")
-    place = directory / f'round-{len(state["rounds"]) - 1}'
-    seconds = 60.0 * SLOWER * float(_asked(state)['robot_minutes']) / max(args.playback, LEAST)
-    bag = recorded_experiment(
-        place / EXPERIMENT, state['robot'], seconds, place / BAG, playback=args.playback
-    )
-    return _round(args, directory, state, [str(bag)], _changes(args, state))
+        # What has to be changed by hand is done when the person calls again.
+        done = not self.args.bag
+        while self.state['state'] == 'open' and (done or not self.asked['changes']):
+            if 'robot_minutes' not in self.asked:
+                raise DataError(
+                    f"nothing is asked for in '{self.directory}'; go on with a recording"
+                )
+            place = self.directory / f'round-{len(self.state["rounds"]) - 1}'
+            speed = self.args.playback
+            seconds = 60.0 * SLOWER * float(self.asked['robot_minutes']) / max(speed, LEAST)
+            where = (place / EXPERIMENT, self.state['robot'], seconds, place / BAG)
+            bag = recorded_experiment(*where, playback=speed)
+            told = '' if self.args.bag else self.args.changed
+            self.take_in([str(bag)], self.changes(told))
+            done = False
 
+    def take_in(self, bags: list[str], changes: str) -> None:
+        """Diagnose everything so far, and ask or end."""
+        from weld_twin_nodes.offline.investigation import PAGE, foreseen, take_in, write_state
+        from weld_twin_nodes.offline.output_directory import write_owned
 
-def _begun(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
-    from weld_twin_nodes.offline.investigation import begin
-    from weld_twin_nodes.offline.measurement_plan import TABLE
+        from ...report.investigation_page import headline, investigation_page
 
-    if not args.robot:
-        raise DataError('an investigation begins with --robot')
-    if directory.exists() and any(directory.iterdir()) and not (directory / TABLE).exists():
-        raise DataError(f"'{directory}' holds something else already; choose another place")
-    budget = BUDGET if args.budget is None else args.budget
-    if not 0.0 <= budget < 1e6:
-        raise DataError(f'--budget must be minutes, got {budget}')
-    words = [('--align', args.align), ('--effects-known', args.effects_known)]
-    words += [('--cell-box', args.cell_box)]
-    words += zip(CHAIN, (link or '' for link in links_of(args)), strict=True)
-    # A box may begin with a minus, and is then taken for an option unless it is joined.
-    options = [f'{word}={value}' for word, value in words if value]
-    return begin(args.robot, options, budget)
+        place = self.directory / f'round-{len(self.state["rounds"])}'
+        self.state = take_in(self.state, bags, *self._heard(bags, changes, place), changes)
+        asked = self.state['rounds'][-1]['asked']
+        if asked is not None:
+            self._write_experiment(place, asked)
+        write_state(self.directory, self.state)
+        write_owned(self.directory / PAGE, investigation_page(self.state))
+        print(headline(self.state))
+        if asked is not None:
+            print(f'{asked["reason"]} Beforehand: {foreseen(asked)}.')
+            print(f'record {place / EXPERIMENT}, then: weld-twin investigate {self.directory} BAG')
+        print(f'page: {self.directory / PAGE}')
 
+    def _heard(self, bags: list[str], changes: str, place: Path) -> tuple[Mapping[str, Any], str]:
+        """Diagnose all recordings, and the experiments by themselves; return what to believe."""
+        from weld_twin_nodes.offline.closing import weighed
+        from weld_twin_nodes.offline.investigation import changed, recordings
+        from weld_twin_nodes.offline.set_up_changes import FRAMES
 
-def _continued(args: argparse.Namespace, directory: Path) -> dict[str, Any]:
-    from weld_twin_nodes.offline.investigation import read_state
+        first, later = recordings(self.state)
+        known = {**changed(self.state), **(dict.fromkeys(bags, changes) if changes else {})}
+        # Seen with another tool, or from elsewhere, they cannot be held against the first.
+        by_itself = not first or any(what in FRAMES for what in known.values())
+        every = [*first, *later, *bags]
+        result = self._diagnosed(every, place, known, ['--confirm'] * by_itself)
+        if by_itself:
+            return weighed(result)
+        beside = place.with_name(f'{place.name}-experiments')
+        try:
+            return weighed(result, self._diagnosed([*later, *bags], beside, known))
+        except TwinError:  # too few to be diagnosed by themselves
+            return weighed(result)
 
-    state = read_state(directory)
-    if args.robot and args.robot != state['robot']:
-        raise DataError(
-            f"the investigation is of robot '{state['robot']}', not of '{args.robot}'; begin another"
-        )
-    if args.budget is not None:
-        state['budget_min'] = args.budget
-        state['state'] = 'open'
-    if state['state'] != 'open':
-        raise DataError(
-            f'the investigation has ended, {state["state"]}: {state["why"]}; '
-            'a larger --budget opens it again'
-        )
-    return state
+    def _diagnosed(
+        self, bags: list[str], place: Path, changes: Mapping[str, str], more: Sequence[str] = ()
+    ) -> dict[str, Any]:
+        """Run the diagnosis as its own command does; return the content of diagnosis.json."""
+        from weld_twin_msgs_py.files.json_file import read_json
 
+        from ...report.diagnosis_files import RESULT
+        from . import diagnose
 
-def _round(
-    args: argparse.Namespace,
-    directory: Path,
-    state: dict[str, Any],
-    bags: list[str],
-    changes: str,
-) -> dict[str, Any]:
-    """Diagnose everything so far, and ask or end; return the state after it."""
-    from weld_twin_nodes.offline.investigation import PAGE, foreseen, take_in, write_state
-    from weld_twin_nodes.offline.output_directory import write_owned
+        parser = argparse.ArgumentParser()
+        add_options(parser, *diagnose.OPTIONS)
+        state = self.state
+        remaining = max(float(state['budget_min']) - float(state['spent_min']), LEAST)
+        words = [*bags, '--robot', state['robot'], '--out', str(place), *state['options'], *more]
+        words += ['--experiment-minutes', f'{remaining:g}', *(['--force'] * self.args.force)]
+        words += [w for bag in bags if bag in changes for w in ('--changed', bag, changes[bag])]
+        diagnose.run(parser.parse_args(words))
+        return read_json(place / RESULT)
 
-    from ...report.investigation_page import headline, investigation_page
+    def _write_experiment(self, place: Path, asked: dict[str, Any]) -> None:
+        """Write the experiment for the generator, and as a program where a controller is named."""
+        from weld_twin_msgs_py.files.joint_file import write_joint_motion
+        from weld_twin_msgs_py.robots import load_robot
+        from weld_twin_nodes.offline.output_directory import new_directory
 
-    place = directory / f'round-{len(state["rounds"])}'
-    heard = _heard(state, bags, changes, place, force=args.force)
-    state = take_in(state, bags, *heard, changes)
-    asked = state['rounds'][-1]['asked']
-    if asked is not None:
-        _write_experiment(args, place, state, asked)
-    write_state(directory, state)
-    write_owned(directory / PAGE, investigation_page(state))
-    print(headline(state))
-    if asked is not None:
-        print(f'{asked["reason"]} Beforehand: {foreseen(asked)}.')
-        print(f'record {place / EXPERIMENT}, then: weld-twin investigate {directory} BAG')
-    print(f'page: {directory / PAGE}')
-    return state
-
-
-def _heard(
-    state: dict[str, Any], bags: list[str], changes: str, place: Path, *, force: bool
-) -> tuple[Mapping[str, Any], str]:
-    """Diagnose all recordings, and the experiments by themselves; return what to believe."""
-    from weld_twin_nodes.offline.closing import weighed
-    from weld_twin_nodes.offline.investigation import changed, recordings
-    from weld_twin_nodes.offline.set_up_changes import FRAMES
-
-    first, later = recordings(state)
-    reported = {**changed(state), **(dict.fromkeys(bags, changes) if changes else {})}
-    # Seen with another tool, or from elsewhere, they cannot be held against the first.
-    by_itself = not first or any(what in FRAMES for what in reported.values())
-    every = [*first, *later, *bags]
-    result = _diagnosed(every, state, place, reported, confirm=by_itself, force=force)
-    if by_itself:
-        return weighed(result)
-    beside = place.with_name(f'{place.name}-experiments')
-    try:
-        return weighed(result, _diagnosed([*later, *bags], state, beside, reported, force=force))
-    except TwinError:  # too few to be diagnosed by themselves
-        return weighed(result)
-
-
-def _diagnosed(
-    bags: list[str],
-    state: dict[str, Any],
-    place: Path,
-    changes: Mapping[str, str],
-    *,
-    force: bool,
-    confirm: bool = False,
-) -> dict[str, Any]:
-    """Run the diagnosis as its own command does; return the content of diagnosis.json."""
-    from ...report.diagnosis_files import RESULT
-    from . import diagnose
-
-    parser = argparse.ArgumentParser()
-    add_options(parser, *diagnose.OPTIONS)
-    remaining = max(float(state['budget_min']) - float(state['spent_min']), LEAST)
-    words = [*bags, '--robot', state['robot'], '--out', str(place), *state['options']]
-    words += ['--experiment-minutes', f'{remaining:g}', *(['--force'] if force else [])]
-    words += ['--confirm'] if confirm else []
-    words += [word for bag in bags if bag in changes for word in ('--changed', bag, changes[bag])]
-    diagnose.run(parser.parse_args(words))
-    result: dict[str, Any] = json.loads((place / RESULT).read_text(encoding='utf-8'))
-    return result
-
-
-def _write_experiment(
-    args: argparse.Namespace, place: Path, state: dict[str, Any], asked: dict[str, Any]
-) -> None:
-    """Write the experiment for the generator, and as a program where a controller is named."""
-    from weld_twin_msgs_py.files.joint_file import write_joint_motion
-    from weld_twin_nodes.offline.output_directory import new_directory
-
-    with new_directory(place, mark=EXPERIMENT, force=args.force, shared=True) as made:
-        write_joint_motion(made / EXPERIMENT, asked.pop('motion'), asked['sentence'])
-        if args.controller:
-            _write_program(args, state, made, place)
-
-
-def _write_program(
-    args: argparse.Namespace, state: dict[str, Any], made: Path, place: Path
-) -> None:
-    from weld_twin_msgs_py.robots import load_robot
-
-    words = dict(word.split('=', 1) for word in state['options'])
-    robot = load_robot(state['robot'], *(words.get(option) for option in CHAIN))
-    try:
-        check_program(args)
-        context = context_of(args, robot, args.controller)
-        lines = _program(args, context, made / EXPERIMENT, place, 'experiment')
-    except TwinError as error:
-        lines = [f'note: no program was written: {error}']
-    print('\n'.join(lines))
+        args, state = self.args, self.state
+        with new_directory(place, mark=EXPERIMENT, force=args.force, shared=True) as made:
+            write_joint_motion(made / EXPERIMENT, asked.pop('motion'), asked['sentence'])
+            if not args.controller:
+                return
+            words = dict(word.split('=', 1) for word in state['options'])
+            robot = load_robot(state['robot'], *(words.get(option) for option in CHAIN))
+            try:
+                check_program(args)
+                context = context_of(args, robot, args.controller)
+                lines = _program(args, context, made / EXPERIMENT, place, 'experiment')
+            except TwinError as error:
+                lines = [f'note: no program was written: {error}']
+            print('\n'.join(lines))

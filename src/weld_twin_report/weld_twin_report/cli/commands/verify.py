@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from weld_twin_msgs_py.files.diagnosis_model import mended_source, read_diagnosis, read_model
     from weld_twin_nodes.offline.verifying import verified
 
-    from ...report.verification_page import told
+    from ...report.verification_page import result_lines
 
     content = read_diagnosis(args.model)
     robot = _robot(args, content)
@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     )
     if mended:
         print(f'note: {mended}')
-    for line in told(result):
+    for line in result_lines(result):
         print(line)
     if args.out:
         _write(args, content, recording.epoch_ns, result)

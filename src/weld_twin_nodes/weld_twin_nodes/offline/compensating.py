@@ -30,29 +30,17 @@ WHOLE = 0.999
 
 
 class Compensated(NamedTuple):
-    """
-    Compensated commands with what the model knows of them.
-
-    Attributes
-    ----------
-    outside : sequence of Stretch
-        Of the nominal commands: where they leave what was recorded.
-    least : float
-        Smallest share of the correction that was applied anywhere, 1 for all of it everywhere.
-    motion : JointMotion
-        The new commands, counted as the nominal ones came.
-    told : str
-        That the commands were read as the diagnosis mended its recordings, and are written as they
-        came; empty where they are not.
-
-    """
+    """Compensated commands with what the model knows of them."""
 
     result: Compensation
     model: Predictor
-    outside: Sequence[Stretch]
+    outside: Sequence[Stretch]  # of the nominal commands: where they leave what was recorded
     least: float
-    motion: JointMotion
+    """Smallest share of the correction that was applied anywhere, 1 for all of it everywhere."""
+    motion: JointMotion  # the new commands, counted as the nominal ones came
     told: str = ''
+    """That the commands were read as the diagnosis mended its recordings, and are written as they
+    came; empty where they are not."""
 
 
 def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compensated:

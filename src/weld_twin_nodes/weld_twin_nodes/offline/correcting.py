@@ -58,22 +58,12 @@ NOT_SURE = (
 
 @dataclass(frozen=True, eq=False)
 class CorrectedProgram:
-    """
-    A program, its correction, and the new texts.
-
-    Attributes
-    ----------
-    texts : tuple of str
-        One for every file of the program.
-    notes : tuple of str
-        What a reader should know, in sentences.
-
-    """
+    """A program, its correction, and the new texts."""
 
     program: Program
-    texts: tuple[str, ...]
+    texts: tuple[str, ...]  # one for every file of the program
     found: ProgramCorrection
-    notes: tuple[str, ...]
+    notes: tuple[str, ...]  # what a reader should know, in sentences
 
     @property
     def accuracy(self) -> tuple[Accuracy | None, Accuracy | None]:
@@ -130,25 +120,15 @@ def corrected_program(
     context: Context,
     model: ProgramModel,
     caps: Caps | None = None,
-    start: Array | None = None,
+    start: Array | None = None,  # shape (n,), joint positions before the first move
+    # Why the model counts joints otherwise than they are read, see `other_readings`; whether a
+    # program does, too, nobody knows.
     readings: str = '',
 ) -> CorrectedProgram:
     """
     Return a program corrected so that the real tool goes where it means.
 
-    Parameters
-    ----------
-    start : array, shape (n,), optional
-        Joint positions before the first move.
-    readings : str
-        Why the model counts joints otherwise than they are read, see `other_readings`; whether a
-        program does, too, nobody knows.
-
-    Raises
-    ------
-    DataError
-        There is no move to correct, or none that can be.
-
+    Raises DataError: there is no move to correct, or none that can be.
     """
     name = program.sources[0].name
     if readings:

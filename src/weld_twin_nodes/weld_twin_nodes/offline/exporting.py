@@ -62,34 +62,21 @@ class Speeds(NamedTuple):
 
 
 def export(
+    # A path file, a bundled seam, an experiment as a diagnosis proposes it, or a seam that is
+    # planned already.
     path: str | SeamPlan,
     context: Context,
     language: str,
-    name: str,
+    name: str,  # of the program
     speeds: Speeds,
-    trigger: int,
-    seam_speed: float = 0.0,
+    trigger: int,  # number of the output that triggers the instrument
+    seam_speed: float = 0.0,  # [m/s], of a seam; 0 for that of its time law
 ) -> tuple[Exported, str, list[str]]:
     """
     Return the program of a seam or an experiment, its text, and what to look out for.
 
-    Parameters
-    ----------
-    path : str or planned seam
-        A path file, a bundled seam, an experiment as a diagnosis proposes it, or a seam that is
-        planned already.
-    name : str
-        Of the program.
-    trigger : int
-        Number of the output that triggers the instrument.
-    seam_speed : float [m/s]
-        Of a seam; 0 for that of its time law.
-
-    Raises
-    ------
-    DataError, PathError
-        The file cannot be read, leaves the robot's limits, or the language cannot say it.
-
+    Raises DataError, PathError: the file cannot be read, leaves the robot's limits, or the
+    language cannot say it.
     """
     robot = context.robot
     _refuse_slides(context, language)

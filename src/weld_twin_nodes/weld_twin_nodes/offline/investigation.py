@@ -103,26 +103,14 @@ def changed(state: State) -> dict[str, str]:
 
 def take_in(
     state: State,
-    bags: Sequence[str],
-    result: Mapping[str, Any],
+    bags: Sequence[str],  # the new recordings
+    result: Mapping[str, Any],  # the content of diagnosis.json
+    # Why it closes the question, as `weighed` tells it; left out, this diagnosis alone counts.
     why: str | None = None,
+    # What was changed in the cell for the new recordings; every later diagnosis is told.
     changes: str = '',
 ) -> State:
-    """
-    Return the state after a diagnosis of all recordings so far.
-
-    Parameters
-    ----------
-    bags : sequence of str
-        The new recordings.
-    result : mapping
-        The content of diagnosis.json.
-    why : str, optional
-        Why it closes the question, as `weighed` tells it; left out, this diagnosis alone counts.
-    changes : str
-        What was changed in the cell for the new recordings; every later diagnosis is told.
-
-    """
+    """Return the state after a diagnosis of all recordings so far."""
     rounds = list(state['rounds'])
     spent = float(state['spent_min'])
     if rounds and rounds[-1].get('asked'):

@@ -25,25 +25,13 @@ DIGITS = 12
 
 @dataclass(frozen=True, eq=False)
 class LoadedModel:
-    """
-    A model and the file it came from.
-
-    Attributes
-    ----------
-    digest : str
-        Of the content of the file.
-    promised : Promise, optional
-        How far measurements are from the twin that has the model.
-    modified : float
-        When the file was written [s since 1970].
-
-    """
+    """A model and the file it came from."""
 
     path: Path
-    digest: str
+    digest: str  # of the content of the file
     read: ProgramModel
-    promised: Promise | None
-    modified: float
+    promised: Promise | None  # how far measurements are from the twin that has the model
+    modified: float  # when the file was written [s since 1970]
 
     def outdated(self, most_age: float = 0.0) -> str:
         """

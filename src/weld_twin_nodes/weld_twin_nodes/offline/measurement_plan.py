@@ -41,60 +41,34 @@ SURE = 0.95
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """
-    A measurement planned for a robot.
+    """A measurement planned for a robot."""
 
-    Attributes
-    ----------
-    q : array, shape (N, n) [rad, m]
-        Stations in the order of a short way.
-    minutes : array, shape (M + 1,)
-        That 0, 1, ... stations take.
-    sigma, within : array, shape (M + 1,)
-        As `MeasurementPlan` has them, up to the most that fit into the time.
-    needed : int or None
-        Stations after which the tolerance is kept; None where not even all that fit do.
-
-    """
-
-    q: Array
-    minutes: Array
+    q: Array  # shape (N, n) [rad, m], stations in the order of a short way
+    minutes: Array  # shape (M + 1,), that 0, 1, ... stations take
     sigma: Array
     within: Array
+    """Shape (M + 1,): as `MeasurementPlan` has them, up to the most that fit into the time."""
     needed: int | None
+    """Stations after which the tolerance is kept; None where not even all that fit do."""
 
 
 def planned(
     robot: Robot,
-    plan_of: Callable[[int], MeasurementPlan],
-    minutes: float | None,
-    seconds: float,
+    plan_of: Callable[[int], MeasurementPlan],  # returns the plan of so many stations
+    minutes: float | None,  # there is time for; left out, as many as ``postures`` take
+    seconds: float,  # [s], that one station takes, the way to it apart
+    # So many stations and no other number; left out, as many as the tolerance needs.
     postures: int | None = None,
     *,
+    # least, offered: fewest stations that can be judged, and most that there are.
     least: int = LEAST,
     offered: int = MOST_ASKED,
 ) -> Planned:
     """
     Return the stations that a measurement needs.
 
-    Parameters
-    ----------
-    plan_of : callable
-        Returns the plan of so many stations.
-    minutes : float, optional
-        There is time for; left out, as many as ``postures`` take.
-    seconds : float [s]
-        That one station takes, the way to it apart.
-    postures : int, optional
-        So many stations and no other number; left out, as many as the tolerance needs.
-    least, offered : int
-        Fewest stations that can be judged, and most that there are.
-
-    Raises
-    ------
-    DataError
-        There is no time for the fewest stations that can be judged, or for those asked for.
-
+    Raises DataError: there is no time for the fewest stations that can be judged, or for those
+    asked for.
     """
     if postures is not None:
         return _so_many(robot, postures, minutes, seconds, plan_of, (least, offered))

@@ -34,13 +34,14 @@ def on_stderr(text: str) -> None:
 
 @contextmanager
 def new_directory(
-    path: Path | str,
+    path: Path | str,  # a folder, new or there already. A link is followed
     *,
-    mark: str,
-    force: bool = False,
-    adds: bool = False,
+    mark: str,  # name of a file that the block makes, and by which the result is known
+    force: bool = False,  # what is in the way gets another name; left out, it is refused
+    adds: bool = False,  # files of the same result that are not made again stay, too
+    # The folder may be anybody's; left out, one that holds other things alone is refused.
     shared: bool = False,
-    tell: Callable[[str], None] = on_stderr,
+    tell: Callable[[str], None] = on_stderr,  # told which files got another name
 ) -> Iterator[Path]:
     """
     Yield a hidden directory whose files come to ``path`` when the block succeeds.
@@ -48,26 +49,7 @@ def new_directory(
     Files of the same result that were there are replaced, those not made again removed. Whatever a
     person has changed, and whatever else lies there, stays.
 
-    Parameters
-    ----------
-    path : Path or str
-        A folder, new or there already. A link is followed.
-    mark : str
-        Name of a file that the block makes, and by which the result is known.
-    force : bool
-        What is in the way gets another name; left out, it is refused.
-    adds : bool
-        Files of the same result that are not made again stay, too.
-    shared : bool
-        The folder may be anybody's; left out, one that holds other things alone is refused.
-    tell : callable
-        Told which files got another name.
-
-    Raises
-    ------
-    DataError
-        Something is in the way, or the place cannot be written.
-
+    Raises DataError: something is in the way, or the place cannot be written.
     """
     target = followed(path)
     try:

@@ -50,26 +50,13 @@ Digests = dict[str, str]
 
 @dataclass(frozen=True)
 class Change:
-    """
-    What is to happen in a folder; plain values, for it is written down.
+    """What is to happen in a folder; plain values, for it is written down."""
 
-    Attributes
-    ----------
-    mark : str
-        Name of the result that the files belong to.
-    place : mapping of str to str or None
-        New files, in order, and the digest of what each may replace; None for nothing.
-    drop : mapping of str to str
-        Files of ours that were not made again, and their digests.
-    listed : mapping of str to str
-        Files of this result afterwards, and their digests.
-
-    """
-
-    mark: str
+    mark: str  # name of the result that the files belong to
     place: Mapping[str, str | None]
-    drop: Mapping[str, str]
-    listed: Mapping[str, str]
+    """New files, in order, and the digest of what each may replace; None for nothing."""
+    drop: Mapping[str, str]  # files of ours that were not made again, and their digests
+    listed: Mapping[str, str]  # files of this result afterwards, and their digests
 
 
 def files_of(folder: Path) -> Digests:

@@ -48,28 +48,16 @@ class Stretch(NamedTuple):
 
 
 class Predictor(NamedTuple):
-    """
-    A twin and how sure it is.
-
-    Attributes
-    ----------
-    posterior : Posterior or None
-        None for an effects file, or a diagnosis written without one.
-    setup : int
-        Which base frame of the posterior, counted from 0.
-    source : Recording or None
-        The recording that it is for, mended as the diagnosis mended its own; None where nothing
-        had to be.
-    told : str
-        What is to be said of that.
-
-    """
+    """A twin and how sure it is."""
 
     twin: Twin
     posterior: Posterior | None = None
-    setup: int = 0
+    """None for an effects file, or a diagnosis written without one."""
+    setup: int = 0  # which base frame of the posterior, counted from 0
     source: Recording | None = None
-    told: str = ''
+    """The recording that it is for, mended as the diagnosis mended its own; None where nothing had
+    to be."""
+    told: str = ''  # what is to be said of that
 
     def covariances(self, recording: Recording) -> Array | None:
         """Return the covariance of the true pose at every joint state, shape (N, 6, 6)."""
@@ -96,49 +84,26 @@ class Predictor(NamedTuple):
 
 
 class Written(NamedTuple):
-    """
-    What a prediction came to.
+    """What a prediction came to."""
 
-    Attributes
-    ----------
-    rms_m : float or None
-        RMS of measured minus twin, where something was measured.
-    sigma_m : float or None
-        Median of the standard deviation of position in its worst direction.
-
-    """
-
-    rms_m: float | None
+    rms_m: float | None  # RMS of measured minus twin, where something was measured
     outside: Sequence[Stretch]
-    sigma_m: float | None
+    sigma_m: float | None  # median of the standard deviation of position in its worst direction
 
 
 def predictor(
     robot: Robot,
-    path: Path | str,
+    path: Path | str,  # diagnosis.json or an effects file
+    # Where the diagnosis fitted a base frame per recording, its hash tells which is meant.
     bag: Path | str,
+    # What the bag holds; its stamps tell whether the set-up's own motion applies.
     recording: Recording,
-    setup: int | None = None,
+    setup: int | None = None,  # which recording's base frame, counted from 1; overrides the bag
 ) -> Predictor:
     """
     Return the twin of a model file for a bag, and how sure it is.
 
-    Parameters
-    ----------
-    path : Path or str
-        diagnosis.json or an effects file.
-    bag : Path or str
-        Where the diagnosis fitted a base frame per recording, its hash tells which is meant.
-    recording : Recording
-        What the bag holds; its stamps tell whether the set-up's own motion applies.
-    setup : int, optional
-        Which recording's base frame, counted from 1; overrides the bag.
-
-    Raises
-    ------
-    ModelError
-        The file is of no use, or it is open which base frame is meant.
-
+    Raises ModelError: the file is of no use, or it is open which base frame is meant.
     """
     content = diagnosis_of(path)
     if 'model' not in content:

@@ -30,21 +30,12 @@ FRAMES = {'tool': 'tool_pose', 'instrument': 'base_pose'}
 
 @dataclass(frozen=True)
 class SetUpChange:
-    """
-    What was changed for one recording.
+    """What was changed for one recording."""
 
-    Attributes
-    ----------
-    kind : str
-        'load', 'tool' or 'instrument'.
-    numbers : tuple of float
-        Of a load its mass [kg], below 0 where it was taken off, and, where given, its centre of mass
-        in the tool frame [m].
-
-    """
-
-    kind: str
+    kind: str  # 'load', 'tool' or 'instrument'
     numbers: tuple[float, ...] = ()
+    """Of a load its mass [kg], below 0 where it was taken off, and, where given, its centre of
+    mass in the tool frame [m]."""
 
     def __str__(self) -> str:
         """Return it as `set_up_change` reads it."""

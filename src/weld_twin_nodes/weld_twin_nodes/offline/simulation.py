@@ -50,30 +50,14 @@ class Entry(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """
-    A run of the cell.
+    """A run of the cell."""
 
-    Attributes
-    ----------
-    real : Twin
-        The robot as it is, with the injected effects.
-    twin : Twin
-        The robot as it is believed to be.
-    stamps : array of int64, shape (N,) [ns]
-        Of the joint states.
-    seed : int
-        Of the measurement noise.
-    path_length : float [m]
-        For D_norm; 0 takes the way of the twin.
-
-    """
-
-    real: Twin
-    twin: Twin
+    real: Twin  # the robot as it is, with the injected effects
+    twin: Twin  # the robot as it is believed to be
     motion: JointMotion
-    stamps: np.ndarray
-    seed: int = 0
-    path_length: float = 0.0
+    stamps: np.ndarray  # shape (N,) [ns], of the joint states
+    seed: int = 0  # of the measurement noise
+    path_length: float = 0.0  # [m], for D_norm; 0 takes the way of the twin
 
     @cached_property
     def recording(self) -> Recording:

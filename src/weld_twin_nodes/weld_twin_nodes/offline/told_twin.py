@@ -27,33 +27,20 @@ for radians are 57 times, millimetres taken for metres a thousand times too larg
 
 def build_twin(
     robot: Robot,
+    # An effects file, or a diagnosis (``.json``) with what it found of the robot, how one set-up
+    # moved left out; empty for none.
     model: Path | str = '',
-    effects: str = '',
+    effects: str = '',  # more effects, in the form of an effects file
     *,
-    implausible: bool = False,
+    implausible: bool = False,  # take values that no machine comes near, too
+    # The caller mends joint positions as the diagnosis did; see `mended_source`.
     mended: bool = False,
 ) -> Twin:
     """
     Return a robot with the effects of a file and those of a text.
 
-    Parameters
-    ----------
-    model : Path or str
-        An effects file, or a diagnosis (``.json``) with what it found of the robot, how one
-        set-up moved left out; empty for none.
-    effects : str
-        More effects, in the form of an effects file.
-    implausible : bool
-        Take values that no machine comes near, too.
-    mended : bool
-        The caller mends joint positions as the diagnosis did; see `mended_source`.
-
-    Raises
-    ------
-    ModelError
-        A file or the text cannot be read, or names an effect the robot cannot have, or a value
-        that no machine comes near; or the model counts joints otherwise than they are read.
-
+    Raises ModelError: a file or the text cannot be read, or names an effect the robot cannot have,
+    or a value that no machine comes near; or the model counts joints otherwise than they are read.
     """
     more = effects_from_list(parse_yaml(effects, 'effects'), robot)
     if not implausible:

@@ -79,23 +79,11 @@ class Promise(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """
-    The RMS that was measured [m].
+    """The RMS that was measured [m]."""
 
-    Attributes
-    ----------
-    rms : float
-        Of a program without the instrument's noise.
-    least : float
-        Below it the true one lies with five in a hundred only.
-    noise : float
-        What of it is the instrument's.
-
-    """
-
-    rms: float
-    least: float
-    noise: float
+    rms: float  # of a program without the instrument's noise
+    least: float  # below it the true one lies with five in a hundred only
+    noise: float  # what of it is the instrument's
 
     @classmethod
     def without_noise(cls, rms: float, noise: float, count: float) -> Measured:
@@ -109,24 +97,13 @@ class Measured(NamedTuple):
 
 
 class Left(NamedTuple):
-    """
-    What is left of a cause.
+    """What is left of a cause."""
 
-    Attributes
-    ----------
-    sites : tuple of Site
-        One, or all of a kind.
-    share, std : float
-        Of the size it had: 0 for gone, 1 for as it was.
-    rms_m : float
-        How far a whole one moves the tool on this motion.
-
-    """
-
-    sites: tuple[Site, ...]
+    sites: tuple[Site, ...]  # one, or all of a kind
     share: float
     std: float
-    rms_m: float
+    """Of the size it had: 0 for gone, 1 for as it was."""
+    rms_m: float  # how far a whole one moves the tool on this motion
 
     @property
     def state(self) -> str:
@@ -142,29 +119,15 @@ class Left(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """
-    What was promised and what was measured.
-
-    Attributes
-    ----------
-    measured : Measured
-        Over the samples that count.
-    causes : tuple of Left
-        What moves the tool most first.
-    off : Array
-        Size of what is left at every sample that counts, shape (M,) [m].
-    program : str
-        Name of the program; empty where the robot was mended.
-
-    """
+    """What was promised and what was measured."""
 
     promised: Promise
-    measured: Measured
+    measured: Measured  # over the samples that count
     samples: int
     kept: bool
-    causes: tuple[Left, ...]
-    off: Array
-    program: str = ''
+    causes: tuple[Left, ...]  # what moves the tool most first
+    off: Array  # size of what is left at every sample that counts, shape (M,) [m]
+    program: str = ''  # name of the program; empty where the robot was mended
     notes: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
@@ -197,35 +160,22 @@ class Verification:
 
 
 def verified(
+    # content, model: of the diagnosis.
     content: Mapping[str, Any],
     model: Model,
-    recording: Recording,
+    recording: Recording,  # measured after the correction
     *,
+    # The content of correction.json, where a program was corrected; left out, the robot itself.
     correction: Mapping[str, Any] | None = None,
+    # Frames that are fitted anew: base, tool, or both. The others are as the diagnosis had them.
     align: str = '',
-    setup: int = 0,
+    setup: int = 0,  # which base frame of the diagnosis, counted from 0
 ) -> Verification:
     """
     Return what was measured after a correction beside what was promised.
 
-    Parameters
-    ----------
-    content, model : mapping, Model
-        Of the diagnosis.
-    recording : Recording
-        Measured after the correction.
-    correction : mapping, optional
-        The content of correction.json, where a program was corrected; left out, the robot itself.
-    align : str
-        Frames that are fitted anew: base, tool, or both. The others are as the diagnosis had them.
-    setup : int
-        Which base frame of the diagnosis, counted from 0.
-
-    Raises
-    ------
-    DataError
-        Nothing was measured, the set-up stands elsewhere, or the recording is not of the program.
-
+    Raises DataError: nothing was measured, the set-up stands elsewhere, or the recording is not of
+    the program.
     """
     seen = _Seen.of(model, recording, align, setup)
     wanted, notes = None, list[str]()

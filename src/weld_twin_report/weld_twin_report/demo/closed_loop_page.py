@@ -27,18 +27,11 @@ AXES = 'xyz'
 
 @dataclass(frozen=True, eq=False)
 class Seam:
-    """
-    One run along a seam.
-
-    Attributes
-    ----------
-    meant, real : array, shape (N, 3) [m]
-        Where the tool was to be, and where it was measured.
-
-    """
+    """One run along a seam."""
 
     meant: Array
     real: Array
+    """Shape (N, 3) [m]: where the tool was to be, and where it was measured."""
 
     @cached_property
     def off(self) -> Array:

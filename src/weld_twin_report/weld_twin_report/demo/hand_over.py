@@ -22,49 +22,23 @@ Progress = Callable[[float], None]
 
 @dataclass
 class Job:
-    """
-    The example, and what is known of it so far.
+    """The example, and what is known of it so far."""
 
-    Attributes
-    ----------
-    folder : Path
-        Where results go.
-    effects : tuple of Effect
-        What is wrong with the robot; the twin does not know.
-    seam : str
-        Kind of the bundled seam.
-    rate : float [1/s]
-        Of the joint states.
-    seed : int
-        Of the measurement noise.
-    plan : Plan
-        From the first step on.
-    bag : Path
-        From the second step on.
-    recording : Recording
-        The bag read again, from the third step on.
-    deviation : array, shape (M, 3) [m]
-        Measured minus twin in the world frame.
-    seam_deviation : array, shape (M, 3) [m]
-        The same along, across and normal to the seam.
-    lines : list of str
-        What to tell the user at the end.
-
-    """
-
-    folder: Path
+    folder: Path  # where results go
     robot: Robot
-    effects: tuple[Effect, ...]
-    seam: str
-    rate: float
-    seed: int
-    plan: Plan = field(init=False)
-    bag: Path = field(init=False)
-    recording: Recording = field(init=False)
+    effects: tuple[Effect, ...]  # what is wrong with the robot; the twin does not know
+    seam: str  # kind of the bundled seam
+    rate: float  # [1/s], of the joint states
+    seed: int  # of the measurement noise
+    plan: Plan = field(init=False)  # from the first step on
+    bag: Path = field(init=False)  # from the second step on
+    recording: Recording = field(init=False)  # the bag read again, from the third step on
     deviation: Array = field(init=False)
+    """Shape (M, 3) [m]: measured minus twin in the world frame."""
     seam_deviation: Array = field(init=False)
+    """Shape (M, 3) [m]: the same along, across and normal to the seam."""
     metrics: DeviationMetrics = field(init=False)
-    lines: list[str] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)  # what to tell the user at the end
 
 
 class Step(NamedTuple):

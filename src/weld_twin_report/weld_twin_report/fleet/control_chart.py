@@ -61,27 +61,14 @@ def baseline(values: Array, before: int | None = None) -> Baseline | None:
 
 def control_chart(
     title: str,
-    seconds: Array,
-    values: Array,
-    axis: Axis,
+    seconds: Array,  # shape (N,), since 1970, ascending
+    values: Array,  # shape (N,)
+    axis: Axis,  # what the values are
     *,
-    before: int | None = None,
+    before: int | None = None,  # number of diagnoses before the first change
     from_zero: bool = False,
 ) -> Html:
-    """
-    Return a chart of values over dates, with the baseline and its limits.
-
-    Parameters
-    ----------
-    seconds : array, shape (N,)
-        Since 1970, ascending.
-    values : array, shape (N,)
-    axis : Axis
-        What the values are.
-    before : int, optional
-        Number of diagnoses before the first change.
-
-    """
+    """Return a chart of values over dates, with the baseline and its limits."""
     usual = baseline(values, before)
     lines = [Line(axis.label, values, marked=values.size <= MARKED)]
     band = None

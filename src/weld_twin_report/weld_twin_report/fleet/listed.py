@@ -29,30 +29,19 @@ YES = {'yes': True, 'true': True, '1': True, 'no': False, 'false': False, '0': F
 
 @dataclass(frozen=True)
 class Listed:
-    """
-    One line of the list; every attribute is a column, and an option of ``diagnose``.
-
-    Attributes
-    ----------
-    at : str
-        When it was recorded, ISO 8601; empty where the stamps are dates.
-    align, effects_known, base_link, tip_link, contacts : str
-        Empty for none.
-    apply : bool
-        Whether a mistake in data or set-up is corrected.
-
-    """
+    """One line of the list; every attribute is a column, and an option of ``diagnose``."""
 
     cell: str
     recording: str
     robot: str
-    at: str = ''
+    at: str = ''  # when it was recorded, ISO 8601; empty where the stamps are dates
     align: str = ''
     effects_known: str = ''
     base_link: str = ''
     tip_link: str = ''
     contacts: str = ''
-    apply: bool = False
+    """Empty for none."""
+    apply: bool = False  # whether a mistake in data or set-up is corrected
 
     @property
     def date(self) -> datetime | None:

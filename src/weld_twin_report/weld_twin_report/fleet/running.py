@@ -43,28 +43,15 @@ Tell = Callable[[int, int, Run | None], None]
 def run_fleet(
     listed: Sequence[Listed],
     database: Database,
-    pool: Pool,
-    limits: Limits,
+    pool: Pool,  # where recordings are diagnosed
+    limits: Limits,  # of each of them
     *,
+    # Directory for all that ``diagnose`` writes, a folder for each; workers must see it.
     keep: Path | None = None,
-    again: bool = False,
+    again: bool = False,  # run what a limit or a crash ended before once more
     tell: Tell = lambda done, total, run: None,
 ) -> dict[str, int]:
-    """
-    Diagnose what is not in the database yet; return how many came to which state.
-
-    Parameters
-    ----------
-    pool : Pool
-        Where recordings are diagnosed.
-    limits : Limits
-        Of each of them.
-    keep : Path, optional
-        Directory for all that ``diagnose`` writes, a folder for each; workers must see it.
-    again : bool
-        Run what a limit or a crash ended before once more.
-
-    """
+    """Diagnose what is not in the database yet; return how many came to which state."""
     writing = _Writing(Runs(database))
     known = writing.runs.finished(again)
     tally: Counter[str] = Counter()

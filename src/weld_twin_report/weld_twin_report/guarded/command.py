@@ -39,49 +39,24 @@ _NO_SPACE = ('No space left on device', 'Disk quota exceeded', 'disk is full')
 
 @dataclass(frozen=True)
 class Limits:
-    """
-    What one command may cost.
-
-    Attributes
-    ----------
-    memory : int
-        Bytes of address space; a diagnosis of an hour's recording needs some 1.5 GB, most of it
-        libraries.
-    wall_s : float
-        Seconds of computing, and in all.
-    file : int
-        Bytes of any one file that it writes.
-
-    """
+    """What one command may cost."""
 
     memory: int = 6_000_000_000
+    """Bytes of address space; a diagnosis of an hour's recording needs some 1.5 GB, most of it
+    libraries."""
     cpu_s: int = 600
-    wall_s: float = 1800.0
-    file: int = 2_000_000_000
+    wall_s: float = 1800.0  # seconds of computing, and in all
+    file: int = 2_000_000_000  # bytes of any one file that it writes
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """
-    How a command ended.
+    """How a command ended."""
 
-    Attributes
-    ----------
-    code : int
-        Its exit code; 2 is a refusal in a sentence, 1 and -1 are failures.
-    said : str
-        The last line that it told.
-    seconds : float
-        It took in all.
-    memory : int
-        Bytes it needed at most.
-
-    """
-
-    code: int
-    said: str
-    seconds: float
-    memory: int = 0
+    code: int  # its exit code; 2 is a refusal in a sentence, 1 and -1 are failures
+    said: str  # the last line that it told
+    seconds: float  # it took in all
+    memory: int = 0  # bytes it needed at most
 
     @property
     def disk_full(self) -> bool:
@@ -108,23 +83,13 @@ class Guarded:
 
     def run(
         self,
-        words: Sequence[object],
+        words: Sequence[object],  # the command's words
+        # Told every line that the command tells of its progress.
         tell: Callable[[str], None] = lambda text: None,
+        # Where it runs: paths relative to it keep the places of this machine out of results.
         folder: Path | None = None,
     ) -> Outcome:
-        """
-        Run ``weld-twin`` with the words given.
-
-        Parameters
-        ----------
-        words : sequence
-            The command's words.
-        tell : callable
-            Told every line that the command tells of its progress.
-        folder : Path, optional
-            Where it runs: paths relative to it keep the places of this machine out of results.
-
-        """
+        """Run ``weld-twin`` with the words given."""
         began = time.monotonic()
         limits = self._limits
         asked = {

@@ -197,10 +197,10 @@ class Database:
 
     def write(
         self,
-        work: Callable[[Connection], T],
+        work: Callable[[Connection], T],  # takes the connection
         *,
-        connecting: bool = False,
-        patience: float | None = None,
+        connecting: bool = False,  # whether a server that is not there is told at once
+        patience: float | None = None,  # seconds; that of the database unless told
     ) -> T:
         """
         Do some work in one transaction, and return what it returns.
@@ -208,22 +208,8 @@ class Database:
         It is done again while others hold the database, or its server is being restarted; so it
         must change nothing but the database.
 
-        Parameters
-        ----------
-        work : callable
-            Takes the connection.
-        connecting : bool
-            Whether a server that is not there is told at once.
-        patience : float, optional
-            Seconds; that of the database unless told.
-
-        Raises
-        ------
-        Unavailable
-            The database could not be used for as long as patience lasts.
-        DataError
-            It does not take what was written.
-
+        Raises Unavailable: the database could not be used for as long as patience lasts. Raises
+        DataError: it does not take what was written.
         """
         remaining = waits(self._patience if patience is None else patience)
         while True:

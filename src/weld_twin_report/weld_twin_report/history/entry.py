@@ -30,43 +30,26 @@ PASSING = 'base '
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """
-    One diagnosis.
+    """One diagnosis."""
 
-    Attributes
-    ----------
-    at : datetime
-        When it was recorded, UTC.
-    robot, kinematics : str
-        Name and fingerprint of the robot's model.
-    recording : str
-        SHA-256 of what was diagnosed.
-    effects : list of mappings
-        What was named, as in ``verdict.effects``.
-    names : tuple of str
-        Coordinates that say something of the arm; none where the data were unsound.
-    value, prior_std : array, shape (P,)
-    covariance : array, shape (P, P)
-    tool : array, shape (4, 4)
-        The fitted tool frame.
-
-    """
-
-    at: datetime
+    at: datetime  # when it was recorded, UTC
     robot: str
     kinematics: str
-    recording: str
+    """Name and fingerprint of the robot's model."""
+    recording: str  # SHA-256 of what was diagnosed
     status: str
     confidence: float | None
     gap_m: float | None
     floor_m: float | None
     unexplained_m: float | None
-    effects: list[Any]
+    effects: list[Any]  # what was named, as in ``verdict.effects``
     names: tuple[str, ...]
+    """Coordinates that say something of the arm; none where the data were unsound."""
     value: Array
     prior_std: Array
-    covariance: Array
-    tool: Array
+    """shape (P,)."""
+    covariance: Array  # shape (P, P)
+    tool: Array  # shape (4, 4), the fitted tool frame
 
     def plain(self) -> dict[str, Any]:
         """Return it as what JSON can hold."""

@@ -28,29 +28,16 @@ NEWEST = 260
 
 @dataclass(frozen=True)
 class Run:
-    """
-    How one recording went.
-
-    Attributes
-    ----------
-    key : str
-        Of what was asked: recording, robot, options and program. The same is not asked twice.
-    state : str
-        'done', 'unsound', 'refused' or 'failed'.
-    sentence : str
-        What was told last: the verdict's status, or why there is none.
-    memory : int
-        Bytes it needed at most.
-
-    """
+    """How one recording went."""
 
     key: str
+    """Of what was asked: recording, robot, options and program. The same is not asked twice."""
     cell: str
     recording: str
-    state: str
-    sentence: str
+    state: str  # 'done', 'unsound', 'refused' or 'failed'
+    sentence: str  # what was told last: the verdict's status, or why there is none
     seconds: float
-    memory: int
+    memory: int  # bytes it needed at most
 
 
 class Runs:

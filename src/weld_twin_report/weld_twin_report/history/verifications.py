@@ -24,23 +24,11 @@ FILE = 'verification.json'
 
 
 class Verified(NamedTuple):
-    """
-    One verification.
+    """One verification."""
 
-    Attributes
-    ----------
-    at : datetime
-        When the cell was measured again, UTC.
-    recording : str
-        SHA-256 of what was measured.
-    content : mapping
-        That of verification.json.
-
-    """
-
-    at: datetime
-    recording: str
-    content: Mapping[str, Any]
+    at: datetime  # when the cell was measured again, UTC
+    recording: str  # SHA-256 of what was measured
+    content: Mapping[str, Any]  # that of verification.json
 
     @property
     def status(self) -> str:

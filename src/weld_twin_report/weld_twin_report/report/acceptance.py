@@ -41,20 +41,11 @@ _REMEDY = (
 
 @dataclass(frozen=True)
 class Demand:
-    """
-    What the reader demands of the robot.
+    """What the reader demands of the robot."""
 
-    Attributes
-    ----------
-    tolerance_m : float, optional
-        Largest deviation of the tool point allowed along the seam.
-    uncertainty_m : float, optional
-        Standard uncertainty of a measured position, as the certificate of the instrument has it.
-
-    """
-
-    tolerance_m: float | None = None
+    tolerance_m: float | None = None  # largest deviation of the tool point allowed along the seam
     uncertainty_m: float | None = None
+    """Standard uncertainty of a measured position, as the certificate of the instrument has it."""
 
 
 def rule_of(diagnosis: Diagnosis, demand: Demand) -> Rule:

@@ -90,21 +90,11 @@ class Holds(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """
-    What is said of a diagnosis.
-
-    Attributes
-    ----------
-    rule : Rule, optional
-        How the largest deviation is judged.
-    brand : str, optional
-        Whose controller it is, as `controllers.BRANDS` has it.
-
-    """
+    """What is said of a diagnosis."""
 
     diagnosis: Diagnosis
-    rule: Rule | None = None
-    brand: str | None = None
+    rule: Rule | None = None  # how the largest deviation is judged
+    brand: str | None = None  # whose controller it is, as `controllers.BRANDS` has it
 
     @property
     def sound(self) -> bool:

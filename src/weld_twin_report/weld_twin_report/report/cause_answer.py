@@ -61,21 +61,11 @@ _SENTENCE = re.compile(r'(?<=\.) (?=[A-Z])')
 
 @dataclass(frozen=True, eq=False)
 class CauseAnswer:
-    """
-    What is said of one cause.
-
-    Attributes
-    ----------
-    k : int
-        The cause, counted from 0.
-    brand : str, optional
-        Whose controller it is, as `controllers.BRANDS` has it.
-
-    """
+    """What is said of one cause."""
 
     diagnosis: Diagnosis
-    k: int
-    brand: str | None = None
+    k: int  # the cause, counted from 0
+    brand: str | None = None  # whose controller it is, as `controllers.BRANDS` has it
 
     @cached_property
     def cause(self) -> Cause:

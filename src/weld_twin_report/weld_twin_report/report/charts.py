@@ -28,30 +28,15 @@ _DIGITS = 5
 
 
 class Line(NamedTuple):
-    """
-    One line of a chart.
+    """One line of a chart."""
 
-    Attributes
-    ----------
-    name : str
-        As the legend has it.
-    values : array, shape (N,)
-        In the unit of the chart; what is not finite leaves a gap.
-    colour : str
-        A colour of the page's style: 'before', 'after', 'soft', 'good', 'care', 'bad'.
-    points : bool
-        Dots in place of a line.
-    marked : bool
-        Dots on the line, where each value is one measurement.
-
-    """
-
-    name: str
-    values: Array
+    name: str  # as the legend has it
+    values: Array  # shape (N,), in the unit of the chart; what is not finite leaves a gap
     colour: str = 'after'
+    """A colour of the page's style: 'before', 'after', 'soft', 'good', 'care', 'bad'."""
     dashed: bool = False
-    points: bool = False
-    marked: bool = False
+    points: bool = False  # dots in place of a line
+    marked: bool = False  # dots on the line, where each value is one measurement
 
 
 class Axis(NamedTuple):
@@ -62,39 +47,22 @@ class Axis(NamedTuple):
 
 
 def chart(
-    title: str,
-    x: Array,
+    title: str,  # shown above; read out instead of the picture
+    x: Array,  # shape (N,), ascending; seconds since 1970 where ``dates`` is set
     lines: Sequence[Line],
     axes: tuple[Axis, Axis],
     *,
+    # Charts of one key have one cursor, and share it with whatever else listens on the page.
     key: str | None = None,
+    # Shape (N,), least and most, shaded in the colour of the first line.
     band: tuple[Array, Array] | None = None,
     dates: bool = False,
-    from_zero: bool = False,
-    height: int = 180,
+    from_zero: bool = False,  # whether the axis starts at zero, as sizes do
+    height: int = 180,  # of the drawing [px]
+    # The chart runs over the position of this joint, so its cursor follows the instant looked at.
     joint: int | None = None,
 ) -> Html:
-    """
-    Return a figure of lines over something; a page's script draws it.
-
-    Parameters
-    ----------
-    title : str
-        Shown above; read out instead of the picture.
-    x : array, shape (N,)
-        Ascending; seconds since 1970 where ``dates`` is set.
-    key : str, optional
-        Charts of one key have one cursor, and share it with whatever else listens on the page.
-    band : tuple of two arrays, shape (N,), optional
-        Least and most, shaded in the colour of the first line.
-    from_zero : bool
-        Whether the axis starts at zero, as sizes do.
-    height : int
-        Of the drawing [px].
-    joint : int, optional
-        The chart runs over the position of this joint, so its cursor follows the instant looked at.
-
-    """
+    """Return a figure of lines over something; a page's script draws it."""
     spec: dict[str, Any] = {
         'x': plain(x),
         'axes': [axis._asdict() for axis in axes],

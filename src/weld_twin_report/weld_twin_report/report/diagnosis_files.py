@@ -35,24 +35,15 @@ from one posture to the next while it rests in its socket."""
 def write_results(
     directory: Path,
     diagnosis: Diagnosis,
-    inputs: Sequence[InputFile],
+    inputs: Sequence[InputFile],  # what it was made from
+    # The URDF that the robot was read from; ``robot.urdf`` then keeps its names.
     given: GivenUrdf | None = None,
-    sheet: Sheet | None = None,
+    sheet: Sheet | None = None,  # what the reader wants of the page
 ) -> None:
     """
     Write diagnosis.json, the page, the model in every form, and what to measure next.
 
     Where the data are unsound there is no model: the page and diagnosis.json say what is wrong.
-
-    Parameters
-    ----------
-    inputs : sequence of InputFile
-        What it was made from.
-    given : GivenUrdf, optional
-        The URDF that the robot was read from; ``robot.urdf`` then keeps its names.
-    sheet : Sheet, optional
-        What the reader wants of the page.
-
     """
     wanted = diagnosis.next_experiment
     if wanted is not None and wanted.get('motion') is not None:

@@ -43,23 +43,13 @@ SCRIPTS = ('sheet.js', 'seam.js', 'polar.js')
 
 @dataclass(frozen=True)
 class Sheet:
-    """
-    What a reader wants of the sheet.
+    """What a reader wants of the sheet."""
 
-    Attributes
-    ----------
-    demand : Demand
-        Tolerance, and uncertainty of the instrument.
-    joints : mapping from str to str
-        What joints are called on the controller; those not in it keep their name.
-    brand : str, optional
-        Whose controller it is, as `controllers.BRANDS` has it; None and the robot's name tells.
-
-    """
-
-    demand: Demand = field(default_factory=Demand)
+    demand: Demand = field(default_factory=Demand)  # tolerance, and uncertainty of the instrument
     joints: Mapping[str, str] = field(default_factory=dict)
+    """What joints are called on the controller; those not in it keep their name."""
     brand: str | None = None
+    """Whose controller it is, as `controllers.BRANDS` has it; None and the robot's name tells."""
 
 
 def report_page(

@@ -160,29 +160,15 @@ def own_file(name: str) -> Html:
 
 def document(
     title: str,
-    *body: Child,
+    *body: Child,  # what stands in the body
+    # What the page may load besides its own style, in the words of a content security policy.
     allowed: str = '',
-    style: str = '',
+    style: str = '',  # CSS after that of all pages
+    # Whether figures of `charts` stand on it; what draws them is then embedded.
     charts: bool = False,
-    scripts: Sequence[Html] = (),
+    scripts: Sequence[Html] = (),  # script elements of the page's own, after those of the charts
 ) -> str:
-    """
-    Return a whole page that needs no other file and no network.
-
-    Parameters
-    ----------
-    *body : str or None
-        What stands in the body.
-    allowed : str
-        What the page may load besides its own style, in the words of a content security policy.
-    style : str
-        CSS after that of all pages.
-    charts : bool
-        Whether figures of `charts` stand on it; what draws them is then embedded.
-    scripts : sequence of Html
-        Script elements of the page's own, after those of the charts.
-
-    """
+    """Return a whole page that needs no other file and no network."""
     if charts:
         allowed = '; '.join(filter(None, [allowed, OWN_SCRIPTS]))
         style = own_file('uplot/uPlot.min.css') + own_file('charts.css') + style

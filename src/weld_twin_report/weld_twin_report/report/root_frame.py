@@ -16,24 +16,12 @@ from weld_twin_msgs_py.programs.notation import ABB_POSE, FANUC_POSE, KUKA_POSE,
 
 
 class _Frames(NamedTuple):
-    """
-    How a maker writes a frame of the cell.
+    """How a maker writes a frame of the cell."""
 
-    Attributes
-    ----------
-    language : str
-        Whose world it counts from.
-    words : callable
-        Takes its six or seven numbers.
-    moved : str
-        How a frame is displaced by another one in the world, {by} its numbers.
-
-    """
-
-    language: str
+    language: str  # whose world it counts from
     notation: Notation
-    words: Callable[[list[float]], str]
-    moved: str
+    words: Callable[[list[float]], str]  # takes its six or seven numbers
+    moved: str  # how a frame is displaced by another one in the world, {by} its numbers
 
 
 def _named(names: str, before: str, after: str) -> Callable[[list[float]], str]:

@@ -41,29 +41,17 @@ class Effort:
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """
-    The question.
-
-    Attributes
-    ----------
-    seam : str
-        What the seam or the bag is called.
-    path : Path or None
-        None where a recording is studied.
-    normal : array, shape (3,), optional
-        Out of the work, for a recording.
-
-    """
+    """The question."""
 
     robot: Robot
     tolerances: tuple[Tolerance, ...]
-    seam: str
-    path: Path | None = None
+    seam: str  # what the seam or the bag is called
+    path: Path | None = None  # none where a recording is studied
     recording: Recording | None = None
     torch: Torch = field(default_factory=Torch)
     points: int = POINTS
     known: tuple[Effect, ...] = ()
-    normal: Array | None = None
+    normal: Array | None = None  # shape (3,), out of the work, for a recording
     weld: WeldTolerance = field(default_factory=WeldTolerance)
     effort: Effort = field(default_factory=Effort)
 

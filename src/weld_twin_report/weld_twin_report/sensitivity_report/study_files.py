@@ -87,39 +87,17 @@ def _rows(result: dict[str, Any]) -> Iterator[list[Any]]:
 
 
 def make_study(
-    out: Path | str,
-    pool: Pool,
-    setting: Setting | None,
+    out: Path | str,  # directory of the results; one that was begun is continued
+    pool: Pool,  # where tasks run
+    setting: Setting | None,  # left out, only the claims are studied
     *,
-    claims_on: Sequence[Robot] = (),
-    seams: Sequence[str] = SEAMS,
-    tell: Tell | None = None,
-    seed: int = 0,
-    force: bool = False,
+    claims_on: Sequence[Robot] = (),  # robots the claims are measured on; none for no claims
+    seams: Sequence[str] = SEAMS,  # bundled seams the claims are measured on
+    tell: Tell | None = None,  # told about progress
+    seed: int = 0,  # of the claims
+    force: bool = False,  # as `new_directory` takes it
 ) -> Path:
-    """
-    Run a study, the claims, or both, write the results and return the page.
-
-    Parameters
-    ----------
-    out : Path or str
-        Directory of the results; one that was begun is continued.
-    pool : Pool
-        Where tasks run.
-    setting : Setting, optional
-        Left out, only the claims are studied.
-    claims_on : sequence of Robot
-        Robots the claims are measured on; none for no claims.
-    seams : sequence of str
-        Bundled seams the claims are measured on.
-    tell : callable, optional
-        Told about progress.
-    seed : int
-        Of the claims.
-    force : bool
-        As `new_directory` takes it.
-
-    """
+    """Run a study, the claims, or both, write the results and return the page."""
     place = study_directory(out)
     drawings: list[Drawing] = []
     with study_files(place, force) as made:

@@ -26,31 +26,16 @@ Check = Callable[[str], str]
 
 
 class Field(NamedTuple):
-    """
-    One field.
-
-    Attributes
-    ----------
-    check : callable, optional
-        Not needed for choices.
-    choices : tuple of pairs
-        Value and text; empty where anything may be written.
-    option : str
-        Of the commands; empty where it is called as the field.
-    lines : bool
-        Whether every line is given by itself.
-    commands : tuple of str
-        Those that take it.
-
-    """
+    """One field."""
 
     title: str
     hint: str = ''
-    check: Check | None = None
+    check: Check | None = None  # not needed for choices
     choices: tuple[tuple[str, str], ...] = ()
-    option: str = ''
-    lines: bool = False
-    commands: tuple[str, ...] = ()
+    """Value and text; empty where anything may be written."""
+    option: str = ''  # of the commands; empty where it is called as the field
+    lines: bool = False  # whether every line is given by itself
+    commands: tuple[str, ...] = ()  # those that take it
 
 
 def _between(low: float, high: float, unit: str = '') -> Check:

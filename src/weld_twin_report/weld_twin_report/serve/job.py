@@ -41,27 +41,16 @@ OTHERS = ('.yaml', '.yml', '.urdf', '.xml')
 
 @dataclass(frozen=True)
 class Asked:
-    """
-    What was asked with a recording or a program.
-
-    Attributes
-    ----------
-    robot : str
-        A bundled robot, or the name of a robot file among those dropped; empty until it is told.
-    apply : bool
-        Whether a mistake in data or set-up is corrected.
-    cell, at : str
-        Into whose history it goes, and when it was recorded; empty for neither.
-    told : dict of str
-        The other fields of the form, by their names in `fields.FIELDS`; checked.
-
-    """
+    """What was asked with a recording or a program."""
 
     robot: str
-    apply: bool = False
+    """A bundled robot, or the name of a robot file among those dropped; empty until it is told."""
+    apply: bool = False  # whether a mistake in data or set-up is corrected
     cell: str = ''
     at: str = ''
+    """Into whose history it goes, and when it was recorded; empty for neither."""
     told: dict[str, str] = field(default_factory=dict)
+    """The other fields of the form, by their names in `fields.FIELDS`; checked."""
 
     @classmethod
     def read(cls, data: Mapping[str, Any]) -> Asked:
@@ -81,43 +70,20 @@ class Asked:
 
 @dataclass(frozen=True)
 class Job:
-    """
-    One recording or program.
+    """One recording or program."""
 
-    Attributes
-    ----------
-    key : str
-        Its name in addresses: chance, so that nobody guesses it.
-    user : str
-        Whose it is.
-    names : tuple of str
-        Of the files dropped.
-    said : str
-        How far it is, or what was told last.
-    since : float
-        When it was dropped, seconds since 1970.
-    seconds : float
-        What the work took.
-    kind : str
-        'recording' or 'program'.
-    party : str
-        With whom it shares what may wait: its user, or other new ones of the same address.
-    later : Asked or None
-        What was asked while it was in work; it is taken up afterwards.
-
-    """
-
-    key: str
-    user: str
-    names: tuple[str, ...]
+    key: str  # its name in addresses: chance, so that nobody guesses it
+    user: str  # whose it is
+    names: tuple[str, ...]  # of the files dropped
     asked: Asked
     state: str = WAITING
-    said: str = ''
-    since: float = field(default_factory=time.time)
-    seconds: float = 0.0
-    kind: str = RECORDING
+    said: str = ''  # how far it is, or what was told last
+    since: float = field(default_factory=time.time)  # when it was dropped, seconds since 1970
+    seconds: float = 0.0  # what the work took
+    kind: str = RECORDING  # 'recording' or 'program'
     party: str = ''
-    later: Asked | None = None
+    """With whom it shares what may wait: its user, or other new ones of the same address."""
+    later: Asked | None = None  # what was asked while it was in work; it is taken up afterwards
 
     @classmethod
     def new(cls, user: str, party: str = '', kind: str = RECORDING) -> Job:

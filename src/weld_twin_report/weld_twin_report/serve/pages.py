@@ -51,20 +51,10 @@ def _style() -> str:
 
 
 class Site(NamedTuple):
-    """
-    What this server has besides recordings.
+    """What this server has besides recordings."""
 
-    Attributes
-    ----------
-    plant : bool
-        A history that everybody reads.
-    live : bool
-        The verdict of running nodes.
-
-    """
-
-    plant: bool = False
-    live: bool = False
+    plant: bool = False  # a history that everybody reads
+    live: bool = False  # the verdict of running nodes
 
     def ways(self) -> Html:
         """Return the way to all pages."""

@@ -121,9 +121,7 @@ def corrected_program(
     model: ProgramModel,
     caps: Caps | None = None,
     start: Array | None = None,  # shape (n,), joint positions before the first move
-    # Why the model counts joints otherwise than they are read, see `other_readings`; whether a
-    # program does, too, nobody knows.
-    readings: str = '',
+    readings: str = '',  # why the model counts joints otherwise, see `other_readings`
 ) -> CorrectedProgram:
     """
     Return a program corrected so that the real tool goes where it means.

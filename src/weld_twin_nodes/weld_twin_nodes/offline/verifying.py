@@ -160,15 +160,12 @@ class Verification:
 
 
 def verified(
-    # content, model: of the diagnosis.
-    content: Mapping[str, Any],
+    content: Mapping[str, Any],  # of the diagnosis
     model: Model,
     recording: Recording,  # measured after the correction
     *,
-    # The content of correction.json, where a program was corrected; left out, the robot itself.
-    correction: Mapping[str, Any] | None = None,
-    # Frames that are fitted anew: base, tool, or both. The others are as the diagnosis had them.
-    align: str = '',
+    correction: Mapping[str, Any] | None = None,  # correction.json, of a program
+    align: str = '',  # frames that are fitted anew; the others are as the diagnosis had them
     setup: int = 0,  # which base frame of the diagnosis, counted from 0
 ) -> Verification:
     """

@@ -206,3 +206,15 @@ def test_exact_data_have_a_least_noise_and_finite_weights():
     problem, model = tiny(noise=0.0, turned=False)
     scale = robust_scale(problem, problem.residuals(model))
     assert scale.position > 0.0 and np.isfinite(scale.weights[0]).all()
+
+
+@pytest.mark.parametrize('ratio', [0.0, -0.010])
+def test_few_stations_are_not_outweighed_by_what_is_believed_of_machines(ratio):
+    """Before the ratio is fitted its gap of millimetres is taken for noise; ten times a usual ratio."""
+    joint = 'shoulder_lift_joint'
+    true = (effect('gear_ratio', joint=joint, scale=ratio),)
+    problem, model = tiny(true, align=('base', 'tool'), count=13, turned=False)
+    bare, scale = robust_fit(problem, model, robust_scale(problem, problem.residuals(model)))
+    start = bare.model.with_found((effect('gear_ratio', joint=joint, scale=0.0),))
+    (found,) = fit(problem, start, scale).model.found
+    assert float(found.scale) == pytest.approx(ratio, abs=3e-4)

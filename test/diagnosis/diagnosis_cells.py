@@ -158,7 +158,7 @@ def known_scale(problem, position=SIGMA, orientation=SIGMA_TURN):
 
 def errors_of(problem, model, scale, precision=None):
     """Return the standard errors of the effects' coordinates, by an orthogonal method."""
-    columns, _ = design(problem, model, scale)
+    columns = design(problem, model, scale)
     own = effect_precision(model) if precision is None else precision
     ridge = np.concatenate([frame_prior(problem, model)[0], own])
     rows = np.concatenate([columns, np.diag(np.sqrt(ridge))], axis=1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import LinAlgError
 
-from weld_twin_core.diagnosis.algebra.definite import inverses, inverted, solved, well_conditioned
+from weld_twin_core.diagnosis.algebra.definite import inverted, solved, well_conditioned
 
 
 def definite(count, least=0.1):
@@ -32,21 +32,7 @@ def test_what_is_not_definite_is_refused_and_what_is_nearly_not_is_told():
     assert not well_conditioned(definite(20, least=1e-13)[0], 1e-12)
     matrix[3, 3] = -1.0
     assert not well_conditioned(matrix, 1e-12)
-    assert solved(matrix.copy(), np.ones(20)) is None
+    with pytest.raises(LinAlgError):
+        solved(matrix.copy(), np.ones(20))
     with pytest.raises(LinAlgError):
         inverted(matrix)
-
-
-@pytest.mark.parametrize('count', [1, 64, 130])
-def test_two_inverses_in_the_room_of_one_do_not_disturb_each_other(count):
-    rng = np.random.default_rng(5)
-    pairs = [
-        (definite(count, least)[0], rng.uniform(0.5, 2.0, count)) for least in (0.1, 0.5, 0.2)
-    ]
-    expected = [np.outer(unit, unit) * np.linalg.inv(matrix) for matrix, unit in pairs]
-    some = np.flatnonzero(rng.random(count) < 0.5)
-    right = rng.normal(size=(count, 3))
-    for found, whole in zip(inverses(iter(pairs)), expected, strict=True):
-        np.testing.assert_allclose(found.times(right), whole @ right, atol=1e-10)
-        np.testing.assert_allclose(found.times(right[:, 0]), whole @ right[:, 0], atol=1e-10)
-        np.testing.assert_allclose(found.among(some), whole[np.ix_(some, some)], atol=1e-10)

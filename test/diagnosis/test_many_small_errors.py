@@ -8,17 +8,16 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 
+from weld_twin_core.diagnosis.algebra.columns import Maker
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.many.shrinkage import groups
-from weld_twin_core.diagnosis.many.small_errors import Waves, with_lines
+from weld_twin_core.diagnosis.many.small_errors import Lines, lines_of, with_lines
 from weld_twin_core.diagnosis.many.weighed_families import weighed_families
 from weld_twin_core.diagnosis.unseen.leftover_structure import Structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.diagnosis.verdict.decision import Evidence, decide
 from weld_twin_core.twin.twin import Twin
-
-ELBOW = 2
 
 
 def ripple(joint, order, amplitude=0.0, phase=0.0):
@@ -32,7 +31,7 @@ def dense(robot):
     return tuple(ripple(joint, 1.0) for joint in robot.joint_names)
 
 
-def lines_of(model):
+def told(model):
     """Return the orders above the dense ones, by joint."""
     out = {e.joint: [n for n in np.atleast_1d(e.order) if n > 100] for e in model.found}
     return {joint: orders for joint, orders in out.items() if orders}
@@ -44,7 +43,7 @@ def test_two_narrow_lines_are_found_where_they_are_and_nowhere_else():
     found = with_lines(
         problem, model.with_found(dense(model.robot)), known_scale(problem), Beliefs()
     )
-    assert lines_of(found) == {'elbow_joint': [256.0], 'wrist_2_joint': [131.0]}
+    assert told(found) == {'elbow_joint': [256.0], 'wrist_2_joint': [131.0]}
 
 
 def test_noise_alone_has_no_lines():
@@ -52,19 +51,21 @@ def test_noise_alone_has_no_lines():
     found = with_lines(
         problem, model.with_found(dense(model.robot)), known_scale(problem), Beliefs()
     )
-    assert lines_of(found) == {}
+    assert told(found) == {}
 
 
 @pytest.mark.parametrize('turned', [True, False])
 def test_the_score_of_a_line_is_the_fall_of_least_squares(turned):
     problem, model = tiny((ripple('elbow_joint', 150.0, 1e-4, 0.3),), count=120, turned=turned)
     scale = known_scale(problem)
-    features = problem.features(model)
-    waves = Waves.of(problem, features, scale, ELBOW, np.array([150.0]), 1.0)
-    chi, joint, _, step = waves.peak(problem.residuals(model), np.ones(1, bool))
+    maker = Maker(problem, problem.features(model), scale)
+    lines = Lines.of(maker, ripple('elbow_joint', 1.0), np.array([150.0]))
+    residual = problem.whitened(problem.residuals(model), scale)
+    chi, k, step = lines.peak(residual)
     columns, target = by_differences(problem, model, 150.0), rows(problem.residuals(model)[0])
     solved, left, *_ = np.linalg.lstsq(columns, target, rcond=None)
-    assert joint == ELBOW
+    after = residual - lines.explained(k, step)
+    assert float(residual @ residual - after @ after) == pytest.approx(chi, rel=1e-6)
     assert chi == pytest.approx(float(target @ target - left[0]), rel=1e-4)
     np.testing.assert_allclose(step, solved, rtol=1e-3)
     assert chi > Beliefs().line_chi2
@@ -88,12 +89,10 @@ def by_differences(problem, model, order):
 
 def test_a_joint_that_hardly_moves_has_no_waves():
     problem, model = tiny((), count=50, static=False)
-    features = problem.features(model)
-    travel = np.ptp(features[0].view.q, axis=0)
-    for joint in np.flatnonzero(travel < 1.0):
-        assert (
-            Waves.of(problem, features, known_scale(problem), int(joint), np.ones(1), 1.0) is None
-        )
+    maker = Maker(problem, problem.features(model), known_scale(problem))
+    travel = np.ptp(maker.features[0].view.q, axis=0)
+    for joint in np.array(model.robot.joint_names)[travel < 1.0]:
+        assert lines_of(maker, ripple(str(joint), 1.0), 1.0) is None
     assert (travel < 1.0).any()
 
 

@@ -8,7 +8,6 @@ from diagnosis_cells import effect, tiny
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses import search
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
-from weld_twin_core.diagnosis.hypotheses.selection import fitted_with
 from weld_twin_core.diagnosis.result import Site
 
 TRUE = (
@@ -22,18 +21,18 @@ IDLE = effect('gear_ratio', joint='wrist_3_joint')
 
 def test_a_rival_that_earns_no_place_takes_none_from_what_was_found(monkeypatch):
     problem, model = tiny(TRUE)
-    work, now, _ = search._workspace(problem, model.with_found(TRUE), (), Beliefs())
+    work, now = search.workspace(problem, model.with_found(TRUE), (), Beliefs())
 
-    def rivals(work, now, k, effective, others):
+    def rivals(work, now, k, others):
         own = Rival(Site(now.model.found[k].name, now.model.found[k].site), 6.2, now, 0.4)
         if k == 0:
             return (own,)
-        idle = fitted_with(work, now.model.without(k), IDLE)
+        idle = work.fitted_with(now.model.without(k), IDLE)
         assert [e.name for e in idle.model.found] == ['joint_offset', 'gear_ratio']
         return Rival(Site(IDLE.name, IDLE.site), 7.7, idle, 0.6), own
 
     monkeypatch.setattr(search, 'rivals', rivals)
-    kept, slots = search.settled(work, now, lambda found: float(found.residual.size), str)
+    kept, slots = search.settled(work, now, str)
     assert [e.name for e in kept.model.found] == ['joint_offset', 'link_length']
     assert len(slots) == 2
 
@@ -41,8 +40,8 @@ def test_a_rival_that_earns_no_place_takes_none_from_what_was_found(monkeypatch)
 def test_what_stands_for_several_gives_way_to_them():
     problem, model = tiny(TRUE)
     stand_ins = (effect('base_pose'), effect('tool_pose'))
-    work, now, _ = search._workspace(problem, model.with_found(stand_ins), (), Beliefs())
-    kept, slots = search.settled(work, now, lambda found: float(found.residual.size), str)
+    work, now = search.workspace(problem, model.with_found(stand_ins), (), Beliefs())
+    kept, slots = search.settled(work, now, str)
     assert {(e.name, e.site) for e in kept.model.found} == {(e.name, e.site) for e in TRUE}
     assert kept.rss < 0.1 * now.rss
     assert len(slots) == 2
@@ -52,9 +51,9 @@ def test_what_stands_for_several_gives_way_to_them():
 def test_the_model_holds_the_likeliest_of_twins_and_not_the_one_that_came_first(monkeypatch, back):
     problem, model = tiny(TRUE)
     first = effect('gear_ratio', joint='elbow_joint')
-    work, now, _ = search._workspace(problem, model.with_found((first, TRUE[1])), (), Beliefs())
+    work, now = search.workspace(problem, model.with_found((first, TRUE[1])), (), Beliefs())
 
-    def rivals(work, now, k, effective, others):
+    def rivals(work, now, k, others):
         own, other = (
             now.model.found[k],
             TRUE[0] if now.model.found[k].name == first.name else first,
@@ -62,12 +61,12 @@ def test_the_model_holds_the_likeliest_of_twins_and_not_the_one_that_came_first(
         sites = Site(own.name, own.site), Site(other.name, other.site)
         if own.name == TRUE[1].name:
             return (Rival(sites[0], 9.0, now, 1.0),)
-        instead = fitted_with(work, now.model.without(k), other)
+        instead = work.fitted_with(now.model.without(k), other)
         ahead = 0.4 if own.name == first.name else back
         order = Rival(sites[1], 9.0, instead, 0.55), Rival(sites[0], 9.0 - ahead, now, 0.45)
         return order if ahead else order[::-1]
 
     monkeypatch.setattr(search, 'rivals', rivals)
-    monkeypatch.setattr(search, 'reconsidered', lambda work, now, sets, effective: (now, ()))
-    kept, _ = search.settled(work, now, lambda found: float(found.residual.size), str)
+    monkeypatch.setattr(search, 'reconsidered', lambda work, now, sets: (now, ()))
+    kept, _ = search.settled(work, now, str)
     assert {(e.name, e.site) for e in kept.model.found} == {(e.name, e.site) for e in TRUE}

@@ -12,6 +12,7 @@ from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.library import build
+from weld_twin_core.diagnosis.hypotheses.seed_systems import Role
 from weld_twin_core.diagnosis.unseen.leftover_structure import structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.recording import Measurements
@@ -44,10 +45,11 @@ def library(problem, model, exclude=()):
     return build(problem, model, known_scale(problem), exclude)
 
 
-def test_families_taken_out_are_in_no_unit_and_said_to_be_absent():
+def test_families_taken_out_only_stand_beside_and_are_said_to_be_absent():
     problem, model = tiny()
     found = library(problem, model, ('joint_offset',))
-    assert not any(unit.family == 'joint_offset' for unit in found.units)
+    roles = {unit.role for unit in found.units if unit.family == 'joint_offset'}
+    assert roles == {Role.TAKEN_OUT}
     assert found.absent['joint_offset'] == 'excluded by the user'
     assert any(unit.family == 'joint_offset' for unit in library(problem, model).units)
 
@@ -82,12 +84,12 @@ def test_the_columns_of_a_unit_are_the_change_of_pose_its_effect_makes():
         ('gear_ratio', 'wrist_1_joint', 'scale', 1e-6),
         ('joint_compliance', 'shoulder_lift_joint', 'compliance', 1e-9),
     ):
-        unit = found.unit(family, joint)
+        unit = next(unit for unit in found.units if unit.site == (family, joint))
         moved = model.with_found((effect(family, joint=joint, **{key: step}),))
         change = problem.whitened(problem.residuals(model), scale) - problem.whitened(
             problem.residuals(moved), scale
         )
-        column = found.column(unit.columns[0][0])
+        column = found.columns.written_out()[unit.columns[0][0]]
         assert np.linalg.norm(column * step - change) < 1e-3 * np.linalg.norm(change)
 
 

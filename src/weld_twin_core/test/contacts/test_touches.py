@@ -126,7 +126,7 @@ def test_four_point_tool_calibration_is_a_special_case_with_its_uncertainty():
     free = [wt.effects.ToolPose(xyz=np.zeros(3), rotvec=np.zeros(3))]
     problem, told = fitted(recording, near, free)
     scale = Scale(SIGMA, 1.0, tuple(np.ones(m) for m in problem.samples))
-    inverse = np.linalg.pinv(design(problem, told.model, scale)[0].T)
+    inverse = np.linalg.pinv(design(problem, told.model, scale).T)
     np.testing.assert_allclose(np.linalg.norm(inverse, axis=1)[:3], deviation, rtol=1e-3)
 
 

@@ -35,7 +35,7 @@ def parted(monkeypatch, *slot):
     """Return what is left of a slot, given sites, probabilities and what each leaves [m]."""
     monkeypatch.setattr(room, 'left_on', lambda found, holdout, beliefs: found.final.left)
     rivals = tuple(Rival(site, 0.0, fitted(site, left=left), p) for site, p, left in slot)
-    found, least = borne_out(Found((rivals,)), ['held out'], (), Beliefs())
+    found, least = borne_out(Found((rivals,)), ['held out'], Beliefs())
     return {r.site: r.probability for r in found.slots[0]}, least
 
 
@@ -63,7 +63,7 @@ def test_what_looked_likelier_here_and_fails_there_is_out_however_sure_it_was(mo
 
 def test_a_sure_leader_and_a_diagnosis_without_held_out_data_are_not_asked():
     slots = ((Rival(TWIST, 0.0, fitted(TWIST), 0.9), Rival(BASE, 0.0, fitted(BASE), 0.1)),)
-    found, least = borne_out(Found(slots), ['held out'], (), Beliefs())
+    found, least = borne_out(Found(slots), ['held out'], Beliefs())
     assert (found.slots, least) == (slots, None)
     unsure = Found(((Rival(TWIST, 0.0, fitted(TWIST), 0.6), Rival(BASE, 0.0, fitted(BASE), 0.4)),))
-    assert borne_out(unsure, [], (), Beliefs()) == (unsure, None)
+    assert borne_out(unsure, [], Beliefs()) == (unsure, None)

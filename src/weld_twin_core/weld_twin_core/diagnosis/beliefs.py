@@ -76,15 +76,10 @@ class Beliefs:
     """RMS change of the residual [noise] below which an effect beside a larger one is not told
     from that one's misfit. A judgement."""
 
-    misfit_share: float = _search(0.06)
-    """RMS that an effect takes away beside all others, as a share of the largest effect, below
-    which in motion it is not told from what that one's formula misses. On 12 development cases
-    (seed 960001) with an effect too many, such took 0.015 to 0.09; of 15 whose small cause was
-    real one took less than 0.03."""
-
-    misfit_noise: float = _search(0.3)
-    """The same in the noise, RMS. On 22 cases whose small causes were real they took more, but for
-    one of 0.2; beyond 0.4 a curve would find it in what is left, by `beaten_share`."""
+    misfit_share: float = _levels(0.06)
+    """RMS that a free form takes off, as a share of the largest effect named at its place, from which
+    on it is more than what formulas miss. On 12 development cases (seed 960001) with an effect too
+    many, such took 0.015 to 0.09; of 15 whose small cause was real one took less than 0.03."""
 
     hope: float = _search(0.3)
     """Exponent by which autocorrelation is believed while causes are still missing, 0 to 1: the

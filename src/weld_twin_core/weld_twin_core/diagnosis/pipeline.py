@@ -21,7 +21,6 @@ from .frames.changes import families_named, settled_between
 from .frames.open_directions import held
 from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
-from .hypotheses.structural_aliases import with_structural_aliases
 from .levels.curved import carried, curved, standing
 from .levels.formulas import missed, no_noise
 from .levels.placed import placed
@@ -155,11 +154,11 @@ def _explained(
     together predict as well, kinds that unseen data need are told in their place.
     """
     result = _searched(examined, exclude, beliefs, progress)
-    out = _told(result, examined, exclude, holdout, beliefs, limits, progress)
+    out = _told(result, examined, holdout, beliefs, limits, progress)
     if result.many is None or out.status != 'unknown' or _named(out) or _nameless(out):
         return out
     progress('a few effects leave the cause unknown: all kinds together')
-    many = _told(result.many, examined, exclude, holdout, beliefs, limits, progress)
+    many = _told(result.many, examined, holdout, beliefs, limits, progress)
     return many if _named(many) else out
 
 
@@ -176,7 +175,6 @@ def _nameless(out: Diagnosis) -> bool:
 def _told(
     result: Search,
     examined: Examined,
-    exclude: Sequence[str],
     holdout: Sequence[Recording],
     beliefs: Beliefs,
     limits: Limits | None,
@@ -187,7 +185,7 @@ def _told(
     if examined.posed is None:
         return refusal(examined)
     holdout = examined.mended(holdout)
-    result, least = borne_out(result, holdout, exclude, beliefs)
+    result, least = borne_out(result, holdout, beliefs)
     unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
     leftover = structure(unseen, result.final.model, beliefs)
     progress('looked for what is left')
@@ -228,8 +226,7 @@ def _searched(
     assert examined.posed is not None
     result = search(*examined.posed, exclude, beliefs, progress)
     result = fitted_together(result, exclude, beliefs, progress)
-    result = settled_between(result, examined.given.may_change, beliefs)
-    return with_structural_aliases(result, exclude, beliefs)
+    return settled_between(result, examined.given.may_change, beliefs)
 
 
 def _held(result: Search, robot: Robot) -> Search:

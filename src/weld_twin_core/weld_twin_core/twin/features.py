@@ -129,26 +129,20 @@ class Features:
         return np.stack(result) if result else np.zeros((0, 6, self.at.size))
 
     def seeds(
-        self, kind: type[Effect], joint: str | None, residual: Array | None = None
+        self, kind: type[Effect], joint: str | None, pull: Array | None = None
     ) -> tuple[list[Effect], float]:
         """
         Return the instances a search for this kind of effect starts from, and among how many.
-
-        ``residual``, shape (c, M), is what the search wants explained.
 
         Parameters
         ----------
         joint : str or None
             The joint it would sit on; None for the robot as a whole.
-        residual : array, shape (c, M) [m, rad], optional
-            What the search wants explained.
+        pull : array, shape (M,), optional
+            How strongly what is to be explained pulls at the joint.
 
         """
         view = self.joint_view if kind.stage in (Stage.SERVO, Stage.PLAY) else self.view
-        pull = None
-        if joint is not None and residual is not None:
-            index = self.twin.robot.index(joint)
-            pull = (self.column(('q', index))[: residual.shape[0]] * residual).sum(axis=0)
         seeds = list(kind.seeds(view, joint, pull))
         return seeds, kind.search.trials(view, joint) or float(len(seeds))
 

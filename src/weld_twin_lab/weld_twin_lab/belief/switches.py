@@ -55,13 +55,6 @@ def nothing(*_: Any) -> list[Any]:
 
 MECHANISMS = {
     'library_again': Mechanism('hypotheses.search', 'ROUNDS', lambda: 1),
-    'negligible': Mechanism('hypotheses.selection', '_negligible', no),
-    'misfit': Mechanism('hypotheses.selection', '_misfit', no),
-    'starts_again': Mechanism('hypotheses.selection', 'restarted', second),
-    'taken_out_alike': Mechanism('hypotheses.structural_aliases', '_outside', no),
-    'taken_out_constants': Mechanism('hypotheses.structural_aliases', '_same_anywhere', nothing),
-    'constants_here': Mechanism('hypotheses.structural_aliases', '_constants_here', nothing),
-    'settable_first': Mechanism('hypotheses.structural_aliases', '_settable_first', first),
     'many': Mechanism('pipeline', 'fitted_together', first),
     'many_bends': Mechanism('many.small_errors', '_bends', nothing),
     'many_lines': Mechanism('many.small_errors', 'with_lines', second),

@@ -20,7 +20,6 @@ from ..algebra.fit import fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Scale
 from ..hypotheses.search import Search
-from ..hypotheses.seed_systems import ranking
 from ..hypotheses.still_joints import narrow
 from ..levels.curved import Curved
 from ..levels.free_form import Part
@@ -134,7 +133,7 @@ def _as_weighed(result: Search) -> Scale:
     Return the noise, as much larger as rows count less in a diagnosis.
 
     A large effect whose formula errs a little leaves something that any other may pick up, so what
-    is learned beside it counts less (`effective_rows`). That neighbours in time say the same is taken
+    is learned beside it counts less (`effective`). That neighbours in time say the same is taken
     into account where pieces of motion are foreseen.
     """
     fit, problem, scale = result.small, result.work.problem, result.work.scale
@@ -182,8 +181,7 @@ def _in_place(result: Search, verdict: Verdict, *, named: bool) -> list[tuple[Ef
 def _beside(result: Search) -> list[tuple[Effect, ...]]:
     """Return the explanations with one effect more, those first that come nearest to be needed."""
     model = result.small.model
-    systems = result.work.beside(model, result.small.residual)
-    ranked = ranking(systems, result.library.units, result.effective(result.small))
+    ranked = result.work.ranked(result.small, result.effective(result.small))
     taken = {(effect.name, effect.site) for effect in model.found}
     more = [choice for choice in ranked if choice.unit.site not in taken]
     return [(*model.found, choice.effect()) for choice in more[: MOST - 1]]

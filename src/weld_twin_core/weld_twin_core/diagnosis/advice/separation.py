@@ -224,8 +224,10 @@ def _side(
         twin = model.with_found(effects)
         # Residuals are measured minus twin; what was measured drops out of differences.
         predicted.append(-problem.whitened(problem.residuals(twin), scale))
-        block, labels = design(problem, twin, scale)
-        columns.append(block)
+        columns.append(design(problem, twin, scale))
+        _, frames = problem.frame_columns(problem.features(twin))
+        sizes = enumerate(effect.fit.coordinates().size for effect in effects)
+        labels = [*frames, *(f'{k}.{j}' for k, size in sizes for j in range(size))]
         names.append([_label(label, problem, mark) for label in labels])
     return Side(predicted, columns, names, max(problem.rows))
 

@@ -9,21 +9,17 @@ scale, as radians and metres in one matrix differ by orders of magnitude.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
-from scipy.linalg.blas import dsymm, dsymv
 from scipy.linalg.lapack import dpocon, dpotrf, dpotri, dpotrs, dtrtri
 
 from ...arrays import Array
 
 SAFE = 100.0
 """The condition is an estimate, good to some factor: so much is left between."""
-STRIP = 64
-"""Rows of a triangle worked on at once: what a strip holds beyond it is a few per cent."""
 Index = NDArray[np.intp]
 
 FLAT = 1e-9
@@ -43,96 +39,19 @@ def inverted(matrix: Array) -> Array:
 
     """
     # A symmetric matrix is its own transpose, and that lies as LAPACK wants it.
-    factor, failed = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
-    if failed:
-        raise LinAlgError('the matrix is not positive definite')
-    upper = dpotri(factor, lower=1, overwrite_c=1)[0].T
-    for start in range(0, len(upper), STRIP):
-        here = slice(start, start + STRIP)
-        corner = np.triu(upper[here, here])
-        upper[here, here] = corner + np.triu(corner, 1).T
-        upper[start + STRIP :, here] = upper[here, start + STRIP :].T
-    return np.asarray(upper)
-
-
-@dataclass(frozen=True, eq=False)
-class Triangle:
-    """
-    A symmetric matrix, kept as one triangle.
-
-    Attributes
-    ----------
-    square : array, shape (P, P)
-        In Fortran order; its other triangle may hold anything.
-    lower : bool
-        Which triangle counts.
-    unit : array, shape (P,)
-        What rows and columns are multiplied by.
-
-    """
-
-    square: Array
-    lower: bool
-    unit: Array
-
-    def times(self, right: Array) -> Array:
-        """Return the product with a vector, shape (P,), or with several, shape (P, R)."""
-        if right.ndim == 1:
-            return np.asarray(
-                self.unit * dsymv(1.0, self.square, self.unit * right, lower=self.lower)
-            )
-        unit = self.unit[:, None]
-        return np.asarray(unit * dsymm(1.0, self.square, unit * right, lower=self.lower))
-
-    def among(self, index: Index) -> Array:
-        """Return the rows and columns of some numbers, ascending, shape (n, n)."""
-        part = self.square[np.ix_(index, index)]
-        half = np.tril(part, -1) if self.lower else np.triu(part, 1)
-        whole = half + half.T
-        whole[np.diag_indices_from(whole)] = np.diag(part)
-        return np.asarray(whole * np.outer(self.unit[index], self.unit[index]))
-
-
-def inverses(scaled: Iterable[tuple[Array, Array]]) -> list[Triangle]:
-    """
-    Return the inverses of symmetric matrices of one size, two in the room of one.
-
-    Parameters
-    ----------
-    scaled : iterable of (array (P, P), array (P,))
-        Each matrix, and what rows and columns of its inverse are multiplied by.
-
-    Raises
-    ------
-    LinAlgError
-        A matrix is not positive definite.
-
-    """
-    out: list[Triangle] = []
-    for matrix, unit in scaled:
-        lower, count = len(out) % 2 == 0, len(matrix)
-        if lower:
-            room = np.empty((count, count + 1), order='F')
-        square = room[:, :count] if lower else room[:, 1:]
-        _put(square, matrix, lower=lower)
-        factor, failed = dpotrf(square, lower=lower, clean=0, overwrite_a=1)
-        if failed:
-            raise LinAlgError('the matrix is not positive definite')
-        out.append(Triangle(dpotri(factor, lower=lower, overwrite_c=1)[0], lower, unit))
+    lower = dpotri(_factor(matrix), lower=1, overwrite_c=1)[0]
+    out = np.tril(lower, -1)
+    out += out.T
+    out[np.diag_indices_from(out)] = lower.diagonal()
     return out
 
 
-def _put(square: Array, matrix: Array, *, lower: bool) -> None:
-    """Write one triangle of a symmetric matrix into a square, and leave the other as it is."""
-    for start in range(0, len(matrix), STRIP):
-        here, beyond = slice(start, start + STRIP), slice(start + STRIP, None)
-        corner = matrix[here, here]
-        own = np.tri(len(corner), dtype=bool)
-        np.copyto(square[here, here], corner, where=own if lower else own.T)
-        if lower:
-            square[beyond, here] = matrix[beyond, here]
-        else:
-            square[here, beyond] = matrix[here, beyond]
+def _factor(matrix: Array, *, clean: bool = False) -> Array:
+    """Return the lower triangle of a factor, in the place of a matrix."""
+    factor, failed = dpotrf(matrix.T, lower=1, clean=clean, overwrite_a=1)
+    if failed:
+        raise LinAlgError('the matrix is not positive definite')
+    return np.asarray(factor)
 
 
 def factored(matrix: Array) -> Callable[[Array], Array]:
@@ -152,9 +71,7 @@ def factored(matrix: Array) -> Callable[[Array], Array]:
     """
     if not matrix.size:
         return np.array
-    factor, failed = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
-    if failed:
-        raise LinAlgError('the matrix is not positive definite')
+    factor = _factor(matrix)
 
     def solve(right: Array) -> Array:
         return np.asarray(dpotrs(factor, right, lower=1)[0])
@@ -179,9 +96,9 @@ def well_conditioned(matrix: Array, least: float) -> bool:
     return bool(share > SAFE * least)
 
 
-def solved(matrix: Array, right: Array) -> tuple[Array, Array] | None:
+def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
     """
-    Return the solution and the diagonal of the inverse, shapes (P,); None if not definite.
+    Return the solution and the diagonal of the inverse, shapes (P,).
 
     Parameters
     ----------
@@ -189,13 +106,15 @@ def solved(matrix: Array, right: Array) -> tuple[Array, Array] | None:
         Symmetric, in C order; overwritten.
     right : array, shape (P,)
 
+    Raises
+    ------
+    LinAlgError
+        The matrix is not positive definite.
+
     """
-    factor, failed = dpotrf(matrix.T, lower=1, clean=1, overwrite_a=1)
-    if failed:
-        return None
+    factor = _factor(matrix, clean=True)
     solution, _ = dpotrs(factor, right, lower=1)
-    inverse, _ = dtrtri(factor, lower=1, overwrite_c=1)
-    upper = inverse.T  # rows that lie together
+    upper = dtrtri(factor, lower=1, overwrite_c=1)[0].T  # rows that lie together
     return solution, np.einsum('ik,ik->i', upper, upper)
 
 

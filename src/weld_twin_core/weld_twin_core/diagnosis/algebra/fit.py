@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 
 from ...arrays import Array
+from .columns import designed
 from .definite import factored, unit_diagonal
-from .designed import designed
 from .independent_rows import measured_axes, robust_spread
 from .prior import effect_precision, frame_prior
 from .problem import Model, Problem, Scale
@@ -80,10 +80,9 @@ class Fit:
         return float(self.residual @ self.residual)
 
 
-def design(problem: Problem, model: Model, scale: Scale) -> tuple[Array, list[str]]:
-    """Return the whitened columns of frames and found effects, shape (P, rows), and names."""
-    columns, names = designed(problem, model, scale)
-    return columns.written_out(), names
+def design(problem: Problem, model: Model, scale: Scale) -> Array:
+    """Return the whitened columns of frames and found effects, shape (P, rows)."""
+    return designed(problem, model, scale).written_out()
 
 
 def stepped(problem: Problem, model: Model, step: Array) -> Model:
@@ -223,7 +222,7 @@ class _Point:
     @cached_property
     def normal_equations(self) -> tuple[Array, Array]:
         """Return normal matrix and right-hand side of a step, the priors included."""
-        columns, _ = designed(self.problem, self.model, self.scale)
+        columns = designed(self.problem, self.model, self.scale)
         right = columns.times(self.residual) - self.ridge * self.x
         normal = columns.normal()
         normal[np.diag_indices_from(normal)] += self.ridge

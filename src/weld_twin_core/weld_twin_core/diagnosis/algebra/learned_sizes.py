@@ -12,8 +12,11 @@ References
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import LinAlgError
 
 from ...arrays import Array
 from ...errors import DataError
@@ -113,9 +116,8 @@ def _solved(
         diagonal += precision
         size = np.abs(diagonal)
         diagonal += more * (size + more * size.max(initial=1.0))
-        result = solved(room, right / noise)
-        if result is not None:
-            return result
+        with suppress(LinAlgError):
+            return solved(room, right / noise)
     raise DataError('the measurements say so little that no errors can be fitted together')
 
 

@@ -227,13 +227,6 @@ class Problem:
             return np.asarray(np.einsum('mci,...im->...cm', own.seen, block[..., :3, :]))
         return block[..., : self.rows[k], :]
 
-    def pulled(self, k: int, rows: Array) -> Array:
-        """Return the pull on the tool of recording k's rows, (c, M), as (3 or 6, M): along each."""
-        own = self.contact(k)
-        if own is not None:
-            return np.asarray(np.einsum('mci,cm->im', own.seen, rows))
-        return rows
-
     def places_taken(self, scale: Scale) -> list[tuple[Array, Array] | None]:
         """
         Return what the unknown places of contacts take up of whitened rows, one per recording.
@@ -358,16 +351,6 @@ class Problem:
         out = np.empty(turned.shape)
         np.multiply(turned, scale.roots[k][:, None] * unit, out=out)
         return out
-
-    def informed(self, k: int, part: Array, scale: Scale) -> Array:
-        """Return a part (c, M) of recording k times what is known of its rows, (c, M)."""
-        size = np.full((len(part), 1), scale.position**-2)
-        size[3:] = scale.orientation**-2
-        root = self.roots[k]
-        if root is None:
-            return np.asarray(part * size * scale.weights[k])
-        rows = np.einsum('mij,jm->im', root, part) * size * scale.weights[k]
-        return np.asarray(np.einsum('mji,jm->im', root, rows))
 
     def measured_rows(self, values: Array, scale: Scale) -> list[Array]:
         """Return `whitened` rows as shifts [m] and turns [rad] again, (M, c) per recording."""

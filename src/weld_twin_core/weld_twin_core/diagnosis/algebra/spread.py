@@ -17,9 +17,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Array
-from .atoms import rows_of
+from .columns import Columns, rows_of
 from .definite import inverted, unit_diagonal, well_conditioned
-from .designed import Design
 
 BLOCKS = 24
 """Stretches whose scores are held apart: enough to tell a variance to a third."""
@@ -30,14 +29,14 @@ TINY = 1e-300
 
 
 def covariance(
-    columns: Design, ridge: Array, residual: Array, labels: Array, share: float
+    columns: Columns, ridge: Array, residual: Array, labels: Array, share: float
 ) -> Array:
     """
     Return the covariance of all columns' coefficients, shape (P, P).
 
     Parameters
     ----------
-    columns : Design
+    columns : Columns
         P whitened columns.
     ridge : array, shape (P,)
         Prior precision.
@@ -60,7 +59,7 @@ def covariance(
     return np.asarray(inverse * np.outer(wider, wider))
 
 
-def unit_inverse(columns: Design, ridge: Array) -> tuple[Array, Array]:
+def unit_inverse(columns: Columns, ridge: Array) -> tuple[Array, Array]:
     """
     Return the inverse of the normal matrix with ones on its diagonal, and the norms of its columns.
 

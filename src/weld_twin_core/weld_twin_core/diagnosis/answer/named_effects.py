@@ -21,7 +21,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.posterior import Posterior
 from ..algebra import spread
-from ..algebra.designed import Design, designed
+from ..algebra.columns import Columns, designed
 from ..algebra.fit import coordinates
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
@@ -160,7 +160,7 @@ def covariance(
         As `standard_errors` takes them.
 
     """
-    columns, _ = designed(problem, model, scale)
+    columns = designed(problem, model, scale)
     count = coordinates(model).size
     prior = precision if precision.size else np.zeros(count)
     live = np.concatenate([np.ones(columns.count - count, bool), _free(model)])
@@ -186,7 +186,7 @@ def _free(model: Model) -> NDArray[np.bool_]:
     return np.array(out, dtype=bool)
 
 
-def _visible(columns: Design, model: Model) -> NDArray[np.bool_]:
+def _visible(columns: Columns, model: Model) -> NDArray[np.bool_]:
     """Return which columns the data show, shape (P,)."""
     scales = np.concatenate([effect.fit.coordinate_scales() for effect in model.found])
     reach = np.concatenate([np.ones(columns.count - scales.size), 1e3 * scales])

@@ -23,8 +23,8 @@ from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...errors import ModelError
 from ...twin.features import joints_of
+from ..algebra.columns import Columns, designed
 from ..algebra.definite import unit_diagonal
-from ..algebra.designed import Design, designed
 from ..algebra.fit import coordinates, design, fit, robust_fit, robust_scale
 from ..algebra.independent_rows import effective_share
 from ..algebra.prior import effect_precision, frame_offset, frame_prior
@@ -182,7 +182,7 @@ def _chosen(
     problem: Problem, model: Model, scale: Scale, precision: Array, beliefs: Beliefs
 ) -> list[int]:
     """Return which candidates are worth more evidence than they cost, chosen one by one."""
-    columns, _ = design(problem, model, scale)
+    columns = design(problem, model, scale)
     residual = problem.whitened(problem.residuals(model), scale)
     ridge, off = frame_prior(problem, model)
     ridge, x = np.concatenate([ridge, precision]), np.concatenate([off, coordinates(model)])
@@ -317,9 +317,9 @@ def _covariance(problem: Problem, model: Model, scale: Scale, precision: Array) 
 
 def _columns(
     problem: Problem, model: Model, scale: Scale, precision: Array
-) -> tuple[Design, Array]:
+) -> tuple[Columns, Array]:
     """Return all columns and their prior precision."""
-    columns, _ = designed(problem, model, scale)
+    columns = designed(problem, model, scale)
     prior = precision if precision.size else np.zeros(coordinates(model).size)
     return columns, np.concatenate([frame_prior(problem, model)[0], prior])
 

@@ -135,7 +135,7 @@ def _closed_step(
     problem: Problem, model: Model, scale: Scale, precision: Array, free: Open
 ) -> Array:
     """Return a least-squares step, shape (P,), that leaves the open directions where they are."""
-    columns, _ = design(problem, model, scale)
+    columns = design(problem, model, scale)
     residual = problem.whitened(problem.residuals(model), scale)
     frames = len(free.names)
     own, moved = frame_prior(problem, model)

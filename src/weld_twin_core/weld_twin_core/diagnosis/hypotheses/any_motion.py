@@ -119,6 +119,45 @@ def always(robot: Robot, one: Effect, other: Effect, align: frozenset[str]) -> b
     return inside(a, b) and inside(b, a)
 
 
+@lru_cache(maxsize=4)
+def set_instead(robot: Robot, align: frozenset[str], exclude: frozenset[str]) -> frozenset[Site]:
+    """
+    Return the constant errors that are on any motion what a person can set, and are no such themselves.
+
+    The tilt of an axis may be the zero of its joint whatever the motion: no measurement can decide,
+    mending one mends both, and the zero is what a controller takes.
+
+    Parameters
+    ----------
+    align : frozenset of str
+        Frames that are fitted, 'base' and 'tool'.
+    exclude : frozenset of str
+        Families taken out of the library: nothing is set by them.
+
+    """
+    frames = [frame_columns(robot, name) for name in sorted(align)]
+    span = span_of(np.concatenate(frames)) if frames else np.zeros((0, 6 * POSTURES))
+    singles = [e for e in _constants(robot) if e.fit.coordinates().size == 1]
+    singles = [e for e in singles if e.traits.set_at_controller <= (e.name not in exclude)]
+    rows = np.concatenate([np.zeros((0, span.shape[1])), *(columns(robot, e) for e in singles)])
+    shown = share_outside(rows, span) > SAME
+    rows = outside(rows, span)
+    unit = rows / np.maximum(np.linalg.norm(rows, axis=1), 1e-300)[:, None]
+    same = np.outer(shown, shown) & (np.abs(unit @ unit.T) > 1.0 - SAME**2)
+    can_be_set = np.array([e.traits.set_at_controller for e in singles], dtype=bool)
+    found = same[:, can_be_set].any(axis=1) & ~can_be_set
+    return frozenset(Site(singles[k].name, singles[k].site) for k in np.flatnonzero(found))
+
+
+def _constants(robot: Robot) -> Iterator[Effect]:
+    """Yield every error of no size that never changes."""
+    for name, kind in REGISTRY.items():
+        if constant(kind):
+            for joint in joints_of(kind, robot):
+                if kind.applicable(anywhere(robot).view, joint) is None:
+                    yield of_no_size(Site(name, joint))
+
+
 def columns(robot: Robot, effect: Effect) -> Array:
     """Return what an error does to the tool in many postures, one row per component."""
     return _levered(anywhere(robot).columns(effect))

@@ -10,17 +10,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arm.robot import Robot
-from ...arrays import Array
-from ...effects.effect import Effect
+from ...effects.effect import Effect, Stage
 from ...effects.registry import REGISTRY
 from ...effects.view import View
-from ...twin.features import Features, joints_of
-from ..algebra.atoms import Amounts, Columns, MovedJoint, Whole, amounts, gathered, moved_joint
+from ...twin.features import joints_of
+from ..algebra.columns import Columns, Maker, Piece
 from ..algebra.problem import Model, Problem, Scale
-from .seed_systems import SeedSystems, Unit
+from ..result import Site
+from .any_motion import set_instead
+from .seed_systems import Role, SeedSystems, Unit
 from .still_joints import REASON, hardly_moves, moved_most, orders_told
 
 EXCLUDED = 'excluded by the user'
+FEW = 2
+"""Instances of a kind that are tried on a joint at rest: what leaks in from either side; of waves
+one does, as all stand still."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +34,8 @@ class Library:
 
     Attributes
     ----------
-    pieces : tuple of Columns
-        All columns, whitened, in the order of their numbers.
+    columns : Columns
+        All of them, in the order of their numbers.
     systems : SeedSystems
         The normal matrix of every seed.
     absent : dict
@@ -39,28 +43,10 @@ class Library:
 
     """
 
-    pieces: tuple[Columns, ...]
+    columns: Columns
     systems: SeedSystems
     units: tuple[Unit, ...]
     absent: dict[str, str]
-
-    def products(self, rows: Array) -> Array:
-        """Return the products of all columns with rows, shape (R, rows), as shape (P, R)."""
-        result = [piece.products(rows) for piece in self.pieces]
-        return np.concatenate([np.zeros((0, rows.shape[0])), *result])
-
-    def column(self, number: int) -> Array:
-        """Return one column, whitened, shape (rows,)."""
-        ends = np.cumsum([piece.count for piece in self.pieces])
-        k = int(np.searchsorted(ends, number, side='right'))
-        return np.asarray(self.pieces[k].written_out()[number - int(ends[k])])
-
-    def unit(self, family: str, joint: str | None) -> Unit | None:
-        """Return a unit by name, or None."""
-        for unit in self.units:
-            if unit.site == (family, joint):
-                return unit
-        return None
 
 
 def candidate_kinds(exclude: Sequence[str], align: frozenset[str]) -> list[type[Effect]]:
@@ -77,61 +63,58 @@ def candidate_kinds(exclude: Sequence[str], align: frozenset[str]) -> list[type[
 
 
 def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] = ()) -> Library:
-    """Return the library at a model: one set of columns that all hypotheses share."""
-    features = problem.features(model)
-    pulls = _pulls(problem, model, scale)
-    shelf = _Shelf(problem, scale, features, pulls, dict.fromkeys(exclude, EXCLUDED))
-    for kind in candidate_kinds(exclude, problem.align):
+    """
+    Return the library at a model: one set of columns that all hypotheses share.
+
+    Families that are excluded are in it too, and so is what no search can find: they are held
+    against what is found, in its place.
+    """
+    shelf = _Shelf(problem, model, scale, exclude)
+    for kind in candidate_kinds((), problem.align):
         for joint in joints_of(kind, model.robot):
             shelf.add(kind, joint)
     for sudden in problem.dated:
         if sudden.name not in exclude:
-            shelf.add_dated(sudden)
-    columns = [index for unit in shelf.units for index in unit.columns]
-    systems = SeedSystems.of(columns, [piece.normal() for piece in shelf.pieces])
-    return Library(tuple(gathered(shelf.pieces)), systems, tuple(shelf.units), shelf.absent)
-
-
-def _pulls(problem: Problem, model: Model, scale: Scale) -> list[Array]:
-    """Return how strongly what is left pulls at the tool of every recording, (3 or 6, M) each."""
-    known = (problem.informed(k, r, scale) for k, r in enumerate(problem.residuals(model)))
-    return [problem.pulled(k, rows) for k, rows in enumerate(known)]
-
-
-def _applicable(kind: type[Effect], joint: str | None, features: list[Features]) -> str | None:
-    reasons = [kind.applicable(maker.view, joint) for maker in features]
-    return None if None in reasons else reasons[0]
+            shelf.place(sudden.name, sudden.site, [sudden], float(sum(problem.samples)))
+    index = [own for unit in shelf.units for own in unit.columns]
+    systems = SeedSystems.of(index, [piece.normal() for piece in shelf.pieces])
+    columns = Columns.joined(shelf.pieces or [Piece(np.zeros((0, problem.size)))])
+    return Library(columns, systems, tuple(shelf.units), shelf.absent)
 
 
 class _Shelf:
     """A library in the making: its columns so far, one piece for every seed, and its units."""
 
     def __init__(
-        self,
-        problem: Problem,
-        scale: Scale,
-        features: list[Features],
-        pulls: Sequence[Array],
-        absent: dict[str, str],
+        self, problem: Problem, model: Model, scale: Scale, exclude: Sequence[str]
     ) -> None:
-        self.problem, self.scale, self.features = problem, scale, features
-        self.pulls, self.absent = pulls, absent
-        self.pieces: list[Columns] = []
+        self.features = problem.features(model)
+        self.excluded = frozenset(exclude)
+        self.alike = set_instead(model.robot, problem.align, self.excluded)
+        self.absent = dict.fromkeys(exclude, EXCLUDED)
+        self.pieces: list[Piece] = []
         self.units: list[Unit] = []
         self._count = 0
-        self._joints: dict[int, MovedJoint] = {}
+        self._maker = Maker(problem, self.features, scale)
+        self._residual = problem.whitened(problem.residuals(model), scale)
+        self._ends = np.cumsum(problem.samples)
 
     def add(self, kind: type[Effect], joint: str | None) -> None:
         """Add a family on a joint, or tell why it is absent."""
-        reason = _applicable(kind, joint, self.features)
-        if reason is not None:
-            self.absent[kind.name] = reason
+        reasons = [kind.applicable(maker.view, joint) for maker in self.features]
+        if (reason := reasons[0]) is not None and None not in reasons:
+            self.absent.setdefault(kind.name, reason)
             return
         result, trials = self._seeds(kind, joint)
         seeds = [seed for seed in result if not hardly_moves(self.features, seed)]
-        if len(seeds) < len(result):
+        role = Role.ALIKE if Site(kind.name, joint) in self.alike else Role.FOUND
+        if kind.name in self.excluded:
+            role = Role.TAKEN_OUT
+        elif len(seeds) < len(result):
             self._leave_out(kind.name, str(joint))
-        self._place(kind.name, joint, seeds, trials)
+        self.place(kind.name, joint, seeds, trials, role)
+        if not seeds:
+            self.place(kind.name, joint, self._constants(kind, joint), 1.0, Role.ALIKE)
 
     def _seeds(self, kind: type[Effect], joint: str | None) -> tuple[list[Effect], float]:
         """Return the instances that are looked for, and among how many they were chosen."""
@@ -139,8 +122,22 @@ class _Shelf:
             most = min(kind.traits.waves.dense, orders_told(self.features, joint))
             lines = kind.search.lines(joint, np.arange(1.0, most + 1.0))
             return lines, float(len(lines))
-        k = moved_most(self.features, joint)
-        return self.features[k].seeds(kind, joint, self.pulls[k])
+        k, pull = moved_most(self.features, joint), None
+        if joint is not None:
+            moved = self._maker.moved(self.features[k].twin.robot.index(joint))
+            pull = np.split(moved.summed(self._residual), self._ends[:-1])[k]
+        return self.features[k].seeds(kind, joint, pull)
+
+    def _constants(self, kind: type[Effect], joint: str | None) -> list[Effect]:
+        """Return instances that are no more than a constant of a joint on these motions."""
+        if kind.of != 'joint':
+            return []
+        view = self.features[moved_most(self.features, joint)].view
+        out = list(kind.search.constants(view, joint))
+        if kind.traits.by_motion and kind.stage not in (Stage.SERVO, Stage.PLAY):
+            seeds = list(kind.seeds(view, joint))[:FEW]
+            out += [seed for seed in seeds if hardly_moves(self.features, seed)]
+        return out
 
     def _leave_out(self, family: str, joint: str) -> None:
         """Tell that a joint, too, hardly moves."""
@@ -151,45 +148,33 @@ class _Shelf:
         joints = [*filter(None, others.split(', ')), joint]
         self.absent[family] = f'{REASON} ({", ".join(dict.fromkeys(joints))})'
 
-    def add_dated(self, sudden: Effect) -> None:
-        """Add what gave way at an instant that the data checks found."""
-        self._place(sudden.name, sudden.site, [sudden], float(sum(self.problem.samples)))
-
-    def _place(
-        self, family: str, joint: str | None, seeds: Sequence[Effect], trials: float
+    def place(
+        self,
+        family: str,
+        joint: str | None,
+        seeds: Sequence[Effect],
+        trials: float,
+        role: Role = Role.FOUND,
     ) -> None:
         """Add the unit of those seeds that the data show."""
-        shown = [(seed, piece) for seed in seeds if (piece := self._columns(seed)) is not None]
+        every = ((seed, self._maker.piece(seed)) for seed in seeds)
+        shown = [(seed, piece) for seed, piece in every if _shown(seed, piece)]
+        if not shown:
+            return
         columns = []
         for _, piece in shown:
             self.pieces.append(piece)
             columns.append(np.arange(self._count, self._count + piece.count))
             self._count += piece.count
-        if shown:
-            kept = tuple(seed for seed, _ in shown)
-            self.units.append(Unit(family, joint, kept, tuple(columns), trials))
+        kept = tuple(seed for seed, _ in shown)
+        self.units.append(Unit(family, joint, kept, tuple(columns), trials, role))
 
-    def _columns(self, seed: Effect) -> Columns | None:
-        """Return a seed's whitened columns, or None when the data do not show it."""
-        shifts = [maker.shifts(seed) for maker in self.features]
-        joint = moved_joint(shifts)
-        piece: Columns
-        if joint is None or self.problem.touched:
-            changes = [m.changes(own) for m, own in zip(self.features, shifts, strict=True)]
-            parts = [self.problem.seen(k, change) for k, change in enumerate(changes)]
-            piece = Whole(self.problem.whitened(parts, self.scale))
-        else:
-            piece = Amounts(self._moved(joint), amounts(shifts, joint, self.problem.samples))
-        # Even a thousand times the typical effect would stay far below the noise.
-        scales = seed.fit.coordinate_scales()
-        reach = 1e3 * float(scales.max()) if scales.size else 1.0
-        return piece if piece.largest() * reach > 1e-2 else None
 
-    def _moved(self, joint: int) -> MovedJoint:
-        if joint not in self._joints:
-            made = MovedJoint.of(self.problem, self.features, self.scale, joint)
-            self._joints[joint] = made
-        return self._joints[joint]
+def _shown(seed: Effect, piece: Piece) -> bool:
+    """Return whether the data show a seed: even a thousand times the typical effect may be no noise."""
+    scales = seed.fit.coordinate_scales()
+    reach = 1e3 * float(scales.max()) if scales.size else 1.0
+    return bool(piece.peaks().max(initial=0.0) * reach > 1e-2)
 
 
 def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:

@@ -11,7 +11,7 @@ these are computed once, and a set costs a small system of equations.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -19,14 +19,14 @@ import numpy as np
 
 from ...arrays import Array
 from ..algebra.alias import outside, span_of
-from ..algebra.fit import Fit, design, fit, solve_scaled
+from ..algebra.fit import Fit, design, solve_scaled
 from .library import Library
 from .seed_systems import SINGULAR, Choice, SeedSystems, evidence, ranking
-from .selection import Workspace, backward, implausible, merged, sites
+from .selection import Place, Workspace, backward, implausible, merged, sites
 
-BEGUN = 12
+BEGUN = 6
 """Effects that a set is begun with, in turn; bounds the time."""
-COMPLETED = 3
+COMPLETED = 2
 """Sets of these, the best with one effect more, that are completed; bounds the time."""
 LONGEST = 6
 """Effects that a set gains at most: cells have one to six causes."""
@@ -34,8 +34,6 @@ AHEAD = 1.0
 """Evidence [nats] by which another set must be ahead to be taken: less is rounding."""
 ROUNDS = 4
 """Sets taken one after the other at most; bounds the time."""
-
-_Site = tuple[str, str | None]
 
 
 class Other(NamedTuple):
@@ -52,11 +50,11 @@ class Other(NamedTuple):
 
     """
 
-    instead_of: _Site
+    instead_of: Place
     fit: Fit
     ahead: float
 
-    def newcomers(self, now: Fit) -> list[_Site]:
+    def newcomers(self, now: Fit) -> list[Place]:
         """Return what it has that was not found, what entered first before the others."""
         had = sites(now)
         return [site for site in sites(self.fit) if site not in had]
@@ -94,10 +92,10 @@ class Sets:
     @classmethod
     def about(cls, work: Workspace, now: Fit) -> Sets:
         """Return the sets about a fit, of which nothing but the frames stays."""
-        bare = fit(work.problem, now.model.with_found(()), work.scale, None, 4)
-        span = span_of(design(work.problem, bare.model, work.scale)[0])
+        bare = work.fitted(now.model.with_found(()))
+        span = span_of(design(work.problem, bare.model, work.scale))
         residual = outside(bare.residual, span)
-        products = work.library.products(np.concatenate([span, residual[None]]))
+        products = work.library.columns.products(np.concatenate([span, residual[None]]))
         frames, right = products[:, :-1], products[:, -1]
         rss, pull = float(residual @ residual), np.zeros(len(span))
         systems = work.library.systems.given(np.eye(len(span)), pull, rss, products)
@@ -129,13 +127,14 @@ class Sets:
 
     def _know(self, columns: Sequence[int]) -> None:
         """Work out the products of some columns with all others, where that was not done."""
-        new = [c for c in dict.fromkeys(columns) if c not in self._cross]
+        new = sorted(set(columns) - self._cross.keys())
         if new:
-            rows = self.library.products(np.stack([self.library.column(c) for c in new]))
+            every = self.library.columns
+            rows = every.products(every.chosen(np.array(new)).written_out())
             rows -= self.frames @ self.frames[new].T
             self._cross.update(zip(new, rows.T.copy(), strict=True))
 
-    def of(self, wanted: Sequence[_Site]) -> list[Choice]:
+    def of(self, wanted: Sequence[Place]) -> list[Choice]:
         """Return some units as a set, each with the seed that serves it best beside the others."""
         chosen: list[Choice] = []
         remaining = set(wanted)
@@ -144,7 +143,7 @@ class Sets:
             remaining.remove(best.unit.site)
         return chosen
 
-    def without(self, start: list[Choice], never: _Site) -> list[Choice]:
+    def without(self, start: list[Choice], never: Place) -> list[Choice]:
         """Return the best set that begins with another and lacks a unit."""
         entering = self._entering(start, never)[:BEGUN]
         self._know(_columns(entering))
@@ -153,12 +152,12 @@ class Sets:
         best = sorted(more.values(), key=self.worth)[-COMPLETED:]
         return max((self._grown(one, never, LONGEST) for one in best), key=self.worth, default=[])
 
-    def _entering(self, chosen: Sequence[Choice], never: _Site) -> list[Choice]:
+    def _entering(self, chosen: Sequence[Choice], never: Place) -> list[Choice]:
         """Return what earns a place beside a set, most evidence first."""
         taken = {never, *_names(chosen)}
         return [c for c in self.beside(chosen, self.enter_nats) if c.unit.site not in taken]
 
-    def _grown(self, chosen: list[Choice], never: _Site, most: int) -> list[Choice]:
+    def _grown(self, chosen: list[Choice], never: Place, most: int) -> list[Choice]:
         """Return a set with what else earns a place, one unit after the other."""
         for _ in range(most):
             entering = self._entering(chosen, never)
@@ -178,9 +177,7 @@ class Sets:
         return chosen
 
 
-def reconsidered(
-    work: Workspace, now: Fit, sets: Sets, effective: Callable[[Fit], float]
-) -> tuple[Fit, list[Other]]:
+def reconsidered(work: Workspace, now: Fit, sets: Sets) -> tuple[Fit, list[Other]]:
     """
     Return the best set that doing without one effect at a time leads to, and others near it.
 
@@ -190,45 +187,41 @@ def reconsidered(
         What the search found.
     sets : Sets
         Of the workspace's library.
-    effective : callable
-        Number of independent rows of a fit.
 
     """
     for _ in range(ROUNDS):
-        others = _others(work, now, replace(sets, count=effective(now)), effective)
+        others = _others(work, now, replace(sets, count=work.effective(now)))
         best = max(others, key=lambda other: other.ahead, default=None)
         if best is None or best.ahead < AHEAD:
             return now, others
-        now = backward(work, best.fit, effective)
+        now = backward(work, best.fit)
     return now, []
 
 
-def _others(
-    work: Workspace, now: Fit, sets: Sets, effective: Callable[[Fit], float]
-) -> list[Other]:
+def _others(work: Workspace, now: Fit, sets: Sets) -> list[Other]:
     """Return the best set without each effect found, where it is near what was found."""
     chosen, out = sets.of(sites(now)), []
     least = sets.worth(chosen) - work.beliefs.rival_nats
-    for site in sites(now):
-        other = sets.without([c for c in chosen if c.unit.site != site], site)
+    for place in sites(now):
+        other = sets.without([c for c in chosen if c.unit.site != place], place)
         if other and sets.worth(other) > least:
             own = _fitted(work, now, other)
             if not implausible(own.model):
-                out.append(Other(site, own, ahead(work, own, now, effective)))
+                out.append(Other(place, own, ahead(work, own, now)))
     return out
 
 
 def _fitted(work: Workspace, now: Fit, chosen: Sequence[Choice]) -> Fit:
     """Return the fit of a set; what was found before starts at its values."""
     known = {(effect.name, effect.site): effect for effect in now.model.found}
-    result = tuple(known[site] for site in _names(chosen) if site in known)
+    result = tuple(known[place] for place in _names(chosen) if place in known)
     for choice in chosen:
         if choice.unit.site not in known:
             result = merged(result, choice.effect())
-    return fit(work.problem, now.model.with_found(result), work.scale, None, 8)
+    return work.fitted(now.model.with_found(result), 8)
 
 
-def ahead(work: Workspace, own: Fit, now: Fit, effective: Callable[[Fit], float]) -> float:
+def ahead(work: Workspace, own: Fit, now: Fit) -> float:
     """
     Return by how much evidence [nats] one set is ahead of another.
 
@@ -238,18 +231,16 @@ def ahead(work: Workspace, own: Fit, now: Fit, effective: Callable[[Fit], float]
     ----------
     own, now : Fit
         The one and the other, on the workspace's problem and scale.
-    effective : callable
-        Number of independent rows of a fit.
 
     """
     trials = {unit.site: float(np.log(unit.trials)) for unit in work.library.units}
 
     def cost(result: Fit) -> float:
-        return sum(trials.get(site, 0.0) + work.beliefs.enter_nats for site in sites(result))
+        return sum(trials.get(place, 0.0) + work.beliefs.enter_nats for place in sites(result))
 
     more = float(own.coordinates.size - now.coordinates.size)
     differing = {family for family, _ in set(sites(own)) ^ set(sites(now))}
-    count = work.independent((now, own), differing, effective)
+    count = work.independent((now, own), differing)
     before, after = (work.left(one, differing) for one in (now, own))
     return evidence(before, before - after, more, count) - cost(own) + cost(now)
 
@@ -258,5 +249,5 @@ def _columns(chosen: Sequence[Choice]) -> list[int]:
     return [int(column) for choice in chosen for column in choice.columns]
 
 
-def _names(chosen: Sequence[Choice]) -> tuple[_Site, ...]:
+def _names(chosen: Sequence[Choice]) -> tuple[Place, ...]:
     return tuple(sorted((c.unit.site for c in chosen), key=str))

@@ -5,24 +5,32 @@ Who else could have done it: for every effect found, the others that would do as
 
 Probabilities come from the evidence of fitted alternatives. Families that share a subspace on
 these data tie, and are named together.
+
+What was taken out of the library is held against what is found all the same: a hose may do on these
+motions what a load does. Where one of them fits as well, no data can vouch for the name alone, and
+they are a set. Where it fits clearly better, what was found stands in for a cause that the library
+lacks. The same holds for what is no more than a constant here, as its joint does not move. None of
+these counts for more than what was found.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.fit import Fit
 from ..result import Site
-from .other_sets import Other
-from .seed_systems import Choice, evidence, ranking
-from .selection import Workspace, fitted_with, implausible
+from .any_motion import constant, of_no_size, same_error
+from .other_sets import Other, ahead
+from .seed_systems import Choice, Role, evidence
+from .selection import Place, Workspace, backward, implausible, sites
 
-SHORTLIST = 7
-"""Rivals fitted at the most; bounds the time that a slot takes."""
+SHORTLIST, BESIDE = 7, 3
+"""Rivals that may be in the model, and others of each role, fitted at the most; bounds the time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +47,10 @@ class Rival:
         Its share of the evidence in this place.
     behind : float
         By how much a family that was taken out is ahead in this place [nats]; 0 of none.
+    role : Role
+        Whether it may be in the model.
+    ahead : float
+        By how much evidence it is ahead of all that may be in the model, where it may not [nats].
 
     """
 
@@ -47,15 +59,11 @@ class Rival:
     fit: Fit
     probability: float = 0.0
     behind: float = 0.0
+    role: Role = Role.FOUND
+    ahead: float = 0.0
 
 
-def rivals(
-    work: Workspace,
-    now: Fit,
-    k: int,
-    effective: Callable[[Fit], float],
-    others: Sequence[Other] = (),
-) -> tuple[Rival, ...]:
+def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> tuple[Rival, ...]:
     """
     Return found effect k and those that could take its place, most probable first.
 
@@ -63,75 +71,68 @@ def rivals(
     ----------
     now : Fit
         The final fit, on the workspace's problem and scale.
-    effective : callable
-        Number of independent rows of a fit.
     others : sequence of Other
         Sets that do without something found: what takes its place may need company.
 
     """
     effect = now.model.found[k]
     rest = work.without(now, k).fit
-    ranked, tried = contenders(work, rest, effective(now), now.model.found)
+    ranked = work.ranked(rest, work.effective(now), roles=Role)
     own = next((c for c in ranked if c.unit.site == (effect.name, effect.site)), None)
-    count = work.independent([now, *(f for _, f in tried)], [effect.name], effective)
-    place = Place(work, effect.name, rest, count)
-    out = [Rival(Site(effect.name, effect.site), place.nats(now, own), now)]
+    tried = [
+        (choice, other)
+        for role in Role
+        for choice in _near(work, ranked, role, sites(now))
+        if not implausible((other := work.fitted_with(rest.model, choice.effect())).model)
+    ]
+    count = work.independent([now, *(f for _, f in tried)], [effect.name])
+    seat = _Seat(work, effect.name, rest, count)
+    out = [Rival(Site(effect.name, effect.site), seat.nats(now, own), now)]
     for choice, other in tried:
-        log_bayes_factor = place.nats(other, choice)
-        out.append(Rival(Site(*choice.unit.site), log_bayes_factor, other))
+        site, nats = Site(*choice.unit.site), seat.nats(other, choice)
+        out.append(Rival(site, nats, other, role=choice.unit.role))
     for other_set in others:
         if other_set.instead_of == (effect.name, effect.site):
-            first = next((s for s in other_set.newcomers(now) if s not in _sites(out)), None)
+            known = {(one.site.effect, one.site.joint) for one in out}
+            first = next((s for s in other_set.newcomers(now) if s not in known), None)
             if first is not None:
                 out.append(Rival(Site(*first), out[0].nats + other_set.ahead, other_set.fit))
-    return weighed(out, work.beliefs.temperature)
+    return _weighed(out, work.beliefs.temperature)
 
 
-def _sites(out: Sequence[Rival]) -> list[tuple[str, str | None]]:
-    return [(alternative.site.effect, alternative.site.joint) for alternative in out]
-
-
-def contenders(
-    work: Workspace, rest: Fit, count: float, taken: Sequence[Effect], most: int = SHORTLIST
-) -> tuple[list[Choice], list[tuple[Choice, Fit]]]:
+def _near(
+    work: Workspace, ranked: Sequence[Choice], role: Role, taken: Sequence[Place]
+) -> list[Choice]:
     """
-    Return how a library's units rank beside a fit, and those near the best, each fitted with it.
+    Return the choices of a role that the model does not have, near the best of them.
 
-    Parameters
-    ----------
-    work : Workspace
-        With the library asked.
-    rest : Fit
-        What each is added to.
-    count : float
-        Number of independent rows.
-    taken : sequence of Effect
-        Those in the model; they are no contenders.
-    most : int
-        Fitted at the most.
-
+    What may not be in the model has to be near the best of all: else it is not the same on these data.
     """
-    beliefs, sites = work.beliefs, {(e.name, e.site) for e in taken}
-    systems = work.beside(rest.model, rest.residual)
-    ranked = ranking(systems, work.library.units, count)
-    choices = [c for c in ranked if c.unit.site not in sites and c.nats > 0.0]
-    reach = max(beliefs.rival_nats, beliefs.rival_share * choices[0].nats) if choices else 0.0
-    close = [c for c in choices if c.nats > choices[0].nats - reach][:most]
-    tried = [(c, fitted_with(work, rest.model, c.effect())) for c in close]
-    return ranked, [(c, other) for c, other in tried if not implausible(other.model)]
+    choices = [c for c in ranked if c.unit.role is role and c.unit.site not in taken]
+    best = max((c.nats for c in (choices if role is Role.FOUND else ranked)), default=0.0)
+    least = max(best - max(work.beliefs.rival_nats, work.beliefs.rival_share * best), 0.0)
+    near = [c for c in choices if c.nats > least]
+    return near[: SHORTLIST if role is Role.FOUND else BESIDE]
 
 
-def weighed(out: Sequence[Rival], temperature: float) -> tuple[Rival, ...]:
-    """Return rivals with probabilities that add up to one, most probable first."""
-    log_bayes_factor = np.array([r.nats for r in out])
-    weights = np.exp((log_bayes_factor - log_bayes_factor.max()) / temperature)
+def _weighed(every: Sequence[Rival], temperature: float) -> tuple[Rival, ...]:
+    """Return the best rival of every site, probabilities adding up to one, most probable first."""
+    most = max(one.nats for one in every if one.role is Role.FOUND)
+    out: dict[Site, Rival] = {}
+    for one in every:
+        if one.role is not Role.FOUND:
+            one = replace(one, nats=min(one.nats, most), ahead=one.nats - most)
+        if one.site not in out or one.nats > out[one.site].nats:
+            out[one.site] = one
+    nats = np.array([one.nats for one in out.values()])
+    weights = np.exp((nats - most) / temperature)
     weights /= weights.sum()
-    reported = [replace(r, probability=float(w)) for r, w in zip(out, weights, strict=True)]
-    return tuple(sorted(reported, key=lambda r: -r.probability))
+    told = [replace(r, probability=float(w)) for r, w in zip(out.values(), weights, strict=True)]
+    return tuple(sorted(told, key=lambda r: -r.probability))
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class _Seat:
     """
     The place of an effect found, in which all that may stand there are weighed by one rule.
 
@@ -151,21 +152,9 @@ class Place:
     rest: Fit
     count: float
 
-    def nats(self, full: Fit, choice: Choice | None = None, unused: int = 0) -> float:
-        """
-        Return the evidence of a fit with something in this place.
-
-        Parameters
-        ----------
-        full : Fit
-            The fit with the effect, or with another in its place.
-        choice : Choice or None
-            The choice in its place, whose number of trials counts; none, and one is counted.
-        unused : int
-            Coordinates of what is in its place that buy nothing there, and cost nothing.
-
-        """
-        freedom = float(full.coordinates.size - self.rest.coordinates.size - unused)
+    def nats(self, full: Fit, choice: Choice | None) -> float:
+        """Return the evidence of a fit with a choice in this place, whose number of trials counts."""
+        freedom = float(full.coordinates.size - self.rest.coordinates.size)
         trials = 1.0
         if choice is not None:
             # Unused components of a vector effect buy nothing and cost nothing.
@@ -173,3 +162,49 @@ class Place:
             trials = max(choice.unit.trials, 1.0)
         before, after = (self.work.left(one, [self.family]) for one in (self.rest, full))
         return evidence(before, before - after, freedom, self.count) - float(np.log(trials))
+
+
+def with_leads(
+    work: Workspace, now: Fit, slots: Sequence[tuple[Rival, ...]]
+) -> tuple[tuple[tuple[Rival, ...], ...], list[Effect]]:
+    """
+    Return the slots, and what was taken out and fits clearly better than what was found.
+
+    That is no rival any more; everything in the places that it replaces is behind it.
+    """
+    behind, refused, out = np.zeros(len(slots)), list[Effect](), list[tuple[Rival, ...]]()
+    for slot, effect in zip(slots, now.model.found, strict=True):
+        taken_out = [one for one in slot if one.role is Role.TAKEN_OUT]
+        # What is the same error on any motion is ahead by its fewer numbers alone.
+        foreign = [one for one in taken_out if not _same_anywhere(now, effect, one)]
+        best = max(foreign, key=lambda one: one.ahead, default=None)
+        if best is not None and (lead := _lead(work, now, best)) is not None:
+            refused.append(best.fit.model.found[-1])
+            behind = np.maximum(behind, lead)
+            slot = _weighed([one for one in slot if one is not best], work.beliefs.temperature)
+        out.append(slot)
+    pairs = zip(out, behind.tolist(), strict=True)
+    return tuple(tuple(replace(one, behind=b) for one in slot) for slot, b in pairs), refused
+
+
+def _same_anywhere(now: Fit, effect: Effect, other: Rival) -> bool:
+    """Return whether an effect and another are constants that are one error on any motion."""
+    beside = of_no_size(other.site)
+    constants = constant(type(effect)) and constant(type(beside))
+    return constants and same_error(now.model.robot, effect, beside)
+
+
+def _lead(work: Workspace, now: Fit, other: Rival) -> Array | None:
+    """
+    Return by how much evidence something taken out is ahead of each effect found, where it clearly is.
+
+    Several effects may imitate one: those that are worth nothing beside it are replaced as well.
+    """
+    own = backward(work, other.fit)
+    kept = sites(own)
+    if (other.site.effect, other.site.joint) not in kept:
+        return None
+    nats = ahead(work, own, now)
+    if nats <= work.beliefs.enter_nats:
+        return None
+    return np.array([nats * (site not in kept) for site in sites(now)])

@@ -6,27 +6,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.fit import Fit, fit, robust_fit, robust_scale
-from ..algebra.independent_rows import effective_share
 from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..result import Site
 from .library import Library, build
 from .other_sets import AHEAD, Sets, reconsidered
-from .rivals import Rival, rivals
-from .selection import (
-    Workspace,
-    backward,
-    forward,
-    implausible,
-    possible_part,
-)
+from .rivals import Rival, rivals, with_leads
+from .selection import Workspace, backward, forward, implausible, possible_part
 
 SEARCH_ROWS = 9000
 """Rows a search works on: what is found there is fitted again on all."""
@@ -56,8 +48,6 @@ class Search:
         The library that rivals are drawn from.
     small : Fit
         The final fit on the workspace's measurements.
-    bare_rss : float
-        Sum of squares on the workspace's measurements without any found effect.
     slots : tuple of tuple of Rival
         For every found effect itself and its rivals; empty when many were fitted together.
     crowded : bool
@@ -78,7 +68,6 @@ class Search:
     precision: Array
     work: Workspace
     small: Fit
-    bare_rss: float
     slots: tuple[tuple[Rival, ...], ...]
     crowded: bool = False
     dense: bool = False
@@ -92,39 +81,7 @@ class Search:
 
     def effective(self, result: Fit) -> float:
         """Return the number of independent rows of a fit on the workspace's measurements."""
-        return effective_rows(self.work.problem, result, self.bare_rss, self.work.beliefs)
-
-
-def effective_rows(
-    problem: Problem, result: Fit, bare_rss: float, beliefs: Beliefs, trust: float = 1.0
-) -> float:
-    """
-    Return the number of independent rows that a fit's evidence may count.
-
-    Frames that are fitted along take rows away. Two more things make a residual less telling than its
-    count: autocorrelation, and physics richer than the model. An explained sum of squares E leaves
-    about ``beliefs.misfit``^2 E of misfit in some ``beliefs.misfit_directions`` directions, and any
-    further column may pick that up by chance.
-
-    ``trust`` is how far to believe the autocorrelation, as its exponent: while causes are still
-    missing from the model, it is theirs.
-
-    Parameters
-    ----------
-    result : Fit
-        A fit of the problem.
-    bare_rss : float
-        Whitened sum of squares before any effect was found.
-    trust : float
-        Exponent between 0 and 1; see above.
-
-    """
-    share = effective_share(result.residual, problem.rows, problem.samples) ** trust
-    count = share * max(result.residual.size - problem.frame_count, 1)
-    # What entered first explains most, and so does what its formula misses.
-    misfit = beliefs.misfit * (result.model.found[0].fit.ideal if result.model.found else 1.0)
-    explained = max(bare_rss - result.rss, 0.0) / max(result.rss, 1e-300) * count
-    return float(count / (1.0 + misfit**2 * explained / beliefs.misfit_directions))
+        return self.work.effective(result)
 
 
 def search(
@@ -143,19 +100,15 @@ def search(
     # Position and orientation weigh as the gap itself spreads, so that neither pays for the other.
     baseline, scale = robust_fit(full, start, robust_scale(full, full.residuals(start)))
     progress('baseline fitted')
-    small = problem.thinned(SEARCH_ROWS)
-    chosen = _chosen(small, baseline.model, exclude, beliefs, progress)
-    work, now, bare = chosen.work, chosen.now, chosen.bare_rss
+    few = problem.thinned(SEARCH_ROWS)
+    work, now, refused, crowded = _chosen(few, baseline.model, exclude, beliefs, progress)
     slots: tuple[tuple[Rival, ...], ...] = ()
-    refused = list(chosen.refused)
-    if not chosen.crowded:
+    if not crowded:
         now = possible(work, now, refused)
-
-        def effective(result: Fit) -> float:
-            return effective_rows(small, result, bare, beliefs)
-
-        work = work.beside_usual(now, effective)
-        now, slots = settled(work, now, effective, progress)
+        work = work.beside_usual(now)
+        now, slots = settled(work, now, progress)
+        slots, better = with_leads(work, now, slots)
+        refused += better
     final, scale = _fitted(full, now.model)
     if absurd := implausible(final.model):
         refused += absurd
@@ -170,9 +123,8 @@ def search(
         precision=effect_precision(final.model),
         work=work,
         small=now,
-        bare_rss=bare,
         slots=slots,
-        crowded=chosen.crowded,
+        crowded=crowded,
         refused=tuple(refused),
     )
 
@@ -197,43 +149,29 @@ def _fitted(full: Problem, model: Model) -> tuple[Fit, Scale]:
     return robust_fit(full, model, robust_scale(full, full.residuals(model)), rounds=1)
 
 
-class _Chosen(NamedTuple):
-    """A selection: what it worked on, its fit, the bare sum of squares, whether it was crowded."""
-
-    work: Workspace
-    now: Fit
-    bare_rss: float
-    crowded: bool
-    refused: tuple[Effect, ...]
-
-
 def _chosen(
-    small: Problem, model: Model, exclude: Sequence[str], beliefs: Beliefs, progress: Progress
-) -> _Chosen:
-    """Return the effects chosen, with a library built anew until the choice stays."""
-    work, now, bare = _workspace(small, model, exclude, beliefs)
-    refused: list[Effect] = []
-    for _ in range(ROUNDS):
-        before = names(model)
+    few: Problem, model: Model, exclude: Sequence[str], beliefs: Beliefs, progress: Progress
+) -> tuple[Workspace, Fit, list[Effect], bool]:
+    """
+    Return the effects chosen, with a library built anew until the choice stays.
 
-        def effective(result: Fit, bare: float = bare) -> float:
-            return effective_rows(small, result, bare, beliefs)
-
-        def hopeful(result: Fit, bare: float = bare) -> float:
-            return effective_rows(small, result, bare, beliefs, beliefs.hope)
-
-        refused = []
-        steps = forward(work, now, hopeful, beliefs.many, progress, refused.append)
-        if steps:
-            now = backward(work, steps[-1].fit, effective)
-        # Of what enters one by one, what came later may stand for some that came before.
-        crowded = small.at_rest and len(now.model.found) >= beliefs.many
-        model = now.model
-        if crowded or names(model) == before:
+    What they were chosen from, their fit, what no machine has so large, and whether they came so
+    many that the selection among them was not finished: of what enters one by one, what came later
+    may stand for some that came before.
+    """
+    work, now = workspace(few, model, exclude, beliefs)
+    for attempt in range(ROUNDS):
+        before = names(now.model)
+        grown, refused = forward(work, now, beliefs.many, progress)
+        if grown is not now:
+            now = backward(work, grown)
+        crowded = few.at_rest and len(now.model.found) >= beliefs.many
+        if crowded or names(now.model) == before or attempt == ROUNDS - 1:
             break
-        del work  # or two libraries would be held at once
-        work, now, bare = _workspace(small, model, exclude, beliefs)
-    return _Chosen(work, now, bare, crowded, tuple(refused))
+        model = now.model
+        del work, now, grown  # or two libraries would be held at once
+        work, now = workspace(few, model, exclude, beliefs)
+    return work, now, refused, crowded
 
 
 def possible(work: Workspace, now: Fit, refused: list[Effect]) -> Fit:
@@ -248,29 +186,29 @@ def possible(work: Workspace, now: Fit, refused: list[Effect]) -> Fit:
     """
     while absurd := implausible(now.model):
         refused += absurd
-        now = fit(work.problem, possible_part(now.model), work.scale, None, 4)
+        now = work.fitted(possible_part(now.model))
     return now
 
 
 def settled(
-    work: Workspace, now: Fit, effective: Callable[[Fit], float], progress: Progress
+    work: Workspace, now: Fit, progress: Progress
 ) -> tuple[Fit, tuple[tuple[Rival, ...], ...]]:
     """Return the fit in which every effect is the best in its place, and its rivals."""
     if not now.model.found:
         return now, ()
     sets, had = Sets.about(work, now), [names(now.model)]
     for attempt in range(SWAPS + 1):
-        now, others = reconsidered(work, now, sets, effective)
+        now, others = reconsidered(work, now, sets)
         progress('other sets weighed')
         slots = []
         for k, effect in enumerate(now.model.found):
-            slots.append(rivals(work, now, k, effective, others))
+            slots.append(rivals(work, now, k, others))
             progress(f'rivals of {Site(effect.name, effect.site)} weighed')
             leader, own = slots[-1][0], next(r for r in slots[-1] if r.fit is now)
             # What was had before comes back only where that is more than rounding.
             most = own.nats + AHEAD * (names(leader.fit.model) in had)
             if leader.nats > most and attempt < SWAPS:
-                swapped = backward(work, leader.fit, effective)
+                swapped = backward(work, leader.fit)
                 # A rival that does not earn a place itself takes none from what did.
                 if leader.site in [Site(e.name, e.site) for e in swapped.model.found]:
                     now = swapped
@@ -289,12 +227,12 @@ def names(model: Model) -> list[tuple[str, str | None, int]]:
     )
 
 
-def _workspace(
+def workspace(
     problem: Problem, model: Model, exclude: Sequence[str], beliefs: Beliefs
-) -> tuple[Workspace, Fit, float]:
-    """Return what selection works on, the fit it starts from, and the bare sum of squares."""
+) -> tuple[Workspace, Fit]:
+    """Return what selection works on, and the fit that it starts from."""
     scale = robust_scale(problem, problem.residuals(model))
     now = fit(problem, model, scale, None, 4)
     bare = fit(problem, now.model.with_found(()), scale, None, 4).rss
     library = build(problem, now.model, scale, exclude)
-    return Workspace(problem, scale, library, beliefs), now, bare
+    return Workspace(problem, scale, library, beliefs, bare), now

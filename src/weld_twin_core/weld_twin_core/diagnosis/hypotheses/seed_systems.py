@@ -9,8 +9,9 @@ together. So each seed has a small system of its own, and those of one size are 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,14 @@ PERFECT = 1e-12
 """Share of the sum of squares that counts as left at the least; keeps a logarithm finite."""
 FEWEST = 3.0
 """Independent rows at the least: a position has three coordinates."""
+
+
+class Role(Enum):
+    """What a unit may do: be found; or only stand beside what was found, as the same on these data."""
+
+    FOUND = 'found'
+    ALIKE = 'alike'
+    TAKEN_OUT = 'taken out'
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +60,7 @@ class Unit:
     seeds: tuple[Effect, ...]
     columns: tuple[Index, ...]
     trials: float
+    role: Role = Role.FOUND
 
     @property
     def site(self) -> tuple[str, str | None]:
@@ -337,7 +347,11 @@ class Choice:
 
 
 def ranking(
-    systems: SeedSystems, units: Sequence[Unit], effective: float, least: float = -np.inf
+    systems: SeedSystems,
+    units: Sequence[Unit],
+    effective: float,
+    least: float = -np.inf,
+    roles: Collection[Role] = (Role.FOUND,),
 ) -> list[Choice]:
     """
     Return every unit's best choice, most evidence first.
@@ -352,6 +366,8 @@ def ranking(
         Number of independent rows.
     least : float
         Evidence [nats] that a choice must exceed.
+    roles : collection of Role
+        Which units are asked.
 
     """
     grown = systems.grown(effective)
@@ -367,7 +383,8 @@ def ranking(
     worth = np.maximum.reduceat(log_bayes_factor, first[:-1]) if units else log_bayes_factor
     worth = worth - np.log([unit.trials for unit in units])
     result = []
-    for u in np.flatnonzero(worth > least).tolist():
+    asked = np.array([unit.role in roles for unit in units], dtype=bool)
+    for u in np.flatnonzero(asked & (worth > least)).tolist():
         seed = int(np.argmax(log_bayes_factor[first[u] : first[u + 1]]))
         k, r = group[first[u] + seed], row[first[u] + seed]
         chosen = np.flatnonzero(grown[k].chosen[r])

@@ -12,20 +12,22 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ...arm.robot import Robot
-from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ...effects.registry import REGISTRY
 from ..algebra.fit import Fit, design, fit
+from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from .library import Library
-from .seed_systems import Choice, SeedSystems, Unit, evidence, ranking
-from .starts import searched, started
+from .seed_systems import Choice, Role, SeedSystems, evidence, ranking
+from .starts import started
 from .usual_errors import UsualErrors, usual
 
 SHORTLIST = 4
 """Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
+Place = tuple[str, str | None]
+"""Family and joint."""
 
 
 class Less(NamedTuple):
@@ -53,6 +55,8 @@ class Workspace:
 
     Attributes
     ----------
+    bare_rss : float
+        Whitened sum of squares before any effect was found.
     errors : UsualErrors or None
         What every arm is off by a little, once it is known how much that is.
 
@@ -62,6 +66,7 @@ class Workspace:
     scale: Scale
     library: Library
     beliefs: Beliefs
+    bare_rss: float
     errors: UsualErrors | None = None
     _left: WeakKeyDictionary[Fit, float] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
@@ -70,21 +75,37 @@ class Workspace:
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
 
-    def beside_usual(self, now: Fit, effective: Callable[[Fit], float]) -> Workspace:
+    def effective(self, result: Fit, trust: float = 1.0) -> float:
         """
-        Return the same with the errors that every arm has a little of, as a fit shows them.
+        Return the number of independent rows that the evidence of a fit may count.
+
+        Frames that are fitted along take rows away. Two more things make a residual less telling than
+        its count: autocorrelation, and physics richer than the model. An explained sum of squares E
+        leaves about ``beliefs.misfit``^2 E of misfit in some ``beliefs.misfit_directions`` directions,
+        and any further column may pick that up by chance.
 
         Parameters
         ----------
-        now : Fit
-        effective : callable
-            Number of independent rows of a fit.
+        trust : float
+            Exponent between 0 and 1 by which autocorrelation is believed: while causes are still
+            missing from the model, it is theirs.
 
         """
+        problem, beliefs, found = self.problem, self.beliefs, result.model.found
+        share = effective_share(result.residual, problem.rows, problem.samples) ** trust
+        count = share * max(result.residual.size - problem.frame_count, 1)
+        # What entered first explains most, and so does what its formula misses.
+        misfit = beliefs.misfit * (found[0].fit.ideal if found else 1.0)
+        explained = max(self.bare_rss - result.rss, 0.0) / max(result.rss, 1e-300) * count
+        return float(count / (1.0 + misfit**2 * explained / beliefs.misfit_directions))
+
+    def beside_usual(self, now: Fit) -> Workspace:
+        """Return the same with the errors that every arm has a little of, as a fit shows them."""
         if usual(now.model.found):
             return self
-        errors = UsualErrors.beside(self.problem, self.scale, now, effective)
-        return replace(self, errors=errors)
+        return replace(
+            self, errors=UsualErrors.beside(self.problem, self.scale, now, self.effective)
+        )
 
     def _errors(self, about: Iterable[str]) -> UsualErrors | None:
         """Return the errors beside which some families are weighed; none if they are such."""
@@ -109,16 +130,15 @@ class Workspace:
             self._left[result] = errors.left(result)
         return self._left[result]
 
-    def independent(
-        self, fits: Sequence[Fit], about: Iterable[str], effective: Callable[[Fit], float]
-    ) -> float:
+    def independent(self, fits: Sequence[Fit], about: Iterable[str]) -> float:
         """
         Return the number of independent rows by which some families are weighed.
 
-        One count for all fits, that of the one which leaves least.
+        One count for all fits, that of the one which leaves least: a worse model explains less and
+        would otherwise be allowed more rows.
         """
         errors = self._errors(about)
-        return effective(min(fits, key=lambda f: f.rss)) if errors is None else errors.count
+        return self.effective(min(fits, key=lambda f: f.rss)) if errors is None else errors.count
 
     def without(self, now: Fit, k: int) -> Less:
         """Return the fit without found effect k of another, made once."""
@@ -127,114 +147,98 @@ class Workspace:
             model = now.model.without(k)
             change = self.problem.whitened(self.problem.residuals(model), self.scale)
             size = float(np.sqrt(((change - now.residual) ** 2).mean()))
-            known[k] = Less(fit(self.problem, model, self.scale, None, 4), size)
+            known[k] = Less(self.fitted(model), size)
         return known[k]
 
-    def beside(self, model: Model, residual: Array) -> SeedSystems:
-        """
-        Return the normal equations of all seeds given a model: its frames and effects fitted.
+    def fitted(self, model: Model, iterations: int = 4) -> Fit:
+        """Return the fit of a model that is nearly there."""
+        return fit(self.problem, model, self.scale, None, iterations)
 
-        Parameters
-        ----------
-        residual : array, shape (rows,)
-            What the model leaves, whitened.
+    def fitted_with(self, model: Model, effect: Effect) -> Fit:
+        """Return the fit of a model with one more effect, merged where its kind can merge."""
+        effect = started(self.problem, model, self.scale, effect)
+        return self.fitted(model.with_found(merged(model.found, effect)), 5)
 
-        """
-        own, _ = design(self.problem, model, self.scale)
-        products = self.library.products(np.concatenate([own, residual[None]]))
-        return self.library.systems.beside(own, residual, products)
+    def beside(self, now: Fit) -> SeedSystems:
+        """Return the normal equations of all seeds given a fit: its frames and effects fitted."""
+        own = design(self.problem, now.model, self.scale)
+        products = self.library.columns.products(np.concatenate([own, now.residual[None]]))
+        return self.library.systems.beside(own, now.residual, products)
 
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """One step of a selection: the unit taken in, its evidence, and the fit with it."""
-
-    unit: Unit
-    nats: float
-    fit: Fit
+    def ranked(
+        self, now: Fit, count: float, least: float = -np.inf, roles: Iterable[Role] = (Role.FOUND,)
+    ) -> list[Choice]:
+        """Return what units are worth beside a fit, as `ranking` does."""
+        return ranking(self.beside(now), self.library.units, count, least, tuple(roles))
 
 
 def forward(
     work: Workspace,
-    start: Fit,
-    effective: Callable[[Fit], float],
-    most: int = 40,
+    now: Fit,
+    most: int,
     tick: Callable[[str], None] = lambda text: None,
-    refused: Callable[[Effect], None] = lambda effect: None,
-) -> list[Step]:
+) -> tuple[Fit, list[Effect]]:
     """
-    Return the steps of a forward selection; what no machine has does not enter.
+    Return the fit of a forward selection, and what no machine has and would have explained the rest.
 
     Parameters
     ----------
-    start : Fit
-        The baseline: frames and known effects.
-    effective : callable
-        Number of independent rows of a fit.
+    now : Fit
+        With what the model has already.
     most : int
         Stop after this many units.
     tick : callable
         Told what was found, for progress.
-    refused : callable
-        Told what would have explained the rest best, where no machine can have it.
 
     """
-    steps: list[Step] = []
-    now = start
-    taken = sites(start)
-    while len(steps) < most:
-        systems = work.beside(now.model, now.residual)
+    for _ in range(most):
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
         # only the fit with a choice tells how many rows were independent.
         rows = float(now.residual.size - work.problem.frame_count)
-        ranked = ranking(systems, work.library.units, rows, work.beliefs.enter_nats)
-        ranked = [choice for choice in ranked if not _repeats(choice, taken)]
-        if not ranked:
-            break
-        best, impossible = _first_possible(work, now, ranked, effective)
-        if best is None:
-            for effect in impossible:
-                refused(effect)
-            break
-        steps.append(best)
-        taken.append(best.unit.site)
-        now = best.fit
-        tick(f'{best.unit} (+{best.nats:.0f} nats)')
-    return steps
+        taken = sites(now)
+        ranked = [
+            choice
+            for choice in work.ranked(now, rows, work.beliefs.enter_nats)
+            if choice.unit.site not in taken or type(choice.unit.seeds[0]).search.joins
+        ]
+        now, entered, impossible = _with_best(work, now, ranked)
+        if entered is None:
+            return now, impossible
+        tick(entered)
+    return now, []
 
 
-def _repeats(choice: Choice, taken: list[tuple[str, str | None]]) -> bool:
-    """Return whether a unit is in the model already and its kind cannot take in another."""
-    kind = type(choice.unit.seeds[0])
-    return choice.unit.site in taken and not kind.search.joins
-
-
-def _close(work: Workspace, ranked: list[Choice]) -> list[Choice]:
-    """Return the choices whose evidence is close to the best."""
-    best = ranked[0].nats
-    slack = max(work.beliefs.close_nats, work.beliefs.close_share * best)
-    return [c for c in ranked if c.nats > best - slack]
-
-
-def _first_possible(
-    work: Workspace, now: Fit, ranked: list[Choice], effective: Callable[[Fit], float]
-) -> tuple[Step | None, list[Effect]]:
+def _with_best(
+    work: Workspace, now: Fit, ranked: list[Choice]
+) -> tuple[Fit, str | None, list[Effect]]:
     """
-    Return the best choice that a machine can have, and better ones that none has.
+    Return the fit with the best choice that a machine can have, its name, and better ones that none has.
 
     What has no such size imitates a cause that the library lacks. What only has no such shape is
     another family's, or that of several causes together: that ends no search.
     """
-    impossible: list[Effect] = []
+    beliefs, impossible = work.beliefs, list[Effect]()
     while ranked:
-        close = _close(work, ranked)[:SHORTLIST]
-        best, absurd = _best_of(work, now, close, effective)
+        slack = max(beliefs.close_nats, beliefs.close_share * ranked[0].nats)
+        close = [c for c in ranked if c.nats > ranked[0].nats - slack][:SHORTLIST]
+        tried = [(work.fitted_with(now.model, c.effect()), c.unit) for c in close]
+        count = work.effective(min((one for one, _ in tried), key=lambda f: f.rss), beliefs.hope)
+        worth = []
+        for one, unit in tried:
+            freedom = one.coordinates.size - now.coordinates.size
+            nats = evidence(now.rss, now.rss - one.rss, freedom, count)
+            worth.append((nats - float(np.log(unit.trials)), one, unit))
+        worth = [item for item in worth if item[0] > beliefs.enter_nats]
+        possible = [item for item in worth if not implausible(item[1].model)]
+        absurd = [effect for _, one, _ in worth for effect in implausible(one.model)]
         impossible += absurd
-        misshapen = [effect for effect in absurd if _misshapen(now.model.robot, effect)]
-        if best is not None or not absurd or len(misshapen) < len(absurd):
-            return best, impossible
+        if possible:
+            nats, best, unit = max(possible, key=lambda item: item[0])
+            return best, f'{unit} (+{nats:.0f} nats)', impossible
+        if not absurd or not all(_misshapen(now.model.robot, effect) for effect in absurd):
+            break
         ranked = [choice for choice in ranked if choice not in close]
-    return None, impossible
+    return now, None, impossible
 
 
 def _misshapen(robot: Robot, effect: Effect) -> bool:
@@ -244,34 +248,7 @@ def _misshapen(robot: Robot, effect: Effect) -> bool:
     return all(name in bent for name, _, _ in beyond(robot, effect))
 
 
-def _best_of(
-    work: Workspace, now: Fit, close: list[Choice], effective: Callable[[Fit], float]
-) -> tuple[Step | None, list[Effect]]:
-    """
-    Return the best of some choices after a nonlinear fit of each.
-
-    Beside it, effects that would have done but that no machine has.
-    """
-    tried = [(c, fitted_with(work, now.model, c.effect())) for c in close]
-    # One count for all, that of the fit which leaves least: a worse model explains less and would
-    # otherwise be allowed more rows.
-    count = effective(min((f for _, f in tried), key=lambda f: f.rss))
-    best: Step | None = None
-    impossible: list[Effect] = []
-    for choice, result in tried:
-        freedom = result.coordinates.size - now.coordinates.size
-        log_bayes_factor = evidence(now.rss, now.rss - result.rss, freedom, count)
-        log_bayes_factor -= float(np.log(choice.unit.trials))
-        if log_bayes_factor <= work.beliefs.enter_nats:
-            continue
-        absurd = implausible(result.model)
-        impossible += absurd
-        if not absurd and (best is None or log_bayes_factor > best.nats):
-            best = Step(choice.unit, log_bayes_factor, result)
-    return best, impossible
-
-
-def sites(result: Fit) -> list[tuple[str, str | None]]:
+def sites(result: Fit) -> list[Place]:
     """Return what is in the model of a fit."""
     return [(effect.name, effect.site) for effect in result.model.found]
 
@@ -286,12 +263,6 @@ def possible_part(model: Model) -> Model:
     return model.with_found(tuple(e for e in model.found if not beyond(model.robot, e)))
 
 
-def fitted_with(work: Workspace, model: Model, effect: Effect) -> Fit:
-    """Return the fit of a model with one more effect, merged where its kind can merge."""
-    effect = started(work.problem, model, work.scale, effect)
-    return fit(work.problem, model.with_found(merged(model.found, effect)), work.scale, None, 5)
-
-
 def merged(result: tuple[Effect, ...], effect: Effect) -> tuple[Effect, ...]:
     """Return the effects with one more, in one with its like where their kind can join."""
     for k, other in enumerate(result):
@@ -302,78 +273,26 @@ def merged(result: tuple[Effect, ...], effect: Effect) -> tuple[Effect, ...]:
     return (*result, effect)
 
 
-def restarted(work: Workspace, now: Fit) -> Fit:
+def backward(work: Workspace, now: Fit) -> Fit:
     """
-    Return the fit after effects with many optima were searched for again beside all others.
+    Return the fit with every effect dropped that is not needed given the others, the least first.
 
-    The first to enter was found while the others were still in the residual.
-    """
-    for k, effect in enumerate(now.model.found):
-        if not searched(effect):
-            continue
-        again = fitted_with(work, work.without(now, k).fit.model, effect)
-        if again.rss < now.rss and not implausible(again.model):
-            result = list(again.model.found)
-            result.insert(k, result.pop())
-            now = fit(work.problem, again.model.with_found(tuple(result)), work.scale, None, 4)
-    return now
-
-
-def backward(work: Workspace, now: Fit, effective: Callable[[Fit], float]) -> Fit:
-    """Return the fit with every effect dropped that is not needed given the others, the least first."""
-    now = restarted(work, now)
-    while now.model.found:
-        each = [work.without(now, k) for k in range(len(now.model.found))]
-        less, sizes = [one.fit for one in each], [one.size for one in each]
-        reasons = (
-            _worthless(work, now, less, effective),
-            _negligible(work, sizes),
-            _misfit(work, now, less, sizes),
-        )
-        needless = next((k for k in reasons if k is not None), None)
-        if needless is None:
-            break
-        now = less[needless]
-    return now
-
-
-def _worthless(
-    work: Workspace, now: Fit, less: Sequence[Fit], effective: Callable[[Fit], float]
-) -> int | None:
-    """Return the effect that is worth least, where it is not worth its freedom."""
-    count = effective(now)
-    log_bayes_factor = []
-    for one in less:
-        freedom = now.coordinates.size - one.coordinates.size
-        log_bayes_factor.append(evidence(one.rss, one.rss - now.rss, freedom, count))
-    least = int(np.argmin(log_bayes_factor))
-    return least if log_bayes_factor[least] < work.beliefs.enter_nats else None
-
-
-def _negligible(work: Workspace, sizes: Sequence[float]) -> int | None:
-    """
-    Return the smallest effect, where it is far below the noise beside a larger one.
-
+    None is needed that is not worth its freedom; nor one far below the noise beside a larger one.
     Thousands of rows make a micrometre significant; next to a larger cause it is more likely the
     difference between that cause and its model.
     """
-    least = int(np.argmin(sizes))
-    most = work.beliefs.negligible if len(sizes) > 1 else work.beliefs.invisible
-    return least if sizes[least] <= most else None
-
-
-def _misfit(work: Workspace, now: Fit, less: Sequence[Fit], sizes: Sequence[float]) -> int | None:
-    """
-    Return the effect that is no more than what a larger one's formula misses.
-
-    A gear in motion is not its formula: of a large effect some per cent are left, far above chance
-    over thousands of rows, and a second effect on the same joint may take them. Where it takes
-    away less than that share of the largest, and less than noise, it is not told. Stations are
-    left alone, as the geometry of an arm has no such misfit.
-    """
-    if len(less) < 2 or work.problem.at_rest:
-        return None
-    most = min(work.beliefs.misfit_noise, work.beliefs.misfit_share * max(sizes))
-    least = int(np.argmin([one.rss for one in less]))
-    taken = max(less[least].rss - now.rss, 0.0) / now.residual.size
-    return least if np.sqrt(taken) <= most else None
+    while now.model.found:
+        less = [work.without(now, k) for k in range(len(now.model.found))]
+        count, worth = work.effective(now), []
+        for one, _ in less:
+            freedom = now.coordinates.size - one.coordinates.size
+            worth.append(evidence(one.rss, one.rss - now.rss, freedom, count))
+        sizes = [one.size for one in less]
+        most = work.beliefs.negligible if len(less) > 1 else work.beliefs.invisible
+        if min(worth) < work.beliefs.enter_nats:
+            now = less[int(np.argmin(worth))].fit
+        elif min(sizes) <= most:
+            now = less[int(np.argmin(sizes))].fit
+        else:
+            break
+    return now

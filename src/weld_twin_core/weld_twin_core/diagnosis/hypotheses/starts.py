@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +12,8 @@ from ...arrays import Array
 from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features
 from ...twin.resampling import Picker
-from ..algebra.alias import span_of
+from ..algebra.alias import outside, span_of
+from ..algebra.columns import Maker, Piece
 from ..algebra.fit import design
 from ..algebra.problem import Model, Problem, Scale
 from .still_joints import moved_most
@@ -23,21 +23,8 @@ LEAST = 1e-9
 """Size, as a share of the typical one, that is taken for less: zero has no logarithm."""
 USUAL = 0.8
 """Spread of the logarithm of a frequency or a damping about the typical one."""
-
-
-class Profile(NamedTuple):
-    """
-    Instances of an effect and what each explains.
-
-    Attributes
-    ----------
-    gains : array, shape (D,)
-        Fall of the whitened sum of squares, frames and the other effects fitted anew.
-
-    """
-
-    effects: list[Effect]
-    gains: Array
+Tried = tuple[list[Effect], Array]
+"""Instances of an effect, and by how much the whitened sum of squares falls with each, (D,)."""
 
 
 def started(problem: Problem, model: Model, scale: Scale, effect: Effect) -> Effect:
@@ -46,25 +33,17 @@ def started(problem: Problem, model: Model, scale: Scale, effect: Effect) -> Eff
 
     The effect itself where its kind has no need of a search.
     """
-    if not searched(effect):
+    if not effect.fit.searched:
         return effect
-    looker = _Looker.of(problem, model, scale)
-    zoom, result = 0, looker.profile(effect, 0)
-    while result is not None:
-        effect = result.effects[int(np.argmax(result.gains + _prior(result.effects)))]
+    looker, zoom = _Looker.of(problem, model, scale), 0
+    while (tried := looker.tried(effect, zoom)) is not None:
+        effects, gains = tried
+        effect = effects[int(np.argmax(gains + _prior(effects)))]
         zoom += 1
-        result = looker.profile(effect, zoom)
     return effect
 
 
-def searched(effect: Effect) -> bool:
-    """Return whether an effect's kind needs a search for its start."""
-    return effect.fit.searched
-
-
-def profile(
-    problem: Problem, model: Model, scale: Scale, k: int
-) -> tuple[list[Effect], Array] | None:
+def profile(problem: Problem, model: Model, scale: Scale, k: int) -> Tried | None:
     """
     Return instances in the place of found effect k, and by how much each fits worse, (D,).
 
@@ -77,15 +56,15 @@ def profile(
 
     """
     effect = model.found[k]
-    if not searched(effect):
+    if not effect.fit.searched:
         return None
     looker = _Looker.of(problem, model.without(k), scale)
-    result = looker.profile(effect, 0)
-    if result is None:
+    tried = looker.tried(effect, 0)
+    if tried is None:
         return None
     remaining = problem.whitened(problem.residuals(model), scale)
     here = float(looker.residual @ looker.residual - remaining @ remaining)
-    return result.effects, here - result.gains
+    return tried[0], here - tried[1]
 
 
 def _prior(effects: list[Effect]) -> Array:
@@ -108,77 +87,67 @@ class _Looker:
     ----------
     residual : array, shape (rows,)
         With frames and effects in the model fitted.
-    basis : array, shape (rows, P)
-        Orthonormal columns of those.
+    span : array, shape (P, rows)
+        Orthonormal rows that span those.
 
     """
 
-    problem: Problem
-    scale: Scale
-    features: list[Features]
+    maker: Maker
     residual: Array
-    basis: Array
+    span: Array
 
     @classmethod
     def of(cls, problem: Problem, model: Model, scale: Scale) -> _Looker:
         """Take the residual and its columns at a model."""
-        basis = span_of(design(problem, model, scale)[0]).T
-        residual = problem.whitened(problem.residuals(model), scale)
-        residual = residual - basis @ (basis.T @ residual)
-        return cls(problem, scale, problem.features(model), residual, basis)
+        span = span_of(design(problem, model, scale))
+        residual = outside(problem.whitened(problem.residuals(model), scale)[None], span)[0]
+        return cls(Maker(problem, problem.features(model), scale), residual, span)
 
-    def profile(self, effect: Effect, zoom: int) -> Profile | None:
+    def tried(self, effect: Effect, zoom: int) -> Tried | None:
         """Return the instances of one zoom, each with its best linear parameter."""
-        joint = self.features[0].twin.robot.index(str(effect.site))
-        residuals = self.problem.by_sample(self.residual)
-        bases = self.problem.by_sample(self.basis)
-        memory = effect.stage in MEMORY
-        views = [maker.joint_view if memory else maker.view for maker in self.features]
-        trials = [effect.fit.starts(view, zoom) for view in views]
+        features = self.maker.features
+        most = features[moved_most(features, effect.site)]
         # What moves the joint most says which instances; the others say what they do there.
-        most = trials[moved_most(self.features, effect.site)]
-        reported = most or next((own for own in trials if own is not None), None)
-        if reported is None:
+        starts = effect.fit.starts(_view(most, effect), zoom)
+        if starts is None:
             return None
-        result = reported[0]
-        pull, mass, shared = (np.zeros(()) for _ in range(3))
-        for k, (maker, view) in enumerate(zip(self.features, views, strict=True)):
-            own = trials[k]
-            same = own is not None and _same(own[0], result)
-            moved = own[1] if own is not None and same else _moved(result, view, joint)
-            if memory:
-                moved = Picker(maker.recording.joints, maker.run.view.t).pick(moved)
-            column = self._white(maker, joint, k)
-            pull = pull + moved @ (column * residuals[k]).sum(axis=1)
-            mass = mass + moved**2 @ (column**2).sum(axis=1)
-            shared = shared + moved @ np.einsum('mc,mcp->mp', column, bases[k])
-        remaining = np.maximum(mass - (shared**2).sum(axis=1), 1e-12 * mass + 1e-300)
-        return _sized(result, pull, remaining)
-
-    def _white(self, maker: Features, joint: int, k: int) -> Array:
-        """Return what one joint does in recording k, whitened, shape (M, c)."""
-        column = self.problem.seen(k, maker.column(('q', joint)))
-        return self.problem.in_noise(k, column, self.scale)
+        effects, joint = starts[0], most.twin.robot.index(str(effect.site))
+        parts = [
+            _picked(maker, effect, starts[1] if maker is most else _moved(effects, maker, joint))
+            for maker in features
+        ]
+        piece = Piece(np.concatenate(parts, axis=1), self.maker.moved(joint))
+        assert piece.joint is not None
+        pull = piece.products(self.residual[None])[:, 0]
+        mass = piece.each**2 @ piece.joint.square
+        shared = (piece.products(self.span) ** 2).sum(axis=1)
+        return _sized(effects, pull, np.maximum(mass - shared, 1e-12 * mass + 1e-300))
 
 
-def _same(one: list[Effect], other: list[Effect]) -> bool:
-    """Return whether two lists hold the same instances."""
-    return len(one) == len(other) and all(
-        np.array_equal(a.vector(), b.vector()) for a, b in zip(one, other, strict=True)
-    )
+def _view(maker: Features, effect: Effect) -> View:
+    """Return what an effect sees of a recording."""
+    return maker.joint_view if effect.stage in MEMORY else maker.view
 
 
-def _moved(effects: list[Effect], view: View, joint: int) -> Array:
+def _moved(effects: list[Effect], maker: Features, joint: int) -> Array:
     """Return what each instance does to the joint, shape (D, N)."""
-    each = [effect.displace(view) for effect in effects]
-    return np.stack([np.broadcast_to(shift['q', joint], view.t.shape) for shift in each])
+    view = _view(maker, effects[0])
+    each = [effect.displace(view)['q', joint] for effect in effects]
+    return np.stack([np.broadcast_to(shift, view.t.shape) for shift in each])
 
 
-def _sized(effects: list[Effect], pull: Array, mass: Array) -> Profile:
+def _picked(maker: Features, effect: Effect, moved: Array) -> Array:
+    """Return displacements at the stamps of the measurements, shape (D, M)."""
+    if effect.stage not in MEMORY:
+        return moved
+    return Picker(maker.recording.joints, maker.run.view.t).pick(moved)
+
+
+def _sized(effects: list[Effect], pull: Array, mass: Array) -> Tried:
     """Return the instances with their linear parameter fitted, where they have one."""
     linear = [p for p in effects[0].parameters if p.linear]
     if not linear:
-        return Profile(effects, 2.0 * pull - mass)
+        return effects, 2.0 * pull - mass
     best = np.clip(pull / mass, linear[0].lower, linear[0].upper)
     sized = [replace(e, **{linear[0].name: float(b)}) for e, b in zip(effects, best, strict=True)]
-    return Profile(sized, best * (2.0 * pull - best * mass))
+    return sized, best * (2.0 * pull - best * mass)

@@ -85,7 +85,7 @@ class UsualErrors:
 
     def beyond(self, result: Fit) -> tuple[Array, float]:
         """Return the residual beside them, (rows,), and its squares with what their sizes cost."""
-        own, _ = design(self.problem, result.model, self.scale)
+        own = design(self.problem, result.model, self.scale)
         both = np.concatenate([own, self.columns])
         normal, right = both @ both.T, both @ result.residual
         normal[np.diag_indices_from(normal)] += np.arange(len(both)) >= len(own)
@@ -95,7 +95,7 @@ class UsualErrors:
 
 def _sized(problem: Problem, scale: Scale, columns: Array, now: Fit) -> Array:
     """Return columns as large as a fit shows them to be."""
-    own, _ = design(problem, now.model, scale)
+    own = design(problem, now.model, scale)
     both = np.concatenate([own, columns])
     # What moved the tool by more than the noise would be a cause by itself.
     most = 1.0 / np.sqrt(np.maximum((columns**2).mean(axis=1), EMPTY))

@@ -135,7 +135,7 @@ def free_form(
         Look also for causes that act at several joints at once, which no curve can carry.
 
     """
-    columns, _ = design(problem, bare.model, scale)
+    columns = design(problem, bare.model, scale)
     held = np.zeros(columns.shape[0])
     if precision.size:
         held[-precision.size :] = precision

@@ -22,8 +22,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.atoms import rows_of
-from ..algebra.designed import designed
+from ..algebra.columns import designed, rows_of
 from ..algebra.fit import Fit, coordinates, fit, robust_scale, solve_scaled, stepped
 from ..algebra.learned_sizes import learned_precision, projected
 from ..algebra.prior import effect_precision, frame_prior
@@ -68,7 +67,7 @@ def _learned(
 ) -> tuple[Model, Array, float]:
     """Return the model after one linear step, the prior precision learned, and its freedom."""
     residual = problem.whitened(problem.residuals(model), scale)
-    columns, _ = designed(problem, model, scale)
+    columns = designed(problem, model, scale)
     frame_ridge, off = frame_prior(problem, model)
     frames = frame_ridge.size
     normal, right = columns.normal(), columns.times(residual)

@@ -23,6 +23,7 @@ from ...effects import REGISTRY
 from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features, joints_of
 from ..algebra.alias import outside, share_outside, span_of
+from ..algebra.columns import Maker, Piece
 from ..algebra.fit import Fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
@@ -166,93 +167,86 @@ def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
 
 
 @dataclass(frozen=True, eq=False)
-class Waves:
+class Lines:
     """
-    Sine and cosine of every order of one joint, and what never changes from look to look.
+    Waves of one joint that may be lines of its ripple.
 
     Attributes
     ----------
-    columns : list of array, shape (c, M)
-        d pose / d joint of every recording.
-    masses : list of array, shape (c, M)
-        The same, weighted by the noise.
-    waves : list of array, shape (2 O, M)
-        Single precision: their sums over thousands of stations are good to 1e-6.
-    normal : array, shape (O, 2, 2)
+    orders : array, shape (K,) [1/rev]
+    free : array of bool, shape (K,)
+        Which of them are far enough from every order that is in the ripple.
+    piece : Piece
+        Sine and cosine of every order.
+    normal : array, shape (K, 2, 2)
+        Their products with each other.
     apart : float
         Half the resolution in orders that the range of motion allows.
 
     """
 
-    joint: int
-    columns: list[Array]
-    masses: list[Array]
-    waves: list[np.ndarray]
+    orders: Array
+    free: NDArray[np.bool_]
+    piece: Piece
     normal: Array
     apart: float
 
     @classmethod
-    def of(
-        cls,
-        problem: Problem,
-        features: list[Features],
-        scale: Scale,
-        joint: int,
-        orders: Array,
-        least: float,
-    ) -> Waves | None:
-        """
-        Return the waves of a joint, or None when it travels less than ``least`` [rad].
-
-        Parameters
-        ----------
-        joint : int
-            Counted from 0.
-        orders : array, shape (K,) [1/rev]
-            Orders to look at.
-        least : float [rad]
-            Travel below which nothing is looked for.
-
-        """
-        low = min(float(maker.view.q[:, joint].min()) for maker in features)
-        high = max(float(maker.view.q[:, joint].max()) for maker in features)
-        if high - low < least:
-            return None
-        columns, masses, waves = [], [], []
-        normal = np.zeros((orders.size, 2, 2))
-        for r, maker in enumerate(features):
-            column = problem.seen(r, maker.column(('q', joint)))
-            mass = problem.informed(r, column, scale)
-            angle = orders[:, None] * maker.view.q[:, joint]
-            sine, cosine = np.sin(angle), np.cos(angle)
-            weight = (column * mass).sum(axis=0)
-            squares = sine**2 @ weight
-            cross = (sine * cosine) @ weight
-            terms = [squares, cross, cross, weight.sum() - squares]
-            normal += np.stack(terms, -1).reshape(-1, 2, 2)
-            columns.append(column)
-            masses.append(mass)
-            waves.append(np.concatenate([sine, cosine]).astype(np.float32))
+    def of(cls, maker: Maker, ripple: Effect, orders: Array) -> Lines:
+        """Return the waves of some orders at the joint of a ripple."""
+        low, high = _ends(maker, ripple)
+        piece = maker.piece(ripple.search.with_orders(orders))
+        size = 1.0 if piece.joint is None else np.sqrt(piece.joint.square)
+        pairs = (piece.each * size).reshape(orders.size, 2, -1)
+        normal = pairs @ np.swapaxes(pairs, 1, 2)
         normal += 1e-9 * np.eye(2) * np.trace(normal[0])
         apart = float(np.ceil(np.pi / (high - low)))
-        return cls(joint, columns, masses, waves, normal, apart)
+        out = cls(orders, np.ones(orders.size, dtype=bool), piece, normal, apart)
+        for order in ripple.search.orders():
+            out.close(order)
+        return out
 
-    def peak(
-        self, residual: list[Array], free: NDArray[np.bool_]
-    ) -> tuple[float, int, int, Array]:
-        """
-        Return the strongest order: chi-square, joint, its place among the orders, (sine, cosine).
+    def close(self, order: float) -> None:
+        """Take the orders next to one that is in the ripple out."""
+        self.free[np.abs(self.orders - order) < self.apart] = False
 
-        ``free``, shape (O,), marks the orders that may enter.
-        """
-        pull = np.zeros(2 * free.size)
-        for mass, part, wave in zip(self.masses, residual, self.waves, strict=True):
-            pull += wave @ (mass * part).sum(axis=0).astype(np.float32)
-        right = np.where(free, pull.reshape(2, -1), 0.0).T
+    def peak(self, residual: Array) -> tuple[float, int, Array]:
+        """Return the chi-square of the strongest order, its number, and (sine, cosine)."""
+        right = self.piece.products(residual[None]).reshape(-1, 2) * self.free[:, None]
         step = np.linalg.solve(self.normal, right[..., None])[..., 0]
         chi = (right * step).sum(axis=-1)
         k = int(np.argmax(chi))
-        return float(chi[k]), self.joint, k, step[k]
+        return float(chi[k]), k, step[k]
+
+    def explained(self, k: int, step: Array) -> Array:
+        """Return what a wave takes off the whitened residual, shape (rows,)."""
+        return Piece(self.piece.each[2 * k : 2 * k + 2], self.piece.joint).mixed(step)
+
+
+def _ends(maker: Maker, effect: Effect) -> tuple[float, float]:
+    """Return between which angles the joint of an effect travels."""
+    i = maker.features[0].twin.robot.index(str(effect.site))
+    ends = [(one.reach[0][i], one.reach[1][i]) for one in maker.features]
+    return min(low for low, _ in ends), max(high for _, high in ends)
+
+
+def lines_of(maker: Maker, effect: Effect, least: float) -> Lines | None:
+    """
+    Return the waves above the dense ones of an effect of waves; None where none can be told.
+
+    Parameters
+    ----------
+    least : float [rad]
+        Travel below which nothing is looked for.
+
+    """
+    waves = effect.traits.waves
+    low, high = _ends(maker, effect) if waves is not None else (0.0, 0.0)
+    if waves is None or high - low < least:
+        return None
+    most = min(waves.highest, orders_told(maker.features, str(effect.site)))
+    orders = np.arange(waves.dense + 1.0, most + 1.0)
+    return Lines.of(maker, effect, orders) if orders.size else None
 
 
 def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -> Model:
@@ -262,51 +256,17 @@ def with_lines(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
     The score statistic of sine and cosine at every order costs one small product per joint; the
     strongest line enters, the residual it explains is taken off, and the look is repeated.
     """
-    kinds = [effect.traits.waves for effect in model.found if effect.traits.waves is not None]
-    if not kinds:
-        return model
-    residual = problem.residuals(model)
-    features = problem.features(model)
-    orders = np.arange(kinds[0].dense + 1.0, kinds[0].highest + 1.0)
-    each = [
-        Waves.of(problem, features, scale, i, orders, beliefs.wave_range)
-        for i in range(model.robot.n)
-    ]
-    waves = {w.joint: w for w in each if w is not None}
-    free = {i: _free(model, features, w, orders) for i, w in waves.items()}
-    result = list(model.found)
-    for _ in range(LINES if waves else 0):
-        chi, i, k, step = max(
-            (w.peak(residual, free[i]) for i, w in waves.items()), key=lambda item: item[0]
-        )
+    maker, found = Maker(problem, problem.features(model), scale), list(model.found)
+    each = ((k, lines_of(maker, effect, beliefs.wave_range)) for k, effect in enumerate(found))
+    looks = [(k, lines) for k, lines in each if lines is not None]
+    residual = problem.whitened(problem.residuals(model), scale)
+    for _ in range(LINES if looks else 0):
+        peaks = [(*lines.peak(residual), k, lines) for k, lines in looks]
+        chi, n, step, k, lines = max(peaks, key=lambda peak: peak[0])
         if chi < beliefs.line_chi2:
             break
-        for r, maker in enumerate(features):
-            angle = orders[k] * maker.view.q[:, i]
-            wave = step[0] * np.sin(angle) + step[1] * np.cos(angle)
-            residual[r] = residual[r] - waves[i].columns[r] * wave
-        free[i] = free[i] & (np.abs(orders - orders[k]) >= waves[i].apart)
-        result = _with_order(result, model.robot.joint_names[i], float(orders[k]))
-    return model.with_found(tuple(result))
-
-
-def _free(
-    model: Model, features: list[Features], waves: Waves, orders: Array
-) -> NDArray[np.bool_]:
-    """Return which orders no wave of the joint is too close to, shape (O,)."""
-    joint = model.robot.joint_names[waves.joint]
-    free: NDArray[np.bool_] = orders <= orders_told(features, joint)
-    for effect in model.found:
-        if effect.site == joint:
-            for order in effect.search.orders():
-                free &= np.abs(orders - order) >= waves.apart
-    return free
-
-
-def _with_order(result: list[Effect], joint: str, order: float) -> list[Effect]:
-    return [
-        effect.search.with_orders(np.append(effect.search.orders(), order))
-        if effect.traits.waves and effect.site == joint
-        else effect
-        for effect in result
-    ]
+        residual = residual - lines.explained(n, step)
+        lines.close(lines.orders[n])
+        orders = np.append(found[k].search.orders(), lines.orders[n])
+        found[k] = found[k].search.with_orders(orders)
+    return model.with_found(tuple(found))

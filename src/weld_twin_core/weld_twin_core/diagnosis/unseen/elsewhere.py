@@ -15,10 +15,10 @@ from dataclasses import replace
 
 from ...recording import Recording
 from ..beliefs import Beliefs
-from ..hypotheses.rivals import Rival, rivals
+from ..hypotheses.rivals import Rival, rivals, with_leads
 from ..hypotheses.search import Search, refitted
+from ..hypotheses.seed_systems import Role
 from ..hypotheses.selection import implausible
-from ..hypotheses.structural_aliases import with_structural_aliases
 from ..result import Site
 from .held_out_shrink import left_on
 
@@ -26,7 +26,7 @@ Slot = tuple[Rival, ...]
 
 
 def borne_out(
-    result: Search, holdout: Sequence[Recording], exclude: Sequence[str], beliefs: Beliefs
+    result: Search, holdout: Sequence[Recording], beliefs: Beliefs
 ) -> tuple[Search, float | None]:
     """
     Return the search with the effects and the rivals that held-out recordings bear out.
@@ -52,7 +52,7 @@ def borne_out(
         return result, None
     # What no machine has is left out of the model and its slots, and still is in the rivals' fits.
     if len(result.slots) == len(result.small.model.found):
-        result = _exchanged(result, holdout, exclude, beliefs)
+        result = _exchanged(result, holdout, beliefs)
     slots, least = list[Slot](), list[float]()
     for effect, candidate_set in zip(result.final.model.found, result.slots, strict=False):
         own = Site(effect.name, effect.site)
@@ -71,12 +71,10 @@ def borne_out(
     return replace(result, slots=tuple(slots)), min(least, default=None)
 
 
-def _exchanged(
-    result: Search, holdout: Sequence[Recording], exclude: Sequence[str], beliefs: Beliefs
-) -> Search:
+def _exchanged(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> Search:
     """Return the search with every effect replaced by its like where that alone carries over."""
     for _ in result.slots:
-        likes = [r for r in _likes(result, beliefs) if r.site.effect not in exclude]
+        likes = list(_likes(result, beliefs))
         remaining = _left(result, likes, holdout, beliefs)
         least = min(remaining, default=float('inf'))
         if not likes or (1.0 + beliefs.parted) * least > left_on(result, holdout, beliefs):
@@ -85,11 +83,10 @@ def _exchanged(
         tried = refitted(result, better.fit)
         if implausible(tried.final.model):
             break
-        slots = tuple(
-            rivals(result.work, better.fit, k, tried.effective)
-            for k in range(len(better.fit.model.found))
-        )
-        result = with_structural_aliases(replace(tried, slots=slots), exclude, beliefs)
+        case = result.work, better.fit
+        every = [rivals(*case, k) for k in range(len(better.fit.model.found))]
+        slots, refused = with_leads(*case, every)
+        result = replace(tried, slots=slots, refused=(*tried.refused, *refused))
     return result
 
 
@@ -97,7 +94,12 @@ def _likes(result: Search, beliefs: Beliefs) -> Iterator[Rival]:
     """Yield the rivals that could be in the model as well."""
     for candidate_set in result.slots:
         for alternative in candidate_set:
-            if alternative.probability >= beliefs.listed and alternative.fit is not result.small:
+            likely = alternative.probability >= beliefs.listed
+            if (
+                likely
+                and alternative.fit is not result.small
+                and alternative.role is not Role.TAKEN_OUT
+            ):
                 yield alternative
 
 

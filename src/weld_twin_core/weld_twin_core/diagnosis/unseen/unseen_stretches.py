@@ -23,9 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ..algebra.atoms import Rows, Whole, rows_of
-from ..algebra.definite import Index, Triangle, factored, inverses, unit_diagonal
-from ..algebra.designed import Design, designed
+from ..algebra.columns import Columns, Piece, Rows, designed, rows_of
+from ..algebra.definite import Index, factored, inverted, unit_diagonal
 from ..algebra.fit import Fit, trusted
 from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
@@ -38,6 +37,8 @@ ROUNDED = 1e-13
 times what one difference of doubles loses."""
 RIDGES = (1e-2, 1.0, 1e2, 1e4)
 """Prior precisions tried on columns of unit mean square, in units of noise: from free to still."""
+ZERO = 1e-140
+"""Norm of a column that counts as none; keeps its square from becoming infinite."""
 MANY = 200
 """Columns from which on an inverse of all of them serves every choice of effects."""
 MOST_STEPS = 1e6
@@ -57,7 +58,7 @@ class Unseen:
     ----------
     labels : array, shape (rows,)
         Stretch of every row.
-    columns : Design
+    columns : Columns
         P columns: frames, then the coordinates of every found effect.
     parts : tuple of slice
         Columns of every effect.
@@ -74,7 +75,7 @@ class Unseen:
     problem: Problem
     scale: Scale
     labels: Array
-    columns: Design
+    columns: Columns
     parts: tuple[slice, ...]
     residual: Array
     taken: Callable[[], Array]
@@ -125,7 +126,7 @@ class Unseen:
 
         return replace(
             self,
-            columns=Design((*self.columns.pieces, Whole(columns))),
+            columns=Columns((*self.columns.pieces, Piece(columns))),
             parts=(*self.parts, slice(count, count + more)),
             taken=cache(taken),
             precision=np.concatenate([self.precision, np.ones(more)]),
@@ -200,28 +201,22 @@ class Unseen:
         residual: Array = np.array(self._explained(mix))
         for b, rows in enumerate(self._spans):
             inverse = self._inverses[b]
-            step = inverse.times(self._right(b, mix))
+            step = inverse @ self._right(b, mix)
             if gone.size:
-                force = np.zeros(step.size)
-                force[gone] = np.linalg.solve(inverse.among(gone), step[gone])
-                step = step - inverse.times(force)
+                step -= inverse[:, gone] @ np.linalg.solve(inverse[np.ix_(gone, gone)], step[gone])
             residual[rows] -= self._stretches[b].mixed(step)
         return residual
 
     @cached_property
-    def _inverses(self) -> list[Triangle]:
+    def _inverses(self) -> list[Array]:
         """Return the inverse of all normal equations without every stretch."""
-        return inverses(self._scaled(b) for b in range(len(self._spans)))
-
-    def _scaled(self, b: int) -> tuple[Array, Array]:
-        """Return all normal equations without one stretch, scaled, and by what, (P, P) and (P,)."""
-        system = self._system(b, np.arange(self.columns.count))
-        size = np.sqrt(np.maximum(np.diag(system), 0.0))
-        unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
-        system *= unit[:, None]
-        system *= unit
-        system[np.diag_indices_from(system)] += DAMPING
-        return system, unit
+        out = []
+        for b in range(len(self._spans)):
+            system, size = unit_diagonal(self._system(b, np.arange(self.columns.count)), DAMPING)
+            # A base that only one stretch shows has columns of zeros without it; it stays put.
+            unit = np.where(size > ZERO, 1.0 / size, 0.0)
+            out.append(inverted(system) * unit[:, None] * unit)
+        return out
 
     def base(self, kept: Sequence[int]) -> Base:
         """Return a model of some effects, fitted with each stretch left out in turn."""
@@ -239,7 +234,7 @@ class Unseen:
     def _solver(self, b: int, index: Index) -> Solver:
         """Return what solves the normal equations of some columns without one stretch."""
         if index.size == self.columns.count > MANY:
-            return self._inverses[b].times
+            return partial(np.matmul, self._inverses[b])
         system, size = unit_diagonal(self._system(b, index), DAMPING)
         return partial(_solved, factored(system), size)
 
@@ -264,7 +259,7 @@ class Unseen:
         return rows_of(self.labels)
 
     @cached_property
-    def _stretches(self) -> list[Design]:
+    def _stretches(self) -> list[Columns]:
         """Return the columns of every stretch."""
         return [self.columns.within(rows) for rows in self._spans]
 
@@ -454,7 +449,7 @@ class Base:
         return list(outs)
 
     @cached_property
-    def _own(self) -> list[Design]:
+    def _own(self) -> list[Columns]:
         """Return the columns of the model on every stretch."""
         return [part.chosen(self.index) for part in self.unseen._stretches]
 
@@ -462,7 +457,7 @@ class Base:
 def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
     """Return the parts of a fitted model; see `Unseen.of`."""
     model = fit.model
-    columns, _ = designed(problem, model, scale)
+    columns = designed(problem, model, scale)
     frames = columns.count - fit.coordinates.size
     ends = np.cumsum([frames, *(effect.fit.coordinates().size for effect in model.found)]).tolist()
     prior = np.zeros(columns.count)

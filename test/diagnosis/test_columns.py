@@ -5,14 +5,7 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.diagnosis.algebra.atoms import (
-    Amounts,
-    MovedJoint,
-    Whole,
-    gathered,
-    moved_joint,
-)
-from weld_twin_core.diagnosis.algebra.designed import Design
+from weld_twin_core.diagnosis.algebra.columns import Columns, MovedJoint, Piece, moved_joint
 
 ROWS = np.repeat([6, 3], [5, 4])
 """Five poses of one recording and four points of another."""
@@ -22,7 +15,7 @@ ROWS = np.repeat([6, 3], [5, 4])
 def columns():
     rng = np.random.default_rng(3)
     joint = MovedJoint(rng.normal(size=ROWS.sum()), np.cumsum(ROWS) - ROWS)
-    return Amounts(joint, rng.normal(size=(4, ROWS.size)))
+    return Piece(rng.normal(size=(4, ROWS.size)), joint)
 
 
 def written(columns):
@@ -44,13 +37,13 @@ def test_products_are_those_of_the_columns_written_out(columns):
     rows, whole = np.random.default_rng(4).normal(size=(3, ROWS.sum())), written(columns)
     np.testing.assert_allclose(columns.products(rows), whole @ rows.T, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(columns.normal(), whole @ whole.T, rtol=1e-12, atol=1e-12)
-    assert columns.largest() == np.abs(whole).max()
+    np.testing.assert_array_equal(columns.peaks(), np.abs(whole).max(axis=1))
 
 
 def test_pieces_of_one_joint_are_joined_and_keep_their_order(columns):
-    other = Whole(np.ones((2, ROWS.sum())))
-    pieces = [Amounts(columns.joint, columns.each[:1]), Amounts(columns.joint, columns.each[1:])]
-    joined = gathered([*pieces, other, columns])
+    other = Piece(np.ones((2, ROWS.sum())))
+    pieces = [Piece(columns.each[:1], columns.joint), Piece(columns.each[1:], columns.joint)]
+    joined = Columns.joined([*pieces, other, columns]).pieces
     assert [piece.count for piece in joined] == [4, 2, 4]
     np.testing.assert_array_equal(joined[0].written_out(), columns.written_out())
 
@@ -68,8 +61,8 @@ def mixed(columns):
     """Return columns of a design: three written out, four of one joint, four of another."""
     rng = np.random.default_rng(8)
     other = MovedJoint(rng.normal(size=ROWS.sum()), columns.joint.first)
-    wide = Whole(rng.normal(size=(3, ROWS.sum())))
-    return Design((wide, columns, Amounts(other, rng.normal(size=(4, ROWS.size)))))
+    wide = Piece(rng.normal(size=(3, ROWS.sum())))
+    return Columns((wide, columns, Piece(rng.normal(size=(4, ROWS.size)), other)))
 
 
 @pytest.mark.parametrize('samples', [range(9), range(2, 6), [0, 3, 4, 8]])

@@ -39,7 +39,8 @@ WORTH = 0.7
 """A further mistake must bring what is wrong below this share of what it was; another one that leaves
 no more than the best over this share does as well."""
 MARGIN = 10.0
-"""Log Bayes factor by which a change at an instant must beat no change and every smooth change."""
+"""Log Bayes factor by which a change at an instant must beat every smooth change, and none at all; on a
+moving arm twice as much."""
 
 # How much is left --------------------------------------------------------------------------------
 

@@ -181,13 +181,15 @@ class _Seen:
     def best(self) -> _Trial | None:
         """Return the step or smooth change with most evidence; None where nothing is sure."""
         trials = []
-        for k in range(len(self.problem.recordings)):
+        for k, recording in enumerate(self.problem.recordings):
+            # What is left of a moving arm hangs together, however good the model.
+            least = MARGIN if recording.joints.static else 2.0 * MARGIN
             smooth = max(self._smooth(k), key=_sure)
             steps = list(self._steps(k))
             step, surest = _simplest(steps), max((t.sure for t in steps), default=0.0)
-            if step is not None and surest > MARGIN + max(smooth.sure, 0.0):
+            if step is not None and surest > max(least, MARGIN + smooth.sure):
                 trials.append(step._replace(sure=surest))
-            elif smooth.sure > MARGIN:
+            elif smooth.sure > least:
                 trials.append(smooth)
         return max(trials, key=_sure, default=None)
 

@@ -1,0 +1,368 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the checks of data stand on, each held against what can be said of it by hand."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from measured_cells import asked, moving, recorded, rejointed, stations
+
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.soundness.base_change import rest_of
+from weld_twin_core.diagnosis.soundness.computed import _rounding
+from weld_twin_core.diagnosis.soundness.lag import lag
+from weld_twin_core.diagnosis.soundness.lengths import instant, length
+from weld_twin_core.diagnosis.soundness.mending import Given, as_entry
+from weld_twin_core.diagnosis.soundness.mixups import _plausible
+from weld_twin_core.diagnosis.soundness.repeats import _apart, _common, refuse_reused
+from weld_twin_core.diagnosis.soundness.richness import motion
+from weld_twin_core.diagnosis.soundness.snapshot import FRAMES, Snapshot
+from weld_twin_core.diagnosis.soundness.stamps import _stream, streams, written
+from weld_twin_core.diagnosis.soundness.stuck import _freed, _inside, _runs
+from weld_twin_core.diagnosis.soundness.suspicions import (
+    doubles,
+    suspicions,
+    turned_bases,
+)
+from weld_twin_core.diagnosis.soundness.touches import _stretch
+from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion
+
+ELBOW = np.array([1.0, 1.0, np.degrees(1.0), 1.0, 1.0, 1.0])
+"""Columns of joints, the elbow's in degrees."""
+
+
+@pytest.fixture
+def still(ur5, rng):
+    return recorded(ur5, stations(ur5, rng, 40), rng, points=True)
+
+
+# The table of mix-ups ---------------------------------------------------------------------------
+
+
+def test_every_suspicion_is_another_one_and_changes_what_it_says(ur5, still):
+    every = [*suspicions(ur5), *doubles(ur5), *turned_bases(ur5)]
+    # The alphabet of this arm is one swap, and told as such.
+    other = [each for each in every if 'alphabetical' not in each.sentence]
+    assert len({str(as_entry(each.mend)) for each in other}) == len(other) == len(every) - 1
+    given = Given((still,), ur5, FRAMES)
+    for each in every:
+        made = each.mend(given)
+        q, seen = made.recordings[0].joints.q, made.recordings[0].seen.position
+        same = np.array_equal(q, still.joints.q)
+        joints = {'joints_swapped', 'coupled_axes', 'constant_angle'}
+        assert same != (
+            each.kind in joints or (each.kind != 'base_turned' and each.at[0] in ur5.joint_names)
+        )
+        if each.kind == 'other_robot':
+            assert made.robot.name in each.sentence and made.robot.n == ur5.n
+        if each.at == ('instrument',) and each.kind != 'camera_inverted':
+            assert not np.array_equal(seen, still.seen.position)
+
+
+@pytest.mark.parametrize(
+    ('words', 'spoil'),
+    [
+        ('joint positions are in degrees', lambda q: np.degrees(q)),
+        ("joint 'elbow_joint' is in degrees where", lambda q: q * ELBOW),
+        ("joint 'elbow_joint' is in degrees, the others", lambda q: np.radians(q) * ELBOW),
+        ("joint 'elbow_joint' counts the other", lambda q: q * [1, 1, -1, 1, 1, 1]),
+        ('all joints count the other way', lambda q: -q),
+        ("'elbow_joint' and 'wrist_3_joint' are swapped", lambda q: q[:, [0, 1, 5, 3, 4, 2]]),
+        ('in reverse order', lambda q: q[:, ::-1]),
+        ('in alphabetical order', lambda q: q[:, [2, 1, 0, 3, 4, 5]]),
+        ("'elbow_joint' lies +90 degrees", lambda q: q - [0, 0, np.pi / 2, 0, 0, 0]),
+        ("'elbow_joint' lies +180 degrees", lambda q: q - [0, 0, np.pi, 0, 0, 0]),
+    ],
+)  # fmt: skip
+def test_what_a_suspicion_says_of_joints_is_what_it_undoes(ur5, still, words, spoil):
+    fitting = [each for each in suspicions(ur5) if words in each.sentence]
+    bad = Given((rejointed(still, spoil(still.joints.q)),), ur5, FRAMES)
+    undone = [each.mend(bad).recordings[0].joints.q for each in fitting]
+    assert any(np.allclose(q, still.joints.q, atol=1e-12) for q in undone)
+
+
+def test_joint_3_counted_against_the_ground_is_put_right_either_way(ur5, still):
+    for sign, word in ((1.0, 'Add'), (-1.0, 'Subtract')):
+        bad = np.array(still.joints.q)
+        bad[:, 2] -= sign * bad[:, 1]
+        (each,) = (s for s in suspicions(ur5) if s.kind == 'coupled_axes' and word in s.remedy)
+        (made,) = each.mend(Given((rejointed(still, bad),), ur5, FRAMES)).recordings
+        np.testing.assert_allclose(made.joints.q, still.joints.q, atol=1e-12)
+
+
+def test_joints_that_slide_are_told_in_lengths_and_turn_by_no_quarter():
+    robot = load('ur5')
+    track = replace(robot, prismatic=np.arange(robot.n) == 0)
+    own = [s for s in suspicions(track) if s.at == (robot.joint_names[0],)]
+    assert {s.kind for s in own} == {'units', 'sign'}
+    assert any('millimetres' in s.sentence for s in own) and not any(
+        'degrees' in s.sentence for s in own
+    )
+
+
+def test_a_base_stands_turned_in_three_and_twenty_ways(ur5):
+    turns = [each.mend(Given((), ur5)).robot.T_world_base[:3, :3] for each in turned_bases(ur5)]
+    assert len(turns) == 23 and all(np.linalg.det(turn) > 0.999 for turn in turns)
+    about_z = [each for each in turned_bases(ur5) if each.alike]
+    assert len(about_z) == 3 and all('about its z axis' in each.sentence for each in about_z)
+    assert sorted(each.sentence.split(' degrees')[0].split()[-1] for each in about_z) == [
+        '-90',
+        '180',
+        '90',
+    ]
+
+
+@pytest.mark.parametrize(('off', 'plausible'), [(0.4, True), (0.6, False)])
+def test_frames_are_as_far_off_as_a_cause_may_be(ur5, off, plausible):
+    base = np.eye(4)
+    base[0, 3] = off
+    model = SimpleNamespace(bases=(ur5.T_world_base @ base,), robot=ur5)
+    assert _plausible(ur5, model) is plausible
+    turned = np.eye(4)
+    turned[:2, :2] = [[np.cos(off / 2), -np.sin(off / 2)], [np.sin(off / 2), np.cos(off / 2)]]
+    model = SimpleNamespace(bases=(ur5.T_world_base @ turned,), robot=ur5)
+    assert _plausible(ur5, model) is (off / 2 < 0.2 + 1e-9)
+
+
+# Snapshots --------------------------------------------------------------------------------------
+
+
+def test_whatever_is_shrunk_must_leave_less_for_its_size(ur5, still):
+    _, model = asked(ur5, still)
+    shot = Snapshot((still,), model)
+    small = Snapshot(
+        (still.with_measured(replace(still.measured, position=1e-3 * still.seen.position)),), model
+    )
+    assert (shot.collapsed, shot.shrunk(shot)) == (1.0, 1.0)
+    assert small.shrunk(shot) == pytest.approx(1e3) and shot.shrunk(small) == 1.0
+    assert small.collapsed > 50.0
+
+
+def test_readings_far_beyond_a_joints_range_are_not_possible(ur5, still):
+    _, model = asked(ur5, still)
+    turn = ur5.upper[0] + np.array([0.9, 1.1])
+    for more, possible in zip(turn, (True, False), strict=True):
+        q = np.array(still.joints.q)
+        q[3, 0] = more
+        assert Snapshot((rejointed(still, q),), model).possible is possible
+
+
+# Readings that stand still ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('static', 'runs'), [(True, [(0, 4), (10, 16)]), (False, [(10, 16)])])
+def test_stretches_that_stand_still_are_long_enough(static, runs):
+    q = np.arange(20.0)
+    q[:5], q[6:9], q[10:17] = q[0], q[6], q[10]
+    joints = JointMotion(0.09 * np.arange(20.0), q[:, None], static=static)
+    assert _runs(joints.q, joints) == runs
+
+
+def test_after_a_stop_an_arm_settles_and_at_a_station_it_has(ur5, rng):
+    run = recorded(ur5, moving(ur5, rng), rng)
+    t = run.joints.t
+    inside = _inside(run, 100, 200)
+    assert run.seen.t[inside].min() >= t[100] + 0.2 and run.seen.t[inside].max() <= t[199]
+    still = replace(run, joints=replace(run.joints, static=True, qd=None))
+    assert run.seen.t[_inside(still, 100, 200)].min() == pytest.approx(t[100], abs=0.02)
+
+
+@pytest.mark.parametrize('joint', [1, 4])
+def test_a_joint_set_free_reaches_where_it_went_and_nowhere_else(ur5, still, joint):
+    _, model = asked(ur5, still, align=())
+    held = np.array(still.joints.q)
+    held[:, joint] += np.linspace(-1.0, 1.5, len(held))
+    everywhere = np.ones(len(held), dtype=bool)
+    assert _freed(model, rejointed(still, held), 0, joint, everywhere) < 1e-4
+    assert (
+        _freed(model, rejointed(still, held), 0, 3 - joint if joint == 1 else 0, everywhere) > 0.01
+    )
+
+
+# Clocks -----------------------------------------------------------------------------------------
+
+
+def wave(t):
+    return np.stack([np.sin(6.0 * t), np.cos(5.0 * t), 0.2 * np.sin(1.3 * t)], axis=1)
+
+
+def test_of_lags_that_explain_as_much_the_nearest_is_told():
+    """A motion that comes round again every two seconds is late by a little, not by a round more."""
+
+    def round_and_round(t):
+        return np.stack([np.sin(np.pi * t), np.cos(2.0 * np.pi * t), np.zeros(t.size)], axis=1)
+
+    joints, t = np.linspace(0.0, 40.0, 4001), np.linspace(3.0, 37.0, 1500)
+    found = lag(joints, round_and_round(joints), t, round_and_round(t - 0.3))
+    assert found.late == pytest.approx(0.3, abs=1e-3)
+
+
+def test_of_lags_the_best_is_told_where_a_nearer_one_explains_less():
+    joints, t = np.linspace(0.0, 40.0, 4001), np.linspace(3.0, 37.0, 1500)
+    for late in (1.3, -0.9):
+        found = lag(joints, wave(joints), t, wave(t - late))
+        assert found.late == pytest.approx(late, abs=1e-3) and found.after < 0.01 * found.before
+
+
+def test_clocks_that_run_apart_are_told_by_their_rate():
+    joints, t = np.linspace(0.0, 40.0, 4001), np.linspace(3.0, 37.0, 1500)
+    found = lag(joints, wave(joints), t, wave(t - 0.1 - 2e-3 * (t - 20.0)))
+    assert found.rate == pytest.approx(2e-3, rel=0.02)
+    assert found.at(np.array([20.0]))[0] == pytest.approx(0.1, abs=2e-3)
+
+
+def test_too_few_samples_tell_no_lag():
+    t = np.linspace(0.0, 10.0, 19)
+    assert lag(t, wave(t), t, wave(t)) is None
+
+
+@pytest.mark.parametrize(('digits', 'step'), [(2, 1e-2), (3, 1e-3), (6, 1e-6), (9, 0.0)])
+def test_the_digits_that_were_written_are_seen(rng, digits, step):
+    assert written(np.round(rng.uniform(0.0, 10.0, 50), digits)) == pytest.approx(step)
+
+
+def told(t):
+    return [(found.level, found.sentence) for found in _stream(t, 'They')]
+
+
+def test_what_is_said_of_stamps_is_what_they_are(rng):
+    t = 0.02 * np.arange(500.0)
+    assert not told(t)
+    lost = np.delete(t, np.arange(100, 110))
+    ((level, words),) = told(lost)
+    assert (
+        level == 'note'
+        and '1 gap(s), the longest 0.22 s at t = 1.98 s; about 10 messages' in words
+    )
+    half = np.delete(t, np.arange(100, 300))
+    assert told(half)[0][0] == 'warning'
+    assert 'in whole 10 ms' in told(np.round(np.arange(500.0) / 60.0, 2))[0][1]
+    assert 'give or take' in told(t + rng.uniform(0.0, 0.015, t.size))[0][1]
+
+
+def test_streams_of_one_length_without_common_time_can_be_brought_together(ur5, rng):
+    run = recorded(ur5, moving(ur5, rng), rng, points=True)
+    for part, mended in ((1.0, True), (0.5, False)):
+        seen = run.measured.take(run.measured.t <= part * run.measured.t[-1])
+        far = run.with_measured(replace(seen, t=seen.t + 900.0))
+        (found,) = streams(Given((far,), ur5))
+        assert found.kind == 'clock' and (found.mend is not None) is mended
+
+
+# Repeats and strays -----------------------------------------------------------------------------
+
+
+def test_rows_in_common_are_equal_to_the_last_digit(rng):
+    first = rng.normal(size=(30, 3))
+    second = np.concatenate([first[:7], first[7:9] + 1e-12, rng.normal(size=(5, 3))])
+    assert _common(first, second) == 7
+
+
+@pytest.mark.parametrize(('shared', 'refused'), [(6, False), (12, True)])
+def test_what_is_judged_on_may_share_a_few_readings_of_a_coarse_instrument(
+    ur5, rng, shared, refused
+):
+    one = recorded(ur5, stations(ur5, rng, 40), rng, points=True)
+    other = recorded(ur5, stations(ur5, rng, 40), rng, points=True, name='other')
+    position = np.array(other.seen.position)
+    position[:shared] = one.seen.position[:shared]
+    held = other.with_measured(replace(other.measured, position=position))
+    if refused:
+        with pytest.raises(DataError, match=f'holds {shared} of its 40'):
+            refuse_reused([one], [held])
+    else:
+        refuse_reused([one], [held])
+
+
+def test_a_stray_is_far_from_its_neighbours_and_a_step_is_none(rng):
+    position = 2e-5 * rng.standard_normal((3, 300))
+    assert not _apart(position).any()
+    position[:, 150:] += 5e-3
+    assert not _apart(position).any()
+    position[1, 80] += 9e-3
+    assert np.flatnonzero(_apart(position)).tolist() == [80]
+    assert _apart(position)[80] == pytest.approx(9e-3, rel=0.02)
+
+
+def test_places_that_moved_are_found_in_a_row_and_the_shorter_part_is_told(rng):
+    points = 1e-5 * rng.standard_normal((30, 3))
+    points[8:20] += [1e-3, 0.0, 0.0]
+    first, last, shift, explained = _stretch(points)
+    assert (first, last) == (8, 20) and explained > 0.99
+    assert shift == pytest.approx(1e-3, rel=0.02)
+    points[:] = 1e-5 * rng.standard_normal((30, 3))
+    points[:22] += [0.0, 2e-3, 0.0]
+    assert _stretch(points)[:2] == (22, 30)
+
+
+# Motion -----------------------------------------------------------------------------------------
+
+
+def test_a_joint_that_goes_back_a_little_has_reversed(ur5, rng):
+    t = np.linspace(0.0, 10.0, 400)
+    q = np.tile(moving(ur5, rng).q[0], (400, 1)) + np.linspace(0.0, 0.5, 400)[:, None]
+    q[300:, 2] = q[300, 2] - 0.05 * (t[300:] - t[300])
+    run = recorded(ur5, JointMotion(t, q), rng)
+    problem, model = asked(ur5, run, align=())
+    case = SimpleNamespace(problem=problem, model=model, recordings=(run,), motions=[q])
+    (one_way,) = (f.sentence for f in motion(case) if 'never' in f.sentence)
+    assert "'elbow_joint'" not in one_way and "'wrist_1_joint'" in one_way
+
+
+@pytest.mark.parametrize(
+    ('value', 'words'),
+    [(2.5, '2.5 m'), (0.0123456, '12.3 mm'), (4.2e-5, '0.042 mm'), (1e-8, 'less than 0.001 mm')],
+)
+def test_lengths_are_told_as_fine_as_instruments_are(value, words):
+    assert length(value) == words
+
+
+def test_an_instant_is_a_station_or_a_time(still):
+    assert instant(still, 0.5 * (still.seen.t[11] + still.seen.t[12])) == 'station 12 of 40'
+    run = replace(still, joints=replace(still.joints, static=False))
+    assert instant(run, 1.25) == 't = 1.25 s'
+
+
+# Changes in time --------------------------------------------------------------------------------
+
+
+def test_a_change_explains_what_was_put_in_and_nothing_once_it_is_taken_out(ur5, rng):
+    run = recorded(ur5, stations(ur5, rng, 80), rng, points=True)
+    problem, model = asked(ur5, run, align=())
+    after = (np.arange(80) >= 50).astype(float)
+    part = problem.residuals(model)[0] + 1e-3 * np.array([[1.0], [-1.0], [0.5]]) * after
+    rest = rest_of([part], problem, model)
+    base = rest.change('base')
+    assert int(base.step_gains(0).argmax()) == 50
+    shapes = np.array([np.arange(80) >= k for k in (20, 50, 70)], dtype=float)
+    np.testing.assert_allclose(base.gains(shapes), base.step_gains(0)[[20, 50, 70]], rtol=1e-6)
+    assert base.size(after) == pytest.approx(1.5e-3, rel=0.05)
+    assert base.nats(after) > 50.0
+    left = base.taken_out(after)
+    assert left.change('base').gains(after[None])[0] < 1e-6 * base.gains(after[None])[0]
+    assert left.far < 0.2 * rest.far and left.left(0) < rest.left(0)
+
+
+def test_constant_errors_of_an_arm_leave_nothing_that_changed(ur5, rng):
+    run = recorded(ur5, stations(ur5, rng, 80), rng, points=True)
+    problem, model = asked(ur5, run, align=())
+    (maker,) = problem.features(model)
+    off = 2e-3 * maker.column(('q', 2))[:3] + 1e-3 * maker.column(('a', 1))[:3]
+    both = rest_of([problem.residuals(model)[0] + off], problem, model)
+    alone = rest_of([problem.residuals(model)[0]], problem, model)
+    assert both.left(0) < 1.2 * alone.left(0)
+
+
+def test_rounding_is_as_coarse_as_the_numbers_are(ur5, rng):
+    run = recorded(ur5, stations(ur5, rng, 80), rng, points=True)
+    rounded = []
+    for digits in (5, 6, 9):
+        seen = replace(run.measured, position=run.measured.position.round(digits))
+        problem = Problem((run.with_measured(seen),), FRAMES)
+        rounded.append(_rounding(problem, asked(ur5, run)[1]))
+    coarse, fine, none = rounded
+    assert 4e-6 < coarse < 1e-5 and fine == pytest.approx(0.1 * coarse) and none == 0.0

@@ -79,7 +79,7 @@ class Slip:
     @property
     def time(self) -> float:
         """Return when [s], between the last measurement before and the first after."""
-        return self.effect.instant
+        return float(self.effect.time)  # type: ignore[attr-defined]
 
     @property
     def alike(self) -> tuple[tuple[str, tuple[str, ...]], ...]:

@@ -42,25 +42,25 @@ BENT = (0.03, 0.15, 1e-3, 1e-3, 0.4)
 """Spread of k1 k2 p1 p2 k3 between such calibrations."""
 SHIFT, TURN = 1.0, 1.0
 """Spread [m, rad] of the places of further cameras and targets: they may be anywhere."""
-HUBER = 3.0
+_HUBER = 3.0
 """A pixel this many robust deviations off starts to lose weight."""
-NORMAL = 1.4826
+_NORMAL = 1.4826
 """Standard deviation of normal numbers over the median of their size."""
-LEAST_PIXEL = 1e-3
+_LEAST_PIXEL = 1e-3
 """Noise of a pixel [px] that is taken at the least: images without any are computed."""
 ROUNDS = 30
 """Steps at the most; six are usual."""
 SETTLED = 1e-6
 """Share by which the cost must still fall."""
-DAMPED = 1e8
+_DAMPED = 1e8
 """Damping of a step, in units of its columns, at which the search ends."""
-REWEIGHTED = 3
+_REWEIGHTED = 3
 """Times that pixels are weighed anew; the last changes no pose by a tenth of its noise."""
-TOGETHER = 64
+_TOGETHER = 64
 """Stamps that are taken at once: enough to share a step, few enough for the memory."""
-SINGULAR = 1e9
+_SINGULAR = 1e9
 """Condition from which on images tell no pose."""
-BEYOND = 1.1
+_BEYOND = 1.1
 """Of the size of an image, from where on a pixel is outside: where the size is not told it follows
 from the centre, which is off by some per cent."""
 LOOSEST, LOOSER = 10.0, 1.5
@@ -68,11 +68,11 @@ LOOSEST, LOOSER = 10.0, 1.5
 believed: a printed board of a few dozen points errs by half more by chance in its figure at most."""
 LEARNED = 3
 """Times that it is learned how well points are known; the last changes it by a few per cent."""
-SHOWN = 1.0
+_SHOWN = 1.0
 """Deviations by which an unknown of one deviation must move all poses together to be kept."""
 
 
-class Adjusted(NamedTuple):
+class _Adjusted(NamedTuple):
     """What images tell."""
 
     measured: Measurements
@@ -240,9 +240,9 @@ class _Point:
         both = np.concatenate([shared, residual[:, :, None]], axis=2)
         size, image = both.shape[2], self.state.seen.image
         parts, normal = list[tuple[Array, Array]](), np.zeros((size, size))
-        for first in range(0, len(self.state.tool), TOGETHER):
-            some = np.flatnonzero((image >= first) & (image < first + TOGETHER))
-            count = min(TOGETHER, len(self.state.tool) - first)
+        for first in range(0, len(self.state.tool), _TOGETHER):
+            some = np.flatnonzero((image >= first) & (image < first + _TOGETHER))
+            count = min(_TOGETHER, len(self.state.tool) - first)
             slot = _slots(image[some] - first)
             wide = np.zeros((count, slot.max() + 1, 2, 6))
             wide[image[some] - first, slot] = of_tool[some]
@@ -279,7 +279,7 @@ def _slots(image: NDArray[np.intp]) -> NDArray[np.intp]:
     return out
 
 
-def adjusted(seen: Sightings) -> Adjusted:
+def adjusted(seen: Sightings) -> _Adjusted:
     """
     Return the poses that images tell.
 
@@ -299,7 +299,7 @@ def adjusted(seen: Sightings) -> Adjusted:
     )
     state = replace(state, unknowns=np.zeros(state.sizes.size))
     reported = np.ones(len(seen.image)) if seen.sigma is None else 1.0 / seen.sigma
-    for _ in range(REWEIGHTED):
+    for _ in range(_REWEIGHTED):
         weight, _ = _weights(state, reported)
         state = _descended(_Point.at(state, weight)).state
     state = _loosened(state, reported)
@@ -396,7 +396,7 @@ def _lies(seen: Sightings, c: int) -> bool:
     """Return whether the images of a camera are stored a quarter turn from its intrinsics."""
     most = seen.pixel[seen.camera == c].max(axis=0, initial=0.0)
     size = seen.cameras[c].image
-    return bool((most > BEYOND * size).any() and (most <= BEYOND * size[::-1]).all())
+    return bool((most > _BEYOND * size).any() and (most <= _BEYOND * size[::-1]).all())
 
 
 def _weights(state: _State, reported: Array) -> tuple[Array, float]:
@@ -404,10 +404,10 @@ def _weights(state: _State, reported: Array) -> tuple[Array, float]:
     residual = state.rows()[0] * reported[:, None]
     # Poses took their share of the noise: six numbers of every stamp, and of unknowns some.
     free = max(1.0 - (6 * len(state.tool) + UNKNOWNS) / max(residual.size, 1), 0.05)
-    spread = NORMAL * float(np.median(np.abs(residual))) / np.sqrt(free)
-    spread = max(float(spread), LEAST_PIXEL)
+    spread = _NORMAL * float(np.median(np.abs(residual))) / np.sqrt(free)
+    spread = max(float(spread), _LEAST_PIXEL)
     off = np.sqrt((residual**2).mean(axis=1)) / spread
-    weight = reported / spread * np.minimum(1.0, HUBER / np.maximum(off, 1e-12))
+    weight = reported / spread * np.minimum(1.0, _HUBER / np.maximum(off, 1e-12))
     return np.asarray(weight), spread / float(np.median(reported))
 
 
@@ -416,7 +416,7 @@ def _descended(here: _Point) -> _Point:
     damping = 1e-6
     for _ in range(ROUNDS):
         there = here.stepped(damping)
-        while not there.cost <= here.cost and damping < DAMPED:
+        while not there.cost <= here.cost and damping < _DAMPED:
             damping = damping * 10.0
             there = here.stepped(damping)
         if not there.cost <= here.cost:
@@ -428,10 +428,10 @@ def _descended(here: _Point) -> _Point:
     return here
 
 
-def _told(point: _Point, noise: float) -> Adjusted:
+def _told(point: _Point, noise: float) -> _Adjusted:
     """Return poses with what is not sure about them."""
     own, state = point.reduced, point.state
-    weak = np.linalg.cond(own.roots) > SINGULAR
+    weak = np.linalg.cond(own.roots) > _SINGULAR
     if weak.any():
         raise DataError(f'the images at {state.seen.t[weak][0]:.3f} s do not tell a pose')
     # Unknowns of unit spread after all that the images tell of them together, and where that is.
@@ -440,7 +440,7 @@ def _told(point: _Point, noise: float) -> Adjusted:
     mean = unit.T @ (own.rest - state.unknowns)
     moved = own.shared @ unit
     _, strength, kept = np.linalg.svd(moved.reshape(-1, moved.shape[2]), full_matrices=False)
-    kept = kept[strength > SHOWN]
+    kept = kept[strength > _SHOWN]
     pose = _stepped(state.tool, _solved(own.roots, own.right))
     change = np.linalg.solve(own.roots, moved @ kept.T)
     said = PoseNoise.of(np.asarray(np.linalg.inv(_swap(own.roots) @ own.roots), dtype=float))
@@ -454,7 +454,7 @@ def _told(point: _Point, noise: float) -> Adjusted:
     )
     off = state.unknowns[: UNKNOWNS * len(state.lenses)].reshape(-1, UNKNOWNS)
     known = tuple(target.sigma for target in state.seen.targets)
-    return Adjusted(measured, state.lenses, off, noise, known)
+    return _Adjusted(measured, state.lenses, off, noise, known)
 
 
 def _of_tool(

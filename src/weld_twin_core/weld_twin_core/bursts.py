@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 
 from .arrays import Array
 
-ENOUGH = 30
+_ENOUGH = 30
 """Stamps below which their steps show no bursts."""
-SHORT = 0.1
+_SHORT = 0.1
 """A step of less than this share of the mean step lies inside a burst."""
 MANY = 0.4
 """Share of the steps that must be so short; bursts of two have half. Of messages that arrive at
 random one step in ten is."""
 LEAST = 5
 """Bursts below which there is no rate of bursts."""
-WINDOW = 5
+_WINDOW = 5
 """Bursts whose least delay is that of the time: some were sent right after a sample."""
-SKIPPED = 0.6
+_SKIPPED = 0.6
 """Steps that the least delay must grow by at once for a sample to have been lost."""
 SETTLED = 3
 """Times that lost samples and the step are found in turn."""
-SOONEST = 0.05
+_SOONEST = 0.05
 """Quantile of the delays of the last sample of a burst that counts as the least; a few may be off."""
 
 
@@ -74,9 +74,9 @@ def bursts(t: Array) -> Bursts | None:
 
     """
     steps = np.diff(t)
-    if t.size < ENOUGH or t[-1] <= t[0]:
+    if t.size < _ENOUGH or t[-1] <= t[0]:
         return None
-    inside = steps < SHORT * float(steps.mean())
+    inside = steps < _SHORT * float(steps.mean())
     if inside.mean() < MANY:
         return None
     last = np.append(np.flatnonzero(~inside), t.size - 1)
@@ -90,7 +90,7 @@ def bursts(t: Array) -> Bursts | None:
     counted = last + np.searchsorted(lost, last, side='right')
     step = float(np.polyfit(counted, t[last], 1)[0])
     # What was measured last before it was sent waited least.
-    first = float(np.quantile(t[last] - step * counted, SOONEST))
+    first = float(np.quantile(t[last] - step * counted, _SOONEST))
     return Bursts(last.size, float(np.median(np.diff(t[last]))), first, step, lost)
 
 
@@ -98,9 +98,9 @@ def _lost(delay: Array, start: NDArray[np.int_], step: float) -> NDArray[np.int_
     """Return the samples before which one is missing: from there on all come a step later."""
     out: list[int] = []
     for k in range(1, delay.size):
-        before = float(delay[max(k - WINDOW, 0) : k].min())
-        later = float(delay[k : k + WINDOW].min()) - before
-        if later > SKIPPED * step and delay.size - k >= 2:
+        before = float(delay[max(k - _WINDOW, 0) : k].min())
+        later = float(delay[k : k + _WINDOW].min()) - before
+        if later > _SKIPPED * step and delay.size - k >= 2:
             missing = max(round(later / step), 1)
             out += [int(start[k])] * missing
             delay = np.where(np.arange(delay.size) >= k, delay - missing * step, delay)

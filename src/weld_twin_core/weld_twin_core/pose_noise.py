@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from .arm.rotation import skew
 from .arrays import Array, readonly
 
-ROUNDED = 1e-6
+_ROUNDED = 1e-6
 """Share by which numbers may differ that were meant to be the same: those of single precision."""
-TINY = 1e-12
+_TINY = 1e-12
 """Share of the largest variance, each in its own unit, below which one counts as none."""
 
 
@@ -58,7 +58,7 @@ class PoseNoise:
         size = np.sqrt(variance)
         unit = covariance / (size[:, :, None] * size[:, None, :])
         strength, ways = np.linalg.eigh(unit)
-        strength = np.maximum(strength, TINY)
+        strength = np.maximum(strength, _TINY)
         root = (ways / np.sqrt(strength)[:, None, :]) @ np.swapaxes(ways, 1, 2)
         root = typical[:, None] * root / size[:, None, :]
         return cls(root, typical, np.sqrt(each[:, 0]))
@@ -117,8 +117,8 @@ def alike(covariance: Array) -> bool:
     """
     first = covariance[0]
     plain = np.diag(np.repeat(first.diagonal()[[0, 3]], 3))
-    same = np.allclose(covariance, first, ROUNDED, 0.0)
-    return bool(same and np.allclose(first, plain, ROUNDED, 0.0))
+    same = np.allclose(covariance, first, _ROUNDED, 0.0)
+    return bool(same and np.allclose(first, plain, _ROUNDED, 0.0))
 
 
 def positive(covariance: Array) -> NDArray[np.bool_]:

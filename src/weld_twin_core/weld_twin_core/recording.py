@@ -17,7 +17,7 @@ from .cubics import hermite
 from .errors import DataError
 from .pose_noise import Common, PoseNoise, inverse_error
 
-WRENCH_FRAMES = ('tool', 'base')
+_WRENCH_FRAMES = ('tool', 'base')
 
 
 def backward_rates(t: Array, values: Array) -> Array:
@@ -355,9 +355,9 @@ class Recording:
                 f'{self.name} has {self.contacts.size} contacts and {self.joints.t.size} '
                 'postures; every posture touches one thing'
             )
-        if self.wrench_frame not in WRENCH_FRAMES:
+        if self.wrench_frame not in _WRENCH_FRAMES:
             raise DataError(
-                f'wrench_frame must be one of {", ".join(WRENCH_FRAMES)}, '
+                f'wrench_frame must be one of {", ".join(_WRENCH_FRAMES)}, '
                 f'got {self.wrench_frame!r}'
             )
         n = self.joints.q.shape[1]

@@ -8,7 +8,7 @@ import numpy as np
 
 from .arrays import Array
 
-PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)
+_PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71)
 """One base for every dimension; more joints than these no arm has."""
 
 
@@ -23,7 +23,7 @@ def halton(dimensions: int, count: int) -> Array:
 
     """
     out = np.zeros((count, dimensions))
-    for k, base in enumerate(PRIMES[:dimensions]):
+    for k, base in enumerate(_PRIMES[:dimensions]):
         rest, weight = np.arange(1, count + 1), 1.0 / base
         while rest.any():
             rest, digit = np.divmod(rest, base)

@@ -25,11 +25,11 @@ from .vectors import components, cross, pad, samples_first
 
 MANY = 5000
 """Joint positions from which `forward` leaves the work to `bulk`..."""
-MOST_JOINTS = 8
+_MOST_JOINTS = 8
 """... and joints up to which it does: there the work grows threefold with every other joint."""
 
 
-class RowAxes(NamedTuple):
+class _RowAxes(NamedTuple):
     """Axes of one DH row in the world frame, components first, shape (3, ...) each [-, m]."""
 
     z: Array
@@ -54,7 +54,7 @@ class Frames(NamedTuple):
 
     rotation: Array
     position: Array
-    rows: tuple[RowAxes, ...]
+    rows: tuple[_RowAxes, ...]
     flange_rotation: Array
     flange_point: Array
     base_rotation: Array
@@ -134,7 +134,7 @@ def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
     axes = max([q.ndim - 1, *(np.ndim(value) for value in shift.values())])
     triad, p = _started(base_rotation, base_point, axes)
     root_rotation, root_point = base_rotation, base_point
-    rows: list[RowAxes] = []
+    rows: list[_RowAxes] = []
     ends: list[tuple[Array, ...]] = []
     for i, values in enumerate(_row_values(robot, q, shift)):
         order = ROW_ORDER[robot.convention]
@@ -192,7 +192,7 @@ def _ended(triad: tuple[Array, ...], p: Array) -> tuple[Array, Array]:
 
 def _row(
     order: tuple[str, ...], axes: tuple[Array, ...], p: Array, values: dict[str, Any]
-) -> tuple[tuple[Array, ...], Array, RowAxes]:
+) -> tuple[tuple[Array, ...], Array, _RowAxes]:
     """Return axes and origin behind a row, and where each of its motions began."""
     moving, met = list(axes), {}
     for kind in order:
@@ -204,9 +204,9 @@ def _row(
         else:
             p = _slid(p, moving[k], values[kind])
     # alpha turns about the x before beta and a moves along the x after it; the two differ only
-    # when beta is not zero, so RowAxes keeps alpha's axis and `column` rebuilds a's from y and z.
+    # when beta is not zero, so _RowAxes keeps alpha's axis and `column` rebuilds a's from y and z.
     x, y, z = moving
-    return (x, y, z), p, RowAxes(*met['theta'], *met['alpha'], *met['beta'])
+    return (x, y, z), p, _RowAxes(*met['theta'], *met['alpha'], *met['beta'])
 
 
 def displaced_robot(robot: Robot, shift: Mapping[Channel, float]) -> Robot:
@@ -266,7 +266,7 @@ def forward(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array:
         T_root_table = forward(foot, q[..., : robot.behind][..., ::-1])
         T_root_tool = forward(arm, q[..., robot.behind :])
         return np.asarray(np.linalg.inv(T_root_table) @ T_root_tool)
-    if q.size >= MANY * robot.n and robot.n <= MOST_JOINTS and not shift:
+    if q.size >= MANY * robot.n and robot.n <= _MOST_JOINTS and not shift:
         return kernel_of(robot).poses(q.reshape(-1, robot.n)).reshape(*q.shape[:-1], 4, 4)
     chain = frames(robot, q, shift)
     return transform(chain.rotation, chain.position)
@@ -298,7 +298,7 @@ def column(robot: Robot, chain: Frames, channel: Channel, shift: Shift = NO_SHIF
     return -out if i < robot.behind else out
 
 
-def _row_column(robot: Robot, row: RowAxes, name: str, tip: Array) -> Array:
+def _row_column(robot: Robot, row: _RowAxes, name: str, tip: Array) -> Array:
     """Return the velocity of the tip and its turn by one value of a row, passed forwards."""
     match name:
         case 'theta':

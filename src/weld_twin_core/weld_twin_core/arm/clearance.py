@@ -19,25 +19,25 @@ from .chain import Frames, frames
 from .mounting import rising, up
 from .robot import Robot
 
-THICK = 0.05
+_THICK = 0.05
 """Radius of a link as a share of the arm's whole length: a UR5, 1.2 m from joint to joint, has 0.06 m,
 a KR 16 of 2.4 m has 0.12 m."""
-TORCH = 0.03
+_TORCH = 0.03
 """Radius of what hangs on the flange [m]: a torch is about 60 mm thick."""
-SHORT = 1e-3
+_SHORT = 1e-3
 """Shorter lines [m] are no link."""
-ALIKE = 1e-3
+_ALIKE = 1e-3
 """Distance [m] by which two postures may differ and be as near: links that cannot move against each
 other differ by rounding."""
-UPRIGHT = 0.99
+_UPRIGHT = 0.99
 """Cosine of the angle to the vertical [1] from which an arm stands upright, within 8 degrees."""
-GROUND = -1
+_GROUND = -1
 """Stands for the line from a positioner's foot to the robot's, where nothing is."""
 PLACES = 5
 """Places along each of two lines between which their distance is looked at."""
 
 
-class Body(NamedTuple):
+class _Body(NamedTuple):
     """Capsules: ends, shape (..., S, 3) each [m], radius (S,) [m], and the link of each (S,)."""
 
     start: Array
@@ -49,15 +49,15 @@ class Body(NamedTuple):
     def long(self) -> Array:
         """Return which capsules have a length in any posture, shape (S,), bool."""
         span = np.linalg.norm((self.end - self.start).reshape(-1, self.link.size, 3), axis=2)
-        return np.asarray(span.max(axis=0, initial=0.0) > SHORT)
+        return np.asarray(span.max(axis=0, initial=0.0) > _SHORT)
 
-    def of(self, which: Array) -> Body:
+    def of(self, which: Array) -> _Body:
         """Return some of the capsules; ``which`` has shape (S,), bool."""
         ends = self.start[..., which, :], self.end[..., which, :]
-        return Body(*ends, self.radius[which], self.link[which])
+        return _Body(*ends, self.radius[which], self.link[which])
 
 
-def body(robot: Robot, q: Array) -> Body:
+def body(robot: Robot, q: Array) -> _Body:
     """
     Return the arm's capsules in the measuring frame.
 
@@ -67,12 +67,12 @@ def body(robot: Robot, q: Array) -> Body:
     return whole.of(whole.long)
 
 
-def _whole(robot: Robot, q: Array) -> Body:
+def _whole(robot: Robot, q: Array) -> _Body:
     """Return every line from base to tool as a capsule, those without a length too."""
     points, link = _line(robot, frames(robot, np.asarray(q, dtype=float)))
     whole = float(np.abs(robot.a).sum() + np.abs(robot.d).sum())
-    radius = np.where(link == robot.n, TORCH, THICK * whole)
-    return Body(points[..., :-1, :], points[..., 1:, :], radius, link).of(link != GROUND)
+    radius = np.where(link == robot.n, _TORCH, _THICK * whole)
+    return _Body(points[..., :-1, :], points[..., 1:, :], radius, link).of(link != _GROUND)
 
 
 def _line(robot: Robot, chain: Frames) -> tuple[Array, Array]:
@@ -81,7 +81,7 @@ def _line(robot: Robot, chain: Frames) -> tuple[Array, Array]:
     for k, row in enumerate(chain.rows):
         if 0 < k == robot.behind:
             points.append(chain.root_point)
-            link.append(GROUND)
+            link.append(_GROUND)
         x, at, turned = (np.moveaxis(v, 0, -1) for v in (row.x, row.x_point, row.z_point))
         if robot.convention == 'standard':
             ends = [at - robot.a[k] * x, at]
@@ -96,7 +96,7 @@ def _line(robot: Robot, chain: Frames) -> tuple[Array, Array]:
     return np.stack(np.broadcast_arrays(*points), axis=-2), np.array(link)
 
 
-def clearances(shape: Body) -> Array:
+def clearances(shape: _Body) -> Array:
     """
     Return how far links that are no neighbours stay apart, shape (..., pairs) [m].
 
@@ -144,7 +144,7 @@ class Space:
         self._usual: dict[bytes, Array] = {}
         self._up = robot.T_world_base[:3, :3] @ up(robot)
         # The floor tilts with a workpiece that the positioner moves.
-        self._upright = not robot.behind and rising(robot) * up(robot)[2] > UPRIGHT
+        self._upright = not robot.behind and rising(robot) * up(robot)[2] > _UPRIGHT
         known = self._known.of(self._known.long)
         standing = float(robot.T_world_base[:3, 3] @ self._up)
         self._foot = min(standing, _lowest(known.end @ self._up).min())
@@ -158,7 +158,7 @@ class Space:
         whole = _whole(self._robot, q)
         long = np.logical_or(whole.long, self._known.long)
         asked = whole.of(long)
-        near = np.minimum(self._as_usual(long), 0.0) - ALIKE
+        near = np.minimum(self._as_usual(long), 0.0) - _ALIKE
         good = (clearances(asked) >= near).all(axis=-1)
         ends = np.concatenate([asked.start[:, asked.link > 0], asked.end], axis=1)
         if self._box is not None:

@@ -11,7 +11,7 @@ from .controller_frames import ControllerFrames
 from .fingerprint import fingerprint
 from .robot import Robot
 
-NO_TOOL = 1e-9
+_NO_TOOL = 1e-9
 """Length of a tool [m] up to which it is none: such a frame only turns the flange as it is drawn."""
 
 
@@ -29,7 +29,7 @@ def controller_frames(robot: Robot) -> ControllerFrames:
     name = bundled_name(robot)
     if name:
         return ControllerFrames(flange=load(name).T_flange_tool)
-    bare = np.abs(robot.T_flange_tool[:3, 3]).max() <= NO_TOOL
+    bare = np.abs(robot.T_flange_tool[:3, 3]).max() <= _NO_TOOL
     return ControllerFrames(flange=robot.T_flange_tool if bare else np.eye(4))
 
 

@@ -47,7 +47,7 @@ def point_force_torque(
     return np.stack(np.broadcast_arrays(*torques))
 
 
-def gravity_direction(robot: Robot, chain: Frames) -> Array:
+def _gravity_direction(robot: Robot, chain: Frames) -> Array:
     """Return gravity in the world frame, components first, shape (3, ...) [m/s^2]."""
     return pad(components(chain.root_rotation @ robot.gravity), chain.position.ndim - 1)
 
@@ -60,7 +60,7 @@ def payload_torque(robot: Robot, chain: Frames, mass: Array | float, com: Array)
     mass: [kg]
     com: centre of the mass in the tool frame, shape (..., 3) [m].
     """
-    weight = mass * pad(gravity_direction(robot, chain), np.ndim(mass))
+    weight = mass * pad(_gravity_direction(robot, chain), np.ndim(mass))
     return point_force_torque(robot, chain, _carried_point(chain, com), weight)
 
 
@@ -143,7 +143,7 @@ def gravity_torque(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array
 def chain_gravity_torque(robot: Robot, chain: Frames) -> Array:
     """Return load torques, shape (n, ...) [N m], for frames already at hand."""
     torque = np.zeros((robot.n, *chain.position.shape[:-1]))
-    gravity = gravity_direction(robot, chain)
+    gravity = _gravity_direction(robot, chain)
     for i, (mass, lever) in enumerate(_carried(robot, chain)):
         z = chain.rows[i].z
         torque[i] = mass * dot(z, gravity) if robot.prismatic[i] else dot(cross(z, lever), gravity)
@@ -218,7 +218,7 @@ def payload_slope(robot: Robot, chain: Frames, mass: Array | float, com: Array) 
 def _weight_slope(robot: Robot, chain: Frames, carried: Sequence[tuple[Any, Array]]) -> Array:
     """Return d tau_i / d q_j of weights, by the mass and first moment beyond each joint."""
     axes = carried[0][1].ndim - 1
-    gravity = pad(gravity_direction(robot, chain), axes)
+    gravity = pad(_gravity_direction(robot, chain), axes)
     slope = np.zeros((robot.n, robot.n, *carried[0][1].shape[1:]))
     for j, (mass, lever) in enumerate(carried):
         z = pad(chain.rows[j].z, axes)
@@ -302,7 +302,7 @@ def base_moment(
     if robot.payload_mass:
         centre = chain.position + chain.rotation @ robot.payload_com
         lever = lever + robot.payload_mass * (components(centre) - origin)
-    moment: Array = cross(lever, gravity_direction(robot, chain))
+    moment: Array = cross(lever, _gravity_direction(robot, chain))
     if wrench is not None:
         force, own = _wrench_in_world(robot, chain, wrench, frame)
         moment = moment + own + cross(components(chain.position) - origin, force)

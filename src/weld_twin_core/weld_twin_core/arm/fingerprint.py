@@ -10,7 +10,7 @@ import numpy as np
 
 from .robot import Robot
 
-GRID = 1e-6
+_GRID = 1e-6
 """Rounding [m, rad]: finer than any arm is known, coarser than files and conversions round."""
 
 
@@ -23,9 +23,9 @@ def fingerprint(robot: Robot) -> str:
 
     """
     angles = np.stack([robot.alpha, robot.theta, robot.beta])
-    turned = np.angle(np.exp(1j * (angles + 0.25 * GRID))) - 0.25 * GRID
+    turned = np.angle(np.exp(1j * (angles + 0.25 * _GRID))) - 0.25 * _GRID
     rows = np.concatenate([turned, np.stack([robot.a, robot.d])])
-    steps = np.round(rows / GRID).astype(np.int64)
+    steps = np.round(rows / _GRID).astype(np.int64)
     behind = f'{robot.behind} behind ' if robot.behind else ''
     text = f'{behind}{robot.convention}{robot.prismatic.astype(int).tolist()}{steps.tolist()}'
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -22,7 +22,7 @@ from .robot import Robot
 NEAR = 0.015
 """Distance [m] between axes up to which two models are of one arm: calibration moves them by
 millimetres, the next size of a series by centimetres."""
-TURNED = 0.03
+_TURNED = 0.03
 """Angle [rad] between axes up to which they are the same; calibrated axes turn by milliradians."""
 
 
@@ -69,7 +69,7 @@ def _axes(robot: Robot) -> tuple[Array, Array]:
 def _alike(one: tuple[Array, Array], other: tuple[Array, Array]) -> bool:
     """Return whether all axes of two arms lie on each other."""
     turned = np.linalg.norm(np.cross(one[0], other[0]), axis=1)
-    if (turned > TURNED).any() or ((one[0] * other[0]).sum(axis=1) < 0.0).any():
+    if (turned > _TURNED).any() or ((one[0] * other[0]).sum(axis=1) < 0.0).any():
         return False
     away = np.linalg.norm(np.cross(one[1] - other[1], other[0]), axis=1)
     return bool((away < NEAR).all())

@@ -15,7 +15,7 @@ from ..arrays import Array
 from .chain import frames
 from .robot import Robot
 
-FLAT = 0.02
+_FLAT = 0.02
 """Share of the arm's length that the second axis lies beyond the foot, from which it tells the way."""
 
 
@@ -35,6 +35,6 @@ def rising(robot: Robot) -> float:
     if robot.n > 1 and not robot.prismatic[0]:
         chain = frames(robot.with_frames(base=np.eye(4)), np.zeros(robot.n))
         rise = float(chain.rows[1].z_point[2])
-        if abs(rise) > FLAT * float(np.abs(robot.a).sum() + np.abs(robot.d).sum()):
+        if abs(rise) > _FLAT * float(np.abs(robot.a).sum() + np.abs(robot.d).sum()):
             return float(np.sign(rise))
     return -1.0 if robot.T_base_origin[2, 2] < -0.5 else 1.0

@@ -13,11 +13,11 @@ from .robot import Robot
 
 ROUNDS = 80
 """Newton steps at the most: from a start at random they reach a point within some thirty."""
-STRIDE = 0.2
+_STRIDE = 0.2
 """Longest step of a joint [rad, m]: longer ones jump to and fro near the edge of the reach."""
-DAMPING = 1e-6
+_DAMPING = 1e-6
 """Added to the squares [m^2/rad^2]: an arm that is stretched has no step that leads outwards."""
-REACHED = 1e-9
+_REACHED = 1e-9
 """Distance [m] from which on the point counts as reached."""
 
 
@@ -29,7 +29,7 @@ def least_step(robot: Robot, q: Array, off: Array) -> Array:
     off: the way that the tool point has to go, shape (M, 3) [m].
     """
     turn = jacobian(robot, q)[:, :3]
-    inverse = np.linalg.inv(turn @ np.swapaxes(turn, 1, 2) + DAMPING * np.eye(3))
+    inverse = np.linalg.inv(turn @ np.swapaxes(turn, 1, 2) + _DAMPING * np.eye(3))
     return np.asarray(np.einsum('mji,mjk,mk->mi', turn, inverse, off))
 
 
@@ -51,8 +51,8 @@ def reaching(robot: Robot, points: Array, start: Array) -> tuple[Array, NDArray[
     q = np.array(start)
     for _ in range(ROUNDS):
         off = points - forward(robot, q)[:, :3, 3]
-        if np.abs(off).max(initial=0.0) < REACHED:
+        if np.abs(off).max(initial=0.0) < _REACHED:
             break
-        q = q + np.clip(least_step(robot, q, off), -STRIDE, STRIDE)
+        q = q + np.clip(least_step(robot, q, off), -_STRIDE, _STRIDE)
     off = points - forward(robot, q)[:, :3, 3]
-    return q, np.linalg.norm(off, axis=1) < REACHED
+    return q, np.linalg.norm(off, axis=1) < _REACHED

@@ -18,7 +18,7 @@ from ..errors import DataError, ModelError
 from .channels import ROW_CHANNELS
 from .controller_frames import ControllerFrames, frame_of, pose_mapping
 
-CONVENTIONS = ('standard', 'modified')
+_CONVENTIONS = ('standard', 'modified')
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 """In the world frame [m/s^2], of a robot file that does not say."""
 _TOP_KEYS = {
@@ -137,9 +137,9 @@ class Robot:
             raise ModelError(f'robot {self.name!r} has no joints')
         if len(set(self.joint_names)) != n:
             raise ModelError(f'robot {self.name!r} uses a joint name twice: {self.joint_names}')
-        if self.convention not in CONVENTIONS:
+        if self.convention not in _CONVENTIONS:
             raise ModelError(
-                f'convention of robot {self.name!r} must be one of {", ".join(CONVENTIONS)}, '
+                f'convention of robot {self.name!r} must be one of {", ".join(_CONVENTIONS)}, '
                 f'got {self.convention!r}'
             )
         shapes: dict[str, tuple[int | None, ...]] = {

@@ -17,7 +17,7 @@ from ..errors import DataError
 from .located import located
 from .sightings import Sightings
 
-LEVER = 0.5
+_LEVER = 0.5
 """Length [m] at which a turn counts against a shift where views are compared: a tool's reach."""
 COMPARED = 60
 """Views that are compared with each other at the most, to find the one that most agree with."""
@@ -128,7 +128,7 @@ def _agreed(poses: Array) -> Array:
     some = poses[np.linspace(0, len(poses) - 1, min(len(poses), COMPARED)).astype(int)]
     shift = np.linalg.norm(some[:, None, :3, 3] - some[None, :, :3, 3], axis=-1)
     turn = rotation_vector(some[:, None, :3, :3] @ np.swapaxes(some[None, :, :3, :3], -1, -2))
-    away = shift + LEVER * np.linalg.norm(turn, axis=-1)
+    away = shift + _LEVER * np.linalg.norm(turn, axis=-1)
     return np.asarray(some[int(np.argmin(np.median(away, axis=1)))])
 
 

@@ -29,7 +29,7 @@ ROUNDS = 20
 """Newton steps at the most from a pixel to its ray; four are enough for lenses of usual cameras."""
 SETTLED = 1e-12
 """Change of a ray at which its search ends."""
-SIZES = (0, 4, 5, 8)
+_SIZES = (0, 4, 5, 8)
 """Numbers of distortion that are understood; what is missing is zero."""
 
 
@@ -64,7 +64,7 @@ class Lens:
         if not (self.focal > 0.0).all():
             raise DataError(f'focal lengths must be positive [px], got {self.focal.tolist()}')
         given = readonly(self.distortion, (None,), 'distortion')
-        if given.size not in SIZES:
+        if given.size not in _SIZES:
             raise DataError(
                 f'a lens has 0, 4, 5 or 8 numbers of distortion (k1 k2 p1 p2 k3 k4 k5 k6), '
                 f'got {given.size}'

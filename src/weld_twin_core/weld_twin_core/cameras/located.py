@@ -22,17 +22,17 @@ from ..arm.rotation import rotation_matrix, skew, transform
 from ..arrays import Array
 from .lens import Lens
 
-FEWEST = 4
+_FEWEST = 4
 """Points of a target in an image from which its pose follows."""
-FLAT = 1e-3
+_FLAT = 1e-3
 """Thickness over width below which points are taken for a plane."""
 STEPS = 15
 """Least-squares steps at the most; five are usual."""
-CLOSER = 10
+_CLOSER = 10
 """Rounds in which a view from far away is made nearer."""
-STRETCHED = 1e-4
+_STRETCHED = 1e-4
 """Width over length below which points are a line, of which no pose follows."""
-DAMPED = 1e-9
+_DAMPED = 1e-9
 """Damping of a step, in units of its columns."""
 
 
@@ -43,17 +43,17 @@ def located(lens: Lens, points: Array, pixels: Array) -> Array | None:
     points: in the target's frame, shape (N, 3) [m].
     pixels: shape (N, 2) [px].
     """
-    if len(points) < FEWEST:
+    if len(points) < _FEWEST:
         return None
     middle = points.mean(axis=0)
     _, size, axes = np.linalg.svd(points - middle, full_matrices=True)
-    if size[1] < STRETCHED * size[0]:
+    if size[1] < _STRETCHED * size[0]:
         return None
     own = (points - middle) @ axes.T
     flat = lens.rays(pixels)
     turned = transform(axes * np.sign(np.linalg.det(axes)), np.zeros(3))
     own *= np.sign(np.linalg.det(axes))
-    starts = _of_plane(own, flat) if size[2] < FLAT * size[0] else _of_space(own, flat)
+    starts = _of_plane(own, flat) if size[2] < _FLAT * size[0] else _of_space(own, flat)
     tried = [_refined(start, own, flat) for start in starts]
     ahead = [(cost, pose) for cost, pose in tried if (own @ pose[2, :3] + pose[2, 3] > 0.0).all()]
     if not ahead:
@@ -96,7 +96,7 @@ def _of_space(own: Array, flat: Array) -> list[Array]:
     """Return the pose of points in space: first as from far away, then nearer."""
     back = np.linalg.pinv(np.hstack([own, np.ones((len(own), 1))]))
     ahead = np.ones(len(own))
-    for _ in range(CLOSER):
+    for _ in range(_CLOSER):
         first, second = (back @ (flat * ahead[:, None])).T
         size = max(0.5 * (np.linalg.norm(first[:3]) + np.linalg.norm(second[:3])), 1e-12)
         x, y = first[:3] / np.linalg.norm(first[:3]), second[:3] / np.linalg.norm(second[:3])
@@ -116,7 +116,7 @@ def _refined(pose: Array, own: Array, flat: Array) -> tuple[float, Array]:
     cost, remaining, columns = _seen(pose, own, flat)
     for _ in range(STEPS):
         normal = columns.T @ columns
-        normal[np.diag_indices(6)] *= 1.0 + DAMPED
+        normal[np.diag_indices(6)] *= 1.0 + _DAMPED
         step = np.linalg.lstsq(normal, columns.T @ remaining, rcond=1e-14)[0]
         there = pose.copy()
         there[:3, :3] = rotation_matrix(step[3:]) @ pose[:3, :3]

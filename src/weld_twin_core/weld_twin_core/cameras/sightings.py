@@ -15,7 +15,7 @@ from ..arrays import Array, readonly
 from ..errors import DataError
 from .lens import Lens
 
-MOUNTS = ('world', 'tool')
+_MOUNTS = ('world', 'tool')
 """Where a camera or a target can be fastened."""
 PLACED = 1e-4
 """Uncertainty [m] of the points of a target of which nothing was said: those of a printed board."""
@@ -94,7 +94,7 @@ class Target:
 
 
 def _mounted(what: str, mount: str) -> None:
-    if mount not in MOUNTS:
+    if mount not in _MOUNTS:
         raise DataError(f"{what} is mounted on {mount!r}; a mount is 'world' or 'tool'")
 
 

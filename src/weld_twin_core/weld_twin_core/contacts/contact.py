@@ -13,12 +13,12 @@ from ..errors import DataError
 
 KINDS = ('point', 'length', 'sphere', 'line', 'plane')
 """What a contact can be; how each is seen is in `surfaces`."""
-TIED = ('distance', 'angle')
+_TIED = ('distance', 'angle')
 """What ties two contacts: the distance of two points, the angle of two planes."""
 LOOSE = 1e-4
 """Uncertainty [m, rad] of a length or an angle that came without one: a calliper's reading, and a
 tenth of a millimetre over a metre of straight edge."""
-FACE = 0.1
+_FACE = 0.1
 """Length [m] over which the uncertainty of a known place turns a face or an edge: that of a block."""
 
 
@@ -81,7 +81,7 @@ class Contact:
     @property
     def sigma_turn(self) -> float:
         """Return the uncertainty [rad] of a known axis."""
-        return self.sigma / FACE
+        return self.sigma / _FACE
 
 
 @dataclass(frozen=True)

@@ -82,8 +82,8 @@ class Contacts:
     @property
     def rows(self) -> int:
         """Return the scalar rows of a posture: 3 for points, 2 for a line, 1 for the others."""
-        return max(ROWS[self.artefact.named(label).kind] for label in set(self.labels))
+        return max(_ROWS[self.artefact.named(label).kind] for label in set(self.labels))
 
 
-ROWS = {'point': 3, 'line': 2, 'length': 1, 'sphere': 1, 'plane': 1}
+_ROWS = {'point': 3, 'line': 2, 'length': 1, 'sphere': 1, 'plane': 1}
 """Scalar rows that one posture gives."""

@@ -14,13 +14,13 @@ from ..arm.rotation import rotation_matrix
 from ..errors import DataError
 from .contact import LOOSE, Contact, Tie
 
-ENTRIES = ('contacts', 'blocks', 'distances', 'angles')
+_ENTRIES = ('contacts', 'blocks', 'distances', 'angles')
 """What an artefact file holds."""
-OF_CONTACT = ('kind', 'radius', 'at', 'axis', 'sigma')
+_OF_CONTACT = ('kind', 'radius', 'at', 'axis', 'sigma')
 """What it says of a contact,"""
-OF_BLOCK = ('size', 'sigma', 'square', 'at', 'turn')
+_OF_BLOCK = ('size', 'sigma', 'square', 'at', 'turn')
 """and of a block."""
-SQUARE = 5e-4
+_SQUARE = 5e-4
 """Uncertainty [rad] of the angles of a block of which nothing was said: half a millimetre a metre,
 what a milled block from any shop has."""
 
@@ -31,7 +31,7 @@ def described(entry: Mapping[str, Any]) -> tuple[tuple[Contact, ...], tuple[Tie,
 
     Raises DataError: something in it cannot be understood; the message says what.
     """
-    if not isinstance(entry, Mapping) or not set(entry) <= set(ENTRIES):
+    if not isinstance(entry, Mapping) or not set(entry) <= set(_ENTRIES):
         result = ', '.join(map(str, entry)) if isinstance(entry, Mapping) else 'no mapping'
         raise DataError(f'an artefact has contacts, blocks, distances and angles; got {result}')
     contacts = [_contact(str(label), what) for label, what in _mapped(entry, 'contacts')]
@@ -54,7 +54,7 @@ def _mapped(entry: Mapping[str, Any], name: str) -> list[tuple[Any, Any]]:
 
 def _contact(label: str, what: object) -> Contact:
     entry = {'kind': what} if isinstance(what, str) else what
-    if not isinstance(entry, Mapping) or not set(entry) <= set(OF_CONTACT):
+    if not isinstance(entry, Mapping) or not set(entry) <= set(_OF_CONTACT):
         raise DataError(
             f'contact {label!r} has a kind, a radius if it is a sphere, and at, axis and sigma if '
             'its place is known'
@@ -74,13 +74,13 @@ def _contact(label: str, what: object) -> Contact:
 
 def _block(label: str, what: object) -> tuple[list[Contact], list[Tie]]:
     """Return the six faces of a block, 'LABEL +x' to 'LABEL -z', and what ties them."""
-    if not isinstance(what, Mapping) or not set(what) <= set(OF_BLOCK):
+    if not isinstance(what, Mapping) or not set(what) <= set(_OF_BLOCK):
         raise DataError(f'block {label!r} has a size, sigma, square, and at and turn if known')
     size = _three(what.get('size'), f'the size of block {label!r}')
     if size is None or min(size) <= 0.0:
         raise DataError(f'block {label!r} needs size: [X, Y, Z], three positive lengths [m]')
     sigma = _number(what.get('sigma', LOOSE), f'sigma of block {label!r}')
-    square = _number(what.get('square', SQUARE), f'square of block {label!r}')
+    square = _number(what.get('square', _SQUARE), f'square of block {label!r}')
     at = _three(what.get('at'), f'at of block {label!r}')
     turn = _three(what.get('turn', [0.0, 0.0, 0.0]), f'the turn of block {label!r}')
     faces = []

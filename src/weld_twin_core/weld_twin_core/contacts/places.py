@@ -17,11 +17,11 @@ ROUNDS = 8
 """Steps at the most; two are enough for points, five for faces found at first sight."""
 SETTLED = 1e-9
 """Step [m, rad] below which a place stays."""
-HUBER = 3.0
+_HUBER = 3.0
 """A contact this many robust deviations off starts to lose weight: one in a wrong socket."""
-NORMAL = 1.4826
+_NORMAL = 1.4826
 """Standard deviation of normal numbers over the median of their size."""
-FIRM = 1e3
+_FIRM = 1e3
 """Weight of a known length against a contact: it is kept, and how far it may give is counted when
 unknowns are taken out."""
 
@@ -168,10 +168,10 @@ def _step(now: Places, points: Array) -> Array:
     """Return one reweighted Gauss-Newton step of the unknowns, shape (Z,)."""
     residual, _, free = now.rows(points)
     size = np.linalg.norm(residual, axis=1) / np.sqrt(residual.shape[1])
-    spread = max(NORMAL * float(np.median(size)), 1e-9)
-    weight = np.sqrt(np.minimum(1.0, HUBER * spread / np.maximum(size, 1e-12)))[:, None]
+    spread = max(_NORMAL * float(np.median(size)), 1e-9)
+    weight = np.sqrt(np.minimum(1.0, _HUBER * spread / np.maximum(size, 1e-12)))[:, None]
     off, change, _ = now.ties()
-    firm = FIRM * np.sqrt(residual.size)
+    firm = _FIRM * np.sqrt(residual.size)
     columns = np.concatenate(
         [(weight[..., None] * free).reshape(-1, free.shape[2]), firm * change]
     )

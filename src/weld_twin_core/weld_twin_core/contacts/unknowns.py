@@ -26,7 +26,7 @@ from ..arrays import Array
 from .contacts import Contacts
 from .places import places
 
-RANK = 1e-9
+_RANK = 1e-9
 """Share of the largest singular value below which a combination of unknowns is not determined."""
 
 
@@ -55,7 +55,7 @@ class Unknowns:
         both = np.concatenate([columns, self.ties])
         size = np.maximum(np.linalg.norm(both, axis=0), 1e-300)
         basis, strength, _ = np.linalg.svd(both / size, full_matrices=False)
-        basis = basis[:count, strength > RANK * strength.max(initial=0.0)]
+        basis = basis[:count, strength > _RANK * strength.max(initial=0.0)]
         directions, taken, _ = np.linalg.svd(basis, full_matrices=False)
         remaining = np.sqrt(np.clip(1.0 - taken**2, 0.0, 1.0))
         return directions.T, np.where(remaining < 1e-7, 0.0, remaining)

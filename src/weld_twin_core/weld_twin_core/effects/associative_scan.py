@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array
 
-STILL = 1e-9
+_STILL = 1e-9
 """Part of a travel, or of the time to let go, below which bristles are moved straight."""
 
 
@@ -105,8 +105,8 @@ def bristle(step: Array, travel: Array | float, leak: Array | float, start: Arra
     """
     bent = np.abs(step) / travel
     whole = bent + leak
-    share = bent / np.where(whole > STILL, whole, 1.0)
-    drive = np.where(whole > STILL, -share * np.expm1(-whole), bent)
+    share = bent / np.where(whole > _STILL, whole, 1.0)
+    drive = np.where(whole > _STILL, -share * np.expm1(-whole), bent)
     return linear(np.exp(-whole), np.sign(step) * drive, start)
 
 
@@ -122,7 +122,7 @@ def bristle_tangent(
     """
     bent = np.abs(step) / travel
     whole = bent + leak
-    remaining, moving = np.exp(-whole), whole > STILL
+    remaining, moving = np.exp(-whole), whole > _STILL
     safe = np.where(moving, whole, 1.0)
     drive = (leak / safe * -np.expm1(-whole) + bent * remaining) / safe
     before = np.concatenate([np.zeros_like(z[..., :1]), z[..., :-1]], axis=-1)

@@ -34,8 +34,8 @@ from .hooks import FitHooks, Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
-FORMS = ('play', 'reversal', 'coast')
-CLOSED = 1e-5
+_FORMS = ('play', 'reversal', 'coast')
+_CLOSED = 1e-5
 """Width [rad] that many small errors start from; less is none."""
 
 RV = (
@@ -50,7 +50,7 @@ class _Search(SearchHooks):
 
     def small(self, view: View, joint: str | None, most: int) -> list[Backlash]:
         """Return a gap that is all but closed."""
-        return [self.kind(str(joint), CLOSED)]
+        return [self.kind(str(joint), _CLOSED)]
 
 
 class _Fit(FitHooks):
@@ -58,9 +58,9 @@ class _Fit(FitHooks):
 
     def turned(self) -> Backlash:
         """Return a gap that the data refuse as the arm resting ahead instead of behind."""
-        if self.coordinates()[0] > CLOSED:
+        if self.coordinates()[0] > _CLOSED:
             return self.effect
-        return replace(self.effect, form='coast', width=CLOSED)
+        return replace(self.effect, form='coast', width=_CLOSED)
 
 
 @register
@@ -106,8 +106,8 @@ class Backlash(MemoryEffect):
     def check(self, robot: Robot) -> None:
         """Refuse an unknown form and a negative width."""
         super().check(robot)
-        if self.form not in FORMS:
-            raise ModelError(f'backlash: form must be one of {FORMS}, got {self.form!r}')
+        if self.form not in _FORMS:
+            raise ModelError(f'backlash: form must be one of {_FORMS}, got {self.form!r}')
 
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
         """Return output minus input of the gap, and its output (or last motion) as state."""

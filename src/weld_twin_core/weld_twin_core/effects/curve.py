@@ -68,8 +68,8 @@ def time(view: View, index: int) -> Array:
     return view.elapsed
 
 
-Quantity = Callable[[View, int], Array]
-QUANTITIES: dict[str, Quantity] = {
+_Quantity = Callable[[View, int], Array]
+QUANTITIES: dict[str, _Quantity] = {
     'constant': constant,
     'angle': angle,
     'direction': direction,

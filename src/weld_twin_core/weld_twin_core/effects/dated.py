@@ -29,7 +29,7 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import base_frame, frame, radians
 
-TIMES = 40
+_TIMES = 40
 """Instants of a moved set-up that a search tries, evenly over the recording."""
 
 T = TypeVar('T', bound='Timed')
@@ -66,7 +66,7 @@ class Timed(Effect):
         ]
 
 
-class Sudden(Timed):
+class _Sudden(Timed):
     """
     What sets in at ``time`` [s].
 
@@ -92,7 +92,7 @@ class _Twin(TwinHooks):
 
 @register
 @dataclass(frozen=True, eq=False)
-class JointSlip(Sudden, ChannelError):
+class JointSlip(_Sudden, ChannelError):
     """The joint stands ``offset`` further than its reading from ``time`` [s] on."""
 
     joint: str
@@ -101,7 +101,7 @@ class JointSlip(Sudden, ChannelError):
 
     name = 'joint_slip'
     traits = replace(
-        Sudden.traits,
+        _Sudden.traits,
         title='slip',
         meaning='a joint slipped at one instant, as by a tooth of a belt',
         entered='zero',
@@ -134,15 +134,15 @@ class JointSlip(Sudden, ChannelError):
         )
 
 
-class SuddenFrame(Sudden, FrameError):
+class _SuddenFrame(_Sudden, FrameError):
     """A frame that stands elsewhere from an instant on."""
 
-    traits = replace(Sudden.traits, of_setup=True)
+    traits = replace(_Sudden.traits, of_setup=True)
 
 
 @register
 @dataclass(frozen=True, eq=False)
-class ToolSlip(SuddenFrame):
+class ToolSlip(_SuddenFrame):
     """The tool is displaced by xyz of the flange and turned by rotvec from ``time`` [s] on."""
 
     xyz: Value = (0.0, 0.0, 0.0)
@@ -151,7 +151,7 @@ class ToolSlip(SuddenFrame):
 
     name = 'tool_slip'
     traits = replace(
-        SuddenFrame.traits,
+        _SuddenFrame.traits,
         title='slipped tool or reflector',
         meaning='tool or reflector moved on the flange at one instant',
         entered='tool',
@@ -173,7 +173,7 @@ class ToolSlip(SuddenFrame):
 
 @register
 @dataclass(frozen=True, eq=False)
-class InstrumentKnock(SuddenFrame):
+class InstrumentKnock(_SuddenFrame):
     """The base is displaced by xyz in the world and turned by rotvec from ``time`` [s] on."""
 
     xyz: Value = (0.0, 0.0, 0.0)
@@ -182,7 +182,7 @@ class InstrumentKnock(SuddenFrame):
 
     name = 'instrument_knock'
     traits = replace(
-        SuddenFrame.traits,
+        _SuddenFrame.traits,
         title='knocked instrument or base',
         meaning='instrument or base was moved at one instant',
         entered='the instrument or the base was knocked',
@@ -201,7 +201,7 @@ class InstrumentKnock(SuddenFrame):
         )
 
 
-class SetupMotion(Timed, FrameError):
+class _SetupMotion(Timed, FrameError):
     """The set-up's own motion: nuisance, never a cause."""
 
     traits = Traits(depends_on='time', place='base', cause=False, of_setup=True)
@@ -210,7 +210,7 @@ class SetupMotion(Timed, FrameError):
 
 @register
 @dataclass(frozen=True, eq=False)
-class SetupStep(SetupMotion):
+class SetupStep(_SetupMotion):
     """Displacement and turn of the base before the instant ``time`` [s]; then it is as aligned."""
 
     xyz: Value = (0.0, 0.0, 0.0)
@@ -218,7 +218,7 @@ class SetupStep(SetupMotion):
     time: float = 0.0
 
     name = 'setup_step'
-    traits = replace(SetupMotion.traits, title='moved set-up', entered='base')
+    traits = replace(_SetupMotion.traits, title='moved set-up', entered='base')
     parameters = frame_parameters(
         Plausible.even(5e-3, 0.1, 'derived: a knock'),
         Plausible.even(5e-3, 0.1, 'derived: a knock'),
@@ -232,7 +232,7 @@ class SetupStep(SetupMotion):
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield steps at evenly spread samples, none at the very ends."""
-        index = np.linspace(0, view.t.size - 1, TIMES + 2).round().astype(int)[1:-1]
+        index = np.linspace(0, view.t.size - 1, _TIMES + 2).round().astype(int)[1:-1]
         for k in np.unique(index):
             if k > 0:
                 yield cls(time=float(0.5 * (view.t[k - 1] + view.t[k])))
@@ -246,7 +246,7 @@ class SetupStep(SetupMotion):
 
 @register
 @dataclass(frozen=True, eq=False)
-class SetupSettling(SetupMotion):
+class SetupSettling(_SetupMotion):
     """Displacement and turn of the base at ``start`` [s], gone with ``time_constant`` [s]."""
 
     xyz: Value = (0.0, 0.0, 0.0)
@@ -255,7 +255,9 @@ class SetupSettling(SetupMotion):
     start: float = 0.0
 
     name = 'setup_settling'
-    traits = replace(SetupMotion.traits, title='settling set-up', entered='how the set-up is held')
+    traits = replace(
+        _SetupMotion.traits, title='settling set-up', entered='how the set-up is held'
+    )
     parameters = frame_parameters(
         Plausible.even(1e-3, 2e-2, 'derived: what a stand creeps while it warms'),
         Plausible.even(1e-3, 2e-2, 'derived: a millimetre on a metre'),

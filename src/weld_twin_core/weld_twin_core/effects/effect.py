@@ -28,10 +28,10 @@ from .wording import travel
 
 __all__ = ['Effect', 'LinearEffect', 'MemoryEffect', 'Parameter', 'Stage', 'Value', 'View']
 
-RELATIVE_STEP = 1e-5
+_RELATIVE_STEP = 1e-5
 """Step of numerical derivatives, in typical magnitudes of the parameter."""
 
-SLIDING_UNITS = {'rad': 'm', 'rad/(N m)': 'm/N'}
+_SLIDING_UNITS = {'rad': 'm', 'rad/(N m)': 'm/N'}
 """Units of a joint that turns, and those in their place where it slides."""
 
 E = TypeVar('E', bound='Effect')
@@ -185,7 +185,7 @@ class Effect(Parametric, ABC):
                 out.append(None)
                 continue
             ends = np.stack([vector, vector])
-            step = RELATIVE_STEP * parameter.typical
+            step = _RELATIVE_STEP * parameter.typical
             ends[:, k] = np.clip(
                 [vector[k] - step, vector[k] + step], parameter.lower, parameter.upper
             )
@@ -232,7 +232,7 @@ class Effect(Parametric, ABC):
 
         """
         slides = robot is not None and self.on_slide(robot)
-        return SLIDING_UNITS.get(parameter.unit, parameter.unit) if slides else parameter.unit
+        return _SLIDING_UNITS.get(parameter.unit, parameter.unit) if slides else parameter.unit
 
     def check(self, robot: Robot) -> None:
         """

@@ -33,11 +33,11 @@ from .view import Parameter, Plausible, Stage, Value, View
 
 SHORTEST, LONGEST = 3e-5, 1.8e-3
 """Pre-sliding travels [rad] that a search considers: a longer one is a loop, `hysteresis`."""
-SLIDING = 0.1
+_SLIDING = 0.1
 """Metres of a joint that slides which are looked at as a radian of one that turns."""
-UNEVEN = 0.6
+_UNEVEN = 0.6
 """Asymmetry beyond which one direction would hardly rub at all. A judgement."""
-A_LITTLE = 1e-9
+_A_LITTLE = 1e-9
 """Asymmetry of friction that may become uneven in a fit."""
 
 
@@ -52,7 +52,7 @@ class _Fit(FitHooks):
         """Return friction of all travels: a start that is far off ends beside the best."""
         if zoom or view.static:
             return None
-        unit = SLIDING if view.robot.prismatic[view.robot.index(self.effect.joint)] else 1.0
+        unit = _SLIDING if view.robot.prismatic[view.robot.index(self.effect.joint)] else 1.0
         travels = unit * np.geomspace(SHORTEST, LONGEST, 7)
         each = [
             Friction(self.effect.joint, 1.0, self.effect.asymmetry, float(x), self.effect.release)
@@ -118,8 +118,8 @@ class Friction(MemoryEffect):
             'asymmetry',
             '-',
             typical=0.1,
-            lower=-UNEVEN,
-            upper=UNEVEN,
+            lower=-_UNEVEN,
+            upper=_UNEVEN,
             linear=False,
             range=Plausible.even(
                 0.2,
@@ -209,9 +209,9 @@ class Friction(MemoryEffect):
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield friction of short and long pre-sliding, even and uneven."""
-        unit = SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
+        unit = _SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
         for travel in (1e-4, 6e-4):
-            for asymmetry in (0.0, A_LITTLE):
+            for asymmetry in (0.0, _A_LITTLE):
                 yield cls(str(joint), 0.0, asymmetry, travel * unit)
 
     def atoms(self, view: View) -> list[Shift]:
@@ -230,7 +230,7 @@ class Friction(MemoryEffect):
         asymmetry = 0.0
         if len(coefficients) > 1:
             uneven = float(coefficients[1]) / windup if windup > 0.0 else 0.0
-            asymmetry = float(np.clip(uneven, -UNEVEN, UNEVEN)) or A_LITTLE
+            asymmetry = float(np.clip(uneven, -_UNEVEN, _UNEVEN)) or _A_LITTLE
         return Friction(self.joint, windup, asymmetry, self.travel, self.release)
 
     def remedy(self, robot: Robot) -> str:

@@ -28,11 +28,11 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
 
-TRAVELS = (3e-5, 3e-4)
+_TRAVELS = (3e-5, 3e-4)
 """Travels [rad] that a search starts from: a longer one is a loop, `hysteresis`."""
-SLIDING = 0.1
+_SLIDING = 0.1
 """Metres of a joint that slides which are looked at as a radian of one that turns."""
-SHOWN = 0.04
+_SHOWN = 0.04
 """
 Angle [rad] that must be left, RMS, of what one unit of it does: less is play and a constant ratio.
 
@@ -139,15 +139,15 @@ class GearRatioByDirection(MemoryEffect):
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield a quick and a slow change of flanks where the joint went both ways over its angle."""
         i = view.robot.index(str(joint))
-        unit = SLIDING if view.robot.prismatic[i] else 1.0
+        unit = _SLIDING if view.robot.prismatic[i] else 1.0
         angle = view.joint(i)
-        for travel in TRAVELS:
+        for travel in _TRAVELS:
             made = cls(str(joint), 0.0, travel * unit)
             way = made._way(angle)[0]
             alike = np.stack([np.ones_like(angle), angle, way], axis=1)
             one = 0.5 * way * angle
             remaining = one - alike @ np.linalg.lstsq(alike, one, rcond=None)[0]
-            if float(np.sqrt((remaining**2).mean())) > SHOWN * unit:
+            if float(np.sqrt((remaining**2).mean())) > _SHOWN * unit:
                 yield made
 
     def remedy(self, robot: Robot) -> str:

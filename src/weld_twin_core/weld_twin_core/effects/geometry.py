@@ -18,7 +18,7 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value
 from .wording import stands, to_mend
 
-URS = (
+_URS = (
     'controller calibrations of a UR3 (github.com/MyRobotLab/pyrobotlab issue 145) and of a UR5 '
     '(github.com/UniversalRobots/Universal_Robots_ROS_Driver issue 457): rows between axes that '
     'are not parallel'
@@ -69,7 +69,7 @@ class JointOffset(ChannelError):
         return f'{stands(joint, offset, sliding=sliding)} {to_mend(offset, sliding=sliding)}'
 
 
-class LinkError(ChannelError):
+class _LinkError(ChannelError):
     """A constant error of one number of one DH row."""
 
     traits = replace(ChannelError.traits, entered='model', everywhere=True)
@@ -79,7 +79,7 @@ class LinkError(ChannelError):
 
 @register
 @dataclass(frozen=True, eq=False)
-class LinkLength(LinkError):
+class LinkLength(_LinkError):
     """A wrong length of the common normal of one DH row."""
 
     joint: str
@@ -87,7 +87,7 @@ class LinkLength(LinkError):
 
     name = 'link_length'
     traits = replace(
-        LinkError.traits,
+        _LinkError.traits,
         title='link length error',
         meaning='a length in the model of the robot is wrong',
         changes_in_use=True,
@@ -101,7 +101,7 @@ class LinkLength(LinkError):
             range=Plausible.even(
                 5e-4,
                 1e-2,
-                f'{URS}: 0.02 to 0.28 mm; range derived: beyond a centimetre it is another arm',
+                f'{_URS}: 0.02 to 0.28 mm; range derived: beyond a centimetre it is another arm',
             ),
         ),
     )
@@ -109,7 +109,7 @@ class LinkLength(LinkError):
 
 @register
 @dataclass(frozen=True, eq=False)
-class LinkOffset(LinkError):
+class LinkOffset(_LinkError):
     """A wrong offset along the axis of one DH row."""
 
     joint: str
@@ -117,7 +117,7 @@ class LinkOffset(LinkError):
 
     name = 'link_offset'
     traits = replace(
-        LinkError.traits,
+        _LinkError.traits,
         title='link offset error',
         meaning='an offset along an axis in the model of the robot is wrong',
     )
@@ -130,7 +130,7 @@ class LinkOffset(LinkError):
             range=Plausible.even(
                 5e-4,
                 1e-2,
-                f'{URS}: 0.09 to 0.32 mm; range derived: beyond a centimetre it is another arm',
+                f'{_URS}: 0.09 to 0.32 mm; range derived: beyond a centimetre it is another arm',
             ),
         ),
     )
@@ -138,7 +138,7 @@ class LinkOffset(LinkError):
 
 @register
 @dataclass(frozen=True, eq=False)
-class LinkTwist(LinkError):
+class LinkTwist(_LinkError):
     """A wrong angle between the axes of one DH row."""
 
     joint: str
@@ -146,7 +146,7 @@ class LinkTwist(LinkError):
 
     name = 'link_twist'
     traits = replace(
-        LinkError.traits,
+        _LinkError.traits,
         title='link twist error',
         meaning='an angle between two axes in the model of the robot is wrong',
     )
@@ -157,14 +157,14 @@ class LinkTwist(LinkError):
             'dalpha',
             'rad',
             typical=5e-4,
-            range=Plausible.even(2e-3, 2e-2, f'{URS}: 0.4 to 3.9 mrad'),
+            range=Plausible.even(2e-3, 2e-2, f'{_URS}: 0.4 to 3.9 mrad'),
         ),
     )
 
 
 @register
 @dataclass(frozen=True, eq=False)
-class AxisParallelism(LinkError):
+class AxisParallelism(_LinkError):
     """The tilt that alpha cannot express where two axes are nearly parallel."""
 
     joint: str
@@ -172,7 +172,7 @@ class AxisParallelism(LinkError):
 
     name = 'axis_parallelism'
     traits = replace(
-        LinkError.traits,
+        _LinkError.traits,
         title='axis parallelism error',
         meaning='two axes that should be parallel are tilted',
     )

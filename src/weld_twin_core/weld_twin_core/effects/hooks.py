@@ -22,7 +22,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from .view import View
 
-JOINT_STEP = 1e-5
+_JOINT_STEP = 1e-5
 """Step of numerical derivatives by a joint's position [rad or m]: rounding and bend weigh alike."""
 
 
@@ -85,14 +85,14 @@ class Traits:
     `bend`."""
 
 
-class Hooks:
+class _Hooks:
     """Questions to a kind of effect, or to an effect."""
 
     def __init__(self, kind: Any, effect: Any) -> None:
         self.kind, self.effect = kind, effect
 
 
-G = TypeVar('G', bound=Hooks, covariant=True)
+G = TypeVar('G', bound=_Hooks, covariant=True)
 
 
 class Hooked(Generic[G]):
@@ -106,7 +106,7 @@ class Hooked(Generic[G]):
         return self.group(kind, effect)
 
 
-class TwinHooks(Hooks):
+class TwinHooks(_Hooks):
     """What the twin asks, and who takes an effect to another recording."""
 
     @property
@@ -134,10 +134,10 @@ class TwinHooks(Hooks):
         for j in range(n):
             high, low = (
                 self.effect.displace(view.displaced({('q', j): np.full(view.t.shape, step)}))
-                for step in (JOINT_STEP, -JOINT_STEP)
+                for step in (_JOINT_STEP, -_JOINT_STEP)
             )
             for channel, value in high.items():
-                slope[channel[1], j] = (value - low[channel]) / (2.0 * JOINT_STEP)
+                slope[channel[1], j] = (value - low[channel]) / (2.0 * _JOINT_STEP)
         return slope
 
     def lasting(self) -> Any:
@@ -149,7 +149,7 @@ class TwinHooks(Hooks):
         return 0.0
 
 
-class SearchHooks(Hooks):
+class SearchHooks(_Hooks):
     """What the search asks, with the fit of many small errors."""
 
     def fits(self, robot: Robot, joint: str | None) -> bool:
@@ -212,7 +212,7 @@ class SearchHooks(Hooks):
         return max(1, self.orders().size)
 
 
-class FitHooks(Hooks):
+class FitHooks(_Hooks):
     """
     What a least-squares fit asks: the coordinates that it turns, and where it starts.
 
@@ -300,7 +300,7 @@ class FitHooks(Hooks):
         return type(self).starts is not FitHooks.starts
 
 
-GROUPS: dict[str, type[Hooks]] = {'twin': TwinHooks, 'search': SearchHooks, 'fit': FitHooks}
+GROUPS: dict[str, type[_Hooks]] = {'twin': TwinHooks, 'search': SearchHooks, 'fit': FitHooks}
 """Groups of questions by the attribute of an effect that answers them."""
 TRAITS = frozenset(each.name for each in fields(Traits))
 OF_GROUP = {k: at for at, g in GROUPS.items() for k in vars(g) if not k.startswith('_')}
@@ -335,7 +335,7 @@ def _forward(old: Any) -> Any:
     return lambda group, *given: old.__get__(group.effect, group.kind)(*given)
 
 
-SAME = 1e-3
+_SAME = 1e-3
 """Positions [rad] closer than this are one: no wave of an order below 3,000 fits between them."""
 
 
@@ -347,6 +347,6 @@ def highest_order(q: Array) -> float:
     180. Half a wave needs a position of its own, and positions that all but coincide are one.
     """
     apart = np.diff(np.unique(q))
-    clusters = 1 + int((apart > SAME).sum())
+    clusters = 1 + int((apart > _SAME).sum())
     span = float(np.ptp(q)) if q.size else 0.0
-    return np.pi * (clusters - 1) / span if span > SAME else 0.0
+    return np.pi * (clusters - 1) / span if span > _SAME else 0.0

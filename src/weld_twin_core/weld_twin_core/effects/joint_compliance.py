@@ -30,7 +30,7 @@ from .wording import metres, radians, size
 
 LOAD_OF_EFFORT = {'effort': -1.0, 'effort_reversed': 1.0}
 """Load torque for each N m of measured effort: against it where it holds the load."""
-STATICS = ('equilibrium', 'first_order', *LOAD_OF_EFFORT)
+_STATICS = ('equilibrium', 'first_order', *LOAD_OF_EFFORT)
 
 
 class _Twin(TwinHooks):
@@ -100,9 +100,9 @@ class JointCompliance(LinearEffect):
     def check(self, robot: Robot) -> None:
         """Refuse unknown statics."""
         super().check(robot)
-        if self.statics not in STATICS:
+        if self.statics not in _STATICS:
             raise ModelError(
-                f'joint_compliance: statics must be one of {STATICS}, got {self.statics!r}'
+                f'joint_compliance: statics must be one of {_STATICS}, got {self.statics!r}'
             )
 
     def per_unit(self, view: View) -> list[Shift]:

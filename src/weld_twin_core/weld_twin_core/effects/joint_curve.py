@@ -19,7 +19,7 @@ from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
-KNOT = 0.1
+_KNOT = 0.1
 """Least distance [rad] of the knots of a joint's curve: ripple of the orders up to ten or so bends
 within some tenths of a radian. A joint that travels less has no curve."""
 LEAST_KNOTS, MOST_KNOTS = 2, 8
@@ -32,7 +32,7 @@ class _Search(SearchHooks):
     def bend(self, joint: str, angles: Array) -> JointCurve | None:
         """Return a level curve over the angle, None where its knots would be too near."""
         low, high = float(angles.min()), float(angles.max())
-        count = min(int((high - low) / KNOT), MOST_KNOTS)
+        count = min(int((high - low) / _KNOT), MOST_KNOTS)
         if count < LEAST_KNOTS:
             return None
         return self.kind(

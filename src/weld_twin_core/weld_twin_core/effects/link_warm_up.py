@@ -27,9 +27,9 @@ from .wording import number
 
 CONSTANTS = (0.15, 0.6, 2.5)
 """Time constants that a search starts from, in lengths of the recording: beyond, it is a ramp."""
-WARMER = 1.0
+_WARMER = 1.0
 """Kelvin by which a temperature must vary to be followed: sensors wander by some tenths."""
-EVEN = 1e-6
+_EVEN = 1e-6
 """Share of their spacing by which stamps of stations differ where they are only counted."""
 
 
@@ -160,7 +160,7 @@ class LinkWarmUp(Effect):
         span = max(float(np.max(view.elapsed, initial=0.0)), 1.0)
         for share in CONSTANTS:
             yield cls(str(joint), 0.0, share * span)
-        if view.temperature is not None and (rise := float(np.ptp(view.temperature))) > WARMER:
+        if view.temperature is not None and (rise := float(np.ptp(view.temperature))) > _WARMER:
             yield cls(str(joint), 0.0, span, (float(np.min(view.temperature)), rise))
 
     def remedy(self, robot: Robot) -> str:
@@ -179,4 +179,4 @@ def _is_pair(follows: Sequence[float]) -> bool:
 def _counted(t: Array) -> bool:
     """Tell whether stamps of stations, shape (M,), are no more than their numbers."""
     apart = np.diff(t)
-    return apart.size < 2 or bool(np.ptp(apart) <= EVEN * np.abs(apart).max())
+    return apart.size < 2 or bool(np.ptp(apart) <= _EVEN * np.abs(apart).max())

@@ -28,7 +28,7 @@ from .view import Parameter, Plausible, Stage, Value, View
 SHARES = (0.03, 0.15)
 """Torques at which the flank is certain that a search starts from, in the largest load seen."""
 
-CHANGED = 0.3
+_CHANGED = 0.3
 """Share of half the play by which the joint must come off its flank: less looks like an offset."""
 
 
@@ -110,4 +110,4 @@ class LoadedPlay(LinearEffect):
 
 def _changes(torque: Array, held: float) -> bool:
     """Return whether a load, shape (N,), moves a gear from its flank that friction holds so far."""
-    return bool(np.ptp(torque / np.hypot(torque, held)) > CHANGED)
+    return bool(np.ptp(torque / np.hypot(torque, held)) > _CHANGED)

@@ -18,11 +18,11 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
-OWN_WEIGHT = 0.5
+_OWN_WEIGHT = 0.5
 """Share of its own weight that no arm carries; those of welding carry a tenth to a third."""
-BELOW = 0.05
+_BELOW = 0.05
 """Share of an arm's own weight by which published masses of its links are off."""
-UNSTATED_MASS = 20.0
+_UNSTATED_MASS = 20.0
 """Load [kg] taken as most where an arm's own masses are not known."""
 
 
@@ -32,8 +32,8 @@ def mass_range(robot: Robot) -> tuple[float, float]:
 
     A load cannot weigh less than nothing, and no arm carries half of what it weighs itself.
     """
-    own = UNSTATED_MASS / OWN_WEIGHT if robot.mass is None else float(robot.mass.sum())
-    return -robot.payload_mass - BELOW * own, OWN_WEIGHT * own - robot.payload_mass
+    own = _UNSTATED_MASS / _OWN_WEIGHT if robot.mass is None else float(robot.mass.sum())
+    return -robot.payload_mass - _BELOW * own, _OWN_WEIGHT * own - robot.payload_mass
 
 
 class _Twin(TwinHooks):

@@ -29,7 +29,7 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
-CHANGED = 0.2
+_CHANGED = 0.2
 """Share of the largest moment by which it must change: with less, a lean is a base pose."""
 
 
@@ -85,7 +85,7 @@ class PedestalTilt(LinearEffect):
             return reason
         moment = np.stack(_moments(view))
         change = np.linalg.norm(np.ptp(moment, axis=-1))
-        if change <= CHANGED * np.linalg.norm(moment, axis=0).max(initial=0.0):
+        if change <= _CHANGED * np.linalg.norm(moment, axis=0).max(initial=0.0):
             return 'the moment on the pedestal hardly changes'
         return None
 

@@ -24,7 +24,7 @@ from .registry import REGISTRY
 from .transmission_ripple import TransmissionRipple
 from .view import Plausible
 
-UNKNOWN = Plausible(np.inf, -np.inf, np.inf, 'derived: nothing is known')
+_UNKNOWN = Plausible(np.inf, -np.inf, np.inf, 'derived: nothing is known')
 """What is plausible where an effect does not say."""
 
 
@@ -52,7 +52,7 @@ def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = Non
     """
     kind = REGISTRY.get(effect)
     each = next((p for p in kind.parameters if p.name == parameter), None) if kind else None
-    result = (each and each.range) or UNKNOWN
+    result = (each and each.range) or _UNKNOWN
     if each and each.sliding and joint is not None and robot.prismatic[robot.index(joint)]:
         result = each.sliding
     if result.by_robot is not None:

@@ -19,11 +19,11 @@ from .view import Parameter, Plausible, Stage, Value, View
 
 FINEST, COARSEST = 1e-4, 2e-2
 """Steps that a search considers [rad]."""
-PEAKS = 3
+_PEAKS = 3
 """Steps that a search starts from; beside the right one stand its half and its double."""
-PHASE = 1.0 / 16.0
+_PHASE = 1.0 / 16.0
 """Periods by which neighbours on the first grid of steps differ at the far end of the travel."""
-QUICK = (5, 9, 15, 25, 27, 45)
+_QUICK = (5, 9, 15, 25, 27, 45)
 """Lengths, doubled often enough, whose spectrum is quick: that of a power of two, a million, lies so
 in memory that it takes three times as long, a good part of a diagnosis of some stations."""
 ZOOM, ZOOMS = 16, 3
@@ -53,7 +53,7 @@ class _Fit(FitHooks):
         travel, far = float(np.ptp(q)), float(np.abs(q).max())
         if zoom == ZOOMS or self.effect.step <= 0.0 or travel <= 0.0:
             return None
-        fine = PHASE / far
+        fine = _PHASE / far
         half = 1.0 / (travel * fine) if zoom == 0 else float(ZOOM)
         offset = np.arange(-min(int(half) + 1, MOST // 2), min(int(half) + 1, MOST // 2) + 1)
         steps = 1.0 / (1.0 / self.effect.step + offset * fine / (0.5 * ZOOM) ** zoom)
@@ -132,13 +132,13 @@ class Quantization(Effect):
         cell = 0.25 * FINEST
         bins = np.rint((q - q.min()) / cell).astype(int)
         least = 4 * (int(bins.max()) + 1)
-        lengths = QUICK if view.static else (1,)
+        lengths = _QUICK if view.static else (1,)
         size = min(odd << (-(-least // odd) - 1).bit_length() for odd in lengths)
         spectrum = np.fft.rfft(np.bincount(bins, pull, minlength=size))
         power = np.abs(spectrum[: int(size * cell / FINEST) + 2]) ** 2
         step = size * cell / np.maximum(np.arange(power.size), 1)
         power[(step < FINEST) | (step > min(COARSEST, 0.5 * travel))] = 0.0
-        for _ in range(PEAKS):
+        for _ in range(_PEAKS):
             k = int(np.argmax(power))
             if power[k] <= 0.0:
                 return

@@ -7,7 +7,7 @@ Light bends towards colder, denser air, with a curvature of the gradient of the 
 over the index. Over a distance L across the gradient the target seems half of curvature * L^2 off,
 towards the warmth; along it, the light runs slower or faster than at the instrument. With r from
 the instrument to the target and gradient G, both together are
-``p -> p + BEND (r.r G / 2 - (G.r) r)``.
+``p -> p + _BEND (r.r G / 2 - (G.r) r)``.
 
 The place of the instrument is the origin of the measuring frame unless it is given. Another place
 only adds a turn, a shift and a scale, as multiplying out shows, which a base pose and a scale of
@@ -32,11 +32,11 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
-BEND = 7.86e-4 * 101.325 / 293.15**2
+_BEND = 7.86e-4 * 101.325 / 293.15**2
 """By how much the refractive index of air falls [1/K], 9.27e-7 at 20 degC and 101.325 kPa:
 n = 1 + 7.86e-4 p / T with p in kPa, less what humidity does (emtoolbox.nist.gov, refractive index
 of air calculator, appendix B)."""
-NEAREST = 1.5
+_NEAREST = 1.5
 """Distance [m] that the tool keeps from an instrument: nearer, most arms could reach into it, and
 the origin is not the instrument's. The bundled arms reach 0.5 to 3 m from their base."""
 
@@ -98,7 +98,7 @@ class Refraction(LinearEffect):
         sight = view.frames.position - (0.0 if self.instrument is None else self.instrument)
         across = 0.5 * (sight**2).sum(axis=-1)
         seen = (
-            BEND * (across[..., None] * axis - sight[..., k, None] * sight)
+            _BEND * (across[..., None] * axis - sight[..., k, None] * sight)
             for k, axis in enumerate(np.eye(3))
         )
         return [{('pose', j): each[..., j] for j in range(3)} for each in seen]
@@ -107,7 +107,7 @@ class Refraction(LinearEffect):
     def applicable(cls, view: View, joint: str | None) -> str | None:
         """Return why the data cannot show it: it has to be known where the instrument stands."""
         nearest = np.linalg.norm(view.frames.position, axis=-1).min(initial=np.inf)
-        if nearest < NEAREST:
+        if nearest < _NEAREST:
             return (
                 "the tool comes within 1.5 m of the measuring frame's origin, so that this is not "
                 'where an instrument stands'

@@ -29,15 +29,15 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
 
-DAMPINGS = (0.3, 0.4, 0.55, 0.75)
+_DAMPINGS = (0.3, 0.4, 0.55, 0.75)
 """Dampings of loops that a search starts from; a stiffer one is hardly told from first order."""
-SWINGING = 0.35
+_SWINGING = 0.35
 """Share of the usual misfit that is left where inertia is in the formula: on a servo axis (the
 recording EMPS) a lag of first order beside friction misses 1.8 % of the trail, a loop that swings
 0.4 %; a little more for arms, whose inertia changes."""
-APART = 1e-6
+_APART = 1e-6
 """Distance of a damping from one at the least: there the two poles meet."""
-SHORTEST = 1e-9
+_SHORTEST = 1e-9
 """Time constant [s] that a loop has at the least."""
 
 
@@ -52,7 +52,7 @@ class _Fit(FitHooks):
     @property
     def ideal(self) -> float:
         """Return less for a loop that swings: its inertia is in the formula."""
-        return 1.0 if self.effect.damping is None else SWINGING
+        return 1.0 if self.effect.damping is None else _SWINGING
 
     def starts(self, view: View, zoom: int) -> tuple[list[Any], Array] | None:
         """Return the loop at all dampings, and then at those close to the best."""
@@ -147,8 +147,8 @@ class ServoLag(MemoryEffect):
     def _poles(self) -> tuple[Array, Array]:
         """Return the two poles of the loop [1/s]."""
         zeta = float(self.damping or 1.0)
-        zeta += APART * (abs(zeta - 1.0) < APART)
-        w = 2.0 * zeta / np.maximum(self.number('time_constant'), SHORTEST)
+        zeta += _APART * (abs(zeta - 1.0) < _APART)
+        w = 2.0 * zeta / np.maximum(self.number('time_constant'), _SHORTEST)
         root = np.sqrt(complex(zeta**2 - 1.0))
         return w * (-zeta + root), w * (-zeta - root)
 
@@ -159,7 +159,7 @@ class ServoLag(MemoryEffect):
         On a straight stretch what is beside the trail swings freely; each pole has its share of
         it, and every kink of the command kicks both.
         """
-        tau = np.maximum(self.number('time_constant'), SHORTEST)
+        tau = np.maximum(self.number('time_constant'), _SHORTEST)
         one, other = self._poles()
         rest = np.zeros(q.shape[:-1], complex)
         t0, q0, rate0, left0, right0 = state or (t[0], q[..., 0], 0.0 * q[..., 0], rest, rest)
@@ -211,7 +211,7 @@ class ServoLag(MemoryEffect):
         if view.static:
             return []
         plain = [cls(str(joint), tau) for tau in (2e-3, 3e-2)]
-        return plain + [cls(str(joint), 1e-2, damping) for damping in DAMPINGS]
+        return plain + [cls(str(joint), 1e-2, damping) for damping in _DAMPINGS]
 
     def atoms(self, view: View) -> list[Shift]:
         """Return the displacement per second of time constant."""

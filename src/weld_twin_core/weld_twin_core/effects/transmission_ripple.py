@@ -21,11 +21,11 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import size
 
-MAX_ORDER = 100
+_MAX_ORDER = 100
 """Highest order a search considers: one per tooth of a 100:1 strain-wave gear."""
-HIGHEST_LINE = 420
+_HIGHEST_LINE = 420
 """Highest order of a single line looked for: some four per tooth of such a gear. A judgement."""
-BANDS = (4, 8, 16, 24, 36, 54, 81, 121, 1000)
+_BANDS = (4, 8, 16, 24, 36, 54, 81, 121, 1000)
 """Orders whose amplitudes are expected to be alike: up to a band's last order. Amplitudes fall off
 with the order, so bands widen with it; where they end is a judgement."""
 
@@ -53,7 +53,7 @@ class _Search(SearchHooks):
 
     def small(self, view: View, joint: str | None, most: int) -> list[TransmissionRipple]:
         """Return one ripple of all orders up to the highest that the measurements can hold apart."""
-        orders = np.arange(1.0, min(MAX_ORDER, most) + 1.0)
+        orders = np.arange(1.0, min(_MAX_ORDER, most) + 1.0)
         zero = np.zeros(orders.size)
         return [self.kind(str(joint), zero, orders, zero)] if orders.size else []
 
@@ -82,7 +82,7 @@ class _Fit(FitHooks):
 
     def alike(self) -> list[tuple[str, ...]]:
         """Return a label per sine and cosine: the joint and the band of its order."""
-        band = np.searchsorted(BANDS, np.repeat(self.effect.search.orders(), 2))
+        band = np.searchsorted(_BANDS, np.repeat(self.effect.search.orders(), 2))
         return [(self.effect.name, self.effect.joint, str(b)) for b in band]
 
     def errors(self, std: Array) -> dict[str, Any]:
@@ -137,7 +137,7 @@ class TransmissionRipple(Effect):
         demand=1,
         by_motion=True,
         everywhere=True,
-        waves=Waves(dense=MAX_ORDER, highest=HIGHEST_LINE),
+        waves=Waves(dense=_MAX_ORDER, highest=_HIGHEST_LINE),
     )
     of = 'joint'
     stage = Stage.JOINT
@@ -224,7 +224,7 @@ class TransmissionRipple(Effect):
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Return one instance per integer order that the joint's range of motion can tell."""
         reported = highest_order(view.joint(view.robot.index(str(joint))))
-        return cls.search.lines(str(joint), np.arange(1.0, min(MAX_ORDER, int(reported)) + 1.0))
+        return cls.search.lines(str(joint), np.arange(1.0, min(_MAX_ORDER, int(reported)) + 1.0))
 
     def atoms(self, view: View) -> list[Shift]:
         """Return sine and cosine of every order, so that amplitude and phase become linear."""

@@ -24,11 +24,11 @@ from .hooks import FitHooks, Hooked, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
-FREQUENCIES = np.geomspace(1.0, 40.0, 64)
+_FREQUENCIES = np.geomspace(1.0, 40.0, 64)
 """Modes [Hz] that a fit may start from, and"""
-DAMPINGS = (0.03, 0.08, 0.25)
+_DAMPINGS = (0.03, 0.08, 0.25)
 """their dampings."""
-HIGHEST = 0.4
+_HIGHEST = 0.4
 """Frequency times the step in time of the joint stream that a search goes up to."""
 
 
@@ -49,8 +49,8 @@ class _Fit(FitHooks):
         kick = np.concatenate([np.zeros(2), np.diff(q, n=2)]) / step
         modes = [
             Vibration(self.effect.joint, float(f), z, 1.0)
-            for f in FREQUENCIES[FREQUENCIES * step < HIGHEST]
-            for z in DAMPINGS
+            for f in _FREQUENCIES[_FREQUENCIES * step < _HIGHEST]
+            for z in _DAMPINGS
         ]
         poles, damped = (np.array(part) for part in zip(*(m._mode() for m in modes), strict=True))
         response = _ringing(np.exp(poles * step), damped, kick)
@@ -185,7 +185,7 @@ class Vibration(MemoryEffect):
         """Yield modes from 2 to 40 Hz, as far as the joint stream's rate can show them."""
         if view.static or view.t.size < 3:
             return
-        highest = HIGHEST / float(np.median(np.diff(view.t)))
+        highest = _HIGHEST / float(np.median(np.diff(view.t)))
         for frequency in np.geomspace(2.0, 40.0, 22):
             if frequency < highest:
                 yield cls(str(joint), float(frequency), 0.05, 0.0)

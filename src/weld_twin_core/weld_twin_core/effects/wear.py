@@ -21,10 +21,10 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
-SLOWED = (0.0, 0.5)
+_SLOWED = (0.0, 0.5)
 """Slowing that a search starts from, over the length of the recording: none, and a rate that falls
 by a third."""
-SMALL = 1e-4
+_SMALL = 1e-4
 """Below it log(1 + x) / x is its series; there the two differ by 1e-13."""
 
 
@@ -94,7 +94,7 @@ class Wear(Effect):
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield a tip that wears evenly, and one that has slowed down by the end."""
         span = max(float(np.max(view.elapsed, initial=0.0)), 1.0)
-        for slowed in SLOWED:
+        for slowed in _SLOWED:
             yield cls(0.0, slowed / span)
 
     def remedy(self, robot: Robot) -> str:
@@ -107,10 +107,10 @@ class Wear(Effect):
 
 def _slowed(x: Array) -> tuple[Array, Array]:
     """Return log(1 + x) / x and its derivative, for x of any shape, not negative."""
-    safe = np.maximum(x, SMALL)
+    safe = np.maximum(x, _SMALL)
     share = np.log1p(safe) / safe
     falls = (1.0 / (1.0 + safe) - share) / safe
-    few = x < SMALL
+    few = x < _SMALL
     return np.where(few, 1.0 - 0.5 * x, share), np.where(few, -0.5 + 2.0 / 3.0 * x, falls)
 
 

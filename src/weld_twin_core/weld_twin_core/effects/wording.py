@@ -12,11 +12,11 @@ import numpy as np
 
 from ..arrays import Array
 
-LEAST_MM = 0.005
+_LEAST_MM = 0.005
 """Shift of a frame [mm] that is not told: no arm repeats that well."""
 _FINE = 1e-3
 """Length [m] below which three decimals of mm are told: a controller takes no more."""
-LEAST_DEG = 0.0003
+_LEAST_DEG = 0.0003
 """Turn of a frame [degrees] that is not told: a metre away it moves the tool by 0.005 mm."""
 
 TURNED_ROUND = (
@@ -67,8 +67,8 @@ def frame(step: Array, shifted: str, turned: str) -> str:
     step: shape (6,) [m, rad].
     shifted, turned: whose axes they are along and about, such as 'of the measuring frame'.
     """
-    moved = _axes(np.asarray(step[:3]) * 1e3, LEAST_MM, 'mm along', 3)
-    about = _axes(np.degrees(step[3:]), LEAST_DEG, 'deg about', 4)
+    moved = _axes(np.asarray(step[:3]) * 1e3, _LEAST_MM, 'mm along', 3)
+    about = _axes(np.degrees(step[3:]), _LEAST_DEG, 'deg about', 4)
     reported = [f'{moved} {shifted}' if moved else '', f'{about} {turned}' if about else '']
     return ' and '.join(filter(None, reported)) or 'less than 0.005 mm'
 

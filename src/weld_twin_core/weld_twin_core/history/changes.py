@@ -29,26 +29,26 @@ from scipy.special import chdtri
 from ..arrays import Array
 from .observation import Observation, Series, series_of
 
-YEAR = 365.25
+_YEAR = 365.25
 """Days of a season."""
 MOST = 8
 """Changes looked for; an arm with more of them was rebuilt."""
-ALIKE = 6.0
+_ALIKE = 6.0
 """Fall of the sum of squares by which another coordinate may explain less and still be told as alike:
 three nats, odds of twenty to one."""
-DATED = 3.84
+_DATED = 3.84
 """Fall within which another instant is as likely: 95 % of chi-square with one degree of freedom."""
-SEASON_SPAN = 0.75
+_SEASON_SPAN = 0.75
 """Share of a year that must be covered before a season is looked for: a shorter piece of a sine
 is a trend."""
-NAMED = 3.0
+_NAMED = 3.0
 """Nats by which a coordinate that a diagnosis has named goes before one that none has: twenty to one."""
-LIKELY = 3.0
+_LIKELY = 3.0
 """Nats by which a coordinate that use can change goes before one that it cannot: twenty to one."""
-FRESH = 6.0
+_FRESH = 6.0
 """By how much more a step before the last diagnosis has to explain: its noise is new in every look, that
 of earlier steps was looked at before. Three nats; a step that is large is told at once all the same."""
-ALARMS = 12.0 / 52.0
+_ALARMS = 12.0 / 52.0
 """
 False alarms allowed in one look, were all that is tried independent. It is not: steps a week apart
 are nearly one, and next week's look sees the same diagnoses again. In simulated years, of other
@@ -99,7 +99,7 @@ def changes(
     *,
     named: Collection[str] = (),
     likely: Collection[str] = (),
-    alarms: float = ALARMS,
+    alarms: float = _ALARMS,
 ) -> tuple[Change, ...]:
     """
     Return what changed, the surest first.
@@ -118,20 +118,20 @@ def changes(
     shapes = _shapes(series.days)
     tests = len(shapes) * series.changing.size
     sooner = np.array(
-        [NAMED * (name in named) + LIKELY * (name in likely) for name in series.names]
+        [_NAMED * (name in named) + _LIKELY * (name in likely) for name in series.names]
     )
     # The last few diagnoses hardly tell a step from a trend; a step is the simpler.
     simple = np.array(
         [
             chdtri(shape.columns.shape[1], alarms / tests)
-            + ALIKE * (shape.kind == 'trend')
-            + FRESH * (shape.kind == 'step' and shape.begin == series.days.size - 1)
+            + _ALIKE * (shape.kind == 'trend')
+            + _FRESH * (shape.kind == 'step' and shape.begin == series.days.size - 1)
             for shape in shapes
         ]
     )
     # What use cannot change has to explain more, if it is known what use can.
     rare = np.array([bool(likely) and name not in {*named, *likely} for name in series.names])
-    look = _Look(series, shapes, simple[:, None] + 2.0 * LIKELY * rare, sooner)
+    look = _Look(series, shapes, simple[:, None] + 2.0 * _LIKELY * rare, sooner)
     taken: list[tuple[Found, Change]] = []
     while len(taken) < MOST:
         more = look.next([result for result, _ in taken])
@@ -201,8 +201,8 @@ def _shapes(days: Array) -> list[Shape]:
     shapes += [
         Shape('trend', k, np.maximum(days - days[k], 0.0)[:, None]) for k in range(count - 2)
     ]
-    if days[-1] - days[0] > SEASON_SPAN * YEAR:
-        phase = 2.0 * np.pi * days / YEAR
+    if days[-1] - days[0] > _SEASON_SPAN * _YEAR:
+        phase = 2.0 * np.pi * days / _YEAR
         shapes.append(Shape('season', 0, np.column_stack([np.cos(phase), np.sin(phase)])))
     return shapes
 
@@ -348,7 +348,7 @@ def _told(
     kind, top = shapes[best[0]].kind, gain[best]
     same = [k for k, each in enumerate(shapes) if each.kind == kind]
     most = gain[same].max(axis=0)
-    alike = np.flatnonzero(most > top - ALIKE)
+    alike = np.flatnonzero(most > top - _ALIKE)
     at = {int(j): same[int(np.argmax(gain[same][:, j]))] for j in alike}
     odds = {
         j: _odds(series, system, shapes[k], j, scatter) + float(sooner[j]) for j, k in at.items()
@@ -356,9 +356,9 @@ def _told(
     place = max(odds, key=lambda j: odds[j])
     shape = shapes[at[place]]
     mean, information = system.sizes(shape)
-    near = [shapes[k].begin for k in same if gain[k, place] > most[place] - DATED]
+    near = [shapes[k].begin for k in same if gain[k, place] > most[place] - _DATED]
     ranked = sorted(odds, key=lambda j: -odds[j])
-    others = [j for j in ranked if j != place and odds[j] > odds[place] - 0.5 * ALIKE]
+    others = [j for j in ranked if j != place and odds[j] > odds[place] - 0.5 * _ALIKE]
     season = kind == 'season'
     return Found(shape, place), Change(
         series.names[place],
@@ -381,7 +381,7 @@ def _slowly(series: Series, shapes: Sequence[Shape], gain: Array, top: float) ->
     begins = [
         each.begin
         for each, explained in zip(shapes, gain, strict=True)
-        if each.kind == 'trend' and explained > top - ALIKE
+        if each.kind == 'trend' and explained > top - _ALIKE
     ]
     return float(series.days[min(begins)]) if begins else None
 

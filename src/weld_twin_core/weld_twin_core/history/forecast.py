@@ -14,11 +14,11 @@ from ..errors import DataError
 from .changes import Change, value_and_rise
 from .observation import Observation
 
-DRAWS = 20_000
+_DRAWS = 20_000
 """Draws of the trend; an interval's ends are good to 1 % of its width."""
-SEED = 7
+_SEED = 7
 """The same trend gives the same interval."""
-NEVER = float('inf')
+_NEVER = float('inf')
 
 
 class Outlook(NamedTuple):
@@ -62,13 +62,13 @@ def reaches(limit: float, now: Outlook) -> tuple[float, float, float]:
     """
     if not limit > 0.0:
         raise DataError(f'a limit must be positive, got {limit}')
-    rng = np.random.default_rng(SEED)
+    rng = np.random.default_rng(_SEED)
     spread, axes = np.linalg.eigh(now.covariance)
     root = axes * np.sqrt(np.maximum(spread, 0.0))
-    value, slope = now.value[:, None] + root @ rng.standard_normal((2, DRAWS))
+    value, slope = now.value[:, None] + root @ rng.standard_normal((2, _DRAWS))
     side = np.where(slope >= 0.0, limit, -limit)
     with np.errstate(divide='ignore', invalid='ignore'):
         days = np.where(np.abs(value) >= limit, 0.0, (side - value) / slope)
-    days = np.where(np.isnan(days), NEVER, np.maximum(days, 0.0))
+    days = np.where(np.isnan(days), _NEVER, np.maximum(days, 0.0))
     low, middle, high = np.quantile(days, [0.05, 0.5, 0.95], method='inverted_cdf')
     return float(low), float(middle), float(high)

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from ..arrays import Array, readonly
 from ..errors import DataError
 
-SHOWN = 1e-6
+_SHOWN = 1e-6
 """Share of the variance before the data that they must take away to have shown anything: less is
 the rounding of a file."""
-ABSENT = 3.0
+_ABSENT = 3.0
 """Standard errors of the diagnoses that name an effect, within which it is taken to be zero in those
 that do not name it: it would have been named beyond."""
 
@@ -77,7 +77,7 @@ class Observation:
         scaled = self.covariance / np.outer(width, width)
         variance, axes = np.linalg.eigh(0.5 * (scaled + scaled.T))
         variance = np.clip(variance, 1e-300, 1.0)
-        shown = np.where(variance < 1.0 - SHOWN, 1.0 / variance - 1.0, 0.0)
+        shown = np.where(variance < 1.0 - _SHOWN, 1.0 / variance - 1.0, 0.0)
         # value = variance * (precision of the data) * (what the data say), along each axis
         along = axes.T @ (self.value / width)
         reported = np.where(shown > 0.0, along / variance, 0.0)
@@ -134,5 +134,5 @@ def series_of(observations: Sequence[Observation]) -> Series:
     for k in changing:
         for w, each in enumerate(ordered):
             if names[k] not in each.names:
-                precision[w, k, k] += 1.0 / (ABSENT * float(np.median(error[k]))) ** 2
+                precision[w, k, k] += 1.0 / (_ABSENT * float(np.median(error[k]))) ** 2
     return Series(days, names, precision, reported, 1.0 / width**2, np.array(changing, dtype=int))

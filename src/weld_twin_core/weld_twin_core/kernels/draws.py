@@ -39,19 +39,19 @@ from ..arm.rotation import rotation_matrix
 from ..arrays import Array
 from ..errors import ModelError
 
-ROUNDING = 1e-14
+_ROUNDING = 1e-14
 """Remainder of the features, relative to the strongest, that counts as none."""
 _NEGLIGIBLE = 1e-13
 """Remainder up to which all samples are taken as determined by a few."""
 _MIXTURES = 48
 """Mixtures that stand for all features; a motion with more independent ones is worked on whole."""
-BLOCK = 504
+_BLOCK = 504
 """Draws whose weights are built at once."""
 POINTS = 8000
 """Draws times samples worked on at once; a few of such arrays fit the processor's cache..."""
-FOLLOWING = 16_000
+_FOLLOWING = 16_000
 """... and twice as many where samples follow from others."""
-SPLIT = 3
+_SPLIT = 3
 """Rows of the near piece, the first included, whose turn drops out."""
 
 
@@ -95,7 +95,7 @@ class SeamDraws:
                 'positioner for fast draws of its DH values; the twin runs draws of any robot'
             )
         self.robot = robot
-        features = _features(q[:, 1:SPLIT]), _features(q[:, SPLIT:])
+        features = _features(q[:, 1:_SPLIT]), _features(q[:, _SPLIT:])
         self._count = len(q)
         turn = rotation_matrix(q[:, :1] * np.array([0.0, 0.0, 1.0]))
         self._first = robot.T_world_base[:3, :3] @ turn
@@ -141,8 +141,8 @@ class SeamDraws:
         """
         out = np.empty((len(draws.theta), self._count, 3))
         with unbuffered():
-            for start in range(0, len(out), BLOCK):
-                part = slice(start, start + BLOCK)
+            for start in range(0, len(out), _BLOCK):
+                part = slice(start, start + _BLOCK)
                 away = self._away(DhDraws(*(values[part] for values in draws)))
                 out[part] = np.einsum('nij,jdn->dni', self._first, away, optimize=True)
         return out
@@ -164,8 +164,8 @@ class SeamDraws:
 
         From those at some samples, which is exact to rounding of the largest, or each by itself.
         """
-        for start in range(0, len(draws.theta), BLOCK):
-            block = DhDraws(*(values[start : start + BLOCK] for values in draws))
+        for start in range(0, len(draws.theta), _BLOCK):
+            block = DhDraws(*(values[start : start + _BLOCK] for values in draws))
             if self.spread is None:
                 parts = self._of_all(block)
             elif determining is None:
@@ -188,7 +188,7 @@ class SeamDraws:
 
     def _of_few(self, draws: DhDraws, spread: Array) -> Iterator[Array]:
         few = self._carried(draws) - self._nominal
-        step = max(1, FOLLOWING // self._count)
+        step = max(1, _FOLLOWING // self._count)
         memory = aligned(3, self._count * step)
         for k in range(0, few.shape[2], step):
             some = few[..., k : k + step]
@@ -197,7 +197,7 @@ class SeamDraws:
 
     def _of_fewer(self, draws: DhDraws, spread: Array, squares: Array) -> Iterator[Array]:
         few = self._carried(draws) - self._nominal
-        step = max(1, FOLLOWING // self._count)
+        step = max(1, _FOLLOWING // self._count)
         memory = aligned(self._count * step)
         for k in range(0, few.shape[2], step):
             some = _squared(spread @ few[..., k : k + step])
@@ -230,10 +230,10 @@ class SeamDraws:
         rows = _Rows(draws)
         tool = self.robot.T_flange_tool[:3, 3]
         tip = np.repeat(tool[:, None, None, None], count, axis=3)
-        far = rows.carried(tip, range(n - 1, SPLIT - 1, -1))
+        far = rows.carried(tip, range(n - 1, _SPLIT - 1, -1))
         start = np.zeros((3, 1, 4, count))
         start[[0, 1, 2], 0, [0, 1, 2]] = 1.0
-        return rows.linked(rows.carried(start, range(SPLIT - 1, 0, -1)), 0), far
+        return rows.linked(rows.carried(start, range(_SPLIT - 1, 0, -1)), 0), far
 
     def _points(self, near: Array, far: Array, memory: Array) -> Array:
         """
@@ -324,7 +324,7 @@ def _determining(features: Array) -> _Determining | None:
     mixtures = mixing @ features
     upper, order = qr(mixtures, mode='r', pivoting=True, check_finite=False)
     strength = np.abs(np.diagonal(upper))
-    rank = int((strength > ROUNDING * strength[0]).sum())
+    rank = int((strength > _ROUNDING * strength[0]).sum())
     if 2 * rank >= features.shape[1]:
         return None
     spread = np.empty((rank, features.shape[1]))

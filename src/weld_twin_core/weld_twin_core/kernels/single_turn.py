@@ -22,7 +22,7 @@ from ..arm.rotation import (
 )
 from ..arrays import Array
 
-UNIT = (0.981, 1.019)
+_UNIT = (0.981, 1.019)
 """Squared lengths between which a quaternion is one of a rotation for sure."""
 
 
@@ -34,7 +34,7 @@ def quaternion_matrix(x: float, y: float, z: float, w: float, name: str) -> Arra
     is.
     """
     square = x * x + y * y + z * z + w * w
-    if not UNIT[0] < square < UNIT[1]:
+    if not _UNIT[0] < square < _UNIT[1]:
         return matrix_from_quaternion([x, y, z, w], name)
     return _matrix(x, y, z, w, 2.0 / square)
 

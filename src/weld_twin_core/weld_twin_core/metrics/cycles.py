@@ -20,16 +20,16 @@ from ..arrays import Array
 from ..errors import DataError
 from ..recording import JointMotion, Measurements, Recording
 
-SAME_POSE = 1e-3
+_SAME_POSE = 1e-3
 """
 Two stops are of one pose where no joint differs by more [rad or m]; a joint stream repeats within
 1e-4, and poses that are meant to differ are degrees apart. What differs is taken off again.
 """
-AT_REST = 2e-3
+_AT_REST = 2e-3
 """Speed [rad/s or m/s] of the fastest joint below which the arm stands; 2 mm/s a metre away."""
-DWELL = 0.5
+_DWELL = 0.5
 """Seconds an arm stands at least, so that it has settled when the second half begins."""
-LOOK = 0.05
+_LOOK = 0.05
 """Spacing [s] at which motion is looked at for stops; ten looks to the shortest."""
 END = 0.1
 """Share of a stop left out at its end, where clocks that differ would see the arm leave."""
@@ -108,20 +108,20 @@ def stops(recording: Recording) -> list[Stop]:
 
 def rests(joints: JointMotion) -> list[tuple[float, float]]:
     """
-    Return start and end [s] of the stretches in which the arm stands for `DWELL` or longer.
+    Return start and end [s] of the stretches in which the arm stands for `_DWELL` or longer.
 
     joints: of a motion.
     """
-    t = np.arange(joints.t[0], joints.t[-1], LOOK)
+    t = np.arange(joints.t[0], joints.t[-1], _LOOK)
     if t.size < 2:
         return []
-    speed = np.abs(np.diff(joints.at(t)[0], axis=0)).max(axis=1) / LOOK
-    still = np.concatenate([[False], speed < AT_REST, [False]]).astype(int)
+    speed = np.abs(np.diff(joints.at(t)[0], axis=0)).max(axis=1) / _LOOK
+    still = np.concatenate([[False], speed < _AT_REST, [False]]).astype(int)
     begins, ends = np.flatnonzero(np.diff(still) > 0), np.flatnonzero(np.diff(still) < 0)
     return [
         (float(t[a]), float(t[b]))
         for a, b in zip(begins, ends, strict=True)
-        if t[b] - t[a] >= DWELL
+        if t[b] - t[a] >= _DWELL
     ]
 
 
@@ -165,13 +165,13 @@ def _labels(q: Array) -> np.ndarray:
     # Of thousands of stations, few are near in the first joint: only these are compared in all.
     order = np.argsort(q[:, 0])
     first = q[order, 0]
-    low = np.searchsorted(first, q[:, 0] - SAME_POSE, 'left')
-    high = np.searchsorted(first, q[:, 0] + SAME_POSE, 'right')
+    low = np.searchsorted(first, q[:, 0] - _SAME_POSE, 'left')
+    high = np.searchsorted(first, q[:, 0] + _SAME_POSE, 'right')
     count = 0
     for k in range(len(q)):
         if labels[k] < 0:
             near = order[low[k] : high[k]]
-            alike = near[np.abs(q[near] - q[k]).max(axis=1) < SAME_POSE]
+            alike = near[np.abs(q[near] - q[k]).max(axis=1) < _SAME_POSE]
             labels[alike[labels[alike] < 0]] = count
             count += 1
     return labels

@@ -18,31 +18,31 @@ from ..recording import JointMotion, Measurements, Recording
 from .cycles import measured_of, pose_cycles, stops
 from .iso9283 import nearest_pass
 
-RETURN = 5e-3
+_RETURN = 5e-3
 """The motion is back where it came near the same joint positions [rad]; 5 mm a metre away."""
-AWAY = 0.05
+_AWAY = 0.05
 """It had left them if it was this far off in between [rad]: ten times as near as it comes back."""
-SAME_PATH = 0.01
+_SAME_PATH = 0.01
 """Two cycles are of one path where no joint differs by more at the same share of it [rad]."""
-REFERENCES = 8
+_REFERENCES = 8
 """Cycles with which all are compared; one of the first eight is of the path that is repeated."""
-SHAPE = 100
+_SHAPE = 100
 """Points at which two cycles are compared; a weave has some ten turns."""
 POINTS = 200
 """Points of the command path at which the criteria are evaluated."""
-CUT = 0.02
+_CUT = 0.02
 """Share of the path left out at either end, where one cycle runs into the next."""
-CUSP = 0.5
+_CUSP = 0.5
 """Cosine of the turn from one step of the path to the next below which it has no direction."""
-SLACK = 0.03
+_SLACK = 0.03
 """Share of a cycle's time by which it may pass a point sooner or later than commanded ..."""
-SLACK_S = 0.25
+_SLACK_S = 0.25
 """... or seconds, whichever is more: clocks that differ, and lag."""
-FINER = 8
+_FINER = 8
 """Points put between two measurements, on a cubic: chords would cut the corners of a weave."""
 GAP = 3.0
 """Spacings of the measurements that may be bridged so; where more is missing, nothing is known."""
-FEWEST = 10
+_FEWEST = 10
 """Points of the path that every cycle was measured at, below which it is not judged."""
 
 
@@ -95,7 +95,7 @@ def spans(joints: JointMotion, anchor: Array) -> list[Span]:
     length = np.maximum((step**2).sum(axis=1), 1e-30)
     part = np.clip(((anchor - a) * step).sum(axis=1) / length, 0.0, 1.0)
     off = np.abs(a + part[:, None] * step - anchor).max(axis=1)
-    near, far = np.flatnonzero(off < RETURN), np.flatnonzero(off > AWAY)
+    near, far = np.flatnonzero(off < _RETURN), np.flatnonzero(off > _AWAY)
     # between two passes next to each other the motion must have been away
     gaps = np.searchsorted(far, near[1:]) > np.searchsorted(far, near[:-1])
     moment = joints.t[:-1] + part * np.diff(joints.t)
@@ -110,16 +110,16 @@ def _of_one_path(joints: JointMotion, result: list[Span]) -> list[Span]:
     if len(result) < 2:
         return result
     shapes = np.stack([_shape(joints, span) for span in result])
-    alike = [np.abs(shapes - one).max(axis=(1, 2)) < SAME_PATH for one in shapes[:REFERENCES]]
+    alike = [np.abs(shapes - one).max(axis=(1, 2)) < _SAME_PATH for one in shapes[:_REFERENCES]]
     chosen = max(alike, key=lambda same: int(same.sum()))
     return [span for span, same in zip(result, chosen, strict=True) if same]
 
 
 def _shape(joints: JointMotion, span: Span) -> Array:
-    """Return joint positions at even shares of the way through the joints, (SHAPE, n)."""
+    """Return joint positions at even shares of the way through the joints, (_SHAPE, n)."""
     t, q = _within(joints, span)
     way = np.concatenate([[0.0], np.linalg.norm(np.diff(q, axis=0), axis=1).cumsum()])
-    return joints.at(_when(way, t, np.linspace(0.0, way[-1], SHAPE)))[0]
+    return joints.at(_when(way, t, np.linspace(0.0, way[-1], _SHAPE)))[0]
 
 
 def _within(joints: JointMotion, span: Span) -> tuple[Array, Array]:
@@ -143,7 +143,7 @@ def _crossings(
     ahead = np.diff(ways, axis=0, append=2.0 * ways[-1:] - ways[-2:-1])
     behind = np.diff(ways, axis=0, prepend=2.0 * ways[:1] - ways[1:2])
     sizes = np.linalg.norm(ahead, axis=1) * np.linalg.norm(behind, axis=1)
-    straight = (ahead * behind).sum(axis=1) > CUSP * sizes
+    straight = (ahead * behind).sum(axis=1) > _CUSP * sizes
     crossed = np.stack(
         [
             _passes(measured, ways, ahead + behind, when, span)
@@ -151,7 +151,7 @@ def _crossings(
         ]
     )
     good = straight & np.isfinite(crossed).all(axis=(0, 2))
-    if good.sum() < FEWEST:
+    if good.sum() < _FEWEST:
         return None
     return PathCycles(tuple(result), arc[good], ways[good], crossed[:, good])
 
@@ -165,7 +165,7 @@ def _even_times(
     joints: JointMotion, robot: Robot, result: Sequence[Span]
 ) -> tuple[list[Array], Array]:
     """Return when each cycle was commanded to be at even steps of the path, and their lengths."""
-    shares = np.linspace(CUT, 1.0 - CUT, POINTS)
+    shares = np.linspace(_CUT, 1.0 - _CUT, POINTS)
     times, arc = [], np.zeros(0)
     for span in result:
         t, _ = _within(joints, span)
@@ -178,7 +178,7 @@ def _even_times(
 
 def _passes(measured: Measurements, ways: Array, along: Array, when: Array, span: Span) -> Array:
     """Return where one cycle passed the planes, (m, 3); NaN where nothing was measured."""
-    slack = max(SLACK * (span.end - span.start), SLACK_S)
+    slack = max(_SLACK * (span.end - span.start), _SLACK_S)
     rows = (measured.t >= span.start - slack) & (measured.t <= span.end + slack)
     out = np.full_like(ways, np.nan)
     if rows.sum() < 4:
@@ -194,9 +194,9 @@ def _passes(measured: Measurements, ways: Array, along: Array, when: Array, span
 
 def _finer(t: Array, position: Array) -> tuple[Array, Array]:
     """Return measurements with points between them; those of a gap are not numbers."""
-    share = np.arange(FINER) / FINER
+    share = np.arange(_FINER) / _FINER
     steps = np.diff(t)
     dense = (t[:-1, None] + steps[:, None] * share).ravel()
     points = hermite(t, position, slopes_of_many(t, position), dense)[0]
-    points[np.repeat(steps > GAP * np.median(steps), FINER)] = np.nan
+    points[np.repeat(steps > GAP * np.median(steps), _FINER)] = np.nan
     return dense, points

@@ -29,7 +29,7 @@ from .iso9283 import (
 )
 from .path_cycles import PathCycles, path_cycles
 
-HOUR = 3600.0
+_HOUR = 3600.0
 """Seconds."""
 
 
@@ -149,7 +149,7 @@ def _pose_test(cycles: PoseCycles) -> PoseTest:
         multidirectional_variation(ways) if len(ways) > 1 else None,
         len(ways),
         drift(groups, command[:3, 3]) if count > 1 else None,
-        float(cycles.t[-1] - cycles.t[0]) / HOUR,
+        float(cycles.t[-1] - cycles.t[0]) / _HOUR,
     )
 
 

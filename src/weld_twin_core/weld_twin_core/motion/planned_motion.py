@@ -27,7 +27,7 @@ _DIFFERENCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class PlanReport:
+class _PlanReport:
     """What a plan asks of the robot."""
 
     duration: float
@@ -74,7 +74,7 @@ class Plan:
     """Arc length of each sample, shape (N,) [m]."""
     length: float
     """Of the seam [m]."""
-    report: PlanReport
+    report: _PlanReport
     """What the plan asks of the robot."""
 
 
@@ -158,8 +158,8 @@ def _report(
     velocity: Array,
     acceleration: Array,
     residual: float,
-) -> PlanReport:
-    return PlanReport(
+) -> _PlanReport:
+    return _PlanReport(
         duration=duration,
         slowed=slowed,
         velocity_use=velocity,

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Array, readonly
 from ..errors import DataError
 
-STILL = 1e-9
+_STILL = 1e-9
 """Below this distance [m] two positions are the same."""
 
 
@@ -37,7 +37,7 @@ def path_tangents(position: ArrayLike) -> Array:
     after, before = np.minimum(index + 1, len(points) - 1), np.maximum(index - 1, 0)
     chord = points[after] - points[before]
     length = np.linalg.norm(chord, axis=1)
-    moving = np.flatnonzero(length > STILL)
+    moving = np.flatnonzero(length > _STILL)
     if moving.size == 0:
         raise DataError('the path does not move, so it has no direction; give the seam tangent')
     held = moving[np.maximum(np.searchsorted(moving, index, side='right') - 1, 0)]
@@ -59,7 +59,7 @@ def seam_axes(tangent: ArrayLike, normal: ArrayLike) -> Array:
     along = _unit(along, 'the seam tangent is zero; give a direction')
     out = normal - (normal * along).sum(axis=-1, keepdims=True) * along
     relative = np.linalg.norm(normal, axis=-1, keepdims=True)
-    out = np.where(np.linalg.norm(out, axis=-1, keepdims=True) < STILL * relative, 0.0, out)
+    out = np.where(np.linalg.norm(out, axis=-1, keepdims=True) < _STILL * relative, 0.0, out)
     out = _unit(out, 'the seam normal lies along the seam; give one that points away from it')
     return np.stack([along, np.cross(out, along), out], axis=-2)
 

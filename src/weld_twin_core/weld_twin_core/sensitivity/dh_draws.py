@@ -20,7 +20,7 @@ from ..kernels.draws import DhDraws, SeamDraws
 from .seam_study import Study
 from .tolerance import Tolerance
 
-VALUES = {
+_VALUES = {
     ('joint_offset', 'offset'): 'theta',
     ('link_offset', 'dd'): 'd',
     ('link_length', 'da'): 'a',
@@ -50,7 +50,7 @@ class DhStudy:
             for key in DhDraws._fields
         }
         for column, tolerance in zip(draws.T, self.tolerances, strict=True):
-            key = VALUES[tolerance.effect, tolerance.parameter]
+            key = _VALUES[tolerance.effect, tolerance.parameter]
             values[key][:, robot.index(str(tolerance.joint))] += column
         away = self.seam.deviations(DhDraws(**values))
         return np.moveaxis(self.study.on_seam(away), -1, 0)
@@ -58,7 +58,7 @@ class DhStudy:
 
 def dh_study(study: Study, tolerances: Sequence[Tolerance]) -> DhStudy | None:
     """Return the fast form of a study, or None where something else than DH values counts."""
-    if study.known or any((t.effect, t.parameter) not in VALUES for t in tolerances):
+    if study.known or any((t.effect, t.parameter) not in _VALUES for t in tolerances):
         return None
     joints = study.recording.joints
     q = joints.q if study.at is None else joints.at(study.at)[0]

@@ -30,7 +30,7 @@ from .tolerance import Tolerance, with_draws
 
 CHUNK = 30_000
 """Runs times path points worked on at once; a few of such arrays fit the processor's cache."""
-Pairs = tuple[NDArray[np.intp], NDArray[np.intp]]
+_Pairs = tuple[NDArray[np.intp], NDArray[np.intp]]
 _BLOCK = 2048
 """Runs whose play and lag are worked out together; larger arrays than these cost page faults."""
 _RANK = 1e-6
@@ -45,7 +45,7 @@ class Expansion:
     tolerances: tuple[Tolerance, ...]
     scale: Array
     """Errors are counted in units of these, shape (P,)."""
-    products: Pairs
+    products: _Pairs
     """Which two errors every quadratic feature multiplies, shape (F,)."""
     weights: Array
     """From features to strengths of the shapes, shape (P + F, R)."""
@@ -192,7 +192,7 @@ class _Runs(NamedTuple):
         return np.asarray(wide.swapaxes(-1, -2))
 
 
-def _columns(runs: _Runs, pairs: Pairs) -> Array:
+def _columns(runs: _Runs, pairs: _Pairs) -> Array:
     """Return first and second derivatives by scaled errors, shape (P + F, 3, N)."""
     first, second = pairs
     unit = np.eye(len(runs.tolerances))

@@ -28,15 +28,15 @@ from ..errors import DataError
 from .evaluate import Function
 from .outcome import refuse_unfinite
 
-LEVELS = 8
+_LEVELS = 8
 """Levels of the grid of each input; even, as the method wants, so that all are visited alike."""
-STEP = LEVELS / (2.0 * (LEVELS - 1.0))
+STEP = _LEVELS / (2.0 * (_LEVELS - 1.0))
 """How far an input moves at a time, as a part of the grid: as the method wants [1]_."""
-CONFIDENCE = 0.95
+_CONFIDENCE = 0.95
 """Of the intervals of mu star."""
-RESAMPLES = 100
+_RESAMPLES = 100
 """Of the bootstrap behind them."""
-MARGIN = 0.02
+_MARGIN = 0.02
 """Probability left out at either end, where a normal distribution is infinitely far out."""
 
 
@@ -94,7 +94,7 @@ class MorrisDesign:
         """Return probabilities of every input, shape (trajectories (P + 1), P)."""
         rng = _numbers(self.seed, 0)
         each = [_trajectory(len(self.names), rng) for _ in range(self.trajectories)]
-        return np.concatenate(each) * (1.0 - 2.0 * MARGIN) + MARGIN
+        return np.concatenate(each) * (1.0 - 2.0 * _MARGIN) + _MARGIN
 
     def screening(self, results: Array) -> Screening:
         """
@@ -114,10 +114,10 @@ class MorrisDesign:
         # One input moves at a time: its step says at which place of the trajectory, and whereto.
         effects = np.einsum('tk,tkp->pt', change, np.sign(steps)) / STEP
         rng = _numbers(self.seed, 1)
-        picks = rng.integers(self.trajectories, size=(inputs, RESAMPLES, self.trajectories))
+        picks = rng.integers(self.trajectories, size=(inputs, _RESAMPLES, self.trajectories))
         size = np.abs(effects)
         again = np.take_along_axis(size[:, None], picks, axis=-1).mean(axis=-1)
-        half = float(ndtri(0.5 + 0.5 * CONFIDENCE)) * again.std(axis=1, ddof=1)
+        half = float(ndtri(0.5 + 0.5 * _CONFIDENCE)) * again.std(axis=1, ddof=1)
         return Screening(
             self.names,
             size.mean(axis=1),
@@ -139,7 +139,7 @@ def _trajectory(inputs: int, rng: np.random.Generator) -> Array:
     order = np.eye(inputs)
     rng.shuffle(order)
     way = rng.choice([-1, 1], inputs)
-    start = rng.choice(np.linspace(0.0, 1.0 - STEP, LEVELS // 2), inputs)
+    start = rng.choice(np.linspace(0.0, 1.0 - STEP, _LEVELS // 2), inputs)
     moved = np.tril(np.ones((inputs + 1, inputs)), -1) @ order.T
     out: Array = start + 0.5 * STEP * ((2.0 * moved - 1.0) * way + 1.0)
     return out

@@ -27,7 +27,7 @@ from ..kernels.saltelli import base_pair, mixed, sobol_estimates, sobol_half_wid
 from .evaluate import Function
 from .outcome import refuse_unfinite
 
-CONFIDENCE = 0.95
+_CONFIDENCE = 0.95
 """Of the intervals of the indices."""
 SETTLED = 0.05
 """Half-width and change of a total index below which a study counts as converged."""
@@ -84,7 +84,7 @@ class SobolIndices:
             'base_samples': self.base_samples,
             'runs': self.runs,
             'seed': self.seed,
-            'confidence': CONFIDENCE,
+            'confidence': _CONFIDENCE,
             'mean': self.mean,
             'std': self.std,
             'sum_S1': float(self.first.sum()),
@@ -152,7 +152,7 @@ class SobolDesign:
         runs = values.reshape(self.base_samples, block)
         first, total = sobol_estimates(runs)
         rng = np.random.default_rng(self.seed)
-        first_half, total_half = sobol_half_widths(runs, CONFIDENCE, rng)
+        first_half, total_half = sobol_half_widths(runs, _CONFIDENCE, rng)
         before = sobol_estimates(runs[: self.base_samples // 2])[1]
         change = float(np.abs(total - before).max())
         settled = max(change, float(total_half.max())) < SETTLED

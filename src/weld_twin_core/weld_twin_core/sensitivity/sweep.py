@@ -17,7 +17,7 @@ from .tolerance import Tolerance
 
 DEGREE = np.pi / 180.0
 """Radians."""
-RANGES: dict[str, tuple[float, float]] = {
+_RANGES: dict[str, tuple[float, float]] = {
     'joint_offset': (0.01 * DEGREE, 0.5 * DEGREE),
     'link_length': (0.0, 0.5e-3),
     'link_twist': (0.01 * DEGREE, 0.5 * DEGREE),
@@ -124,9 +124,9 @@ def default_values(tolerance: Tolerance, count: int = 25) -> Array:
 
     """
     last = 3.0 * (abs(tolerance.distribution.mean) + tolerance.distribution.std)
-    ends = RANGES.get(tolerance.effect, (0.0, last))
+    ends = _RANGES.get(tolerance.effect, (0.0, last))
     if tolerance.effect == 'base_pose' and tolerance.parameter == 'rotvec':
-        ends = RANGES['joint_offset']
+        ends = _RANGES['joint_offset']
     return np.linspace(*ends, count)
 
 

@@ -134,7 +134,7 @@ def _expanded(robot: Robot, entry: Mapping[str, Any], scale: float) -> list[Tole
     numbers = {k: v for k, v in entry.items() if k not in _OWN_KEYS}
     out = []
     for joint in _sites(robot, name, entry.get('joint')):
-        effect = blank_effect(name, joint)
+        effect = _blank_effect(name, joint)
         for parameter, index in effect.components():
             if entry.get('parameter', parameter.name) != parameter.name:
                 continue
@@ -167,7 +167,7 @@ def _typical(parameter: Parameter, scale: float) -> Distribution:
     return Distribution('normal', (0.0, size), *bounds)
 
 
-def blank_effect(name: str, joint: str | None) -> Effect:
+def _blank_effect(name: str, joint: str | None) -> Effect:
     """Return an effect whose parameters have their defaults."""
     entry = {'effect': name} if joint is None else {'effect': name, 'joint': joint}
     return effect_from_mapping(entry)
@@ -193,7 +193,7 @@ def with_draws(
     out = {(effect.name, effect.site): effect for effect in known}
     others = [effect for effect in known if out[effect.name, effect.site] is not effect]
     for key, members in columns.items():
-        effect = out[key] if key in out else blank_effect(*key)
+        effect = out[key] if key in out else _blank_effect(*key)
         base = effect.vector()
         place = {(p.name, index): c for c, (p, index) in enumerate(effect.components())}
         vector = np.array(np.broadcast_to(base, draws.shape[:-1] + base.shape))

@@ -147,7 +147,7 @@ def compare_profiles(
     out = []
     for name, study in studies.items():
         each = expected_deviation(study, tolerances)
-        same = stretched(study, slowest / float(study.t[-1]))
+        same = _stretched(study, slowest / float(study.t[-1]))
         out.append(
             ProfileResult(
                 name,
@@ -160,7 +160,7 @@ def compare_profiles(
     return tuple(out)
 
 
-def stretched(study: Study, factor: float) -> Study:
+def _stretched(study: Study, factor: float) -> Study:
     """Return the study of the same motion done more slowly."""
     motion = study.recording.joints
     rate = None if motion.qd is None else motion.qd / factor

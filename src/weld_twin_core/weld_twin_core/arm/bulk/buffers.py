@@ -10,9 +10,9 @@ import numpy as np
 
 from ...arrays import Array
 
-CACHE_LINE = 64
+_CACHE_LINE = 64
 """Bytes; arrays begin at a multiple of it."""
-SHORT = 512
+_SHORT = 512
 """Numbers in numpy's buffer while rows are worked on."""
 
 
@@ -24,8 +24,8 @@ def aligned(*shape: int) -> Array:
     costs twice as much. Rows stay aligned when their length is a multiple of 8.
     """
     size = prod(shape) * 8
-    raw = np.empty(size + CACHE_LINE, dtype=np.uint8)
-    start = -raw.ctypes.data % CACHE_LINE
+    raw = np.empty(size + _CACHE_LINE, dtype=np.uint8)
+    start = -raw.ctypes.data % _CACHE_LINE
     return raw[start : start + size].view(np.float64).reshape(shape)
 
 
@@ -38,7 +38,7 @@ def unbuffered() -> Iterator[None]:
     8192 numbers into it and back, though nothing has to be converted: four times the work. With a
     buffer that is shorter than a row it does not.
     """
-    usual = np.setbufsize(SHORT)
+    usual = np.setbufsize(_SHORT)
     try:
         yield
     finally:

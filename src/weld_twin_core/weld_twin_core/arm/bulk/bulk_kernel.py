@@ -27,7 +27,7 @@ from .half_angle import DEGREE, HalfAngle
 from .screw_regions import ROWS, Division, Region
 from .weights import on_half_angles
 
-BLOCK = 1504
+_BLOCK = 1504
 """Poses worked on at once; the working memory of a six-joint arm then fits a cache of 2 MB."""
 
 POSE = 12
@@ -51,7 +51,9 @@ class BulkKernel:
 
     """
 
-    def __init__(self, robot: Robot, channels: Sequence[Channel] = (), block: int = BLOCK) -> None:
+    def __init__(
+        self, robot: Robot, channels: Sequence[Channel] = (), block: int = _BLOCK
+    ) -> None:
         self.robot = robot
         self.channels = tuple(channels)
         self.block = block

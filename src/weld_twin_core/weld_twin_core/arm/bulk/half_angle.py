@@ -52,7 +52,7 @@ DEGREE = len(COSINE) - 1
 _POLYNOMIALS = np.array([COSINE, SINE])
 
 
-def tangent_is_vectorised() -> bool:
+def _tangent_is_vectorised() -> bool:
     """Tell whether this numpy, on this processor, takes many tangents at once."""
     introspect = getattr(np.lib, 'introspect', None)  # since numpy 2.1
     if introspect is None:
@@ -62,7 +62,7 @@ def tangent_is_vectorised() -> bool:
     return bool(kernel.startswith(('AVX512', 'X86_V4')))
 
 
-BY_TANGENT = tangent_is_vectorised()
+_BY_TANGENT = _tangent_is_vectorised()
 
 
 class HalfAngle:
@@ -80,7 +80,7 @@ class HalfAngle:
         *shape: int,
         powers: Array | None = None,
         own: Array | None = None,
-        by_tangent: bool = BY_TANGENT,
+        by_tangent: bool = _BY_TANGENT,
     ) -> None:
         self.shape = shape
         size = int(np.prod(shape))
@@ -118,7 +118,7 @@ class HalfAngle:
         np.multiply(sine, sine, out=sine)
 
 
-def sincos(angles: Array, by_tangent: bool = BY_TANGENT) -> tuple[Array, Array]:
+def sincos(angles: Array, by_tangent: bool = _BY_TANGENT) -> tuple[Array, Array]:
     """Return sine and cosine of angles of any shape [rad]."""
     sine, cosine = HalfAngle(*angles.shape, by_tangent=by_tangent)(angles)
     sine *= 2.0

@@ -21,8 +21,8 @@ from ..channels import AXIS, TURNS, row_factors
 from ..robot import Robot
 from ..rotation import skew
 
-HALF_ANGLE = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 2.0], [0.0, -2.0, 0.0]])
-"""(1, c, s) = (1, u, v) @ HALF_ANGLE, with u and v as in `half_angle`."""
+_HALF_ANGLE = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 2.0], [0.0, -2.0, 0.0]])
+"""(1, c, s) = (1, u, v) @ _HALF_ANGLE, with u and v as in `half_angle`."""
 
 
 _TURNS = np.stack([skew(axis) for axis in np.eye(3)])
@@ -99,7 +99,7 @@ def generator(axis: int) -> Array:
     return out
 
 
-def adjoint(matrices: Array) -> Array:
+def _adjoint(matrices: Array) -> Array:
     """Return how matrices (k, 4, 4) of one factor act on screws (moment, axis), (k, 6, 6)."""
     out = np.zeros((len(matrices), 6, 6))
     turn, shift = matrices[:, :3, :3], matrices[:, :3, 3]
@@ -148,9 +148,9 @@ class Piece:
 
     def screws(self, turns: Sequence[tuple[int, int]]) -> Array:
         """Return weights of moment about the origin and axis, shape (features, turns, 2, 3)."""
-        acting = [adjoint(self._before)]
+        acting = [_adjoint(self._before)]
         for factor in self._factors:
-            acting.append(product(acting[-1], adjoint(factor.matrices)))
+            acting.append(product(acting[-1], _adjoint(factor.matrices)))
         out = np.zeros((len(self._upto[-1]), len(turns), 2, 3))
         for t, (k, axis) in enumerate(turns):
             out[:, t, 0] = self._all_features(acting[k][:, :3, 3 + axis])
@@ -171,5 +171,5 @@ def on_half_angles(weights: Array, joints: int) -> Array:
     """Return weights of (1, c, s) features turned into weights of (1, u, v) features."""
     out = weights
     for axis in range(joints):
-        out = HALF_ANGLE @ out.reshape(3**axis, 3, -1)
+        out = _HALF_ANGLE @ out.reshape(3**axis, 3, -1)
     return out.reshape(weights.shape)

@@ -21,12 +21,12 @@ from ...arm.robot import Robot
 from ...arrays import Array
 from .subproblems import angle_onto, angle_to_distance, angle_to_height, turn, turn_matrix
 
-EXACT = 1e-9
+_EXACT = 1e-9
 """How far [m, rad] axes may be from meeting or parallel; an arm with errors is not exact."""
 
 
 @dataclass(frozen=True, eq=False)
-class Screws:
+class _Screws:
     """Joint axes (6, 3), a point on each (6, 3) [m], and the tool pose (4, 4), all at q = 0."""
 
     axis: Array
@@ -34,15 +34,15 @@ class Screws:
     home: Array
 
 
-Solver = Callable[[Screws, Array, Array], Array]
+_Solver = Callable[[_Screws, Array, Array], Array]
 
 
 @lru_cache(maxsize=8)
-def screws(robot: Robot) -> Screws:
+def screws(robot: Robot) -> _Screws:
     """Return the joint axes of a robot at joint position zero, in the world frame."""
     zero = np.zeros(robot.n)
     rows = frames(robot, zero).rows
-    return Screws(
+    return _Screws(
         np.array([row.z for row in rows]),
         np.array([row.z_point for row in rows]),
         forward(robot, zero),
@@ -60,7 +60,7 @@ def family(robot: Robot) -> str | None:
         return None
     if _parallel(arm, 2, 3) and not _parallel(arm, 0, 1) and not _parallel(arm, 3, 4):
         return 'three parallel'
-    if _off_axis(arm, 3, wrist) < EXACT and not _parallel(arm, 3, 4):
+    if _off_axis(arm, 3, wrist) < _EXACT and not _parallel(arm, 3, 4):
         return 'spherical wrist'
     return None
 
@@ -86,7 +86,7 @@ def branches(robot: Robot, poses: Array) -> Array:
     return np.where((gap < 1e-6)[..., None], q, np.nan)
 
 
-def _spherical(arm: Screws, rotation: Array, point: Array) -> Array:
+def _spherical(arm: _Screws, rotation: Array, point: Array) -> Array:
     """Return q (8, N, 6): shoulder, elbow and wrist, each two ways."""
     h, p = arm.axis, arm.point
     centre = np.asarray(_meeting(arm, 4, 5))
@@ -128,7 +128,7 @@ def _wrist(h4: Array, h5: Array, h6: Array, rotation: Array) -> tuple[Array, Arr
     return q4, q5, _rest(h6, np.swapaxes(before, -1, -2) @ rotation[:, :, None])
 
 
-def _three_parallel(arm: Screws, rotation: Array, point: Array) -> Array:
+def _three_parallel(arm: _Screws, rotation: Array, point: Array) -> Array:
     """Return q (8, N, 6): shoulder, wrist and elbow, each two ways."""
     h, p = arm.axis, arm.point
     centre = np.asarray(_meeting(arm, 4, 5))
@@ -149,7 +149,7 @@ def _three_parallel(arm: Screws, rotation: Array, point: Array) -> Array:
     return _listed(q1[:, None, None], q2, q3, q4, q5[:, :, None], q6[:, :, None])
 
 
-def _planar(arm: Screws, foot: Array, total: Array) -> tuple[Array, Array, Array]:
+def _planar(arm: _Screws, foot: Array, total: Array) -> tuple[Array, Array, Array]:
     """
     Return both (q2, q3, q4) that put axis 4 at ``foot`` from axis 2 and turn by ``total``.
 
@@ -169,25 +169,25 @@ def _rest(axis: Array, rotation: Array) -> Array:
     return angle_onto(axis, np.broadcast_to(aside, rotation.shape[:-1]), rotation @ aside)
 
 
-def _parallel(arm: Screws, i: int, j: int) -> bool:
-    return bool(np.linalg.norm(np.cross(arm.axis[i], arm.axis[j])) < EXACT)
+def _parallel(arm: _Screws, i: int, j: int) -> bool:
+    return bool(np.linalg.norm(np.cross(arm.axis[i], arm.axis[j])) < _EXACT)
 
 
-def _off_axis(arm: Screws, i: int, point: Array) -> float:
+def _off_axis(arm: _Screws, i: int, point: Array) -> float:
     return float(np.linalg.norm(np.cross(point - arm.point[i], arm.axis[i])))
 
 
-def _meeting(arm: Screws, i: int, j: int) -> Array | None:
+def _meeting(arm: _Screws, i: int, j: int) -> Array | None:
     """Return the point where two axes meet, or None when they are parallel or pass by."""
     if _parallel(arm, i, j):
         return None
     directions = np.stack([arm.axis[i], -arm.axis[j]], axis=-1)
     steps = np.linalg.lstsq(directions, arm.point[j] - arm.point[i], rcond=None)[0]
     point = arm.point[i] + steps[0] * arm.axis[i]
-    return point if _off_axis(arm, j, point) < EXACT else None
+    return point if _off_axis(arm, j, point) < _EXACT else None
 
 
-_SOLVERS: dict[str, Solver] = {
+_SOLVERS: dict[str, _Solver] = {
     'spherical wrist': _spherical,
     'three parallel': _three_parallel,
 }

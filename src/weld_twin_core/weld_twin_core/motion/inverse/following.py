@@ -27,9 +27,9 @@ from ...arm.rotation import skew
 from ...arrays import Array
 from .continuity import LEAP
 
-KNOTS = 16
+_KNOTS = 16
 """Knots of the polynomials through which the rest of a smooth seam is guessed."""
-SHORT = 2 * KNOTS
+_SHORT = 2 * _KNOTS
 """Samples below which polynomials through knots would say nothing about those between them."""
 _LONG = 2000
 """Samples worked on at once."""
@@ -57,7 +57,7 @@ def follow(robot: Robot, poses: Array, seed: Array) -> Array | None:
     poses: evenly spaced, by and large: the polynomials are over the samples, shape (N, 4, 4).
     seed: shape (6,) [rad or m].
     """
-    if robot.n != 6 or len(poses) < SHORT:
+    if robot.n != 6 or len(poses) < _SHORT:
         return None
     kernel = kernel_of(robot, tuple(('theta', i) for i in range(6)))
     q = _piece(kernel, poses, seed)
@@ -73,7 +73,7 @@ def _piece(kernel: BulkKernel, poses: Array, start: Array) -> Array | None:
         index, spread = _knots(len(poses))
         result = _closed_knots(kernel, poses[index], start)
         q = None if result is None else _corrected(kernel, poses, spread, *result)
-        if q is not None or half < SHORT:
+        if q is not None or half < _SHORT:
             return q
     before = _piece(kernel, poses[: half + 1], start)
     if before is None:
@@ -89,7 +89,7 @@ def _knots(count: int) -> tuple[NDArray[np.intp], Array]:
 
     The knots are nearest the extrema of a Chebyshev polynomial; the matrix is that of [1]_.
     """
-    part = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, KNOTS))
+    part = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, _KNOTS))
     index = np.unique(np.rint(part * (count - 1)).astype(int))
     apart = (index[:, None] - index) * (4.0 / count)
     np.fill_diagonal(apart, 1.0)

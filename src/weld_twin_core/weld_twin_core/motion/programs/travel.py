@@ -28,26 +28,26 @@ from .moves import Move, MoveProgram
 
 STEP = 0.01
 """Way of the tool [m] between two samples of a linear or circular move."""
-SAMPLES = (5, 120)
+_SAMPLES = (5, 120)
 """Fewest and most samples of a move: enough to follow a posture, and to keep long programs quick."""
-TURN = 0.02
+_TURN = 0.02
 """Way of a joint [rad or m] between two samples of a joint move."""
-SHORT = 32
+_SHORT = 32
 """Samples below which a move is followed from its begin alone."""
-REST = 0.3
+_REST = 0.3
 """Stay [s] after which the arm is where its controller wants it; servo lag is some 50 ms."""
 NEAR = 0.15
 """A linear move that would begin farther than this [rad or m] from the posture reached so far has
 to change the posture."""
 CLOSED = 1e-7
 """Gap [m, rad] up to which a pose counts as reached; programs write micrometres."""
-STANDS = (
+_STANDS = (
     'the positioner moves while the tool goes straight in a frame that stands still; what way it '
     'takes on the workpiece is up to the controller'
 )
-LEAST_TIME = 0.02
+_LEAST_TIME = 0.02
 """Shortest time [s] of a move."""
-SLOW = 0.15
+_SLOW = 0.15
 """Share of a move's way over which it speeds up from a stop: a judgement."""
 
 
@@ -74,7 +74,7 @@ class Travel(NamedTuple):
     """Where the program names no posture and the only known one was taken: file and line."""
 
 
-Known = Callable[[Array], Array]
+_Known = Callable[[Array], Array]
 """Tells which joint positions (K, n) are postures that the arm is known to work in."""
 
 
@@ -83,7 +83,7 @@ class _Course(NamedTuple):
 
     robot: Robot
     program: MoveProgram
-    known: Known | None
+    known: _Known | None
     lost: dict[int, str]
     assumed: list[str]
 
@@ -97,7 +97,7 @@ class _Reached(NamedTuple):
 
 
 def travel(
-    robot: Robot, program: MoveProgram, start: Array | None = None, known: Known | None = None
+    robot: Robot, program: MoveProgram, start: Array | None = None, known: _Known | None = None
 ) -> Travel:
     """
     Return the motion of a program; seams that cannot be followed are left out, with the reason.
@@ -151,7 +151,7 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
     reported = course.program.external_at(move.end)
     turned = np.abs(reported - q[: reported.size])[: arm.behind].max(initial=0.0)
     if turned > CLOSED and not move.along:
-        raise PathError(STANDS)
+        raise PathError(_STANDS)
     poses, via = tool_way(arm, course.program, move, forward(arm, q))
     share = np.linspace(0.0, 1.0, len(poses))[:, None]
     way = _on_the_way(
@@ -161,13 +161,13 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
     length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
     turn = float(np.linalg.norm(rotation_vector(poses[-1, :3, :3] @ poses[0, :3, :3].T)))
     # A move that only turns the tool takes as long as one on which its end 0.2 m away travels.
-    duration = max(max(length, 0.2 * turn) / max(move.speed, 1e-3), LEAST_TIME)
+    duration = max(max(length, 0.2 * turn) / max(move.speed, 1e-3), _LEAST_TIME)
     return _Reached(way, np.linspace(0.0, move.duration or duration, len(way)), via)
 
 
 def _on_the_way(carried: CarriedArm, poses: Array, q: Array, reported: Array) -> Array:
     """Return joint positions along poses that begin where the arm stands, shape (K, n)."""
-    if len(poses) < SHORT:
+    if len(poses) < _SHORT:
         start = carried.whole(reported, np.tile(q[reported.shape[1] :], (len(poses), 1)))
         near, error = carried.polish(start, poses)
         steps = np.abs(np.diff(near, axis=0, prepend=q[None])).max()
@@ -187,10 +187,10 @@ def _joint_move(carried: CarriedArm, course: _Course, move: Move, q: Array | Non
     arm.check_positions(end[None])
     if q is None:
         return _Reached(end[None], np.zeros(1), -1)
-    count = int(np.clip(np.ceil(np.abs(end - q).max() / TURN) + 1, 3, SHORT))
+    count = int(np.clip(np.ceil(np.abs(end - q).max() / _TURN) + 1, 3, _SHORT))
     share = np.linspace(0.0, 1.0, count)[:, None]
     duration = float((np.abs(end - q) / arm.max_velocity).max()) / max(move.speed, 1e-3)
-    times = share[:, 0] * max(move.duration or duration, LEAST_TIME)
+    times = share[:, 0] * max(move.duration or duration, _LEAST_TIME)
     return _Reached(q + share * (end - q), times, -1)
 
 
@@ -281,7 +281,7 @@ def _share_of(arc: Arc, point: Array) -> float:
 
 
 def _count(length: float) -> int:
-    return int(np.clip(np.ceil(length / STEP) + 1, *SAMPLES))
+    return int(np.clip(np.ceil(length / STEP) + 1, *_SAMPLES))
 
 
 def _turning(begin: Array, end: Array, share: Array) -> Array:
@@ -302,7 +302,7 @@ def _joined(done: Sequence[tuple[Move, _Reached]]) -> Piece:
         q.append(reached.q[first:])
         clock = float(times[-1])
         if move.stop or k == len(done) - 1:
-            stay = clock + max(move.dwell, REST) * np.array([0.25, 0.5, 1.0])
+            stay = clock + max(move.dwell, _REST) * np.array([0.25, 0.5, 1.0])
             t.append(stay)
             q.append(np.repeat(reached.q[-1:], stay.size, axis=0))
             clock = float(stay[-1])
@@ -328,5 +328,5 @@ def _eased(t: Array, from_rest: bool, to_rest: bool) -> Array:
 def _late(share: Array) -> Array:
     """Return how much later a place is reached, its share of the way from a stop, than at full speed."""
     # The speed rises from a tenth along the way; half a sine there is speed rising evenly enough.
-    near = np.minimum(share / SLOW, 0.9)
-    return np.asarray(SLOW * (np.log1p(10.0 * near) - near))
+    near = np.minimum(share / _SLOW, 0.9)
+    return np.asarray(_SLOW * (np.log1p(10.0 * near) - near))

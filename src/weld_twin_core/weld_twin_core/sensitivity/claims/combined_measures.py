@@ -23,7 +23,7 @@ GROUPS = {
     'link_length': 'length',
     'base_pose': 'initial',
 }
-ORDER = ('angular', 'backlash', 'length', 'initial')
+_ORDER = ('angular', 'backlash', 'length', 'initial')
 """The paper's final ranking (V.vii), the strongest first."""
 _DRAWS = 200
 """Draws of all errors at once, of which median and extremes are told."""
@@ -41,7 +41,7 @@ def sums(case: Case) -> dict[str, float]:
     combined = np.linalg.norm(exact_deviations(study, tolerances, draws), axis=-1)
     labels = np.array([GROUPS[t.effect] for t in tolerances])
     parts = np.zeros_like(combined)
-    for label in ORDER:
+    for label in _ORDER:
         own = [k for k, name in enumerate(labels) if name == label]
         effects = with_draws((), [tolerances[k] for k in own], draws[:, own])
         parts = parts + np.linalg.norm(study.deviations(effects), axis=-1)
@@ -100,30 +100,30 @@ def ranking(case: Case) -> dict[str, float]:
     fast = model(case.aggressive, tolerances)
     result = design.indices(fast.at_probabilities(design.samples()).d_norm)
     total = dict(zip(result.names, result.total, strict=True))
-    out = {f'ST_{label}': total[label] for label in ORDER}
+    out = {f'ST_{label}': total[label] for label in _ORDER}
     out['ST_half'] = float(result.total_half.max())
-    out['rank_holds'] = all(total[a] > total[b] for a, b in pairwise(ORDER))
+    out['rank_holds'] = all(total[a] > total[b] for a, b in pairwise(_ORDER))
     return out | _stability(case) | _per_unit(case)
 
 
 def _stability(case: Case) -> dict[str, float]:
     """Return how often groups keep the paper's order when their tolerances change."""
-    square = dict.fromkeys(ORDER, 0.0)
+    square = dict.fromkeys(_ORDER, 0.0)
     for tolerance, value in zip(case.local.tolerances, case.local.contribution, strict=True):
         square[GROUPS[tolerance.effect]] += float(value) ** 2
-    size = np.sqrt([square[label] for label in ORDER])
+    size = np.sqrt([square[label] for label in _ORDER])
     rng = np.random.default_rng(case.seed)
-    scaled = size * _FACTOR ** rng.uniform(-1.0, 1.0, (_RANKED, len(ORDER)))
+    scaled = size * _FACTOR ** rng.uniform(-1.0, 1.0, (_RANKED, len(_ORDER)))
     return {
         'rank_share': float((np.diff(scaled, axis=1) < 0.0).all(axis=1).mean()),
         'rank_first_share': float((scaled.argmax(axis=1) == 0).mean()),
-        **{f'contribution_{label}_m': v for label, v in zip(ORDER, size, strict=True)},
+        **{f'contribution_{label}_m': v for label, v in zip(_ORDER, size, strict=True)},
     }
 
 
 def _per_unit(case: Case) -> dict[str, float]:
     """Return the strongest coefficient of each group per degree or per millimetre [mm]."""
-    best = dict.fromkeys(ORDER, 0.0)
+    best = dict.fromkeys(_ORDER, 0.0)
     for tolerance, value in zip(case.local.tolerances, case.local.peak, strict=True):
         unit = 1e3 * DEGREE if tolerance.unit == 'rad' else 1.0
         label = GROUPS[tolerance.effect]

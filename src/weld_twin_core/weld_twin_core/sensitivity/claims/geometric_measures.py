@@ -56,7 +56,7 @@ def _distance(case: Case, *effects: Effect) -> Array:
     return np.asarray(np.linalg.norm(case.smooth.deviations(effects), axis=-1))
 
 
-def linearity(case: Case) -> dict[str, float]:
+def _linearity(case: Case) -> dict[str, float]:
     """Measure how far a sweep of joint offsets departs from proportion, alone and together."""
     offsets = default_tolerances(case.robot, ('joint_offset',))
     result = [sweep(case.smooth, t, default_values(t)) for t in offsets]
@@ -107,7 +107,7 @@ def lengths(case: Case) -> dict[str, float]:
     }
 
 
-def conditioning(case: Case) -> dict[str, float]:
+def _conditioning(case: Case) -> dict[str, float]:
     """Measure whether a high condition number goes with a high gain along the seam."""
     stand = posture(case.smooth)
     condition, gain = _anywhere(case)
@@ -150,9 +150,9 @@ def bound(case: Case) -> dict[str, float]:
 MEASURES: tuple[Measure, ...] = (
     baseline,
     initialization,
-    linearity,
+    _linearity,
     leverage,
     lengths,
-    conditioning,
+    _conditioning,
     bound,
 )

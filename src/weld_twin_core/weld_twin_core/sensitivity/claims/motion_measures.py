@@ -74,7 +74,7 @@ def play(case: Case) -> dict[str, float]:
     }
 
 
-def locality(case: Case) -> dict[str, float]:
+def _locality(case: Case) -> dict[str, float]:
     """Measure how much of the squared deviation lies at reversals, as play and as written."""
     study = case.aggressive
     travel = np.ptp(study.recording.joints.q, axis=0)
@@ -113,7 +113,7 @@ def frequency(case: Case) -> dict[str, float]:
     return out | {'finer_mean_written': _distance(finer, effects).mean() / coarse_mean}
 
 
-def planning(case: Case) -> dict[str, float]:
+def _planning(case: Case) -> dict[str, float]:
     """Measure the expected deviation by time law, geometry alone and with lag and play."""
     profiles = ('constant', 's-curve', 'smooth', 'aggressive')
     out: dict[str, float] = {}
@@ -136,4 +136,4 @@ def planning(case: Case) -> dict[str, float]:
     return out
 
 
-MEASURES: tuple[Measure, ...] = (offset, lag, play, locality, frequency, planning)
+MEASURES: tuple[Measure, ...] = (offset, lag, play, _locality, frequency, _planning)

@@ -66,7 +66,7 @@ class Timed(Effect):
         ]
 
 
-class _Sudden(Timed):
+class Sudden(Timed):
     """
     What sets in at ``time`` [s].
 
@@ -92,7 +92,7 @@ class _Twin(TwinHooks):
 
 @register
 @dataclass(frozen=True, eq=False)
-class JointSlip(_Sudden, ChannelError):
+class JointSlip(Sudden, ChannelError):
     """The joint stands ``offset`` further than its reading from ``time`` [s] on."""
 
     joint: str
@@ -101,7 +101,7 @@ class JointSlip(_Sudden, ChannelError):
 
     name = 'joint_slip'
     traits = replace(
-        _Sudden.traits,
+        Sudden.traits,
         title='slip',
         meaning='a joint slipped at one instant, as by a tooth of a belt',
         entered='zero',
@@ -134,10 +134,10 @@ class JointSlip(_Sudden, ChannelError):
         )
 
 
-class _SuddenFrame(_Sudden, FrameError):
+class _SuddenFrame(Sudden, FrameError):
     """A frame that stands elsewhere from an instant on."""
 
-    traits = replace(_Sudden.traits, of_setup=True)
+    traits = replace(Sudden.traits, of_setup=True)
 
 
 @register

@@ -10,12 +10,15 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.errors import ModelError, TwinError
+from weld_twin_core.errors import DataError, ModelError, TwinError
 from weld_twin_msgs_py.assembly import Intake
 from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, FedBack, plain_messages
 from weld_twin_msgs_py.messages.topics import (
@@ -89,6 +92,7 @@ class CellNode(TellingNode):
             ),
             post_callback=self._jumped,
         )
+        self.add_on_set_parameters_callback(self._check)
 
     # Settings --------------------------------------------------------------------------------
 
@@ -102,6 +106,8 @@ class CellNode(TellingNode):
         every = self.every_setting()
         for item in every:
             self.declare_parameter(item.name, item.default, item.descriptor())
+            if odd := item.odd(self.setting(item.name)):
+                raise DataError(odd)
         refuse_unknown(self._parameter_overrides, [item.name for item in every])
         named = {*(topic.relative for topic in (*BY_NAME.values(), *FRAMES)), *self.own_topics()}
         self.overrides = QosOverrides(
@@ -109,6 +115,19 @@ class CellNode(TellingNode):
         )
         beside = self.setting('joints_beside') if self.has_parameter('joints_beside') else ''
         self.carrying_nothing = tuple(name.strip() for name in beside.split(','))
+
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        every = {item.name: item for item in self.every_setting()}
+        for name, value in ((each.name, each.value) for each in parameters):
+            reason = every[name].odd(value) if name in every else ''
+            reason = reason or self.why_not(name, value)
+            if reason:
+                return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
+
+    def why_not(self, name: str, value: Any) -> str:
+        """Return why a running node does not take a value of a parameter; empty where it does."""
+        return ''
 
     def own_topics(self) -> Sequence[str]:
         """Return the names of topics that are none of the table."""
@@ -285,6 +304,18 @@ class CellNode(TellingNode):
         if self.frames is not None:
             self.frames.tree.clear()
         self.time_went_back()
+
+    def answer(self, service: str, action: Callable[[], str]) -> None:
+        """Offer a service that answers with what an action says, or with why it cannot be done."""
+
+        def answered(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            try:
+                response.message, response.success = action(), True
+            except TwinError as error:
+                response.message = str(error)
+            return response
+
+        self.create_service(Trigger, service, answered)
 
     # Outputs ---------------------------------------------------------------------------------
 

@@ -10,13 +10,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
-from rcl_interfaces.msg import SetParametersResult
-from rclpy.parameter import Parameter
 from rclpy.task import Future
-from std_srvs.srv import Trigger
 
 from weld_twin_core.arm.rotation import transform
-from weld_twin_core.errors import DataError, TwinError
 from weld_twin_core.twin.goal_correction import CorrectedGoal, Refusal
 from weld_twin_core.twin.pose_correction import PoseCorrection
 from weld_twin_core.twin.program_model import ProgramModel
@@ -42,7 +38,7 @@ from ..streams.looks_beside import LooksBeside
 from ..streams.pose_stream import PoseStream
 from ..streams.supervision import Supervision
 from .cell_frames import base_frame
-from .compensator_settings import COMPENSATOR_SETTINGS, REFUSALS, limits_of, no_refusal
+from .compensator_settings import COMPENSATOR_SETTINGS, limits_of
 from .goal_audit import GoalAudit
 from .goal_judge import GoalJudge, Judged
 from .goal_relay import Decision, GoalRelay
@@ -93,8 +89,7 @@ class Compensator(ManagedNode):
         self._audit = GoalAudit(self)
         self._frame = PlannedFrame(self.setting('base_frame'))
         self._encoders: dict[str, tuple[PoseEncoder, TwistEncoder]] = {}
-        self.add_on_set_parameters_callback(self._check)
-        self.create_service(Trigger, '~/reload', self._reload)
+        self.answer('~/reload', self._reload)
         self.listen(TOOL_WRENCH, self._on_wrench, held=True)
         self.listen(TEMPERATURE, self._on_temperature, held=True)
         self.listen(JOINT_STATES, self._on_joints)
@@ -102,8 +97,6 @@ class Compensator(ManagedNode):
         self.listen(POSE_IN, self._on_pose)
         self._relay = self._offer_action()
         self.every(LOOK_EVERY, self._look)
-        if self.setting('on_refusal') not in REFUSALS:
-            raise DataError(no_refusal(self.setting('on_refusal')))
         self.start()
 
     def own_topics(self) -> list[str]:
@@ -171,29 +164,17 @@ class Compensator(ManagedNode):
         self._moving = Moving(lawless) if lawless else None
         self.get_logger().info(f'model {self._model.digest}: {len(read.effects)} effects')
 
-    def _reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _reload(self) -> str:
         """Go on with the file as it is now; a goal that runs ends with the one before."""
-        try:
-            self._take_model()
-        except TwinError as error:
-            response.message = str(error)
-            return response
-        assert self._model is not None
+        self._take_model()
         if self._active:
             self._renew_stream()
         self._look()
-        response.success, response.message = True, f'model {self._model.digest}'
-        return response
+        return f'model {self._token()}'
 
-    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
-        for parameter in parameters:
-            if parameter.name == 'on_refusal' and parameter.value not in REFUSALS:
-                reason = no_refusal(parameter.value)
-                return SetParametersResult(successful=False, reason=reason)
-            if self._active:
-                reason = f'{parameter.name} may be set while the compensator is not active'
-                return SetParametersResult(successful=False, reason=reason)
-        return SetParametersResult(successful=True)
+    def why_not(self, name: str, value: Any) -> str:
+        """Return that nothing changes while goals may come."""
+        return f'{name} may be set while the compensator is not active' if self._active else ''
 
     # What is known ---------------------------------------------------------------------------
 

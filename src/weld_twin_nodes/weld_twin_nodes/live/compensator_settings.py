@@ -13,8 +13,6 @@ from .input_settings import JOINT_SETTINGS
 from .robot_settings import ROBOT_SETTINGS
 from .settings import Setting
 
-REFUSALS = ('stop', 'pass')
-"""What the parameter ``on_refusal`` may be."""
 COMPENSATOR_SETTINGS = (
     Setting(
         'managed',
@@ -35,6 +33,7 @@ COMPENSATOR_SETTINGS = (
         'stop',
         'what becomes of poses that are refused: stop (nothing is sent) or pass; goals are rejected',
         live=True,
+        choices=('stop', 'pass'),
     ),
     Setting('max_correction_m', 2e-3, 'longest way a pose may be moved [m]', 0.0, 0.1, live=True),
     Setting(
@@ -79,8 +78,3 @@ def limits_of(node: CellNode) -> GoalLimits:
     """Return what a correction may do at most, by the parameters of a node."""
     names = ('correction_m', 'correction_rad', 'rate_m_s', 'rate_rad_s', 'acceleration')
     return GoalLimits(*(node.setting(f'max_{name}') for name in names))
-
-
-def no_refusal(value: str) -> str:
-    """Return that a value is none of those of ``on_refusal``."""
-    return f'on_refusal must be one of {", ".join(REFUSALS)}, got {value!r}'

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from std_srvs.srv import Trigger
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.assembly.stamp_order import Forward
@@ -103,7 +102,7 @@ class ContactMarker(CellNode):
         self._last: dict[tuple[str, ...], int] = {}
         self._contacts = self.offer(CONTACT)
         self.listen(JOINT_STATES, self._on_joints, required=True)
-        self.create_service(Trigger, '~/mark', self._mark)
+        self.answer('~/mark', self._mark)
 
     def time_went_back(self) -> None:
         """Forget the joint states of before."""
@@ -116,22 +115,17 @@ class ContactMarker(CellNode):
             q = from_messages.joint_positions(message, names)
             self._parts.setdefault(names, Part()).take(from_messages.stamp_ns(message), q)
 
-    def _mark(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Answer with the number of the contact, or why there is none."""
-        try:
-            stamp, joints = self._standing()
-            label = str(self.setting('label')).strip()
-            if not label:
-                raise DataError('the parameter label is empty; set it to what the tool touches')
-            self._write(label, joints)
-        except DataError as error:
-            response.success, response.message = False, str(error)
-            return response
+    def _mark(self) -> str:
+        """Return the number of the contact; refuse what is none."""
+        stamp, joints = self._standing()
+        label = str(self.setting('label')).strip()
+        if not label:
+            raise DataError('the parameter label is empty; set it to what the tool touches')
+        self._write(label, joints)
         self._contacts.publish(self.messages.contact(stamp, label))
         self._last = {names: part.newest[0] for names, part in self._parts.items()}
         count = self._marked[label] = self._marked.get(label, 0) + 1
-        response.success, response.message = True, f'contact {count} of {label!r}'
-        return response
+        return f'contact {count} of {label!r}'
 
     def _standing(self) -> tuple[int, dict[str, float]]:
         """

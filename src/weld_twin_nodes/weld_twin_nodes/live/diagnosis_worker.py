@@ -13,9 +13,11 @@ import os
 import pickle
 import subprocess
 import sys
-import threading
 from collections.abc import Callable
+from concurrent.futures import Future, wait
 from typing import TYPE_CHECKING, Any, NamedTuple
+
+from .work_beside import WorkBeside
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
@@ -79,18 +81,17 @@ class Worker:
 
     def __init__(self, tell: Callable[[str], object] = sys.stderr.write) -> None:
         self._tell = tell
+        self._beside = WorkBeside()
         self._process: subprocess.Popen[bytes] | None = None
-        self._thread: threading.Thread | None = None
-        self._result: Finding | str | None = None
+        self._doing: Future[Finding | str] | None = None
 
     @property
     def busy(self) -> bool:
         """Return whether a job is under way."""
-        return self._thread is not None and self._thread.is_alive()
+        return self._doing is not None and not self._doing.done()
 
     def start(self, job: Job) -> None:
         """Begin a job; the one before must be finished."""
-        self._result = None
         self._process = subprocess.Popen(
             [sys.executable, '-m', _MODULE],
             stdin=subprocess.PIPE,
@@ -98,33 +99,30 @@ class Worker:
             stderr=subprocess.PIPE,
         )
         # Handing over the data waits for the other interpreter to be up: not in the caller's time.
-        self._thread = threading.Thread(
-            target=self._exchange, args=(self._process, job), daemon=True
-        )
-        self._thread.start()
+        self._doing = self._beside.submit(self._exchange, self._process, job)
 
     def take(self) -> Finding | str | None:
         """Return the finding or the error of a finished job, once; else None."""
-        if self.busy:
+        if self._doing is None or self.busy:
             return None
-        result, self._result = self._result, None
-        return result
+        done, self._doing = self._doing, None
+        return done.result()
 
     def stop(self) -> None:
         """End the job under way."""
         if self._process is not None:
             self._process.kill()
-        if self._thread is not None:
-            self._thread.join(_DEAD_WITHIN)
+        if self._doing is not None:
+            wait([self._doing], _DEAD_WITHIN)
 
-    def _exchange(self, process: subprocess.Popen[bytes], job: Job) -> None:
+    def _exchange(self, process: subprocess.Popen[bytes], job: Job) -> Finding | str:
         answer, said = process.communicate(pickle.dumps(job))
         if said and process.returncode >= 0:  # one that was stopped may say anything
             self._tell(f'the diagnosis says: {said.decode(errors="replace").strip()[-_LAST:]}')
-        if process.returncode == 0:
-            self._result = pickle.loads(answer)
-        else:
-            self._result = f'the diagnosis ended with code {process.returncode}'
+        if process.returncode:
+            return f'the diagnosis ended with code {process.returncode}'
+        result: Finding | str = pickle.loads(answer)
+        return result
 
 
 def find(job: Job) -> Finding:

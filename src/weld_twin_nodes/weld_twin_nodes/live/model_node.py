@@ -8,9 +8,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
-from std_srvs.srv import Trigger
 
 from weld_twin_core.errors import TwinError
 from weld_twin_core.twin.twin import Twin
@@ -46,9 +44,8 @@ class ModelNode(CellNode):
         super().__init__(name, **kwargs)
         self.robot = robot_of(self)
         self.stream = JointStream(self._twin(self.setting('effects')), self.joint_names)
-        self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._changed)
-        self.create_service(Trigger, '~/reload', self._reload)
+        self.answer('~/reload', self._reload)
 
     def start(self) -> None:
         """Take input; to be called when the outputs are there."""
@@ -84,26 +81,20 @@ class ModelNode(CellNode):
             self.warn(doubt, doubt)
         return placed_twin(self, twin)
 
-    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
-        for parameter in parameters:
-            if parameter.name == 'effects':
-                try:
-                    self._twin(parameter.value)
-                except TwinError as error:
-                    return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+    def why_not(self, name: str, value: Any) -> str:
+        """Return what is wrong with effects that are set."""
+        try:
+            if name == 'effects':
+                self._twin(value)
+        except TwinError as error:
+            return str(error)
+        return ''
 
     def _changed(self, parameters: list[Parameter]) -> None:
         if any(parameter.name == 'effects' for parameter in parameters):
             self.on_twin(self._twin(self.setting('effects')))
 
-    def _reload(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            twin = self._twin(self.setting('effects'))
-        except TwinError as error:
-            response.message = str(error)
-            return response
+    def _reload(self) -> str:
+        twin = self._twin(self.setting('effects'))
         self.on_twin(twin)
-        response.success = True
-        response.message = f'{len(twin.effects)} effects'
-        return response
+        return f'{len(twin.effects)} effects'

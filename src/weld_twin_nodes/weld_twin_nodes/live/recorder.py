@@ -10,9 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.exceptions import InvalidTopicNameException
-from rclpy.parameter import Parameter
 from rclpy.validate_topic_name import validate_topic_name
 from std_srvs.srv import Trigger
 
@@ -55,7 +53,6 @@ class Recorder(ManagedNode):
         self._run: RecordingRun | None = None
         self._ending = False
         self._wound_down: Callable[[], None] | None = None
-        self.add_on_set_parameters_callback(self._check)
         self.create_service(Trigger, '~/counts', self._tell)
         self.start()
 
@@ -131,12 +128,11 @@ class Recorder(ManagedNode):
         if run is not None:
             run.close()
 
-    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
-        for parameter in parameters:
-            if parameter.name == 'out' and self._run is not None:
-                reason = f"'{self._run.out}' is being recorded; a bag keeps its name"
-                return SetParametersResult(successful=False, reason=reason)
-        return SetParametersResult(successful=True)
+    def why_not(self, name: str, value: Any) -> str:
+        """Return that a bag is under way."""
+        if name != 'out' or self._run is None:
+            return ''
+        return f"'{self._run.out}' is being recorded; a bag keeps its name"
 
     def _tell(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Answer with the messages written by topic, and those dropped."""

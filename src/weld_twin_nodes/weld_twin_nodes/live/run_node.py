@@ -35,26 +35,14 @@ LOOP = 0.25
 """Seconds of one turn of the loop; also how late an end may be noticed."""
 
 
-EXECUTORS = ('events', 'single_threaded')
-"""What the parameter ``executor`` may be."""
-
-
-def executor(name: str = EXECUTORS[0]) -> Executor:
+def executor(name: str = 'events') -> Executor:
     """
     Return what serves a node.
 
     The events executor costs a third of the other per message; an rclpy that has none gives the
     other.
-
-    Raises
-    ------
-    ModelError
-        There is none of that name.
-
     """
-    if name not in EXECUTORS:
-        raise ModelError(f'executor must be one of {", ".join(EXECUTORS)}, got {name!r}')
-    if name == EXECUTORS[0]:
+    if name == 'events':
         with suppress(ImportError):  # it came with an update of Jazzy
             from rclpy.experimental import EventsExecutor
 

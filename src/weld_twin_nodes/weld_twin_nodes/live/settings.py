@@ -33,6 +33,8 @@ class Setting:
         May be changed while the node runs.
     numbers : bool
         It is a list of numbers; `NO_NUMBERS` where it is not set.
+    choices : tuple of str
+        What it may be; empty for anything.
 
     """
 
@@ -43,6 +45,13 @@ class Setting:
     high: float | None = None
     live: bool = False
     numbers: bool = False
+    choices: tuple[str, ...] = ()
+
+    def odd(self, value: Any) -> str:
+        """Return why a value is none that it may be; empty where it is one."""
+        if not self.choices or value in self.choices:
+            return ''
+        return f'{self.name} must be one of {", ".join(self.choices)}, got {value!r}'
 
     def descriptor(self) -> ParameterDescriptor:
         """Return what `ros2 param describe` shows and rclpy enforces."""
@@ -83,6 +92,7 @@ SHARED = (
         'events',
         "what serves the node's messages: events, the quickest, or single_threaded, for an rclpy "
         'without it; events becomes single_threaded there by itself',
+        choices=('events', 'single_threaded'),
     ),
     Setting('stale_after', 1.0, 'silence after which an input counts as stale [s]', 0.05, 3600.0),
 )

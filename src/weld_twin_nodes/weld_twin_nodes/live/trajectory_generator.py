@@ -54,6 +54,7 @@ class TrajectoryGenerator(CellNode):
             'plan',
             'where the motion is from: plan, or the messages of '
             'joint_trajectory or path, each run when it comes',
+            choices=('plan', 'joint_trajectory', 'path'),
         ),
         Setting('path', 'line', 'kind of the bundled seam, or path of a path file'),
         Setting('profile', 'smooth', 'time law: constant, trapezoid, s-curve, smooth, aggressive'),
@@ -114,10 +115,8 @@ class TrajectoryGenerator(CellNode):
             self._run(joint_motion(self._robot, self.setting('path'), *self._law))
         elif source == 'joint_trajectory':
             self.listen(JOINT_TRAJECTORY, self._on_trajectory, required=True)
-        elif source == 'path':
-            self.listen(PATH, self._on_path, required=True)
         else:
-            raise DataError(f'source must be plan, joint_trajectory or path, got {source!r}')
+            self.listen(PATH, self._on_path, required=True)
 
     def _on_trajectory(self, message: Any) -> None:
         self._refuse_busy()

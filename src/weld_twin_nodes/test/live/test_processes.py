@@ -76,6 +76,11 @@ BAD_STARTS = {
     'unknown seam': ('trajectory_generator', {'path': 'nowhere.yaml'}, "'nowhere.yaml'"),
     'out of range': ('trajectory_generator', {'rate': -5.0}, 'rate'),
     'wrong type': ('error_injector', {'seed': 1.5}, 'seed'),
+    'no executor': (
+        'contact_marker',
+        {'executor': 'threads'},
+        "executor must be one of events, single_threaded, got 'threads'",
+    ),
     'no bag': ('recorder', {}, "needs the parameter 'out'"),
     'no topic': ('recorder', {'out': 'x', 'topics': ['not a topic']}, "'not a topic' is no name"),
     'no storage': ('recorder', {'out': 'x', 'storage': 'tape'}, "got 'tape'"),

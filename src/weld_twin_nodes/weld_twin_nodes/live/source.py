@@ -162,7 +162,8 @@ class Source:
         if wanted.required and not self.infos:
             lost = elsewhere(self._node, self.name, wanted.own, wanted.kinds)
             return [lost] if lost else []
-        understood = {info.topic_type for info in self.infos if wanted.any_kind} | {*wanted.kinds}
+        others = {info.topic_type for info in self.infos} if wanted.any_kind else ()
+        understood = *wanted.kinds, *others
         return unheard_publishers(self.infos, self.name, self.kind, self._qos, understood)
 
     def switched(self) -> str:

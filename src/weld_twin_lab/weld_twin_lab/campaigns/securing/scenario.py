@@ -27,7 +27,7 @@ SECONDS = 6.0
 """How long everybody speaks and listens."""
 STARTED = 15.0
 """Seconds the nodes have to start."""
-ENDED = 30.0
+ENDED = 90.0
 """Seconds a process has to end."""
 WORDS = {
     'trajectory_generator': ['-p', 'source:=joint_trajectory'],

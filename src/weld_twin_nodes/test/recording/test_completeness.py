@@ -81,6 +81,12 @@ def heard_of(cell, recorder_process):
     cell.wait(lambda: not silent(), lambda: f'the recorder to hear of {silent()}')
 
 
+def heard_by(cell, speaker):
+    """Wait until a speaker reaches the recorder and knows that it lives, as it waits for it then."""
+    cell.wait(lambda: speaker.listeners()[JOINT_STATES.name] > 0, 'the recorder')
+    cell.wait(lambda: '/recorder' in speaker.neighbours.alive(), 'word of the recorder')
+
+
 def finish(cell, process):
     """End the recorder; the nodes of this process are served meanwhile, as if they lived on."""
     process.interrupt()
@@ -210,7 +216,7 @@ def test_publishers_that_ended_have_told_what_they_sent_and_each_counts_anew(cel
     process = recorder(cell, tmp_path)
     for _ in range(2):
         speaker = cell.add(Speaker)
-        cell.wait(lambda s=speaker: s.listeners()[JOINT_STATES.name] > 0, 'the recorder')
+        heard_by(cell, speaker)
         speaker.speak(350)
         cell.remove(speaker)
     assert finish(cell, process) == 0

@@ -64,7 +64,7 @@ def weighed(
     pairs = ((together, alone), (alone, together))
     heard = [_with_belief(result, other) for result, other in pairs]
     # What does not fit together, as after a knock between two recordings, may be sound by itself.
-    heard = [one for one in heard if not _unsound(one)] or heard
+    heard = [one for one in heard if one['verdict']['status'] != 'unsound'] or heard
     if not _same(together, alone):
         heard.sort(key=lambda one: one['verdict']['confidence'] or 0.0, reverse=True)
     stated = [one for one in heard if one['verdict']['status'] in STATED]
@@ -175,10 +175,6 @@ def _sites(result: Mapping[str, Any]) -> list[set[tuple[str, str | None]]]:
 def sets_named(result: Mapping[str, Any]) -> Sequence[Sequence[Mapping[str, Any]]]:
     """Return what each cause that is named may be, one group a cause."""
     return result['verdict'].get('indistinguishable') or ()
-
-
-def _unsound(result: Mapping[str, Any]) -> bool:
-    return bool(result['verdict']['status'] == 'unsound')
 
 
 def _words(result: Mapping[str, Any]) -> str:

@@ -16,7 +16,6 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.soundness.mending import reading_map
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.compensation import Compensation, compensate
-from weld_twin_core.twin.posterior import Posterior
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.diagnosis_model import mended_source, read_model
@@ -49,9 +48,10 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
 
     Raises ModelError: the file is of no use.
     """
-    twin = build_twin(robot, path, mended=True)
-    model = Predictor(twin, _posterior(robot, path))
-    stored, given, reported = _model(robot, path), recording, ''
+    content, twin = diagnosis_of(path), build_twin(robot, path, mended=True)
+    model = Predictor(twin, read_posterior(robot, path) if content else None)
+    stored = read_model(robot, path) if 'model' in content else None
+    given, reported = recording, ''
     if stored is not None:
         # Its clocks are its own, and commands need none.
         recording, reported = mended_source(stored, robot, given, -1)
@@ -78,11 +78,6 @@ def _as_given(motion: JointMotion, stored: Model) -> JointMotion:
     back = np.linalg.inv(matrix).T
     qd = None if motion.qd is None else motion.qd @ back
     return replace(motion, q=(motion.q - offset) @ back, qd=qd)
-
-
-def _model(robot: Robot, path: Path | str) -> Model | None:
-    """Return what a diagnosis holds; None for an effects file or a diagnosis without a model."""
-    return read_model(robot, path) if 'model' in diagnosis_of(path) else None
 
 
 def write_compensated(
@@ -123,7 +118,3 @@ def trust_sentences(made: Compensated) -> list[str]:
             'it would say'
         )
     return out
-
-
-def _posterior(robot: Robot, path: Path | str) -> Posterior | None:
-    return read_posterior(robot, path) if diagnosis_of(path) else None

@@ -12,7 +12,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 
 from ..report.charts import Axis, Line, chart
-from ..report.html import Html, document, section, table, tag
+from ..report.html import Html, document, main, section, table, tag
 
 WAYS = {
     'goals': 'as a goal of a trajectory controller, with the correction of play',
@@ -74,26 +74,19 @@ def closed_loop_page(robot: str, seams: tuple[Seam, Seam], how: str, noise: floa
         f'The same seam on the same arm: {before.rms * 1e3:.3f} mm off as it is, '
         f'{after.rms * 1e3:.3f} mm through the compensator (RMS).'
     )
-    body = tag(
-        'main',
-        tag('header', tag('p.kind', 'Closed loop'), tag('p.subject', robot)),
-        tag('section#verdict', tag('h1', head), _figures(before, after)),
-        section(
-            'Along the seam',
-            *_charts(before, after),
-            id_='seam',
-            lead='How far the measured tool is from where it was to be. Both runs have one scale.',
-        ),
-        section(
-            'How it was done',
-            tag(
-                'p',
-                'The error injector stands in for the arm. The diagnosis of its first run is the model. '
-                f'The seam was corrected {WAYS[how]}. The noise of the measurement alone is '
-                f'{noise * 1e3:.3f} mm.',
-            ),
-            id_='how',
-        ),
+    how_done = (
+        'The error injector stands in for the arm. The diagnosis of its first run is the model. '
+        f'The seam was corrected {WAYS[how]}. The noise of the measurement alone is '
+        f'{noise * 1e3:.3f} mm.'
+    )
+    lead = 'How far the measured tool is from where it was to be. Both runs have one scale.'
+    body = main(
+        ('Closed loop', ''),
+        robot,
+        head,
+        _figures(before, after),
+        section('Along the seam', *_charts(before, after), id_='seam', lead=lead),
+        section('How it was done', tag('p', how_done), id_='how'),
     )
     return document(f'Closed loop · {robot}', body, charts=True)
 
@@ -109,31 +102,22 @@ def _figures(before: Seam, after: Seam) -> Html:
 def _charts(before: Seam, after: Seam) -> list[Html]:
     """Return the distance along the seam of both runs, and their parts along the axes."""
     x = np.linspace(0.0, min(before.way[-1], after.way[-1]), SHOWN)
-    axis = Axis('way along the seam', 'mm')
-    size = [np.interp(x, one.way, one.off) * 1e3 for one in (before, after)]
-    out = [
-        chart(
-            'Distance from the seam',
-            x * 1e3,
-            [Line('as it is', size[0], 'before'), Line('corrected', size[1], 'after')],
-            (axis, Axis('distance', 'mm')),
-            key='seam',
-            from_zero=True,
-            height=240,
-        )
-    ]
-    for k, name in enumerate(AXES):
-        parts = [
-            np.interp(x, one.way, (one.real - one.meant)[:, k]) * 1e3 for one in (before, after)
-        ]
-        out.append(
-            chart(
-                f'Part along {name}',
-                x * 1e3,
-                [Line('as it is', parts[0], 'before'), Line('corrected', parts[1], 'after')],
-                (axis, Axis(name, 'mm')),
-                key='seam',
-                height=120,
+
+    def drawn(title: str, across: str, parts: list[Array], height: int, from_zero: bool) -> Html:
+        lines = [
+            Line(name, np.interp(x, one.way, part) * 1e3, colour)
+            for one, part, name, colour in zip(
+                (before, after), parts, ('as it is', 'corrected'), ('before', 'after'), strict=True
             )
-        )
-    return out
+        ]
+        axes = (Axis('way along the seam', 'mm'), Axis(across, 'mm'))
+        return chart(title, x * 1e3, lines, axes, key='seam', from_zero=from_zero, height=height)
+
+    off = [one.real - one.meant for one in (before, after)]
+    return [
+        drawn('Distance from the seam', 'distance', [before.off, after.off], 240, True),
+        *(
+            drawn(f'Part along {name}', name, [part[:, k] for part in off], 120, False)
+            for k, name in enumerate(AXES)
+        ),
+    ]

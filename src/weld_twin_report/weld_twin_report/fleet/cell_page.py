@@ -137,7 +137,7 @@ def _charts(entries: Sequence[Entry], changes: Sequence[Mapping[str, Any]]) -> H
     if len(entries) == 1:
         return None
     seconds = np.array([entry.at.timestamp() for entry in entries])
-    gaps = np.array([_number(entry.gap_m) for entry in entries])
+    gaps = np.array([entry.gap_m for entry in entries], dtype=float)
     charts: list[Child] = [
         control_chart('Gap', seconds, MILLI * gaps, Axis('gap', 'mm'), from_zero=True)
     ]
@@ -173,10 +173,6 @@ def _shown(entries: Sequence[Entry], begins: Mapping[str, float]) -> list[str]:
 
 def _value(entry: Entry, name: str) -> float:
     return float(entry.value[entry.names.index(name)]) if name in entry.names else np.nan
-
-
-def _number(value: float | None) -> float:
-    return np.nan if value is None else value
 
 
 def _diagnoses(entries: Sequence[Entry]) -> Html:

@@ -26,60 +26,53 @@ UNNAMED = (
 )
 """Of a curve: a joint that is off alike everywhere need not be so for its zero."""
 _PLACES = {
-    ('kuka', 'zero'): 'Start-up > Master: $MAMES of the axis, in degrees: new value = old value '
-    '{degrees}; then master the axis at its notch.',
-    ('kuka', 'base'): 'Start-up > Calibrate > Base: change BASE_DATA[n], or $ROBROOT of the cell.',
-    (
-        'kuka',
-        'root',
-    ): 'Start-up > Calibrate > External kinematic system > Root point (numeric): ROOT of '
-    'MACHINE_DEF[n] in the world.',
-    ('kuka', 'tool'): 'Start-up > Calibrate > Tool: change TOOL_DATA[n].',
-    ('kuka', 'load'): 'Start-up > Calibrate > Tool > Payload data: change LOAD_DATA[n].',
-    ('abb', 'zero'): 'Calibration > Calib. parameters: motor calibration offset of the axis, in '
-    'radians of the motor: new value = old value {radians_back} * G, where G is radians of the '
-    'motor per radian of the joint, with its sign.',
-    ('abb', 'base'): 'Change wobj.uframe of the work object, or Base Frame in the topic Motion.',
-    (
-        'abb',
-        'root',
-    ): 'Base Frame of the positioner, such as that of orbit_a, in the world (topic Motion, '
-    'type Single; of two axes that are one unit, Robot).',
-    ('abb', 'tool'): 'Change tframe of the tooldata.',
-    ('abb', 'load'): 'Change the loaddata, or run LoadIdentify.',
-    ('fanuc', 'zero'): 'MENU > SYSTEM > Master/Cal > Single axis master: MSTR POS of the axis, in '
-    'degrees: new value = what it reads now {degrees}; then EXEC, without moving it before.',
-    ('fanuc', 'base'): 'MENU > SETUP > Frames: change the user frame UFRAME[n].',
-    (
-        'fanuc',
-        'root',
-    ): 'MENU > SETUP > Coord: frame of the leader of the coordinated pair, in the world '
-    'of the robot.',
-    ('fanuc', 'tool'): 'MENU > SETUP > Frames: change the tool frame UTOOL[n].',
-    ('fanuc', 'load'): 'MENU > SYSTEM > Motion: change the payload schedule.',
-    (
-        'yaskawa',
-        'zero',
-    ): 'ROBOT > HOME POSITION: absolute data of the axis, in pulses: new value = '
-    'old value {degrees_back} * P, where P is pulses per degree, with its sign: turn the axis by '
-    '+10 deg, read by how many pulses its position grows, and divide.',
-    ('yaskawa', 'base'): 'ROBOT > USER COORDINATE: teach or change the user frame.',
-    ('yaskawa', 'tool'): 'ROBOT > TOOL: change X, Y, Z, Rx, Ry, Rz of the tool file.',
-    ('yaskawa', 'load'): 'ROBOT > TOOL: change weight and centre of gravity of the tool file.',
-    (
-        'ur',
-        'zero',
-    ): 'By a new kinematic calibration, which a service engineer makes. delta_theta of the joint '
-    'in calibration.conf, in radians: new value = old value {radians}; the readings stay, and the '
-    'pose that is shown moves.',
-    (
-        'ur',
-        'model',
-    ): 'By a new kinematic calibration, which a service engineer makes. It stands as a '
-    'delta of the link in calibration.conf of the controller.',
-    ('ur', 'base'): 'Installation > Features: change the feature that the program moves in.',
-    ('ur', 'tool'): 'Installation > General > TCP: change position and orientation.',
-    ('ur', 'load'): 'Installation > General > Payload: change mass and centre of gravity.',
+    'kuka': {
+        'zero': 'Start-up > Master: $MAMES of the axis, in degrees: new value = old value '
+        '{degrees}; then master the axis at its notch.',
+        'base': 'Start-up > Calibrate > Base: change BASE_DATA[n], or $ROBROOT of the cell.',
+        'root': 'Start-up > Calibrate > External kinematic system > Root point (numeric): ROOT of'
+        ' MACHINE_DEF[n] in the world.',
+        'tool': 'Start-up > Calibrate > Tool: change TOOL_DATA[n].',
+        'load': 'Start-up > Calibrate > Tool > Payload data: change LOAD_DATA[n].',
+    },
+    'abb': {
+        'zero': 'Calibration > Calib. parameters: motor calibration offset of the axis, in '
+        'radians of the motor: new value = old value {radians_back} * G, where G is '
+        'radians of the motor per radian of the joint, with its sign.',
+        'base': 'Change wobj.uframe of the work object, or Base Frame in the topic Motion.',
+        'root': 'Base Frame of the positioner, such as that of orbit_a, in the world (topic '
+        'Motion, type Single; of two axes that are one unit, Robot).',
+        'tool': 'Change tframe of the tooldata.',
+        'load': 'Change the loaddata, or run LoadIdentify.',
+    },
+    'fanuc': {
+        'zero': 'MENU > SYSTEM > Master/Cal > Single axis master: MSTR POS of the axis, in '
+        'degrees: new value = what it reads now {degrees}; then EXEC, without moving it '
+        'before.',
+        'base': 'MENU > SETUP > Frames: change the user frame UFRAME[n].',
+        'root': 'MENU > SETUP > Coord: frame of the leader of the coordinated pair, in the world '
+        'of the robot.',
+        'tool': 'MENU > SETUP > Frames: change the tool frame UTOOL[n].',
+        'load': 'MENU > SYSTEM > Motion: change the payload schedule.',
+    },
+    'yaskawa': {
+        'zero': 'ROBOT > HOME POSITION: absolute data of the axis, in pulses: new value = old '
+        'value {degrees_back} * P, where P is pulses per degree, with its sign: turn the '
+        'axis by +10 deg, read by how many pulses its position grows, and divide.',
+        'base': 'ROBOT > USER COORDINATE: teach or change the user frame.',
+        'tool': 'ROBOT > TOOL: change X, Y, Z, Rx, Ry, Rz of the tool file.',
+        'load': 'ROBOT > TOOL: change weight and centre of gravity of the tool file.',
+    },
+    'ur': {
+        'zero': 'By a new kinematic calibration, which a service engineer makes. delta_theta of '
+        'the joint in calibration.conf, in radians: new value = old value {radians}; the '
+        'readings stay, and the pose that is shown moves.',
+        'model': 'By a new kinematic calibration, which a service engineer makes. It stands as a '
+        'delta of the link in calibration.conf of the controller.',
+        'base': 'Installation > Features: change the feature that the program moves in.',
+        'tool': 'Installation > General > TCP: change position and orientation.',
+        'load': 'Installation > General > Payload: change mass and centre of gravity.',
+    },
 }
 """Menus as they are usually called. docs/sheet.md tells which names were found where."""
 _BY_MODEL = ('ur',)
@@ -141,7 +134,7 @@ def correction(effect: Effect, brand: str | None, robot: Robot | None = None) ->
         return reported + (
             '.' if brand else '; --controller with the name of its maker tells the menu.'
         )
-    place = _PLACES.get((str(brand), kind))
+    place = _PLACES.get(str(brand), {}).get(kind)
     if place is None:
         return _PROGRAM
     if isinstance(effect, RootPose) and robot is not None:

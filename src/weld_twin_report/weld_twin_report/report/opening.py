@@ -50,37 +50,20 @@ _HEADS = (
     *('Cause', 'Share of the gap', 'By how much', 'How sure'),
     *('If only this is mended', 'Where to enter it'),
 )
-WORDS = (
-    ('gap', 'how far the tool is from where the model of the robot has it: measured minus model'),
-    ('RMS', 'an average of sizes: the root of the mean of the squares'),
-    (
-        'measuring noise',
-        'what the instrument alone makes: nothing below it can be seen in these data',
-    ),
-    (
-        'not used for fitting',
-        'each stretch was predicted from the others, so that nothing is judged on what it was '
-        'learned from',
-    ),
-    (
-        'share',
-        'the part of the squared gap that a cause makes: squares add up to 100 %, lengths do not',
-    ),
-    (
-        'curve',
-        'where the cause has no name: how far the joint is off, as it was measured, over the angle, '
-        'the speed or the like; programs can be corrected by it',
-    ),
-    (
-        'mended',
-        'thought away: the arm as if this cause were gone and all others still there; of a cause '
-        'without a name, programs corrected by its curve',
-    ),
-    (
-        'standard deviation',
-        'two of three values lie within one, 95 of 100 within two',
-    ),
-)
+WORDS = {
+    'gap': 'how far the tool is from where the model of the robot has it: measured minus model',
+    'RMS': 'an average of sizes: the root of the mean of the squares',
+    'measuring noise': 'what the instrument alone makes: nothing below it can be seen in these data',
+    'not used for fitting': 'each stretch was predicted from the others, so that nothing is judged '
+    'on what it was learned from',
+    'share': 'the part of the squared gap that a cause makes: squares add up to 100 %, lengths do '
+    'not',
+    'curve': 'where the cause has no name: how far the joint is off, as it was measured, over the '
+    'angle, the speed or the like; programs can be corrected by it',
+    'mended': 'thought away: the arm as if this cause were gone and all others still there; of a '
+    'cause without a name, programs corrected by its curve',
+    'standard deviation': 'two of three values lie within one, 95 of 100 within two',
+}
 """Words of the page that not everybody has, each told once."""
 
 
@@ -131,7 +114,9 @@ def _holds(answer: Answer) -> Html | None:
 
 def _words(_: Answer) -> Html:
     """Return what the words of the page mean, folded."""
-    return tag('details.detail', tag('summary', 'What the words on this page mean'), pairs(WORDS))
+    return tag(
+        'details.detail', tag('summary', 'What the words on this page mean'), pairs(WORDS.items())
+    )
 
 
 def figures(answer: Answer) -> Html:

@@ -189,9 +189,11 @@ def run_all(
     results = runner.run(tasks, meanwhile)
     for label, result in zip(owners, results[len(pieces) :], strict=True):
         parts[label].append(result)
-    outcome = {label: (_joined(own), own[0]['model_error']) for label, own in parts.items()}
+    outcome = {
+        label: (
+            joined([unpacked(part['outcomes']) for part in own]),
+            own[0]['model_error'],
+        )
+        for label, own in parts.items()
+    }
     return outcome, results[: len(pieces)]
-
-
-def _joined(parts: list[dict[str, Any]]) -> Outcomes:
-    return joined([unpacked(part['outcomes']) for part in parts])

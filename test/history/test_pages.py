@@ -9,7 +9,7 @@ import pytest
 
 from weld_twin_lab.benchmark.made_history import fill
 from weld_twin_nodes.cli.in_process import weld_twin
-from weld_twin_report.fleet.control_chart import baseline
+from weld_twin_report.fleet.cell_page import baseline
 from weld_twin_report.history import Database
 from weld_twin_report.history.runs import Run, Runs
 

@@ -21,10 +21,8 @@ from weld_twin_report.cli.commands.diagnose import BRANDS as CHOICES
 from weld_twin_report.report import report_page
 from weld_twin_report.report.acceptance import Demand
 from weld_twin_report.report.controllers import BRANDS, brand_of
-from weld_twin_report.report.diagnosis_page import Sheet
-from weld_twin_report.report.directions import components, sides_words
-from weld_twin_report.report.joint_names import joint_labels, renamed
-from weld_twin_report.report.page_data import page_data
+from weld_twin_report.report.diagnosis_page import Sheet, joint_labels, renamed
+from weld_twin_report.report.page_data import components, page_data, sides_words
 
 THREE = diagnoses.circle()
 PARTS = ('base_yaw_actuator', 'shoulder_lift', 'forearm_elbow_rotation', 'w1', 'w2', 'w3')

@@ -27,7 +27,7 @@ from weld_twin_report.report.answer import Answer
 from weld_twin_report.report.controllers import correction
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 from weld_twin_report.report.diagnosis_page import Sheet
-from weld_twin_report.report.directions import components, sides_words
+from weld_twin_report.report.page_data import components, sides_words
 from weld_twin_report.report.to_do import worth_doing
 
 PLAY = diagnoses.backlash()

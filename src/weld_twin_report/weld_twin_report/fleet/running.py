@@ -12,25 +12,30 @@ written as soon as it can.
 from __future__ import annotations
 
 import json
+import shutil
+import tempfile
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from weld_twin_core.errors import DataError
+from weld_twin_core.errors import DataError, TwinError
+from weld_twin_msgs_py.files.scratch import Scratch
+from weld_twin_nodes.offline.output_directory import new_directory
 from weld_twin_nodes.offline.task_pool import Pool, Task, available_cores, call
 
-from ..guarded import Guarded, Limits
-from ..history import Unavailable
+from ..guarded import Guarded, Limits, Outcome
+from ..history import Unavailable, entry_of
 from ..history.database import Database
 from ..history.entry import Entry
-from ..history.runs import DONE, FAILED, Run, Runs
+from ..history.runs import DONE, FAILED, REFUSED, UNSOUND, Run, Runs
+from ..report.diagnosis_files import RESULT
 from .listed import Listed
-from .one_recording import diagnosed
 
 BATCH = 256
 """Recordings given to the pool at once; a list of a hundred thousand is not held there whole."""
@@ -165,3 +170,67 @@ class Threads:
         self._pool.shutdown(wait=False, cancel_futures=True)
         Guarded.end_all()
         self._pool.shutdown()
+
+
+STATES = {0: DONE, 2: REFUSED, 3: UNSOUND}
+"""By the exit code of ``diagnose``; any other is a failure."""
+_mine = threading.local()
+
+
+def diagnosed(listed: Listed, key: str, limits: Limits, keep: str) -> dict[str, Any]:
+    """
+    Return how a recording went, and its entry.
+
+    ``key``: of the run. ``keep``: directory for what the command wrote; empty to keep nothing.
+    """
+    done, entry = Outcome(-1, '', 0.0), None
+    try:
+        with Scratch(Path(tempfile.gettempdir()), 'weld_twin-fleet-') as place:
+            out = place / 'found'
+            done = _warm(limits).run(listed.words(out))
+            state, sentence, entry = _read(listed, done, out)
+            if keep and out.is_dir():
+                with new_directory(Path(keep) / key, mark=RESULT, force=True) as kept:
+                    shutil.copytree(out, kept, dirs_exist_ok=True)
+    except (OSError, DataError) as error:  # the disk is full: this can run again, the others go on
+        said = str(error)
+        if isinstance(error, OSError):
+            where = f" '{error.filename}'" if error.filename else ''
+            said = f'{error.strerror or error}{where}'
+        state, sentence, entry = FAILED, said, None
+    run = Run(key, listed.cell, listed.recording, state, sentence, done.seconds, done.memory)
+    return {'run': asdict(run), 'entry': entry}
+
+
+def _read(listed: Listed, done: Outcome, out: Path) -> tuple[str, str, dict[str, Any] | None]:
+    """Return state, sentence and entry of what the command left."""
+    state = STATES.get(done.code, FAILED)
+    if done.disk_full:
+        state = FAILED
+    if state == UNSOUND:
+        return state, _unsound(out), None
+    if state != DONE:
+        return state, done.said.removeprefix('weld-twin: '), None
+    try:
+        entry = entry_of(out, listed.date)
+    except TwinError as error:
+        return REFUSED, str(error).replace(f'{out}/diagnosis.json', listed.recording), None
+    return state, entry.status, entry.plain()
+
+
+def _unsound(out: Path) -> str:
+    """Return what is wrong with data or set-up."""
+    from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
+
+    reported = read_diagnosis(out / 'diagnosis.json').get('unsound') or []
+    return str(reported[0]['sentence']) if reported else 'data or set-up are wrong'
+
+
+def _warm(limits: Limits) -> Guarded:
+    """Return this thread's own warm process; it ends with the thread's process."""
+    known: tuple[Limits, Guarded] | None = getattr(_mine, 'warm', None)
+    if known is None or known[0] != limits:
+        if known is not None:
+            known[1].close()
+        known = _mine.warm = (limits, Guarded(limits))
+    return known[1]

@@ -24,8 +24,18 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
 from .entry import ARRAYS, Entry
-from .opening import WRITES, alone, bring_up, engine_of, refuse_missing, version_of
-from .passing import Unavailable, passes, unavailable, waits
+from .opening import (
+    WRITES,
+    Unavailable,
+    alone,
+    bring_up,
+    engine_of,
+    passes,
+    refuse_missing,
+    unavailable,
+    version_of,
+    waits,
+)
 from .schema import VERSION, not_a_cell, schema, stored
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from weld_twin_core.errors import DataError
 
 from .database import Damaged, Database, Refused
 from .entry import Entry
-from .passing import Unavailable
+from .opening import Unavailable
 from .tracking import changed, observations
 from .words import as_dict
 

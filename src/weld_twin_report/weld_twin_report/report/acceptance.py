@@ -18,8 +18,8 @@ from weld_twin_nodes.wording.quantities import millimetres
 from weld_twin_nodes.wording.switches import switches, trusted
 from weld_twin_nodes.wording.words import listed, unnamed
 
-from .directions import worst
 from .html import Html, joined, section, table, tag
+from .page_data import worst
 from .performance_page import PATH_HEADS, POSE_HEADS, path_row, pose_rows
 from .seam_view import at_rest, instant
 

@@ -43,8 +43,7 @@ from weld_twin_nodes.wording.words import (
 from .cause_answer import CauseAnswer
 from .family_table import FAMILY_HEADS, RIPPLE_HEADS, family_rows, ripple_rows
 from .page_data import places, remainder
-from .to_do import worth_doing
-from .untried import weighed
+from .to_do import weighed, worth_doing
 
 _FIRST_REAL_STAMP = 10**18
 """Stamps [ns] before 2001 count from something else than the epoch."""

@@ -20,7 +20,7 @@ from weld_twin_nodes.offline.exports import write_all
 from weld_twin_nodes.offline.where_it_holds import where_it_holds
 
 from .diagnosis_page import Sheet, report_page
-from .untried import weighed
+from .to_do import weighed
 
 RESULT = 'diagnosis.json'
 PAGE = 'report.html'

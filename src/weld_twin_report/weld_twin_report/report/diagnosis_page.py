@@ -4,10 +4,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+
+import yaml
 
 from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.errors import ModelError
 from weld_twin_core.metrics.conformity import Rule
 from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_nodes.wording.quantities import counted
@@ -24,7 +30,7 @@ from .acceptance import (
 )
 from .answer import Answer
 from .cause_cards import causes_cards
-from .cause_list import causes_section, changed_section
+from .cause_list import causes_section, changed_section, shrink_section
 from .charts import embedded
 from .circle_plot import circle_data, circles_section
 from .contact_clouds import contacts_section
@@ -32,11 +38,9 @@ from .controllers import brand_of
 from .footing import checks_section, inputs_section, next_section, printed_section
 from .gap_location import where_section
 from .html import Html, document, joined, own_file, tag
-from .joint_names import renamed
 from .opening import header, opening
 from .page_data import page_data
 from .seam_view import left_out, seam_section
-from .shrinking import shrink_section
 
 SCRIPTS = ('sheet.js', 'seam.js', 'polar.js')
 
@@ -134,3 +138,55 @@ def _judged(diagnosis: Diagnosis, rule: Rule) -> Html | None:
         data_top=f'{1e3 * size:.9f}',
         data_where=where,
     )
+
+
+_PREFIX = re.compile(r'[A-Za-z]{1,3}')
+
+
+def joint_labels(reported: str, joints: Sequence[str]) -> dict[str, str]:
+    """
+    Return what each joint is called on the page.
+
+    Parameters
+    ----------
+    reported : str
+        A prefix such as ``A`` or ``J``, which the number of the joint follows, or a YAML file that
+        gives a name to joints: ``shoulder_pan_joint: A1``. Empty for the names of the model.
+    joints : sequence of str
+        Of the model, in chain order.
+
+    Raises
+    ------
+    ModelError
+        It is neither, or the file names a joint that the robot does not have.
+
+    """
+    if not reported:
+        return {}
+    if _PREFIX.fullmatch(reported):
+        return {name: f'{reported}{k}' for k, name in enumerate(joints, 1)}
+    path = Path(reported)
+    if not path.is_file():
+        raise ModelError(
+            f'--joint-names {reported}: give a prefix of one to three letters such as A, or a YAML '
+            'file with a line "joint: name" for each joint'
+        )
+    content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    if not isinstance(content, dict):
+        raise ModelError(f'{reported}: expected lines "joint: name", one for each joint')
+    for name in content:
+        if name not in joints:
+            raise ModelError(
+                f'{reported}: the robot has no joint {name!r}; it has {", ".join(joints)}'
+            )
+    return {str(name): str(label) for name, label in content.items()}
+
+
+def renamed(markup: str, labels: Mapping[str, str]) -> str:
+    """Return markup in which joints have their labels; other words are left alone."""
+    if not labels:
+        return markup
+    by_name = {escape(name): escape(label) for name, label in labels.items()}
+    longest = sorted(by_name, key=len, reverse=True)
+    pattern = re.compile(rf'(?<![\w/.-])({"|".join(map(re.escape, longest))})(?![\w/-])')
+    return pattern.sub(lambda match: by_name[match[1]], markup)

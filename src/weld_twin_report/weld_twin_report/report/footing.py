@@ -25,8 +25,7 @@ from weld_twin_nodes.wording.words import (
 
 from .answer import Answer
 from .html import Child, Html, joined, pairs, section, table, tag
-from .to_do import made_for, minutes
-from .untried import untried
+from .to_do import made_for, minutes, untried
 
 _APART = (
     *('kind', 'motion', 'between', 'cost', 'robot_minutes', 'expected_separation_sigma'),

@@ -16,9 +16,8 @@ from weld_twin_nodes.wording.words import DEPENDENCES, HALF, REGIMES, likely, li
 
 from .answer import Answer
 from .cause_answer import CauseAnswer
-from .directions import components, sides_words, worst
 from .html import Html, bars, joined, section, tag
-from .page_data import SEEN
+from .page_data import SEEN, components, sides_words, worst
 from .seam_view import at_rest, seen_at
 
 _FRAMED = (

@@ -29,9 +29,9 @@ from weld_twin_nodes.wording.words import (
 from .acceptance import largest, mark
 from .answer import Answer
 from .cause_answer import CauseAnswer
-from .directions import components, sides_words, worst
 from .html import Child, Figure, Html, joined, lines, pairs, tag
 from .html import figures as drawn
+from .page_data import components, sides_words, worst
 from .seam_view import at_rest, instant, left_out
 from .to_do import warned
 

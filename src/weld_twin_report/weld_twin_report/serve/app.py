@@ -29,14 +29,13 @@ from ..history import Unavailable
 from ..history.database import Database
 from ..report.html import Html
 from . import pages
-from .access import Access, be, be_nobody
+from .access import Access, People, be, be_nobody
 from .bodies import Busy, TooMuch, TooSlow
 from .connections import Doors
+from .directory import NO_ROOM, NoRoom, is_full, refuse_full
 from .fields import sentence
 from .job import DIAGNOSIS, DONE, FOUND, MODEL, OPEN, PROGRAM, RECORDING, UPLOADS, Job
-from .people import People
 from .queue import HISTORY, UNKNOWN, Queue
-from .room import NO_ROOM, NoRoom, is_full, refuse_full
 from .settings import Settings
 from .uploads import asked_of, asked_of_program, save, save_program
 

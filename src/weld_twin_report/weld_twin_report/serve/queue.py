@@ -24,7 +24,7 @@ from ..history import entry_of
 from ..history.database import Database
 from ..history.entry import instant
 from ..history.runs import Runs
-from .directory import Directory
+from .directory import NO_ROOM, Directory, giving_way, is_full, size_of
 from .job import (
     DONE,
     FAILED,
@@ -41,7 +41,6 @@ from .job import (
     Asked,
     Job,
 )
-from .room import NO_ROOM, giving_way, is_full, size_of
 from .settings import Settings
 
 STATES = {0: DONE, 2: REFUSED, 3: UNSOUND}

@@ -109,8 +109,7 @@ rare:
 def _sheet(args: argparse.Namespace) -> Sheet:
     """Return what the page is to show; checked before anything is computed."""
     from ...report.acceptance import Demand
-    from ...report.diagnosis_page import Sheet
-    from ...report.joint_names import joint_labels
+    from ...report.diagnosis_page import Sheet, joint_labels
     from ...report.pdf import browser
 
     if args.pdf:

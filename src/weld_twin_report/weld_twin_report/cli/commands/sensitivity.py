@@ -178,7 +178,7 @@ def _recording(args: argparse.Namespace, robot: Robot) -> Recording:
 def _claims_robots(args: argparse.Namespace) -> list[Robot]:
     from weld_twin_msgs_py.robots import load_robot
 
-    from ...sensitivity_report.claims_table import ROBOTS
+    from ...sensitivity_report.study_files import ROBOTS
 
     return [load_robot(name) for name in args.claims_robots or ROBOTS] if args.claims else []
 

@@ -12,9 +12,10 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from served import Person, Server, drop, fill, small_disk
 
+from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.main import parser_of
 from weld_twin_report.serve.access import _without_token
-from weld_twin_report.serve.fields import CORRECT, sentence
+from weld_twin_report.serve.fields import CORRECT, DIAGNOSE, given, sentence, words
 
 for needed in ('fastapi', 'uvicorn', 'python_multipart', 'sqlalchemy'):
     pytest.importorskip(needed, reason="the server is an extra: pip install 'weld-twin[serve]'")
@@ -191,6 +192,14 @@ def spoilt_jobs(jobs, address):
         (jobs / name).mkdir()
         (jobs / name / 'job.json').write_text(text)
     return {jobs / name / 'job.json': text for name, text in texts.items()}
+
+
+def test_a_region_of_the_browser_is_a_box_and_no_file_of_the_server():
+    box = '-300,-200.5,100:600,200,400'
+    assert words(given({'region': box}, (DIAGNOSE,)), DIAGNOSE) == [f'--region={box}']
+    for other in ('found/diagnosis.json', '/etc/passwd', '1,2,3', f'{box}:1'):
+        with pytest.raises(DataError, match='Where it matters'):
+            given({'region': other}, (DIAGNOSE,))
 
 
 def test_what_commands_say_names_fields_of_the_browser():

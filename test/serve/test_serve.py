@@ -356,6 +356,7 @@ def test_who_does_not_come_from_a_page_of_ours_changes_nothing(server):
         ({'files': [(f'{k}.mcap', b'') for k in range(30)]}, ''),
         ({'robot': '/etc/passwd'}, 'is none of those bundled'),
         ({'align': '--out'}, '“What is not known?” cannot be'),
+        ({'region': '../secret'}, '“Where it matters” cannot be'),
         ({'at': 'Monday'}, 'is no date'),
     ],
 )

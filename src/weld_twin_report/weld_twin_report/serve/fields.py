@@ -80,6 +80,9 @@ _millimetres, _degrees, _celsius = (
     _between(0, 360, 'deg'),
     _between(-100, 200),
 )
+# A region may be a file for the command line; here it is a box alone.
+_corner = r'-?\d+(\.\d+)?(,-?\d+(\.\d+)?){2}'
+_box = _kept(re.compile(f'{_corner}:{_corner}').fullmatch)
 _coupled, _name = _kept(re.compile(r'\d+[+-]\d+').fullmatch), _kept(str.isprintable)
 _AS_TABLE = ('', 'as the table says')
 _FRAMES = (
@@ -92,6 +95,11 @@ _LANGUAGES = ((name, f'{one.maker} ({name})') for name, one in LANGUAGES.items()
 _OF_DIAGNOSES = {
     'align': Field('What is not known?', choices=_FRAMES),
     'tolerance': Field('Tolerance', 'largest deviation allowed, in mm, such as 0.5', _millimetres),
+    'region': Field(
+        'Where it matters',
+        'a box in the base frame in mm, its lower and its upper corner: 300,-200,100:600,200,400',
+        _box,
+    ),
     'uncertainty': Field(
         'Uncertainty of the instrument',
         'standard uncertainty in mm, from its certificate',

@@ -38,7 +38,7 @@ PROGRAM_FILES = (
 """The same of a program, besides its own files."""
 FIRST = ('align',)
 """Fields that everybody is shown; the others are folded away."""
-MORE = ('tolerance', 'uncertainty', 'controller', 'length_unit', 'angle_unit')
+MORE = ('tolerance', 'region', 'uncertainty', 'controller', 'length_unit', 'angle_unit')
 COUNTING = ('joint_signs', 'joint_offsets', 'coupled', 'base_link', 'tip_link', 'flange_link')
 """How the controller counts its joints, and which chain of a URDF is the arm."""
 HOW = tuple(name for name, each in FIELDS.items() if CORRECT in each.commands)

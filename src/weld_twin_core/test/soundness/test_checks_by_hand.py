@@ -10,24 +10,31 @@ import pytest
 from measured_cells import asked, moving, recorded, rejointed, stations
 
 from weld_twin_core.arm.catalog import load
+from weld_twin_core.cameras.sightings import Fitted
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.soundness.base_change import rest_of
-from weld_twin_core.diagnosis.soundness.computed import _rounding
-from weld_twin_core.diagnosis.soundness.lag import lag
-from weld_twin_core.diagnosis.soundness.lengths import instant, length
+from weld_twin_core.diagnosis.soundness.computed import _gap, _rounding
+from weld_twin_core.diagnosis.soundness.evidence import Case, _believed
+from weld_twin_core.diagnosis.soundness.gate import CHECKS, Examined, _gave_way
+from weld_twin_core.diagnosis.soundness.images import _undone
+from weld_twin_core.diagnosis.soundness.lag import Lag, lag
+from weld_twin_core.diagnosis.soundness.lengths import instant, length, listed
 from weld_twin_core.diagnosis.soundness.mending import Given, as_entry
 from weld_twin_core.diagnosis.soundness.mixups import _plausible
-from weld_twin_core.diagnosis.soundness.repeats import _apart, _common, refuse_reused
+from weld_twin_core.diagnosis.soundness.repeats import _apart, _common, refuse_reused, repeats
 from weld_twin_core.diagnosis.soundness.richness import motion
+from weld_twin_core.diagnosis.soundness.slips import Settling, Slip, changes
 from weld_twin_core.diagnosis.soundness.snapshot import FRAMES, Snapshot
 from weld_twin_core.diagnosis.soundness.stamps import _stream, streams, written
-from weld_twin_core.diagnosis.soundness.stuck import _freed, _inside, _runs
+from weld_twin_core.diagnosis.soundness.stuck import _freed, _inside, _runs, _whole
 from weld_twin_core.diagnosis.soundness.suspicions import (
     doubles,
     suspicions,
+    turned_base,
     turned_bases,
 )
 from weld_twin_core.diagnosis.soundness.touches import _stretch
+from weld_twin_core.effects.dated import InstrumentKnock, JointSlip, ToolSlip
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
 
@@ -366,3 +373,140 @@ def test_rounding_is_as_coarse_as_the_numbers_are(ur5, rng):
         rounded.append(_rounding(problem, asked(ur5, run)[1]))
     coarse, fine, none = rounded
     assert 4e-6 < coarse < 1e-5 and fine == pytest.approx(0.1 * coarse) and none == 0.0
+
+
+SIDE = np.array([[1.0], [-1.0], [0.5]])
+"""Direction of a change of the set-up."""
+
+
+def changed(ur5, *runs, by, align=('tool',)):
+    """Return what is found of runs whose first points are moved by (M,) lengths along `SIDE` [m]."""
+    problem, model = asked(ur5, *runs, align=align)
+    parts = problem.residuals(model)
+    parts[0] = parts[0] + SIDE * by
+    return changes(problem, rest_of(parts, problem, model), ur5.joint_names, 0.01)
+
+
+def test_a_step_is_one_where_nothing_smooth_does_as_well(ur5, rng):
+    run = recorded(ur5, stations(ur5, rng, 80), rng, points=True)
+    age = np.arange(80.0)
+    (step,) = changed(ur5, run, by=1e-3 * (age >= 50), align=())
+    assert isinstance(step.effect, InstrumentKnock) and step.time == 49.5 and step.dated
+    assert step.size == pytest.approx(1.5e-3, rel=0.05)
+    (warm,) = changed(ur5, run, by=1e-3 * np.exp(-age / 15.0), align=())
+    assert isinstance(warm, Settling) and warm.time_constant == pytest.approx(15.0, rel=0.15)
+    assert not changed(ur5, run, by=1e-3 * age / 80.0, align=())
+    assert not changed(ur5, run, by=0.0 * age, align=())
+
+
+def test_what_moved_before_a_recording_is_no_step_in_one(ur5, rng):
+    runs = [recorded(ur5, stations(ur5, rng, 50), rng, points=True, name=n) for n in 'ab']
+    (moved,) = changed(ur5, *runs, by=np.full(50, 1e-3))
+    assert isinstance(moved, Slip) and (moved.recording, moved.time) == (1, 0.0)
+    assert not moved.dated
+    assert not changed(ur5, *runs, by=np.full(50, 1e-3), align=('base', 'tool'))
+
+
+def test_what_would_look_the_same_is_told_with_its_place(still):
+    slip = Slip(
+        ToolSlip(time=11.5), 0, 2e-3, 90.0, (InstrumentKnock(time=11.5), JointSlip('elbow_joint'))
+    )
+    assert slip.alike == (
+        ('instrument_knocked', ('instrument',)),
+        ('joint_slipped', ('elbow_joint',)),
+    )
+    words = slip.sentence(still)
+    assert words.startswith('The reflector jumped') and 'station 12 of 40' in words
+    assert (
+        "A knock at instrument or base or a slip of joint 'elbow_joint' would look the same"
+        in words
+    )
+    found = _gave_way(slip, SimpleNamespace(recordings=(still,)))
+    assert (found.kind, found.at, found.alike) == ('reflector_jumped', ('tool',), slip.alike)
+
+
+def test_of_one_recording_what_gave_way_is_for_the_search_to_weigh(ur5, still):
+    slip = Slip(ToolSlip(time=11.5), 0, 2e-3, 90.0)
+    found = Examined(Given((still,), ur5), asked(ur5, still), (), (), (), (slip,))
+    assert found.torn(*found.posed) is found
+    assert [item.kind for item in found.told([ToolSlip(time=11.5)])] == ['reflector_jumped']
+    assert found.told([]) == ()
+
+
+# What is believed -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('rate', 'after', 'believed'),
+    [(0.0, 4e-3, True), (0.2, 4e-3, False), (0.0, 0.02, False), (0.0, 5.5e-3, False)],
+)
+def test_a_lag_must_explain_most_of_the_gap_and_be_one_of_clocks(rate, after, believed):
+    before = Lag(0.3, 0.0, 5.0, before=0.01 if after < 0.01 else 0.1)
+    assert _believed(before, Lag(0.3, rate, 5.0, after=after)) is believed
+    assert not _believed(None, before) and not _believed(before, None)
+
+
+@pytest.mark.parametrize(('gap', 'held'), [(0.06, True), (0.2, False)])
+def test_a_tool_that_never_moves_is_held_where_the_arm_says_so_too(ur5, still, gap, held):
+    seen = replace(still.measured, position=np.tile(still.seen.position[:1], (40, 1)))
+    case = Case(*asked(ur5, still.with_measured(seen)))
+    vars(case)['gap'] = gap
+    assert case.held is held
+    case = Case(*asked(ur5, still))
+    vars(case)['gap'] = gap
+    assert not case.held
+
+
+@pytest.mark.parametrize(
+    ('pixel', 'off', 'undone'),
+    [(0.4, 1.0, True), (0.4, 5.0, False), (0.9, 1.0, False), (1.1, 0.0, True), (1.6, 0.0, False)],
+)
+def test_a_mistake_of_cameras_is_one_where_lenses_are_as_calibrated(pixel, off, undone):
+    far = 6.0 if pixel > 1.0 else 2.0
+    before = Fitted(1.0, np.array([[far, 0.0]]))
+    assert _undone(before, Fitted(pixel, np.array([[off, 0.0]]))) is undone
+
+
+def test_a_gap_is_made_up_for_what_the_fit_took(ur5, still):
+    problem, model = asked(ur5, still)
+    own = np.median(np.linalg.norm(problem.residuals(model)[0], axis=0))
+    assert _gap(problem, model) == pytest.approx(own / np.sqrt(1.0 - 12.0 / 120.0))
+
+
+def test_stations_that_are_there_twice_are_counted(ur5, rng):
+    run = recorded(ur5, stations(ur5, rng, 40), rng, points=True)
+    case = SimpleNamespace(held=False, recordings=(run,), motions=[run.joints.q])
+    assert not list(repeats(case))
+    seen, q = run.measured, np.array(run.joints.q)
+    position = np.array(seen.position)
+    position[[7, 9]], q[[7, 9]] = position[3], q[3]
+    both = replace(rejointed(run, q), measured=replace(seen, position=position))
+    case = SimpleNamespace(held=False, recordings=(both,), motions=[q])
+    (found,) = repeats(case)
+    assert found.level == 'warning' and found.sentence.startswith('2 station(s)')
+
+
+def test_all_joints_stand_still_where_the_tool_goes_on(ur5, rng):
+    run = recorded(ur5, stations(ur5, rng, 40), rng, points=True)
+    assert _whole(run) is None
+    q = np.array(run.joints.q)
+    q[10:18] = q[10]
+    assert 'from station 10 to 17' in _whole(rejointed(run, q)).sentence
+    alone = rejointed(run, q).with_measured(run.measured.take(np.arange(40) % 40 == 12))
+    assert _whole(alone) is None
+
+
+def test_names_are_listed_as_people_do():
+    assert [listed(list('abc')[:k]) for k in (1, 2, 3)] == ['a', 'a and b', 'a, b and c']
+
+
+def test_a_track_that_carries_the_arm_has_no_zero_that_looks_like_a_turned_base(ur5):
+    track = replace(ur5, prismatic=np.arange(ur5.n) == 0)
+    turn = np.diag([-1.0, -1.0, 1.0])
+    assert turned_base(ur5, turn).alike and 'would look the same' in turned_base(ur5, turn).remedy
+    alone = turned_base(track, turn)
+    assert not alone.alike and 'would look the same' not in alone.remedy
+
+
+def test_every_check_has_a_sentence_for_when_it_finds_nothing():
+    assert all(passed.endswith('.') and callable(look) for look, passed in CHECKS.values())

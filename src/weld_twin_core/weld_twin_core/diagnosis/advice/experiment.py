@@ -170,11 +170,8 @@ def _outside(first: Explanation, second: Explanation) -> dict[str, Any]:
     names = [_named(*pair) or 'nothing more' for pair in ((one, other), (other, one))]
     families = sorted({effect.name for effect in one + other})
     return {
+        **dict.fromkeys(('motion', 'cost', 'robot_minutes', 'stations')),
         'kind': 'outside',
-        'motion': None,
-        'cost': None,
-        'robot_minutes': None,
-        'stations': None,
         'between': [_side(one), _side(other)],
         'changes': '',
         'expected_separation_sigma': 0.0,
@@ -224,15 +221,15 @@ def _entry(
 ) -> dict[str, Any]:
     option = plan.candidate
     joints = plan.motion()
-    sentence = option.sentence.format(count=len(joints.t) if joints.static else 0)
+    stations = len(joints.t) if joints.static else None
     return {
         'kind': option.kind,
-        'sentence': f'{sentence} Check the motion for collisions first.',
+        'sentence': f'{option.sentence.format(count=stations)} Check the motion for collisions first.',
         'reason': reason,
         'expected_separation_sigma': plan.after,
         'cost': round(plan.minutes, 2),
         'robot_minutes': round(plan.robot_minutes, 2),
-        'stations': len(joints.t) if joints.static else None,
+        'stations': stations,
         'between': between,
         'changes': option.changed,
         'motion': _motion(joints, model.robot.joint_names),

@@ -65,61 +65,60 @@ def next_touches(
     groups = list(_touchable(problem, model, design, elsewhere))
     if not groups:
         return None
-    spread = scatter([each for group in groups for each in group.touches], design.errors)
+    spread = scatter([each for _, touches, _ in groups for each in touches], design.errors)
     weight = spread if disputed is None else _sizes(design, effects, disputed)
-    options = [group.weighed(weight) for group in groups]
+    options = [_Option.of(*group, weight) for group in groups]
     # Fewer than three places show nobody what carries over to another one.
-    new = [option for option in options if option.group.place is not None]
+    new = [option for option in options if option.place is not None]
     few = new if new and len(problem.recordings) < PLACES else options
     best = min(few, key=lambda option: option.best.open(weight))
     parted = None if disputed is None else best.best.open(weight) ** -0.5
     return _entry(best, spread, model, parted)
 
 
-class _Group(NamedTuple):
-    """Touches of what is there, or of one new place [m]."""
+class _Option(NamedTuple):
+    """
+    Touches of what is there, or of one new place [m], in the order in which they are worth making.
 
-    before: Design
+    ``known`` is what is known before, and after each.
+    """
+
     touches: list[Touchable]
     place: Array | None
-
-    def weighed(self, weight: Array) -> _Option:
-        """Return the touches in the order in which they are worth making."""
-        rows = np.concatenate([each.rows for each in self.touches])
-        return _Option(self, *chosen(self.before, rows, weight, MOST))
-
-
-class _Option(NamedTuple):
-    """Touches in the order in which they are worth making, and what is known after each."""
-
-    group: _Group
     order: list[int]
-    after: list[Design]
+    known: list[Design]
+
+    @classmethod
+    def of(
+        cls, before: Design, touches: list[Touchable], place: Array | None, weight: Array
+    ) -> _Option:
+        """Return touches put in order by what they tell of weighed errors."""
+        order, after = chosen(before, np.concatenate([t.rows for t in touches]), weight, MOST)
+        return cls(touches, place, order, [before, *after])
 
     @property
     def best(self) -> Design:
         """Return what is known after the touches that are proposed."""
-        return self.after[min(COUNT, len(self.after)) - 1]
+        return self.known[: COUNT + 1][-1]
 
     def needed(self, spread: Array) -> int | None:
         """Return how many touches reach most of what more of them can narrow."""
-        scatters = [design.open(spread) ** 0.5 for design in (self.group.before, *self.after)]
-        each = scatters[0] - np.array(scatters[1:])
-        enough = np.flatnonzero(each >= REACHABLE * each[-1])
-        return int(enough[0]) + 1 if len(each) == MOST else None
+        scatters = np.sqrt([design.open(spread) for design in self.known])
+        enough = np.flatnonzero(scatters[0] - scatters >= REACHABLE * (scatters[0] - scatters[-1]))
+        return int(enough[0]) if len(self.order) == MOST else None
 
 
 def _touchable(
     problem: Problem, model: Model, design: Design, elsewhere: bool
-) -> Iterator[_Group]:
+) -> Iterator[tuple[Design, list[Touchable], Array | None]]:
     """Yield further touches of all that is there, and of every new place."""
     same = [design.touchable(k, recording) for k, recording in again(problem, model)]
     if same:
-        yield _Group(design, same, None)
+        yield design, same, None
     wider, last = design.with_place(), len(problem.recordings)
     for recording in beside(problem, model) if elsewhere else ():
         there = wider.touchable(last, recording)
-        yield _Group(wider, [there], recording.seen.position[0])
+        yield wider, [there], recording.seen.position[0]
 
 
 def _unknowns(
@@ -153,10 +152,10 @@ def _sizes(design: Design, effects: Sequence[Effect], disputed: set[tuple[str, .
 
 def _entry(best: _Option, spread: Array, model: Model, parted: float | None) -> dict[str, Any]:
     """Return the proposal as plain numbers and strings."""
-    rows, touches, place = best.order[:COUNT], best.group.touches, best.group.place
+    rows, touches, place = best.order[:COUNT], best.touches, best.place
     q = np.concatenate([each.recording.joints.q for each in touches])[rows]
     labels = [label for each in touches for label in each.recording.touched.labels]
-    both = (best.group.before, best.best)
+    both = (best.known[0], best.best)
     before, after = (1e3 * each.sigma * each.open(spread) ** 0.5 for each in both)
     what = f'Touch what was touched in these {len(rows)} postures.'
     if place is not None:

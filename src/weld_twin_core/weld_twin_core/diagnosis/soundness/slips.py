@@ -79,7 +79,7 @@ class Slip:
     @property
     def time(self) -> float:
         """Return when [s], between the last measurement before and the first after."""
-        return float(self.effect.time)  # type: ignore[attr-defined]
+        return self.effect.time
 
     @property
     def alike(self) -> tuple[tuple[str, tuple[str, ...]], ...]:

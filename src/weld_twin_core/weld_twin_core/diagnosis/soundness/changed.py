@@ -20,7 +20,7 @@ from .lengths import falls, instant, length, listed
 from .limits import FEW, HALVED, NOISE, PARTED, WRONG
 from .mending import differing
 from .orientation import disagreement
-from .slips import Settling, Slip
+from .slips import TAKEN_UP, Settling, Slip
 from .snapshot import Arm, Snapshot
 
 TORCH = 0.1
@@ -28,15 +28,10 @@ TORCH = 0.1
 
 
 def setup(case: Case) -> Sequence[Finding]:
-    """
-    Return steps and settling of the set-up; those that are dated are causes, and told there.
-
-    A change twice as large as the largest gaps did not happen: whatever is aligned, one side of a
-    step keeps half of it. A strong shake makes such steps that other columns undo.
-    """
+    """Return steps and settling of the set-up; those that are dated are causes, and told there."""
     out = []
     for each in case.changes:
-        if each.size > 2.0 * case.largest:
+        if each.size > TAKEN_UP * case.largest:
             continue
         if isinstance(each, Settling):
             out.append(note(_settled(case, each)))

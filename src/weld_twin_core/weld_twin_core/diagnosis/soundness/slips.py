@@ -26,6 +26,10 @@ from .base_change import CONSTANTS, Change, Rest, other_shapes
 from .lengths import instant, length
 from .limits import FEW, MARGIN, MOST, TINY
 
+TAKEN_UP = 2.5
+"""A change this many times as large as the largest gaps did not happen: one frame that is fitted takes
+up half of it, base and tool together a little more. A strong shake makes such steps that other columns
+undo."""
 SLOW = 2.0
 """Seconds below which nothing warms up; what dies away faster is a transient of the arm."""
 MOVED_BEFORE = np.inf
@@ -138,10 +142,9 @@ def changes(
             out += seen.named(best)
             continue
         taken.append((best.recording, best.at))
-        # Effects that no formula holds exactly leave small steps here and there; and no step is twice
-        # as large as the largest gaps: one frame that is fitted takes up half of it.
+        # Effects that no formula holds exactly leave small steps here and there.
         size = best.change.size(best.shape)
-        dated = before - rest.far > FEW * whole and size < 2.0 * largest
+        dated = before - rest.far > FEW * whole and size < TAKEN_UP * largest
         out.append(Slip(best.effect, best.recording, size, best.sure, best.others, dated))
     return out
 

@@ -52,7 +52,7 @@ TESTS = {
     'src/weld_twin_core/test/diagnosis': 'needed_kinds planned sizes arm_or_field decision '
     'learned_sizes stray_readings folds',
     'src/weld_twin_core/test/soundness': 'alignment checks_by_hand gravity mends soundness trials',
-    'src/weld_twin_core/test/advice': 'next_experiment',
+    'src/weld_twin_core/test/advice': 'next_experiment pieces_by_hand',
 }
 """What asks about the engine, folder by folder: files of tests that take a second or two at most.
 Other rooms are asked about by the files that import the modules drawn."""

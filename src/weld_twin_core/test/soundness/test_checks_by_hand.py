@@ -379,12 +379,12 @@ SIDE = np.array([[1.0], [-1.0], [0.5]])
 """Direction of a change of the set-up."""
 
 
-def changed(ur5, *runs, by, align=('tool',)):
+def changed(ur5, *runs, by, align=('tool',), largest=0.01):
     """Return what is found of runs whose first points are moved by (M,) lengths along `SIDE` [m]."""
     problem, model = asked(ur5, *runs, align=align)
     parts = problem.residuals(model)
     parts[0] = parts[0] + SIDE * by
-    return changes(problem, rest_of(parts, problem, model), ur5.joint_names, 0.01)
+    return changes(problem, rest_of(parts, problem, model), ur5.joint_names, largest)
 
 
 def test_a_step_is_one_where_nothing_smooth_does_as_well(ur5, rng):
@@ -397,6 +397,14 @@ def test_a_step_is_one_where_nothing_smooth_does_as_well(ur5, rng):
     assert isinstance(warm, Settling) and warm.time_constant == pytest.approx(15.0, rel=0.15)
     assert not changed(ur5, run, by=1e-3 * age / 80.0, align=())
     assert not changed(ur5, run, by=0.0 * age, align=())
+
+
+@pytest.mark.parametrize(('times', 'dated'), [(2.3, True), (2.7, False)])
+def test_a_step_far_larger_than_the_largest_gaps_is_no_cause(ur5, rng, times, dated):
+    run = recorded(ur5, stations(ur5, rng, 80), rng, points=True)
+    step = 1e-3 * (np.arange(80) >= 50)
+    (found,) = changed(ur5, run, by=step, align=(), largest=1.5e-3 / times)
+    assert found.dated is dated
 
 
 def test_what_moved_before_a_recording_is_no_step_in_one(ur5, rng):

@@ -18,7 +18,7 @@ from weld_twin_report.history import Database
 
 BAG = Path(__file__).parents[2] / 'bags/elbow_play'
 COMPARED = ('cell', 'recording', 'state', 'sentence')
-LINES = 3
+LINES = 2
 KILLED_BETWEEN = 0.3, 1.0
 """Shares of the time of a whole run; the first part is Python's start."""
 
@@ -29,7 +29,7 @@ def run(listed, database, patience=3600.0):
     began = time.perf_counter()
     try:
         subprocess.run(
-            [sys.executable, *words, '--workers', '2'], capture_output=True, timeout=patience
+            [sys.executable, *words, '--workers', '1'], capture_output=True, timeout=patience
         ).check_returncode()
     except subprocess.TimeoutExpired:
         return None

@@ -18,7 +18,7 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from rosgraph_msgs.msg import Clock
 
-from weld_twin_core.errors import ModelError
+from weld_twin_core.errors import ModelError, TwinError
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
@@ -26,6 +26,7 @@ from weld_twin_nodes.harness import Cell, CellTimeout
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.error_injector import ErrorInjector
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
+from weld_twin_nodes.live.recorder import Recorder
 
 pytestmark = pytest.mark.cells
 
@@ -82,13 +83,10 @@ BAD_STARTS = {
         "executor must be one of events, single_threaded, got 'threads'",
     ),
     'no bag': ('recorder', {}, "needs the parameter 'out'"),
-    'no topic': ('recorder', {'out': 'x', 'topics': ['not a topic']}, "'not a topic' is no name"),
-    'no storage': ('recorder', {'out': 'x', 'storage': 'tape'}, "got 'tape'"),
 }
 
 
-def test_a_node_that_cannot_start_says_why_in_a_line_and_exits_with_2(cell, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_node_that_cannot_start_says_why_in_a_line_and_exits_with_2(cell):
     started = {
         what: (cell.start(node, **parameters), sentence)
         for what, (node, parameters, sentence) in BAD_STARTS.items()
@@ -99,7 +97,19 @@ def test_a_node_that_cannot_start_says_why_in_a_line_and_exits_with_2(cell, tmp_
         assert len(said) == 1, process.log
         assert sentence in said[0], what
         assert 'Traceback' not in process.log, what
-    assert list(tmp_path.glob('*x*')) == []
+
+
+@pytest.mark.parametrize(
+    ('wrong', 'sentence'),
+    [
+        ({'topics': ['not a topic']}, "'not a topic' is no name"),
+        ({'storage': 'tape'}, "got 'tape'"),
+    ],
+)
+def test_a_recorder_that_cannot_record_leaves_nothing(cell, tmp_path, wrong, sentence):
+    with pytest.raises(TwinError, match=sentence):
+        cell.add(Recorder, out=str(tmp_path / 'bag'), **wrong)
+    assert not list(tmp_path.glob('*bag*'))
 
 
 def motion(robot, samples):
@@ -186,8 +196,6 @@ def test_the_harness_says_which_node_died_and_why(cell):
 
 
 def test_topics_can_be_remapped(cell, robot):
-    from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
-
     cell.add(
         ForwardKinematicsTwin,
         cli_args=['--ros-args', '-r', '/twin/tool_pose:=/cell7/predicted'],

@@ -402,7 +402,7 @@ def test_two_of_one_name_are_told_and_a_disk_that_does_not_answer_keeps_none(tmp
         assert handle.accepted
         assert 'nothing has come on /clock' in planner.process.log
         planner.process.signal(signal.SIGTERM)
-        assert planner.process.end(20.0) == 0
+        assert planner.process.end(60.0) == 0
         assert f"'{audit}' has not taken all lines" in planner.process.log
 
 
@@ -478,7 +478,7 @@ def test_a_tracker_that_was_lost_must_bear_the_model_out_again(planner):
         planner.cell.meet()
 
     deviate(5)
-    for _ in range(5):
+    for _ in range(20):  # a busy machine takes long for these
         seen(planner.cell, 2.2)
         planner.refused(planner.goal(sway()), 'the tracker is lost')
         begun = time.monotonic()
@@ -534,7 +534,7 @@ class Poses:
     def feed(self, q, until, what):
         """Send one pose again and again until something is so."""
         T = forward(ROBOT, np.asarray(q))
-        end = time.monotonic() + 30.0
+        end = time.monotonic() + 60.0
         while not until() and time.monotonic() < end:
             self._stamp += 8_000_000
             self._given.publish(self.cell.messages.pose(self._stamp, T[:3, 3], T[:3, :3], 'base'))

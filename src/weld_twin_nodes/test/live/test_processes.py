@@ -72,33 +72,6 @@ def test_a_program_told_to_end_while_it_is_still_loading_ends_quietly(tmp_path):
     assert (done.returncode, done.stderr) == (0, b'')
 
 
-BAD_STARTS = {
-    'unknown robot': ('error_injector', {'robot': 'ur99'}, "'ur99' is neither"),
-    'unknown seam': ('trajectory_generator', {'path': 'nowhere.yaml'}, "'nowhere.yaml'"),
-    'out of range': ('trajectory_generator', {'rate': -5.0}, 'rate'),
-    'wrong type': ('error_injector', {'seed': 1.5}, 'seed'),
-    'no executor': (
-        'contact_marker',
-        {'executor': 'threads'},
-        "executor must be one of events, single_threaded, got 'threads'",
-    ),
-    'no bag': ('recorder', {}, "needs the parameter 'out'"),
-}
-
-
-def test_a_node_that_cannot_start_says_why_in_a_line_and_exits_with_2(cell):
-    started = {
-        what: (cell.start(node, **parameters), sentence)
-        for what, (node, parameters, sentence) in BAD_STARTS.items()
-    }
-    for what, (process, sentence) in started.items():
-        assert process.end() == 2, what
-        said = [line for line in process.log.splitlines() if line.startswith('weld_twin: ')]
-        assert len(said) == 1, process.log
-        assert sentence in said[0], what
-        assert 'Traceback' not in process.log, what
-
-
 @pytest.mark.parametrize(
     ('wrong', 'sentence'),
     [

@@ -64,6 +64,16 @@ def test_a_node_loads_nothing_that_it_needs_for_a_diagnosis_alone(name):
             'base_from_tf:=true',
             'needs the names measuring_frame and base_frame\n',
         ),
+        ('error_injector', 'robot:=ur99', "'ur99' is neither"),
+        ('error_injector', 'seed:=1.5', 'seed'),
+        ('trajectory_generator', 'path:=nowhere.yaml', "'nowhere.yaml'"),
+        ('trajectory_generator', 'rate:=-5.0', 'rate'),
+        ('recorder', 'storage:=mcap', "needs the parameter 'out'"),
+        (
+            'contact_marker',
+            'executor:=threads',
+            "executor must be one of events, single_threaded, got 'threads'",
+        ),
     ],
 )
 def test_a_parameter_that_cannot_be_is_refused_in_a_sentence(name, word, sentence, capsys):

@@ -9,8 +9,8 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
-COUNTED = frozenset({'seconds', 'fia'})
-"""Measures that are no shares of cases."""
+from ..blind.measures import measure_table
+
 HEAD = (
     'statements',
     'number',
@@ -48,10 +48,7 @@ def _beside_goals(result: Mapping[str, Any]) -> list[str]:
     return [
         'Beside the goals:',
         '',
-        markdown.table(
-            ('measure', 'value', '95 % interval', 'cases', 'goal', 'reached'),
-            *(_goal(item) for item in result['goals']),
-        ),
+        measure_table(result['goals']),
         *_failures(result['wrong_and_sure']),
     ]
 
@@ -99,22 +96,6 @@ def _row(name: str, row: Mapping[str, Any]) -> tuple[str, ...]:
     )
 
 
-def _goal(item: Mapping[str, Any]) -> tuple[str, ...]:
-    estimate, goal = item['estimate'], item['goal']
-    if estimate['value'] is None:
-        return (item['title'], '-', '-', '0', '-', '-')
-    show = _number if item['key'] in COUNTED else _percent
-    reached = {True: 'yes', False: 'no', None: ''}[item['reached']]
-    return (
-        item['title'],
-        show(estimate['value']),
-        f'{show(estimate["low"])} to {show(estimate["high"])}',
-        str(estimate['cases']),
-        '' if goal is None else f'{"≥" if item["at_least"] else "≤"} {show(goal)}',
-        reached,
-    )
-
-
 def _failures(listed: Sequence[Mapping[str, Any]]) -> list[str]:
     if not listed:
         return ['No case was sure and wrong.', '']
@@ -136,10 +117,6 @@ def _failures(listed: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def _percent(value: float) -> str:
     return f'{100.0 * value:.1f} %'
-
-
-def _number(value: float) -> str:
-    return f'{value:.2f}'
 
 
 def _listed(values: Sequence[object]) -> str:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from weld_twin_core.diagnosis.result import NAMING
+
 from .ambiguous import Site
 
 CONFIDENT = 0.8
@@ -19,7 +21,6 @@ IN_LIBRARY = frozenset({'single', 'double', 'triple', 'ambiguous'})
 NOT_IN_LIBRARY = frozenset({'outside', 'withheld'})
 NAMED = {'station_step': 'instrument_knock'}
 """What the twin calls a cause that the plant calls otherwise."""
-NAMING = ('identified', 'ambiguous')
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
+from weld_twin_msgs_py.files import markdown
+
 from .judging import NOT_IN_LIBRARY, Judged
 from .statistics import Estimate, brier, calibration_error, share
 
 AS_GOOD = 1.05
 """RMS left over what the true causes leave, up to which an answer predicts as the truth does."""
+NUMBERS = frozenset({'brier', 'ece', 'ece_library', 'seconds', 'fia'})
+"""Measures that are numbers; the others are shares of cases."""
+HEADS = ('measure', 'value', '95 % interval', 'cases', 'goal', 'reached')
+REACHED = {None: '', True: 'yes', False: 'no'}
 CLEAR = 3.0
 """Effect RMS over noise from which a cause is plain to see."""
 
@@ -46,6 +52,38 @@ class Measure:
     def as_dict(self) -> dict[str, Any]:
         """Return plain values."""
         return {**asdict(self), 'estimate': self.estimate._asdict(), 'reached': self.reached}
+
+
+def measure_table(measures: Sequence[Mapping[str, Any]]) -> str:
+    """
+    Return measures beside their goals in Markdown.
+
+    Parameters
+    ----------
+    measures : sequence of mappings
+        As `Measure.as_dict` gives them.
+
+    """
+    return markdown.table(HEADS, *map(_row, measures))
+
+
+def _row(item: Mapping[str, Any]) -> tuple[str, ...]:
+    estimate, goal = item['estimate'], item['goal']
+    if estimate['value'] is None:
+        return (item['title'], '-', '-', '0', '-', '-')
+    digits = 3 if item['key'].startswith(('brier', 'ece')) else 2
+
+    def told(value: float) -> str:
+        return f'{value:.{digits}f}' if item['key'] in NUMBERS else f'{100.0 * value:.1f} %'
+
+    return (
+        item['title'],
+        told(estimate['value']),
+        f'{told(estimate["low"])} to {told(estimate["high"])}',
+        str(estimate['cases']),
+        '' if goal is None else f'{"≥" if item["at_least"] else "≤"} {told(goal)}',
+        REACHED[item['reached']],
+    )
 
 
 class Question(NamedTuple):

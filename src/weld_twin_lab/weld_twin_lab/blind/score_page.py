@@ -6,21 +6,16 @@ from __future__ import annotations
 
 from weld_twin_msgs_py.files import markdown
 
-from .measures import Measure
+from .measures import measure_table
 from .scoring import Score
 
-COUNTED = frozenset({'brier', 'ece', 'ece_library'})
-"""Measures that are numbers; the others are shares."""
-MEASURES = ('measure', 'value', '95 % interval', 'of', 'goal', 'reached')
 MISSED = ('case', 'kind', 'truth (RMS over noise)', 'verdict', 'confidence', 'why there is none')
-REACHED = {None: '', True: 'yes', False: 'no'}
 
 
 def page(score: Score) -> str:
     """Return measures, cases that were missed, and what a diagnosis costs."""
     made, costs = score.made, score.costs
     seen = 'could be read' if made['truths_readable'] else 'could not be read'
-    rows = [_row(measure) for measure in score.measures]
     missed = [
         (
             case.name,
@@ -38,25 +33,9 @@ def page(score: Score) -> str:
             f'# {len(score.cases) - len(missed)} of {len(score.cases)} cases answered rightly\n',
             f'Seed {made["seed"]}, seal {made["seal"]}, engine {made["engine"][:16]} of version '
             f'{made["version"]}. Truths {seen} from where the cases were diagnosed.\n',
-            markdown.table(MEASURES, *rows),
+            measure_table([measure.as_dict() for measure in score.measures]),
             f'A diagnosis took {costs["median_seconds"]:.1f} s in the median, '
             f'{costs["most_seconds"]:.1f} s at most, and {costs["most_memory_mib"]:.0f} MiB.\n',
             *([markdown.table(MISSED, *missed)] if missed else []),
         ]
     )
-
-
-def _row(measure: Measure) -> tuple[str, ...]:
-    value, low, high, count = measure.estimate
-    goal = ''
-    if measure.goal is not None:
-        goal = f'{"≥" if measure.at_least else "≤"} {_number(measure.key, measure.goal)}'
-    ends = '' if low is None else f'{_number(measure.key, low)} to {_number(measure.key, high)}'
-    told = _number(measure.key, value)
-    return measure.title, told, ends, str(count), goal, REACHED[measure.reached]
-
-
-def _number(key: str, value: float | None) -> str:
-    if value is None:
-        return '-'
-    return f'{value:.3f}' if key in COUNTED else f'{100.0 * value:.1f} %'

@@ -15,7 +15,7 @@ from weld_twin_core.arm.rotation import transform
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.soundness.gate import examine
 from weld_twin_core.diagnosis.soundness.mending import Given
-from weld_twin_core.effects import JointCoupling, JointOffset, effects_from_list
+from weld_twin_core.effects import REGISTRY, JointCoupling, JointOffset, effects_from_list
 from weld_twin_core.effects.setup_motion import of_the_robot
 from weld_twin_core.recording import JointMotion
 
@@ -188,6 +188,11 @@ SLIPS = {
 }
 
 
+STILL = ('constant', 'time')
+MOVING = [name for name, kind in REGISTRY.items() if kind.traits.depends_on not in STILL]
+"""What is not tried where it is about what gave way."""
+
+
 @pytest.mark.parametrize('kind', SLIPS)
 def test_what_gave_way_is_dated_and_named_as_a_cause(ur5, rng, kind):
     entry, _ = SLIPS[kind]
@@ -196,7 +201,7 @@ def test_what_gave_way_is_dated_and_named_as_a_cause(ur5, rng, kind):
     bad = recorded(robot, stations(ur5, rng), rng, effects)
     (slip,) = seen(robot, bad).slips
     assert slip.kind == kind and slip.time == 60.5
-    found = diagnose([bad], robot, align='base,tool', experiment=False)
+    found = diagnose([bad], robot, align='base,tool', exclude=MOVING, experiment=False)
     assert [(u.kind, u.applied) for u in found.unsound] == [(kind, True)]
     named = {(f.effect.name, f.effect.site) for f in found.effects}
     assert (entry['effect'], entry.get('joint')) in named

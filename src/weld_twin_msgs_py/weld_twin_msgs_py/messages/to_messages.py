@@ -43,7 +43,7 @@ class Messages:
     def _make(self, kind: str, **fields: Any) -> Any:
         return self._lookup(kind)(**fields)
 
-    def _stamped(self, kind: str, ns: int, frame_id: str, **fields: Any) -> Any:
+    def _stamped(self, kind: str, ns: int, frame_id: str, /, **fields: Any) -> Any:
         return self._make(kind, header=self.header(ns, frame_id), **fields)
 
     def time(self, ns: int) -> Any:

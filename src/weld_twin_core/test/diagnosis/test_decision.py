@@ -150,10 +150,12 @@ def test_a_gap_is_unknown_where_a_cause_without_a_name_is_likelier_than_not(name
     assert status == 'identified' or 'not in the library' in alone.reasons[0]
 
 
-def test_what_is_left_makes_a_gap_unknown_where_it_is_more_than_what_is_named():
-    # A gap of 1 mm and noise of 0.3 mm; 0.68 mm leave about half of the square to the name.
+@pytest.mark.parametrize('part', [1.0, 0.3, 3.0])
+def test_what_is_left_makes_a_gap_unknown_where_it_is_more_than_what_is_named(part):
+    # A gap of 1 mm and noise of 0.3 mm; 0.68 mm leave about half of the square to the name, by
+    # whatever its part is told.
     for after, status in ((0.65e-3, 'identified'), (0.75e-3, 'unknown')):
-        told = evidence(SURE, gap=1e-3, after=after, floor=0.3e-3)
+        told = evidence(SURE, gap=1e-3, after=after, floor=0.3e-3, parts=(part,))
         verdict = decide(told)
         assert (verdict.status, verdict.sets) == (status, ((PLAY,),))
 

@@ -107,9 +107,9 @@ def test_each_node_runs_as_installed_with_the_parameter_file(workspace, sourced,
             assigned = [f'{k}={v}' for k, v in {**sourced, **own}.items()]
             started[name] = cell.start(['env', '-i', *assigned, *command])
         cell.wait(
-            lambda: set(NODES) <= set(cell.node.get_node_names()), 'the installed nodes', 30.0
+            lambda: set(NODES) <= set(cell.node.get_node_names()), 'the installed nodes', 120.0
         )
-        cell.wait(lambda: len(deviations) > 0, 'a deviation', 30.0)
+        cell.wait(lambda: len(deviations) > 0, 'a deviation', 120.0)
         for process in started.values():
             process.interrupt()
         codes = {name: process.end() for name, process in started.items()}

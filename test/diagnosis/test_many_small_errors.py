@@ -152,7 +152,6 @@ def judged(families, gain=0.0, sure=0.0):
             gap=4e-4,
             after=left,
             floor=SIGMA * np.sqrt(3.0),
-            fitted=left,
             independent=False,
             parts=(),
             families=weighed,

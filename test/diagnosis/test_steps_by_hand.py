@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.frames.in_turn import chord
 from weld_twin_core.diagnosis.frames.open_directions import shown
-from weld_twin_core.diagnosis.levels.groups import _curved, smooth_field
 from weld_twin_core.diagnosis.levels.placed import _tilt
 from weld_twin_core.diagnosis.predicting.leftover import _middle, _shared
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, weighed
@@ -23,7 +22,7 @@ from weld_twin_core.diagnosis.soundness.lag import lag
 from weld_twin_core.diagnosis.soundness.mixups import _fixture
 from weld_twin_core.diagnosis.soundness.slips import _Seen
 from weld_twin_core.diagnosis.soundness.suspicions import turned_base
-from weld_twin_core.diagnosis.unseen.leftover_structure import _motion, _padded
+from weld_twin_core.diagnosis.unseen.groups import _curved, smooth_field
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 
@@ -55,16 +54,6 @@ def test_a_turned_base_is_told_by_its_axis(ur5, turn, told):
 def test_a_base_turned_about_no_axis_is_told_by_all_three(ur5):
     matrix = Rotation.from_rotvec([40.0, 40.0, 0.0], degrees=True).as_matrix()
     assert 'about its axis (+1, +1, +0)' in turned_base(ur5, matrix).sentence
-
-
-def test_the_side_of_stations_stands_where_paths_have_their_direction(ur5):
-    t = np.linspace(0.0, 10.0, 500)
-    view = SimpleNamespace(static=False, t=t, qd=0.3 * np.cos(t)[:, None])
-    path = _motion(SimpleNamespace(run=SimpleNamespace(view=view)), 0)
-    sides = np.array([[1.0, -1.0, 1.0]])
-    (row,) = np.flatnonzero(_padded(sides, len(path)).any(axis=1))
-    away = np.abs(view.qd[:, 0]) > 0.1
-    assert path[row][away] == pytest.approx(np.sign(view.qd[away, 0]), abs=1e-6)
 
 
 def test_a_tool_turned_by_its_last_joint_alone_is_not_tilted():
@@ -203,7 +192,7 @@ def test_the_age_of_a_sample_goes_from_none_to_all_of_its_recording():
 def test_a_smooth_field_has_slopes_and_bends_of_all_three_coordinates():
     problem, model = tiny(count=60, turned=False)
     (maker,) = problem.features(model)
-    columns = smooth_field(problem, 0, maker).reshape(27, -1)
+    columns = smooth_field(maker)[:, :3].reshape(27, -1)
     assert np.linalg.matrix_rank(columns) == 27
 
 

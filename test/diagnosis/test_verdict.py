@@ -36,9 +36,9 @@ def test_what_depends_on_the_angle_of_a_joint_is_said_to_and_noise_is_not(size, 
     problem, model = with_bend(size)
     scale = known_scale(problem)
     bare = fit(problem, model, scale)
-    found = structure(Unseen.of(problem, scale, bare, np.zeros(0)), model, Beliefs())
+    found = structure(Unseen.of(problem, scale, bare, np.zeros(0)), model, bare, Beliefs())
     assert (found.gain > 0.03 and found.sure > 3.0) is seen
-    assert (found.depends_on[:1] == ('the angle of elbow_joint',)) is seen
+    assert (found.depends_on[:1] == ('angle at elbow_joint',)) is seen
 
 
 def library(problem, model, exclude=()):
@@ -103,8 +103,8 @@ def test_a_tool_that_slipped_is_told_from_a_base_that_moved():
     problem = Problem((recording.with_measured(slipped),))
     scale = known_scale(problem)
     bare = fit(problem, model, scale)
-    found = structure(Unseen.of(problem, scale, bare, np.zeros(0)), model, Beliefs())
-    assert found.depends_on[0].endswith('seen from the tool')
+    found = structure(Unseen.of(problem, scale, bare, np.zeros(0)), model, bare, Beliefs())
+    assert found.depends_on[0].endswith('at tool')
 
 
 def test_every_joint_that_hardly_moves_is_named_with_the_family_it_cannot_show():

@@ -13,7 +13,7 @@ FILES = {
     for name, file in module_files(ROOT / 'src').items()
     if name.startswith('weld_twin_core.diagnosis.')
 }
-MAKING = {'soundness', 'levels', 'advice'}
+MAKING = {'soundness', 'unseen', 'advice'}
 """Rooms that make instances of their own: what mistakes look like, and curves without formula."""
 
 

@@ -11,8 +11,8 @@ import weld_twin_core as wt
 from weld_twin_core.arm.chain import forward, jacobian
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_core.diagnosis.levels.groups import all_groups, whole_arm_groups
 from weld_twin_core.diagnosis.soundness.touches import touches
+from weld_twin_core.diagnosis.unseen.groups import all_groups
 
 SOCKETS = {'a': [0.45, 0.1, 0.3], 'b': [0.45, 0.15, 0.3], 'c': [-0.1, 0.5, 0.4]}
 EACH = 14
@@ -106,9 +106,6 @@ def test_swapped_files_are_not_mended(sound, robot):
 def test_contacts_have_no_instrument_that_could_be_at_fault(sound, robot):
     problem, model = aligned(sound, robot, 'tool', ())
     scale = problem.unit_scale()
-    groups = [
-        *all_groups(problem, model, scale),
-        *whole_arm_groups(problem, model, scale),
-    ]
-    assert {group.at for group in groups} >= set(robot.joint_names[1:-1])
-    assert 'instrument' not in {group.at for group in groups}
+    places = {group.at for group in all_groups(problem, model, scale)}
+    assert places >= set(robot.joint_names[1:-1])
+    assert 'instrument' not in places

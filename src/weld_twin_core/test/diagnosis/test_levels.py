@@ -11,18 +11,13 @@ import pytest
 from small_arm import small_arm
 
 import weld_twin_core as wt
+from weld_twin_core.diagnosis.algebra.designed import Design
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.levels.formulas import Missed, no_noise
-from weld_twin_core.diagnosis.levels.free_form import (
-    Choosing,
-    Folds,
-    Member,
-    choosing,
-    chosen,
-    worth,
-)
-from weld_twin_core.diagnosis.levels.groups import Group
+from weld_twin_core.diagnosis.levels.free_form import Choosing, Member, chosen, worth
 from weld_twin_core.diagnosis.unseen.folds import posture_regions, steadiness
+from weld_twin_core.diagnosis.unseen.groups import Group
+from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.diagnosis.verdict.decision import Verdict
 from weld_twin_core.effects.curve import basis
 from weld_twin_core.effects.joint_curve import JointCurve
@@ -115,16 +110,24 @@ def test_friction_that_wanders_is_placed_though_nothing_predicts_it():
     assert told.causes[0].dependence[0][0] in ('direction', 'time')
 
 
-def test_folds_leave_out_what_they_judge():
+def choice(target, ways, *groups):
+    """Return a choice of groups of columns that are to explain a target, nothing else fitted."""
+    none = np.zeros(0)
+    taken, columns = lambda: np.zeros((0, target.size)), Design.of(np.zeros((0, target.size)))
+    fitted = Unseen(None, None, ways[0], columns, (), target, taken, none, none)
+    told = [Group(str(k), '', (), np.atleast_2d(g), np.ones(1)) for k, g in enumerate(groups)]
+    return Choosing(told, [fitted.by(labels) for labels in ways])
+
+
+def test_parts_left_out_are_judged_by_fits_of_the_others():
     rng = np.random.default_rng(0)
     columns, target = rng.normal(size=(3, 40)), rng.normal(size=40)
     labels = np.repeat(np.arange(4), 10)
-    precision = np.full(3, 0.5)
-    got = Folds.of(columns, target, labels).errors(np.arange(3), precision)
+    (got,) = choice(target, [labels], columns).errors([Member(0, 0.5)])
     for k in range(4):
         fit, judge = labels != k, labels == k
         a = columns[:, fit]
-        x = np.linalg.solve(a @ a.T + np.diag(precision), a @ target[fit])
+        x = np.linalg.solve(a @ a.T + 0.5 * np.eye(3), a @ target[fit])
         left = target[judge] - x @ columns[:, judge]
         assert got[k] == pytest.approx(left @ left)
 
@@ -184,13 +187,7 @@ def test_what_groups_are_worth_adds_up():
     rng = np.random.default_rng(4)
     columns = rng.standard_normal((2, 600))
     target = 2.0 * columns[0] + columns[1] + 0.5 * rng.standard_normal(600)
-    work = Choosing(
-        [],
-        np.zeros(0, dtype=int),
-        np.zeros(0),
-        [np.array([0]), np.array([1])],
-        (Folds.of(columns, target, np.arange(600) % 10),),
-    )
+    work = choice(target, [np.arange(600) % 10], *columns)
     told = worth(work, [Member(0, 1e-3), Member(1, 1e-3)])
     assert sum(told.shares) == pytest.approx(told.gain)
     assert told.gain == pytest.approx(5.0 / 5.25, abs=0.02)
@@ -199,8 +196,7 @@ def test_what_groups_are_worth_adds_up():
 
 def picked(target, ways, *groups):
     """Return which of some groups of columns are chosen."""
-    told = [Group(str(k), '', (), np.atleast_2d(g), np.ones(1)) for k, g in enumerate(groups)]
-    work = choosing(told, np.zeros((0, target.size)), np.zeros(0), target, ways)
+    work = choice(target, ways, *groups)
     return sorted(member.group for member in chosen(work, Beliefs()))
 
 

@@ -39,11 +39,8 @@ class Beliefs:
     """
     What a diagnosis believes before it sees data, as numbers.
 
-    Each field says what it means, its unit, and where its value comes from. "Moved" tells what
-    changes when the number is moved by 25 % down and up on 40 sealed development cases (`weld-twin
-    blind make --cases 40 --seed 424202`), of which 35 are right as the numbers stand, before names
-    are held against curves. The numbers by which data are refused as
-    unsound lie in `soundness.limits`.
+    Each field says what it means, its unit, and where its value comes from. The numbers by which
+    data are refused as unsound lie in `soundness.limits`.
 
     Examples
     --------
@@ -167,39 +164,34 @@ class Beliefs:
     # The verdict -----------------------------------------------------------------------------
 
     sure: float = _verdict(0.85, most=1.0)
-    """Probability from which on a leader is named alone. Moved: less: none changes; more: 2
-    verdicts change, 35 right."""
+    """Probability from which on a leader is named alone."""
 
     listed: float = _verdict(0.03)
-    """Probability from which on a rival is named beside a leader that is not sure. Moved:
-    less: none changes; more: 1 verdict changes, 35 right."""
+    """Probability from which on a rival is named beside a leader that is not sure."""
 
     unexplained: float = _verdict(0.05)
     """Share of the squared gap that may stay unexplained before it is told as something left, and
-    before the answer is 'unknown' where nothing was found. Moved: no verdict changes."""
+    before the answer is 'unknown' where nothing was found."""
 
     least_excess: float = _verdict(0.05)
     """Share of the squared floor that a gap counts as standing above it at the least; keeps
-    the share unexplained from a division by next to nothing. Moved: nothing changes."""
+    the share unexplained from a division by next to nothing."""
 
     above: float = _verdict(1.3)
     """What remains must exceed an independently measured floor by this factor to count; the
-    floor itself is known to a tenth or so, and noise has tails. Moved: less: 5 verdicts
-    change, 30 right; more: none changes."""
+    floor itself is known to a tenth or so, and noise has tails."""
 
     structure_gain: float = _verdict(0.03)
-    """Share of the squared unseen error that a structure must take away to be one (moved:
-    nothing changes),"""
+    """Share of the squared unseen error that a structure must take away to be one,"""
 
     structure_sure: float = _verdict(3.0)
-    """and the same in its standard errors between stretches. Moved: nothing changes."""
+    """and the same in its standard errors between stretches."""
 
     blatant_gain: float = _verdict(0.15)
-    """The same for a structure so large that a few stretches may hold all of it
-    (moved: nothing changes),"""
+    """The same for a structure so large that a few stretches may hold all of it,"""
 
     blatant_sure: float = _verdict(1.5)
-    """and its standard errors, which are then large as well. Moved: nothing changes."""
+    """and its standard errors, which are then large as well."""
 
     far_above: float = _verdict(1.7)
     """What remains over the floor, RMS, from which the answer is 'unknown' where nothing was found

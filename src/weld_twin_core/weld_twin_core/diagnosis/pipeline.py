@@ -21,7 +21,7 @@ from .frames.changes import families_named, settled_between
 from .frames.open_directions import held
 from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
-from .levels.curved import carried, curved, standing
+from .levels.curved import carried, curved
 from .levels.formulas import missed, no_noise
 from .levels.placed import placed
 from .many.fitted_together import fitted_together
@@ -34,7 +34,7 @@ from .soundness.gate import Examined, examine
 from .soundness.mending import Given
 from .soundness.repeats import refuse_reused
 from .unseen.elsewhere import borne_out
-from .unseen.held_out_shrink import held_out_shrink, reached_by_chance
+from .unseen.held_out_shrink import held_out_shrink
 from .unseen.leftover_structure import structure
 from .unseen.unseen_stretches import Unseen
 from .verdict.decision import LIKELIER, decide
@@ -185,21 +185,20 @@ def _told(
     if examined.posed is None:
         return refusal(examined)
     holdout = examined.mended(holdout)
-    result, least = borne_out(result, holdout, beliefs)
+    result = borne_out(result, holdout, beliefs)
     unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
-    leftover = structure(unseen, result.final.model, beliefs)
+    leftover = structure(unseen, result.final.model, result.baseline, beliefs)
     progress('looked for what is left')
     floor = noise_floor(result.problem, result.problem.residuals(result.final.model))
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
-    chance = reached_by_chance(result, unseen, holdout, beliefs)
-    evidence = gathered(result, unseen, leftover, shrink, floor, beliefs, least, chance)
-    alternative = curved(result, beliefs)
+    evidence = gathered(result, unseen, leftover, shrink, floor, beliefs)
     remaining = missed(result, unseen, beliefs)
     table = table_of(result.slots, beliefs)
-    statements = stated(result, unseen, evidence, table, alternative)
+    statements = stated(result, unseen, evidence, table)
     evidence = statements.put_to(replace(evidence, missed=remaining.in_words))
-    verdict = no_noise(decide(evidence, beliefs), alternative, remaining, beliefs)
-    alternative = standing(result, verdict, alternative, beliefs)
+    verdict = decide(evidence, beliefs)
+    alternative = curved(result, verdict, beliefs)
+    verdict = no_noise(verdict, alternative, remaining, beliefs)
     unseen.forget_other_parts()
     places = placed(result, verdict, alternative, remaining, beliefs)
     progress('held against curves without a formula')

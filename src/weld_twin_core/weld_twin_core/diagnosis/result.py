@@ -183,6 +183,10 @@ class Site:
         """Return it as people read it."""
         return f'{self.effect} of {self.joint}' if self.joint else self.effect
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain values in the public schema."""
+        return asdict(self)
+
 
 @dataclass(frozen=True)
 class Family:
@@ -243,7 +247,7 @@ class Family:
             'members': [{'joint': site.joint, 'rms_m': size} for site, size in self.members],
             'growth': self.growth,
             'needed': [{'joint': site.joint, 'share': share} for site, share in self.needed],
-            'like': [{'effect': site.effect, 'joint': site.joint} for site, _ in self.like],
+            'like': [site.as_dict() for site, _ in self.like],
         }
 
 
@@ -300,9 +304,7 @@ class Cause:
             'rest': self.rest,
             'place': [{'at': at, 'probability': p} for at, p in self.place],
             'dependence': [{'on': on, 'probability': p} for on, p in self.dependence],
-            'name': [
-                {'effect': s.effect, 'joint': s.joint, 'probability': p} for s, p in self.name
-            ],
+            'name': [{**site.as_dict(), 'probability': p} for site, p in self.name],
             'share': self.share,
             'share_ci90': list(self.share_ci90),
             'came_back': None,  # older readers ask for it
@@ -326,6 +328,11 @@ class Candidate:
     rms_after_m: float
     shrink: float
     """Share of the RMS gap that it takes away on data not used for fitting."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of ``candidates``."""
+        numbers = {key: value for key, value in vars(self).items() if key != 'site'}
+        return {**self.site.as_dict(), **numbers}
 
 
 @dataclass(frozen=True)
@@ -653,7 +660,7 @@ class Diagnosis:
             'gap': dict(vars(self.gap)) if sound else None,
             'where': self._where() if sound else None,
             'verdict': self._verdict(),
-            'candidates': [_candidate(item) for item in self.candidates] if sound else None,
+            'candidates': [item.as_dict() for item in self.candidates] if sound else None,
             'shrink': self._shrink() if sound else None,
             'unexplained': self._unexplained() if sound else None,
             'next_experiment': self.next_experiment,
@@ -676,12 +683,9 @@ class Diagnosis:
             'sure': self.sure,
             'complete': None if confidence is None else self.complete,
             'indistinguishable': [
-                [{'effect': s.effect, 'joint': s.joint} for s in group]
-                for group in self.indistinguishable
+                [s.as_dict() for s in group] for group in self.indistinguishable
             ],
-            'same_on_any_motion': [
-                [{'effect': s.effect, 'joint': s.joint} for s in group] for group in self.same
-            ],
+            'same_on_any_motion': [[s.as_dict() for s in group] for group in self.same],
             'reasons': list(self.reasons),
             'families': [family.as_dict() for family in self.families],
             'actions': list(self.actions),
@@ -695,9 +699,7 @@ class Diagnosis:
             'rms_after_m': shrink.rms_after_m,
             'ratio': shrink.ratio,
             'ci95': list(shrink.ci95),
-            'elsewhere_ci95': None
-            if shrink.elsewhere_ci95 is None
-            else list(shrink.elsewhere_ci95),
+            'elsewhere_ci95': shrink.elsewhere_ci95 and list(shrink.elsewhere_ci95),
             'held_out': shrink.held_out,
             'steps': [{'added': n, 'rms_m': v} for n, v in shrink.steps],
             'alone': [{'mended': n, 'rms_m': v} for n, v in shrink.alone],
@@ -751,16 +753,6 @@ def _statics(recordings: Sequence[Recording]) -> str:
     if not recordings or recordings[0].effort is None:
         return 'equilibrium'
     return 'effort' if recordings[0].effort_holds else 'effort_reversed'
-
-
-def _candidate(item: Candidate) -> dict[str, Any]:
-    return {
-        'effect': item.site.effect,
-        'joint': item.site.joint,
-        'probability': item.probability,
-        'rms_after_m': item.rms_after_m,
-        'shrink': item.shrink,
-    }
 
 
 def _frame(matrix: Array) -> list[list[float]]:

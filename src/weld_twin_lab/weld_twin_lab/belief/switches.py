@@ -63,7 +63,7 @@ MECHANISMS = {
     'held_out_likes': Mechanism('unseen.elsewhere', '_exchanged', first),
     'formulas_lost_motion': Mechanism('levels.formulas', 'beside_names', nothing),
     'formulas_scatter': Mechanism('levels.formulas', 'scatter', nothing),
-    'whole_arm': Mechanism('levels.free_form', 'whole_arm_groups', nothing),
+    'whole_arm': Mechanism('unseen.groups', '_of_all', nothing),
     'none_against_curves': Mechanism('pipeline', 'no_noise', first),
     'open_frames': Mechanism('pipeline', '_held', first),
 }

@@ -15,29 +15,23 @@ RISK, CAUSE_RISK = 0.0025, 0.01
 """Probability that an answer is sure and wrong, and that a cause told as sure is wrong."""
 SITUATION = {
     'gap': 1,
-    'left elsewhere': -1,
     'structure': -1,
-    'structure, errors': -1,
     'rows': 0,
     'joints moving': 1,
-    'refused': -1,
     'lacking': -1,
     'cancelling': -1,
-    'curves instead': -1,
 }
 """What a diagnosis as a whole shows."""
 NAMES = {
     'names': 1,
     'least name': 1,
     'told': 0,
-    'least apart': 1,
     'least size': 0,
     'widest set': 0,
 }
 """What the names told add up to."""
 NAMED = {
     **SITUATION,
-    'form': -1,
     'left': -1,
     'left unexplained': -1,
     'stations': 0,
@@ -52,14 +46,11 @@ TERMS: dict[str, dict[str, int]] = {
         'rows': 0,
         'joints moving': 1,
         'stations': 0,
-        'refused': -1,
         'lacking': -1,
         'behind': -1,
         'cancelling': -1,
         'weight': 1,
         'evidence': 1,
-        'margin': 1,
-        'apart': 1,
         'size': 1,
         'wander over size': -1,
         'left at its joint': -1,
@@ -68,7 +59,6 @@ TERMS: dict[str, dict[str, int]] = {
     },
     'place': {
         'weight of the place': 1,
-        'form agrees': 1,
         'size': 1,
         'gap': 0,
         'wander': 0,
@@ -76,7 +66,6 @@ TERMS: dict[str, dict[str, int]] = {
     },
     'dependence': {
         'weight of the dependence': 1,
-        'form agrees': 1,
         'rows': 0,
         'constant': 0,
         'angle': 0,
@@ -90,12 +79,8 @@ TERMS: dict[str, dict[str, int]] = {
     'complete': {
         'left': -1,
         'left unexplained': -1,
-        'left elsewhere': -1,
         'structure': -1,
-        'structure, errors': -1,
         'gap': 0,
-        'form': 0,
-        'refused': -1,
         **{f'told as {one}': 0 for one in TOLD_AS},
         **NAMES,
     },
@@ -104,18 +89,15 @@ TERMS: dict[str, dict[str, int]] = {
     'answer, unknown': {
         'gap': 0,
         'left unexplained': 0,
-        'curves': 0,
+        'groups': 0,
+        'steady': 1,
         'rows': 0,
         'stations': 0,
         'structure': 1,
-        'structure, errors': 1,
-        'left elsewhere': 1,
-        'refused': 0,
         'lacking': 1,
-        'curves instead': 1,
         **NAMES,
     },
-    'answer, none': {'structure': -1, 'structure, errors': -1, 'form': -1, 'rows': 0, 'left': -1},
+    'answer, none': {'structure': -1, 'rows': 0, 'left': -1},
     'answer, many': {'structure': -1, 'left': -1, 'gap': 0},
 }
 """By kind of statement, as `weld_twin_core.diagnosis.calibration.features.KINDS` lists them."""

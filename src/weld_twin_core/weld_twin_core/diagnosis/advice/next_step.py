@@ -23,7 +23,7 @@ from ..hypotheses.search import Search
 from ..hypotheses.still_joints import narrow
 from ..levels.curved import Curved
 from ..levels.free_form import Part
-from ..levels.groups import Group
+from ..unseen.groups import Group
 from ..verdict.decision import Verdict
 from .chosen_pieces import DECIDES
 from .experiment import confirming, next_experiment

@@ -90,7 +90,7 @@ def answer(
     step = None if limits is None else next_step(result, verdict, limits, alternative)
     return Diagnosis(
         gap=gap(result, evidence.floor),
-        where=locate(result, unseen, reported),
+        where=locate(result, evidence.structure, reported),
         status=verdict.status,
         effects=effects,
         indistinguishable=verdict.sets,

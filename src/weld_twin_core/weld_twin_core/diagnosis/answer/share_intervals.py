@@ -3,10 +3,10 @@
 """
 How sure the shares of named causes are, for the motion that was recorded.
 
-Four doubts are drawn together: the coordinates of all causes, which hang together as their columns
-do; which member of a set it is; how much of what is left above the noise belongs to the causes;
-and how large the noise is and how it happens to lie along the gap. Every
-draw is parted as the shares themselves are.
+Three doubts are drawn together: the coordinates of all causes, which hang together as their columns
+do; how much of what is left above the noise belongs to the causes; and how large the noise is and how
+it happens to lie along the gap. Members of a set move the tool alike: which of them it is changes no
+share. Every draw is parted as the shares themselves are.
 """
 
 from __future__ import annotations
@@ -17,13 +17,12 @@ from dataclasses import replace
 import numpy as np
 
 from ...arrays import Array
-from ..algebra.fit import Fit, trusted
+from ..algebra.fit import trusted
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Problem, Scale
-from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
-from ..levels.causes import LISTED, covering
-from ..result import Cause, Site
+from ..levels.causes import covering
+from ..result import Cause
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .named_effects import covariance, idealised
@@ -82,7 +81,7 @@ def _tries(result: Search, unseen: Unseen, floor: float) -> Array:
     # Of what is left above the noise any part may be the causes'.
     remaining = rng.uniform(noise, after, DRAWS) + unsure * rng.standard_normal(DRAWS)
     explained = 1.0 - remaining[:, None] / before
-    return parted * explained + _of_members(rng, result) * (1.0 - after / before)
+    return parted * explained
 
 
 def _coordinates(rng: np.random.Generator, result: Search, missed: float) -> Array:
@@ -144,50 +143,6 @@ def _noise_unsure(
     # It happens to lie along the gap or against it; and its square is known from so many rows.
     along = 2.0 * np.sqrt(noise * before / count) * after / before
     return float(np.hypot(along, noise * np.sqrt(2.0 / count)))
-
-
-def _of_members(rng: np.random.Generator, result: Search) -> Array:
-    """Return what other members of the sets would change in the part of every effect, drawn."""
-    model = result.final.model.found
-    sites = [Site(effect.name, effect.site) for effect in model]
-    out = np.zeros((DRAWS, len(sites)))
-    for k, candidate_set in enumerate(result.slots[: len(sites)]):
-        likely = [
-            alternative for alternative in candidate_set if alternative.probability >= LISTED
-        ]
-        if len(likely) < 2 or sites[k] not in [alternative.site for alternative in likely]:
-            continue
-        parts = np.array([_with_member(result, alternative, sites, k) for alternative in likely])
-        own = parts[[alternative.site for alternative in likely].index(sites[k])]
-        belief = np.array([alternative.probability for alternative in likely])
-        out += (parts - own)[rng.choice(len(likely), DRAWS, p=belief / belief.sum())]
-    return out
-
-
-def _with_member(result: Search, alternative: Rival, sites: list[Site], k: int) -> Array:
-    """Return the part of every effect, (K,), where a rival stands in the place of effect k."""
-    out = np.zeros(len(sites))
-    parts = _fitted_parts(result.work.problem, result.work.scale, alternative.fit)
-    for effect, part in zip(alternative.fit.model.found, parts, strict=True):
-        site = Site(effect.name, effect.site)
-        out[sites.index(site) if site in sites else k] += part
-    return out
-
-
-def _fitted_parts(problem: Problem, scale: Scale, fit: Fit) -> Array:
-    """Return the part of every effect of a fit in what all of them explain."""
-    model = fit.model
-    each = np.array(
-        [
-            _positions(
-                problem,
-                scale,
-                problem.whitened(problem.residuals(model.without(k)), scale) - fit.residual,
-            )
-            for k in range(len(model.found))
-        ]
-    )
-    return _parted(each @ each.sum(axis=0))
 
 
 def _positions(problem: Problem, scale: Scale, rows: Array) -> Array:

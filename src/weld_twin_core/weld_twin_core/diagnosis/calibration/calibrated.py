@@ -9,14 +9,22 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from ..hypotheses.search import Search
-from ..levels.curved import Curved
 from ..levels.free_form import FreeForm
 from ..posterior.table import Row
 from ..result import NAMING, Cause
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
-from .features import TOLD_AS, Numbers, of_level, of_name, of_rest, of_situation, of_whole
+from .features import (
+    TOLD_AS,
+    Numbers,
+    of_form,
+    of_level,
+    of_name,
+    of_rest,
+    of_situation,
+    of_whole,
+)
 from .weights import Calibration, Features, usual_calibration
 
 Key = TypeVar('Key')
@@ -64,8 +72,6 @@ class Stated:
         found.
     situation : mapping from str to float
         Features of the diagnosis as a whole.
-    rival : Curved or None
-        The free-form explanation in place of all names.
 
     """
 
@@ -73,7 +79,6 @@ class Stated:
     names: tuple[Statement, ...]
     nameless: Statement | None
     situation: Features
-    rival: Curved | None
 
     def put_to(self, evidence: Evidence) -> Evidence:
         """Return evidence with what is believed of the names, and that a cause has none."""
@@ -82,37 +87,22 @@ class Stated:
         return replace(evidence, believed=believed, nameless=nameless)
 
 
-def stated(
-    result: Search,
-    unseen: Unseen,
-    evidence: Evidence,
-    table: tuple[Row, ...],
-    alternative: Curved | None,
-) -> Stated:
-    """
-    Return how probable it is of every effect found that one of its names is right, or that none can be.
-
-    Parameters
-    ----------
-    alternative : Curved or None
-        The free-form explanation in place of all names.
-
-    """
+def stated(result: Search, unseen: Unseen, evidence: Evidence, table: tuple[Row, ...]) -> Stated:
+    """Return how probable it is of every effect found that a name is right, or that none can be."""
     learned = usual_calibration()
-    situation = of_situation(result, unseen, evidence, alternative)
+    situation = of_situation(result, evidence)
     if result.dense:
-        names = [Statement('name of many', 0, dict(situation), KIND)]
-        return Stated(table, tuple(names), None, situation, alternative)
+        return Stated(table, (Statement('name of many', 0, situation, KIND),), None, situation)
     sizes = [unseen.rms(part) / max(evidence.floor, 1e-12) for part in unseen.targets[1:]]
     each = zip(table, sizes, unseen.wandered(), strict=False)
     on = evidence.structure.depends_on
     every = [of_name(row, size, float(wandered), on) for row, size, wandered in each]
-    names = [_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every)]
+    names = tuple(_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every))
     if not names:
-        return Stated(table, (), None, situation, alternative)
+        return Stated(table, (), None, situation)
     whole = of_whole([one.probability for one in names], [one.features for one in names])
     nameless = _told('nameless', None, {**situation, **whole}, learned)
-    return Stated(table, tuple(names), nameless, situation, alternative)
+    return Stated(table, names, nameless, situation)
 
 
 def calibrated(
@@ -143,7 +133,8 @@ def calibrated(
     slots = [cause for cause in reported if cause.slot is not None]
     names = [before.names[cause.slot].features for cause in slots if cause.slot is not None]
     whole = of_whole([cause.probability for cause in slots], names)
-    verdict, more = _of_answer(verdict, {**before.situation, **whole}, learned)
+    whole = {**before.situation, **whole, **of_form(placing)}
+    verdict, more = _of_answer(verdict, whole, learned)
     if verdict.sure and verdict.status in NAMING:
         # Who is sure of the whole answer is sure of each part of it.
         reported = [replace(cause, sure=True) for cause in reported]
@@ -163,13 +154,14 @@ def _levels(
     situation, both = before.situation, ('place', 'dependence')
     if cause.slot is not None:
         row, name = before.table[cause.slot], before.names[cause.slot]
-        own = [{**name.features, **of_level(row, level, before.rival)} for level in both]
+        own = [{**name.features, **of_level(row, level)} for level in both]
         levels = [_told(one, k, more, learned) for one, more in zip(both, own, strict=True)]
         return [*levels, replace(name, cause=k)]
     if many and cause.name and not cause.rest:
         reported = {'place': KIND_AT, 'dependence': KIND_AT, 'name': KIND}
         return [Statement(f'{on} of many', k, dict(situation), p) for on, p in reported.items()]
-    own = [{**situation, **of_rest(cause, level, placing)} for level in both]
+    form = of_form(placing)
+    own = [{**situation, **form, **of_rest(cause, level)} for level in both]
     return [
         _told(f'{level} of the rest', k, more, learned)
         for level, more in zip(both, own, strict=True)

@@ -15,11 +15,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..hypotheses.search import Search
-from ..levels.curved import Curved, gain_of
 from ..levels.free_form import FreeForm
 from ..posterior.table import Row, dependence_of
 from ..result import Cause
-from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Left
 from ..verdict.evidence import Evidence
 
@@ -51,54 +49,23 @@ KINDS = {
 """Every kind of statement, and what it says."""
 
 
-def of_situation(
-    result: Search, unseen: Unseen, evidence: Evidence, alternative: Curved | None
-) -> Numbers:
-    """
-    Return the features that all statements of a diagnosis share.
-
-    Parameters
-    ----------
-    result : Search
-        The effects found.
-    unseen : Unseen
-        Of its final model.
-    alternative : Curved or None
-        The free-form explanation in place of all names.
-
-    """
+def of_situation(result: Search, evidence: Evidence) -> Numbers:
+    """Return the features that all statements of a diagnosis share."""
     floor = max(evidence.floor, 1e-12)
-    elsewhere = evidence.after if evidence.least is None else min(evidence.after, evidence.least)
     travel = np.max([np.ptp(r.joints.q, axis=0) for r in result.problem.recordings], axis=0)
     return plain(
         {
             'gap': log(evidence.gap / floor),
             'left': log(evidence.after / floor),
-            'left elsewhere': log(elsewhere / max(evidence.fitted * evidence.chance, 1e-12)),
             'left unexplained': Left(evidence, result.work.beliefs).share,
             'structure': evidence.structure.gain,
-            'structure, errors': evidence.structure.sure,
             'rows': log(result.effective(result.small)),
             'joints moving': float((travel > MOVES).mean()),
-            'causes': len(evidence.slots),
-            'refused': len(evidence.refused),
             'lacking': float(bool(evidence.lacking)),
             'cancelling': log(sum(evidence.parts)) if evidence.parts else 0.0,
             'stations': float(result.problem.recordings[0].joints.static),
-            **_of_curves(unseen, alternative),
         }
     )
-
-
-def _of_curves(unseen: Unseen, alternative: Curved | None) -> Numbers:
-    """Return how curves without a name compare with the names."""
-    if alternative is None:
-        return dict.fromkeys(('curves', 'curves instead', 'form'), 0.0)
-    return {
-        'curves': len(alternative.form.parts),
-        'curves instead': max(gain_of(unseen, alternative.unseen)[0], -1.0),
-        'form': alternative.form.gain,
-    }
 
 
 def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ()) -> Numbers:
@@ -121,9 +88,7 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
         {
             'weight': odds(row.mass),
             'evidence': log1(row.gap),
-            'margin': log1(min(row.margin, FAR)),
             'behind': log1(row.leader.behind),
-            'apart': log(min(row.apart, FAR)),
             'size': log(size),
             'wander': log(wandered),
             'wander over size': log(wandered) - log(size),
@@ -136,26 +101,20 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
     )
 
 
-def of_level(row: Row, level: str, alternative: Curved | None) -> Numbers:
-    """
-    Return the features of the place, or of the dependence, of an effect found.
-
-    Parameters
-    ----------
-    level : str
-        'place' or 'dependence'.
-    alternative : Curved or None
-        The free-form explanation; it may find the same.
-
-    """
+def of_level(row: Row, level: str) -> Numbers:
+    """Return the features of the place, or of the dependence, of an effect found."""
     weights = row.places() if level == 'place' else row.dependences()
-    own = max(weights, key=lambda key: weights[key])
-    parts = alternative.form.parts if alternative is not None else ()
-    seen = {part.group.at if level == 'place' else part.group.on for part in parts}
-    return plain({f'weight of the {level}': odds(weights[own]), 'form agrees': float(own in seen)})
+    return plain({f'weight of the {level}': odds(max(weights.values()))})
 
 
-def of_rest(cause: Cause, level: str, form: FreeForm | None) -> Numbers:
+def of_form(form: FreeForm | None) -> Numbers:
+    """Return how many groups without a formula stand for what has no name, and how surely."""
+    if form is None:
+        return {'groups': 0.0, 'steady': 0.0}
+    return plain({'groups': len(form.parts), 'steady': min(form.steady, 10.0)})
+
+
+def of_rest(cause: Cause, level: str) -> Numbers:
     """
     Return the features of the place, or of the dependence, of what has no name.
 
@@ -174,8 +133,6 @@ def of_rest(cause: Cause, level: str, form: FreeForm | None) -> Numbers:
             'weight': odds(first),
             'second': second,
             'share': cause.share,
-            'groups': 0 if form is None else len(form.parts),
-            'steady': 0.0 if form is None else min(form.steady, 10.0),
         }
     )
 
@@ -203,7 +160,6 @@ def of_whole(probabilities: Sequence[float], names: Sequence[Mapping[str, float]
             'names': float(np.log(max(float(np.prod(probabilities)), 1.0 / FAR))),
             'least name': odds(min(probabilities, default=0.5)),
             'told': len(names),
-            'least apart': min((own['apart'] for own in names), default=log(FAR)),
             'least size': min((own['size'] for own in names), default=0.0),
             'widest set': max((own['members'] for own in names), default=0.0),
             **alone,

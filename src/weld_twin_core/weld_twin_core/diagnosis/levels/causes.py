@@ -79,7 +79,7 @@ def causes(
     floor : float
         RMS of the noise alone [m].
     placing : FreeForm or None
-        What tells the places of an unknown gap; the curves carried, where left out.
+        What tells the places of an unknown gap.
 
     """
     reported = _told_claims(result, table, verdict)
@@ -204,13 +204,7 @@ def _nameless(
         # What was found and does not count as named is left, and nothing else says where it sits.
         return reported, _rest([], beliefs) if len(reported) < len(result.slots) else None
     model = result.final.model.found
-    if placing is None and curved is not None:
-        placing = curved.form
-    parts = placing.parts if placing is not None else ()
-    places: dict[str, list[Part]] = {}
-    for part in parts:
-        places.setdefault(part.group.at, []).append(part)
-    places = _merged(places)
+    places = _by_place(() if placing is None else placing.parts)
     held = _carried_by(places, curved) if places else {}
     claims, remaining = list(reported), list[Part]()
     taken = {at for claim in reported for at in claim.members}
@@ -233,10 +227,7 @@ def _rest(remaining: list[Part], beliefs: Beliefs) -> _Claim:
     """Return what is left beside everything told, where the most of it is."""
     if not remaining:
         return _Claim((), {}, {}, {})
-    places: dict[str, list[Part]] = {}
-    for part in remaining:
-        places.setdefault(part.group.at, []).append(part)
-    places = _merged(places)
+    places = _by_place(remaining)
     first = max(places, key=lambda at: sum(part.share for part in places[at]))
     own = places[first]
     return _Claim((), _place_of(first, own, beliefs), _dependence_of(own), {})
@@ -278,21 +269,20 @@ def _dependence_of(parts: list[Part]) -> dict[str, float]:
     return out
 
 
-def _merged(places: dict[str, list[Part]]) -> dict[str, list[Part]]:
-    """Return the places, with joints that all depend on the load, or lag, put under one cause."""
-    out = dict(places)
+def _by_place(parts: Sequence[Part]) -> dict[str, list[Part]]:
+    """Return the parts at each place; joints that all depend on the load, or lag, are one cause."""
+    out: dict[str, list[Part]] = {}
+    for part in parts:
+        out.setdefault(part.group.at, []).append(part)
     for on, together, least in (('load', 'load', 2), ('speed', 'clock', 3)):
         joints = [
             place
-            for place, parts in out.items()
-            if place != together and all(part.group.on == on for part in parts)
+            for place, own in out.items()
+            if place != together and all(part.group.on == on for part in own)
         ]
         if len(joints) >= least or (joints and together in out):
-            out.setdefault(together, [])
-            out[together] = [
-                *out[together],
-                *(part for place in joints for part in out.pop(place)),
-            ]
+            alike = [part for place in joints for part in out.pop(place)]
+            out[together] = [*out.get(together, ()), *alike]
     return out
 
 

@@ -15,7 +15,7 @@ from ..algebra.fit import Fit, fit, robust_fit, robust_scale
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..result import Shrink, Site
+from ..result import NAMING, Shrink, Site
 from ..unseen.folds import gain
 from ..unseen.held_out_shrink import held_out_shrink
 from ..unseen.unseen_stretches import Unseen
@@ -53,55 +53,33 @@ class Curved:
         return self.unseen.rms(self.unseen.whole)
 
 
-def curved(result: Search, beliefs: Beliefs) -> Curved | None:
+def curved(result: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
     """
-    Return the free-form explanation of the whole gap, without any name; None where there is none.
+    Return curves for what a verdict leaves beside the names that it tells; None where there are none.
+
+    What carries to no other posture may still be told from neighbours in time.
 
     Parameters
     ----------
     result : Search
         The set-up's own motion that it holds stays beside the curves.
-
-    """
-    if result.dense:
-        return None
-    return _beside(result, _setup(result), beliefs)
-
-
-def standing(
-    result: Search, verdict: Verdict, alone: Curved | None, beliefs: Beliefs
-) -> Curved | None:
-    """
-    Return curves for what an 'unknown' verdict leaves beside the names that it tells.
-
-    Parameters
-    ----------
     verdict : Verdict
-        Of any other status, nothing changes.
-    alone : Curved or None
-        The free-form explanation without names.
+        Of one that names something nothing is left.
 
     """
-    if verdict.status != 'unknown' or result.dense:
-        return alone
+    if verdict.status in NAMING or result.dense:
+        return None
     reported = {site for group in verdict.sets for site in group}
-    named = [
+    kept = [
         effect
         for effect, candidate_set in zip(result.final.model.found, result.slots, strict=False)
         if {Site(effect.name, effect.site), candidate_set[0].site} & reported
     ]
-    if not named:
-        wandering = None if alone else _beside(result, _setup(result), beliefs, wandering=True)
-        return alone or wandering
-    kept = [*_setup(result), *named]
-    beside = _beside(result, kept, beliefs)
-    if beside is None and result.final.model.found != tuple(kept):
-        beside = _beside(result, kept, beliefs, wandering=True)
-    return beside
-
-
-def _setup(result: Search) -> list[Effect]:
-    return [effect for effect in result.final.model.found if not effect.traits.cause]
+    kept = [effect for effect in result.final.model.found if not effect.traits.cause] + kept
+    found = _beside(result, kept, beliefs)
+    if found is None and verdict.status == 'unknown':
+        found = _beside(result, kept, beliefs, wandering=True)
+    return found
 
 
 def bare_fit(result: Search, kept: Sequence[Effect] = ()) -> tuple[Problem, Fit, Scale]:
@@ -116,7 +94,7 @@ def _beside(
     result: Search, kept: Sequence[Effect], beliefs: Beliefs, *, wandering: bool = False
 ) -> Curved | None:
     small, bare, scale = bare_fit(result, kept)
-    form = free_form(small, scale, bare, np.zeros(0), beliefs, wandering=wandering)
+    form = free_form(small, scale, bare, beliefs, wandering=wandering)
     if not form.parts:
         return None
     model = bare.model.with_found((*bare.model.found, *form.curves))

@@ -11,40 +11,21 @@ the name misses.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Array
-from ...effects.associative_scan import play
-from ...effects.curve import QUANTITIES, basis
-from ...twin.features import Features
-from ...twin.resampling import Picker
-from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..hypotheses.usual_errors import UsualErrors
 from ..unseen.folds import least_gain
+from ..unseen.groups import all_groups
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
-from .groups import LEAST, smooth_field, spanned
 from .scatter import Scatter, scatter
 
-GAPS = (5e-5, 2e-4, 8e-4, 2e-3, 1e-2, 4e-2)
-"""Widths [rad, or tens of centimetres] of gaps in series: from half of what the finest play is to
-what takes a tenth of a radian to build up."""
-TURNED = 1e-4
-"""Travel [rad, or tens of centimetres] after which a joint counts as going the other way: teeth
-have changed flanks by then."""
-BENT = 4
-"""Knots over the angle for each way: straight, bent, and bent back."""
-SHARES = (0.02, 0.1, 0.4)
-"""Shares of the joint's largest speed about which what depends on the way may set in."""
-SLIDING = 0.1
-"""Metres of a joint that slides which are looked at as a radian of one that turns."""
 FIELD = 'instrument'
 """A free field over the workspace speaks against every formula: it is what each of them bends to."""
 
@@ -173,59 +154,15 @@ def beside_names(result: Search, unseen: Unseen) -> list[Beside]:
     problem, model = unseen.problem, result.final.model
     if problem.touched or not model.found:
         return []
-    features = problem.features(model)
     sizes = [unseen.rms(part) for part in unseen.targets[1:]]
-    bases = unseen.bases()
+    bases, places = unseen.bases(), {e.at for e in model.found}
     out = []
-    for at, on, columns in _forms(problem, unseen.scale, features, {e.at for e in model.found}):
-        own = [s for e, s in zip(model.found, sizes, strict=False) if at in (e.at, 'instrument')]
-        reported = least_gain([base.gain(columns) for base in bases])
+    for group in all_groups(problem, model, unseen.scale):
+        lost = group.on == 'direction' and not group.curves and group.at in places
+        if not lost and group.at != FIELD:
+            continue
+        own = [s for e, s in zip(model.found, sizes, strict=False) if group.at in (e.at, FIELD)]
+        reported = least_gain([base.gain(group.columns) for base in bases])
         share = float(np.sqrt(max(reported.fall, 0.0))) / max([*own, 1e-12])
-        out.append(Beside(at, on, reported.share, reported.steady, share))
+        out.append(Beside(group.at, group.on, reported.share, reported.steady, share))
     return out
-
-
-def _forms(
-    problem: Problem, scale: Scale, features: list[Features], places: set[str]
-) -> Iterator[tuple[str, str, Array]]:
-    """Yield place, dependence and columns, whitened and of unit mean square, (E, rows)."""
-    field = [smooth_field(problem, k, maker) for k, maker in enumerate(features)]
-    # Where noise hides the squares of the place, its linear part may still show.
-    linear = [np.concatenate([part[k : k + 3] for k in range(0, len(part), 9)]) for part in field]
-    named = [('instrument', 'place', field), ('instrument', 'place', linear)]
-    moving = not problem.at_rest
-    for i, joint in enumerate(features[0].twin.robot.joint_names if moving else ()):
-        if joint in places and _moves(features, i):
-            ways = [_lost(problem, k, maker, features, i) for k, maker in enumerate(features)]
-            named.append((joint, 'direction', ways))
-    for at, on, parts in named:
-        columns = spanned(problem, scale, at, on, (), parts).columns
-        if columns.size:
-            yield at, on, columns
-
-
-def _moves(features: list[Features], i: int) -> bool:
-    return max(float(np.ptp(m.run.view.q[:, i])) for m in features) > LEAST['angle']
-
-
-def _lost(problem: Problem, k: int, maker: Features, features: list[Features], i: int) -> Array:
-    """Return what joint i may lose by the way it goes, shape (E, c, M)."""
-    view, unit = maker.view, SLIDING if maker.twin.robot.prismatic[i] else 1.0
-    q = maker.joint_view.joint(i)
-    widths = unit * np.array([*GAPS, TURNED])[:, None]
-    trails = play(q, widths, np.full(len(widths), q[0])) - q
-    trails = Picker(maker.recording.joints, maker.run.view.t).pick(trails)
-    way = trails[-1] / (-0.5 * widths[-1])
-    angles = [m.view.q[:, i] for m in features]
-    knots = np.linspace(min(map(np.min, angles)), max(map(np.max, angles)), BENT)
-    speed = view.qd[:, i]
-    fastest = max(float(np.abs(m.view.qd[:, i]).max()) for m in features)
-    rest = QUANTITIES['direction'](view, i)
-    about = np.tanh(speed / (np.array(SHARES)[:, None] * max(fastest, LEAST['speed'])))
-    shapes = [
-        *trails[:-1],
-        *(way * basis(knots.tolist(), view.q[:, i])),
-        *about,
-        *(rest, np.abs(rest), speed, way * QUANTITIES['load'](view, i)),
-    ]
-    return np.asarray(problem.seen(k, maker.column(('q', i))) * np.array(shapes)[:, None, :])

@@ -5,23 +5,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.definite import Index, factored
-from ..algebra.fit import Fit, design
+from ..algebra.definite import factored
+from ..algebra.fit import Fit
 from ..algebra.problem import Problem, Scale
 from ..beliefs import Beliefs
 from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import steadiness, ways_to_divide
-from .groups import Group, all_groups, wandering_groups, whole_arm_groups
+from ..unseen.groups import Group, all_groups
+from ..unseen.unseen_stretches import Base, Unseen
 
 STANDS_OUT, NAMED = 0.5, 3
 """Weight from which one place is named alone, and how many are named where none has it."""
@@ -29,9 +28,11 @@ RIDGES = (1e-1, 1e1, 1e3)
 """Prior precision of the columns of a group in units of noise: from free to hardly there."""
 MOST = 6
 """More groups than this at once say that nothing simple is at work."""
-SHORTLIST = 12
+SHORTLIST = 6
 """Groups tried on unseen folds at every step, those that fit best in sample; the right one has
 not been seen below the fourth."""
+TRACE = 1e-9
+"""Share of a column's square that keeps the algebra whole where the data hardly show a frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +114,9 @@ def free_form(
     problem: Problem,
     scale: Scale,
     bare: Fit,
-    precision: Array,
     beliefs: Beliefs,
     *,
     wandering: bool = False,
-    whole_arm: bool = False,
 ) -> FreeForm:
     """
     Return the few groups that explain what a fit leaves, each with its rivals.
@@ -126,27 +125,17 @@ def free_form(
     ----------
     bare : Fit
         Frames and the effects that are named beyond doubt.
-    precision : array, shape (K,)
-        Prior precision of those effects' coordinates.
     wandering : bool
         Look for what changes as the recording goes on, and ask no more of it than to predict
         short stretches from their neighbours.
-    whole_arm : bool
-        Look also for causes that act at several joints at once, which no curve can carry.
 
     """
-    columns = design(problem, bare.model, scale)
-    held = np.zeros(columns.shape[0])
-    if precision.size:
-        held[-precision.size :] = precision
-    groups = all_groups(problem, bare.model, scale)
-    if whole_arm:
-        groups += whole_arm_groups(problem, bare.model, scale)
-    ways = ways_to_divide(problem, STRETCHES)
+    groups = list(all_groups(problem, bare.model, scale, wandering=wandering))
+    labels = ways_to_divide(problem, STRETCHES)
     if wandering:
-        groups += wandering_groups(problem, bare.model, scale)
-        ways = [problem.block_labels(SHORT) % STRETCHES]
-    work = choosing(groups, columns, held, bare.residual, ways)
+        labels = [problem.block_labels(SHORT) % STRETCHES]
+    fitted = Unseen.of(problem, scale, bare, np.zeros(bare.coordinates.size))
+    work = Choosing(groups, [fitted.by(each) for each in labels])
     members = chosen(work, beliefs)
     parts, total = [], worth(work, members)
     for k, member in enumerate(members):
@@ -156,119 +145,11 @@ def free_form(
     return FreeForm(tuple(parts), total.gain, total.steady)
 
 
-@dataclass(frozen=True, eq=False)
-class Member:
+class Member(NamedTuple):
     """A group in the model, and the ridge that holds it."""
 
     group: int
     ridge: float
-
-
-@dataclass(frozen=True, eq=False)
-class Folds:
-    """
-    Normal equations of every fold of one way to divide the rows, as far as they are asked for.
-
-    Of a hundred groups a choice looks at some tens, and at few of them together.
-
-    Attributes
-    ----------
-    columns : array, shape (P, rows)
-        Features, whitened.
-    target : array, shape (rows,)
-        What they are to explain, whitened.
-    labels : array of int, shape (rows,)
-        The fold that each row belongs to.
-    order : array of int, shape (rows,), or None
-        Rows fold by fold; None where they lie so.
-    spans : tuple of slice
-        The folds, in that order.
-
-    """
-
-    columns: Array
-    target: Array
-    labels: Array
-    order: Index | None
-    spans: tuple[slice, ...]
-
-    @classmethod
-    def of(cls, columns: Array, target: Array, labels: Array) -> Folds:
-        """Divide the rows by folds."""
-        together = bool((np.diff(labels) >= 0).all())
-        order = None if together else np.argsort(labels, kind='stable')
-        ends = np.cumsum(np.unique(labels, return_counts=True)[1]).tolist()
-        return cls(
-            columns, target, labels, order, tuple(slice(a, b) for a, b in pairwise([0, *ends]))
-        )
-
-    def errors(self, index: Index, precision: Array) -> Array:
-        """
-        Return the squared error on every fold of the columns fitted on the others, (..., B).
-
-        Parameters
-        ----------
-        index : array of int, shape (p,)
-        precision : array, shape (..., p)
-            Prior precisions, each tried.
-
-        """
-        if not index.size:
-            return np.broadcast_to(self.squares, (*precision.shape[:-1], self.squares.size))
-        self._ask(index)
-        mine = self._normals[:, index[:, None], index]
-        pulls = self._rights[:, index]
-        held = np.eye(index.size) * precision[..., None, None, :]
-        others = mine.sum(axis=0) - mine + held
-        x = np.linalg.solve(others, (pulls.sum(axis=0) - pulls)[..., None])[..., 0]
-        moved = (mine @ x[..., None])[..., 0]
-        explained = np.einsum('...bp,...bp->...b', x, 2.0 * pulls - moved)
-        return np.asarray(self.squares - explained)
-
-    def _ask(self, index: Index) -> None:
-        """Multiply out what is not there yet of some columns with each other."""
-        lacking = ~self._have[np.ix_(index, index)]
-        while lacking.any():
-            first = int(np.argmax(lacking.sum(axis=1)))
-            alike = (lacking == lacking[first]).all(axis=1)
-            rows, others = index[alike], index[lacking[first]]
-            one, other = self._sorted(rows), self._sorted(others)
-            for normal, part in zip(self._normals, self.spans, strict=True):
-                block = one[:, part] @ other[:, part].T
-                normal[np.ix_(rows, others)] = block
-                normal[np.ix_(others, rows)] = block.T
-            self._have[np.ix_(rows, others)] = self._have[np.ix_(others, rows)] = True
-            lacking = ~self._have[np.ix_(index, index)]
-
-    def _sorted(self, index: Index) -> Array:
-        """Return some columns, fold by fold."""
-        own = self.columns[index]
-        return own if self.order is None else own[:, self.order]
-
-    @cached_property
-    def _normals(self) -> Array:
-        """Return room for the normal matrices, shape (B, P, P); what is not written costs nothing."""
-        return np.empty((len(self.spans), len(self.columns), len(self.columns)))
-
-    @cached_property
-    def _have(self) -> NDArray[np.bool_]:
-        """Return which entries of the normal matrices are there, shape (P, P)."""
-        return np.zeros((len(self.columns), len(self.columns)), dtype=bool)
-
-    @cached_property
-    def _rights(self) -> Array:
-        """Return the products with what is to be explained in every fold, shape (B, P)."""
-        weight = np.zeros((self.target.size, len(self.spans)))
-        rows = np.arange(self.target.size) if self.order is None else self.order
-        for fold, part in enumerate(self.spans):
-            weight[rows[part], fold] = self.target[rows[part]]
-        return np.asarray((self.columns @ weight).T)
-
-    @cached_property
-    def squares(self) -> Array:
-        """Return the square of what is to be explained in every fold, shape (B,)."""
-        target = self.target if self.order is None else self.target[self.order]
-        return np.array([target[part] @ target[part] for part in self.spans])
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,115 +159,68 @@ class Choosing:
 
     Attributes
     ----------
-    fixed : array of int
-        Columns of nuisance frames and named effects, always fitted.
-    places : list of array of int
-        Columns of every group.
-    ways : tuple of Folds
-        Stretches of time, and regions of posture.
+    groups : sequence of Group
+    ways : sequence of Unseen
+        What is always fitted, with stretches of time left out in turn, and regions of posture.
 
     """
 
-    groups: list[Group]
-    fixed: Index
-    fixed_precision: Array
-    places: list[Index]
-    ways: tuple[Folds, ...]
+    groups: Sequence[Group]
+    ways: Sequence[Unseen]
 
-    def shortlist(self, members: Sequence[Member]) -> list[int]:
-        """Return the groups that would fit best in sample beside the members, best first."""
-        index, precision = self._columns_of(members)
-        columns, right = self.ways[0].columns, self._right
-        beside = columns @ columns[index].T
-        solve = factored(beside[index] + np.diag(precision))
-        own, rest = solve(beside.T), right - beside @ solve(right[index])
+    def beside(self, members: Sequence[Member]) -> list[Base]:
+        """Return what is always fitted with some members, for each way to divide."""
+        more = [self.groups[m.group].columns / np.sqrt(m.ridge) for m in members]
+        ways = [way.along(np.concatenate(more)) for way in self.ways] if more else self.ways
+        return [way.base(range(len(way.parts))) for way in ways]
+
+    def errors(self, members: Sequence[Member]) -> list[Array]:
+        """Return the squared error of a model on every part left out, for each way to divide."""
+        return [base.errors(base.residual) for base in self.beside(members)]
+
+    def entrants(self, members: Sequence[Member]) -> list[tuple[Member, list[Array]]]:
+        """Return the groups that fit best beside the members, at their best ridge, and the errors."""
+        bases, out = self.beside(members), []
         taken = {m.group for m in members}
-        falls = {}
-        for k, place in enumerate(self.places):
-            if k in taken:
-                continue
-            left = self._alone[k] - beside[place] @ own[:, place]
-            left[np.diag_indices_from(left)] += RIDGES[1]
-            falls[k] = float(rest[place] @ np.linalg.solve(left, rest[place]))
-        return sorted(falls, key=lambda k: -falls[k])[:SHORTLIST]
+        for group in self._shortlist(bases[0].unseen, taken):
+            columns = self.groups[group].columns
+            ways = [[base.errors(r) for r in base.extended(columns, RIDGES)] for base in bases]
+            worst = np.max([np.sum(errors, axis=1) for errors in ways], axis=0)
+            best = int(np.argmin(worst))
+            out.append((Member(group, RIDGES[best]), [errors[best] for errors in ways]))
+        return out
 
-    @cached_property
-    def _right(self) -> Array:
-        """Return the products of all columns with what is to be explained, shape (P,)."""
-        return np.asarray(self.ways[0].columns @ self.ways[0].target)
+    def _shortlist(self, fitted: Unseen, taken: set[int]) -> list[int]:
+        """Return the groups that would fit best in sample beside what is fitted, best first."""
+        columns = fitted.columns.written_out()
+        normal = columns @ columns.T
+        normal[np.diag_indices_from(normal)] = normal.diagonal() * (1.0 + TRACE) + fitted.precision
+        solve = factored(normal)
+        rest = fitted.residual - solve(columns @ fitted.residual) @ columns
+        falls = {}
+        for k, group in enumerate(self.groups):
+            if k not in taken:
+                beside = columns @ group.columns.T
+                left = self._alone[k] - beside.T @ solve(beside)
+                left[np.diag_indices_from(left)] += RIDGES[1]
+                pull = group.columns @ rest
+                falls[k] = float(pull @ np.linalg.solve(left, pull))
+        return sorted(falls, key=lambda k: -falls[k])[:SHORTLIST]
 
     @cached_property
     def _alone(self) -> list[Array]:
         """Return the products of every group's columns with each other."""
-        each = (self.ways[0].columns[place] for place in self.places)
-        return [own @ own.T for own in each]
-
-    def _columns_of(self, members: Sequence[Member]) -> tuple[Index, Array]:
-        index = np.concatenate([self.fixed, *(self.places[m.group] for m in members)])
-        held = [np.full(self.places[m.group].size, m.ridge) for m in members]
-        return index.astype(int), np.concatenate([self.fixed_precision, *held])
+        return [group.columns @ group.columns.T for group in self.groups]
 
     def by_chance(self, members: Sequence[Member], gain: float, steady: float) -> bool:
         """Return whether the best that could enter beside some members gains as much of noise."""
-        if not may_be_chance(self.ways[0].target.size, gain):
+        if not may_be_chance(self.ways[0].residual.size, gain):
             return False
-        index, precision = self._columns_of(members)
-        columns, taken = self.ways[0].columns, {m.group for m in members}
-        groups = (columns[place] for k, place in enumerate(self.places) if k not in taken)
+        fitted, taken = self.beside(members)[0].unseen, {m.group for m in members}
+        groups = (group.columns for k, group in enumerate(self.groups) if k not in taken)
         ways = [way.labels for way in self.ways]
-        every = Candidates(columns[index], precision, groups, RIDGES, ways)
+        every = Candidates(fitted.columns.written_out(), fitted.precision, groups, RIDGES, ways)
         return gain < chance_gain(every, steady)
-
-    def errors(self, members: Sequence[Member]) -> list[Array]:
-        """Return the squared error of a model on every fold, for each way to divide."""
-        index, precision = self._columns_of(members)
-        return [way.errors(index, precision) for way in self.ways]
-
-    def ridged(self, members: Sequence[Member], group: int) -> tuple[Member, list[Array]]:
-        """Return a group beside the members at its best ridge, and the errors on every fold."""
-        index, precision = self._columns_of([*members, Member(group, 0.0)])
-        held = np.tile(precision, (len(RIDGES), 1))
-        held[:, -self.places[group].size :] = np.array(RIDGES)[:, None]
-        ways = [way.errors(index, held) for way in self.ways]
-        best = int(np.argmin(np.max([way.sum(axis=1) for way in ways], axis=0)))
-        return Member(group, RIDGES[best]), [way[best] for way in ways]
-
-
-def choosing(
-    groups: list[Group],
-    fixed: Array,
-    fixed_precision: Array,
-    target: Array,
-    ways: Sequence[Array],
-) -> Choosing:
-    """
-    Return what groups are chosen on.
-
-    Parameters
-    ----------
-    groups : list of Group
-        Their columns become parts of one array here, so that none is held twice.
-    fixed : array, shape (F, rows)
-        Whitened columns always fitted.
-    fixed_precision : array, shape (F,)
-    target : array, shape (rows,)
-        What is to be explained: the whitened residual without any group.
-    ways : sequence of array of int, shape (rows,)
-        Each way to divide the rows into folds: stretches of time, regions of posture.
-
-    """
-    size = np.sqrt(np.maximum((fixed**2).mean(axis=1), 1e-300))
-    columns = np.concatenate([fixed / size[:, None], *(g.columns for g in groups)])
-    at, places = fixed.shape[0], []
-    for k, group in enumerate(groups):
-        end = at + group.columns.shape[0]
-        places.append(np.arange(at, end))
-        groups[k] = replace(group, columns=columns[at:end])
-        at = end
-    folds = [Folds.of(columns, target, labels) for labels in ways]
-    # Frames that the data hardly show move freely; a trace of ridge keeps the algebra whole.
-    held = np.maximum(fixed_precision / size**2, 1e-6 * target.size)
-    return Choosing(groups, np.arange(fixed.shape[0]), held, places, tuple(folds))
 
 
 def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:
@@ -394,7 +228,7 @@ def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:
     members: list[Member] = []
     now = work.errors(members)
     while len(members) < MOST:
-        tried = [(_worst_gain(now, errors), m, errors) for m, errors in _entrants(work, members)]
+        tried = [(_worst_gain(now, errors), m, errors) for m, errors in work.entrants(members)]
         if not tried:
             break
         gain, member, errors = max(tried, key=lambda item: item[0])
@@ -406,11 +240,6 @@ def chosen(work: Choosing, beliefs: Beliefs) -> list[Member]:
         members.append(member)
         now = errors
     return _pruned(work, members, beliefs)
-
-
-def _entrants(work: Choosing, members: list[Member]) -> list[tuple[Member, list[Array]]]:
-    """Return the groups that fit best beside the members, at their best ridge, and the errors."""
-    return [work.ridged(members, group) for group in work.shortlist(members)]
 
 
 def _worst_gain(before: list[Array], after: list[Array]) -> float:
@@ -487,10 +316,10 @@ def rival_weights(
     """
     rest = members[:k] + members[k + 1 :]
     own = (members[k], work.errors(members))
-    tried = [own, *(pair for pair in _entrants(work, rest) if pair[0].group != own[0].group)]
+    tried = [own, *(pair for pair in work.entrants(rest) if pair[0].group != own[0].group)]
     totals = np.array([max(float(e.sum()) for e in errors) for _, errors in tried])
     weights = (totals / max(totals.min(), 1e-300)) ** (-beliefs.group_rows / 4.0)
     # A group that needs fewer columns to do the same is the likelier one: freedom only helps.
-    weights /= np.array([work.places[m.group].size for m, _ in tried])
+    weights /= np.array([len(work.groups[m.group].columns) for m, _ in tried])
     weights /= weights.sum()
     return [(m.group, float(w)) for (m, _), w in zip(tried, weights, strict=True)]

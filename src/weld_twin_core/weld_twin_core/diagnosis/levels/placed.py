@@ -16,18 +16,16 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..algebra.fit import Fit
-from ..algebra.problem import Model, Problem, Scale
+from ..algebra.problem import Model, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..result import Site
 from ..unseen.folds import least_gain
+from ..unseen.groups import Group, all_groups
 from ..unseen.unseen_stretches import Base, Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved, bare_fit
 from .formulas import Missed
 from .free_form import FreeForm, Part, free_form
-from .groups import Group, all_groups, smooth_field, spanned
 from .scatter import Scatter
 
 ROUNDED, JUMPING = 0.6, 0.4
@@ -55,15 +53,14 @@ def placed(
     """
     Return the groups that tell place and dependence of an unknown gap; None of any other.
 
-    They explain what is left beside everything that is told. Beside what curves can carry to another
-    motion, causes are tried that act on the whole arm at once.
+    They explain what is left beside everything that is told.
 
     Parameters
     ----------
     result : Search
         The effects found, before curves take their place.
     alternative : Curved or None
-        The free-form explanation that can be carried; what stays beside it stays here too.
+        The free-form explanation beside what is told.
     missed : Missed
         What the formulas miss. Joints that noise comes from are places, too, where no group finds
         any.
@@ -71,55 +68,13 @@ def placed(
     """
     if verdict.status != 'unknown':
         return None
-    form = _grouped(result, verdict, alternative, beliefs)
-    if any(one.on == 'place' for one in missed.forms):
-        form = _with_field(form, beliefs)
-    form = arm_first(result, form)
-    return _with_scatter(form, missed.scattered)
-
-
-def _grouped(
-    result: Search, verdict: Verdict, alternative: Curved | None, beliefs: Beliefs
-) -> FreeForm:
-    """Return the groups of columns that tell place and dependence of what no name stands for."""
-    none = np.zeros(0)
     if result.dense:
         # Beside many small errors it is what they leave that has no place yet.
         bare = replace(result.final, model=result.final.model.with_found(()))
-        return free_form(result.problem, result.scale, bare, none, beliefs, whole_arm=True)
-    reported = {site for group in verdict.sets for site in group}
-    own = [
-        e
-        for e in result.final.model.found
-        if Site(e.name, e.site) in reported or not e.traits.cause
-    ]
-    kept = own if alternative is None else alternative.kept
-    small, bare, scale = bare_fit(result, kept)
-    form = free_form(small, scale, bare, none, beliefs, whole_arm=True)
-    if form.parts:
-        return form
-    if alternative is not None:
-        return alternative.form
-    # What carries to no other posture may still be told from neighbours in time.
-    return free_form(small, scale, bare, none, beliefs, whole_arm=True, wandering=True)
-
-
-def _with_field(form: FreeForm, beliefs: Beliefs) -> FreeForm:
-    """
-    Return a form in which a moved base and a bent field are one cause of the instrument.
-
-    To first order a field over the workspace moves and turns the base, and scales.
-    """
-    one = [part for part in form.parts if part.group.at in ('base', 'instrument')]
-    rest = tuple(part for part in form.parts if part not in one)
-    share = sum(part.share for part in one) or form.gain
-    field, base = (
-        Group(at, on, (), np.zeros((0, 0)), np.zeros(0))
-        for at, on in (('instrument', 'place'), ('base', 'constant'))
-    )
-    belief = beliefs.level_shared
-    part = Part(field, 1.0, ((field, belief), (base, 1.0 - belief)), share)
-    return replace(form, parts=tuple(sorted((part, *rest), key=lambda each: -each.share)))
+        form = free_form(result.problem, result.scale, bare, beliefs)
+    else:
+        form = FreeForm(()) if alternative is None else alternative.form
+    return _with_scatter(arm_first(result, form), missed.scattered)
 
 
 def _with_scatter(form: FreeForm, scattered: Sequence[Scatter]) -> FreeForm:
@@ -146,16 +101,22 @@ def arm_first(result: Search, form: FreeForm) -> FreeForm:
     if not fields or _tilt(result.problem, result.baseline.model) > TILT:
         return form
     small, bare, scale = bare_fit(result)
-    joints, bases = _joints(small, bare, scale), _bases(small, bare, scale)
+    bases = Unseen.of(small, scale, bare, np.zeros(bare.coordinates.size)).bases()
+    names = bare.model.robot.joint_names
+    joints: dict[str, list[Group]] = {}
+    field = 0.0
+    for group in all_groups(small, bare.model, scale):
+        if group.at in names and group.on in STATIC:
+            joints.setdefault(group.at, []).append(group)
+        elif group.at == 'instrument':
+            field = max(field, _gain(bases, [group]))
     every = [group for each in joints.values() for group in each]
     arm = _gain(bases, every) if every else 0.0
-    if arm <= 0.0 or arm < AS_GOOD * _gain(bases, [_field(small, bare, scale)]):
-        return form
     gains = {name: max(_gain(bases, groups), 0.0) for name, groups in joints.items()}
-    rest = tuple(part for part in form.parts if part not in fields)
     whole = sum(gains.values())
-    if whole <= 0.0:
+    if min(arm, whole) <= 0.0 or arm < AS_GOOD * field:
         return form
+    rest = tuple(part for part in form.parts if part not in fields)
     sizes = {name: (1.0 - FIELD) * gain / whole for name, gain in gains.items()}
     part = _shared(fields, joints, sizes)
     return replace(form, parts=tuple(sorted((part, *rest), key=lambda each: -each.share)))
@@ -179,26 +140,6 @@ def _shared(
     share = sum(part.share for part in fields)
     every = (*rivals, (fields[0].group, FIELD))
     return Part(joints[ordered[0]][0], fields[0].ridge, every, share)
-
-
-def _joints(problem: Problem, bare: Fit, scale: Scale) -> dict[str, list[Group]]:
-    """Return what every joint and its link can be off by at rest."""
-    names = bare.model.robot.joint_names
-    out: dict[str, list[Group]] = {}
-    for group in all_groups(problem, bare.model, scale):
-        if group.at in names and group.on in STATIC:
-            out.setdefault(group.at, []).append(group)
-    return out
-
-
-def _field(problem: Problem, bare: Fit, scale: Scale) -> Group:
-    features = problem.features(bare.model)
-    parts = [smooth_field(problem, k, maker) for k, maker in enumerate(features)]
-    return spanned(problem, scale, 'instrument', 'place', (), parts)
-
-
-def _bases(problem: Problem, bare: Fit, scale: Scale) -> list[Base]:
-    return Unseen.of(problem, scale, bare, np.zeros(bare.coordinates.size)).bases()
 
 
 def _gain(bases: Sequence[Base], groups: Sequence[Group]) -> float:

@@ -14,8 +14,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-import numpy as np
-
 from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
 from ..beliefs import Beliefs
@@ -60,35 +58,9 @@ class Row:
         )
 
     @property
-    def others(self) -> list[Rival]:
-        """Return those that are not named."""
-        return [alternative for alternative in self.slot if alternative.site not in self.listed]
-
-    @property
     def gap(self) -> float:
         """Return by how much evidence the best answer with it is ahead of the best without [nats]."""
         return self.leader.nats
-
-    @property
-    def margin(self) -> float:
-        """Return by how much the leader is ahead of the best that is not named [nats]; inf of none."""
-        return min(
-            (self.leader.nats - alternative.nats for alternative in self.others),
-            default=float('inf'),
-        )
-
-    @property
-    def apart(self) -> float:
-        """
-        Return how far the nearest that is not named leaves another residual, RMS [noise]; inf of none.
-
-        The next rival and the frames were fitted, so this is what lies outside the span of both.
-        """
-        own = self.leader.fit.residual
-        return min(
-            (_rms(own - alternative.fit.residual) for alternative in self.others),
-            default=float('inf'),
-        )
 
     def names(self) -> dict[Site, float]:
         """Return the weight of every name."""
@@ -157,7 +129,3 @@ def _marginal(candidate_set: Slot, key: Callable[[Rival], Key]) -> dict[Key, flo
 def _numbers(site: Site) -> int:
     """Return how many numbers an effect has: the fewer, the simpler."""
     return sum(max(parameter.size, 1) for parameter in REGISTRY[site.effect].parameters)
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt((values**2).mean()))

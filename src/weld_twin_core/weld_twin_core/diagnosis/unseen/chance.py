@@ -65,36 +65,6 @@ class Candidates(NamedTuple):
     ways: Sequence[Array]
 
 
-def left_out(columns: Array, precision: Array, labels: Array | None, targets: Array) -> Array:
-    """
-    Return what columns leave of targets on every part, fitted on the others, shape (K, rows).
-
-    Without parts, what they leave where they are fitted.
-
-    Parameters
-    ----------
-    columns : array, shape (P, rows)
-    precision : array, shape (P,)
-    labels : array of int, shape (rows,), or None
-    targets : array, shape (K, rows)
-
-    """
-    hat = _hat(columns, precision)
-    out = targets - targets @ hat
-    for part in () if labels is None else np.unique(labels):
-        rows = np.flatnonzero(labels == part)
-        own = np.eye(rows.size) - hat[np.ix_(rows, rows)]
-        out[:, rows] = np.linalg.lstsq(own, out[:, rows].T, rcond=FLAT)[0].T
-    return np.asarray(out)
-
-
-def _hat(columns: Array, precision: Array) -> Array:
-    """Return the matrix that makes a fit of targets, shape (rows, rows)."""
-    system, size = unit_diagonal(columns @ columns.T + np.diag(precision), DAMPING)
-    unit = columns / size[:, None]
-    return np.asarray(unit.T @ np.linalg.solve(system, unit))
-
-
 def noise(rows: int) -> Array:
     """Return drawings of whitened noise, shape (DRAWS, rows)."""
     return np.random.default_rng(SEED).standard_normal((DRAWS, rows))
@@ -117,13 +87,8 @@ def chance_gain(candidates: Candidates, steady: float, *, pooled: bool = False) 
         Whether all ways to divide count together, and not the one that shows least.
 
     """
-    rows = candidates.fixed.shape[1]
-    rest = np.eye(rows) - _hat(candidates.fixed, candidates.precision)
-    remaining = rest @ noise(rows).T
-    ways = [
-        [_Part.of(rest, remaining, np.flatnonzero(labels == b)) for b in np.unique(labels)]
-        for labels in candidates.ways
-    ]
+    rest, remaining = _noise_left(candidates.fixed, candidates.precision)
+    ways = [_parts(rest, remaining, labels) for labels in candidates.ways]
     best = 0.0
     for group in candidates.groups:
         each = [
@@ -133,6 +98,14 @@ def chance_gain(candidates: Candidates, steady: float, *, pooled: bool = False) 
     return best
 
 
+def _noise_left(columns: Array, precision: Array) -> tuple[Array, Array]:
+    """Return what a fit leaves of unit rows, (rows, rows), and of drawings of noise, (rows, DRAWS)."""
+    system, size = unit_diagonal(columns @ columns.T + np.diag(precision), DAMPING)
+    unit = columns / size[:, None]
+    rest = np.eye(columns.shape[1]) - unit.T @ np.linalg.solve(system, unit)
+    return rest, rest @ noise(columns.shape[1]).T
+
+
 class _Part(NamedTuple):
     """Rows that are left out together, what undoes their own part in a fit, and what it leaves there."""
 
@@ -140,11 +113,15 @@ class _Part(NamedTuple):
     undone: Array
     left: Array
 
-    @classmethod
-    def of(cls, rest: Array, remaining: Array, rows: Index) -> _Part:
-        """Return rows of what a fit leaves of unit rows, (rows, rows), and of targets, (rows, K)."""
+
+def _parts(rest: Array, remaining: Array, labels: Array) -> list[_Part]:
+    """Return the parts, from what a fit leaves of unit rows, (rows, rows), and of targets."""
+    out = []
+    for part in np.unique(labels):
+        rows = np.flatnonzero(labels == part)
         undone = np.linalg.pinv(rest[np.ix_(rows, rows)], rcond=FLAT, hermitian=True)
-        return cls(rows, np.asarray(undone, dtype=np.float64), undone @ remaining[rows])
+        out.append(_Part(rows, np.asarray(undone), undone @ remaining[rows]))
+    return out
 
 
 def _shares(
@@ -197,11 +174,11 @@ def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, kno
     rows = columns.shape[1]
     if rows > FEW:
         return 1.0
-    targets = noise(rows)
-    unseen = [(left_out(columns, precision, w, targets) ** 2).mean(axis=1) for w in ways]
-    floors = np.ones(len(targets))
-    if not known:
-        floors = np.array(
-            [spread_of(each) for each in left_out(columns, precision, None, targets)]
-        )
-    return float((np.sqrt(np.max(unseen, axis=0)) / floors).max())
+    rest, remaining = _noise_left(columns, precision)
+    squares = [
+        np.sum([(part.left**2).sum(axis=0) for part in _parts(rest, remaining, w)], axis=0)
+        for w in ways
+    ]
+    unseen = np.sqrt(np.max(squares, axis=0) / rows)
+    floors = 1.0 if known else np.array([spread_of(each) for each in remaining.T])
+    return float((unseen / floors).max())

@@ -25,9 +25,7 @@ from .held_out_shrink import left_on
 Slot = tuple[Rival, ...]
 
 
-def borne_out(
-    result: Search, holdout: Sequence[Recording], beliefs: Beliefs
-) -> tuple[Search, float | None]:
+def borne_out(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> Search:
     """
     Return the search with the effects and the rivals that held-out recordings bear out.
 
@@ -39,21 +37,13 @@ def borne_out(
     holdout : sequence of Recording
         Never fitted; without any nothing changes.
 
-    Returns
-    -------
-    result : Search
-        Probabilities of the rivals that stay add up to one again.
-    least : float or None [m]
-        Least RMS on the held-out recordings over everything that could be in the model, one rival
-        at a time; None where nothing was held out, or nothing has a rival.
-
     """
     if not holdout:
-        return result, None
+        return result
     # What no machine has is left out of the model and its slots, and still is in the rivals' fits.
     if len(result.slots) == len(result.small.model.found):
         result = _exchanged(result, holdout, beliefs)
-    slots, least = list[Slot](), list[float]()
+    slots = list[Slot]()
     for effect, candidate_set in zip(result.final.model.found, result.slots, strict=False):
         own = Site(effect.name, effect.site)
         close = [r for r in candidate_set if r.probability >= beliefs.listed or r.site == own]
@@ -66,9 +56,8 @@ def borne_out(
                 dict(zip((r.site for r in close), remaining, strict=True)),
                 beliefs,
             )
-            least += remaining
         slots.append(candidate_set)
-    return replace(result, slots=tuple(slots)), min(least, default=None)
+    return replace(result, slots=tuple(slots))
 
 
 def _exchanged(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> Search:

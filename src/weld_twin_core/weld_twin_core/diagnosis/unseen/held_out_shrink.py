@@ -22,9 +22,6 @@ from ..result import Shrink
 from .folds import jackknife, posture_regions
 from .unseen_stretches import Unseen
 
-LARGE = 300
-"""Coordinates above which families are ordered by how far each gets alone: trying all at every
-step costs too much."""
 STUDENT = 2.36
 """Student's t for 95 % and the 8 stretches that take turns."""
 FEWEST = 3
@@ -86,39 +83,6 @@ def left_on(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> f
     return float(np.sqrt(_on_bags(result, holdout, beliefs.other_setup)[1].mean()))
 
 
-def reached_by_chance(
-    result: Search, unseen: Unseen, holdout: Sequence[Recording], beliefs: Beliefs
-) -> float:
-    """
-    Return the ratio of what is left on held-out recordings to that on those fitted by chance alone.
-
-    The upper end of its 95 % interval where the model is right: 15 stations reach 1.4. One where
-    nothing is held out.
-
-    Parameters
-    ----------
-    result : Search
-        Its final model is judged.
-    unseen : Unseen
-        Of this model.
-
-    """
-    if not holdout:
-        return 1.0
-    _, there, labels = _on_bags(result, holdout, beliefs.other_setup)
-    here = unseen.squares(unseen.whole)
-    pairs = ((there, labels), (here, unseen.trusted_labels()))
-    return float(np.exp(STUDENT * np.sqrt(sum(map(_log_variance, *zip(*pairs, strict=True))))))
-
-
-def _log_variance(squares: Array, labels: Array) -> float:
-    """Return the variance of the logarithm of an RMS, by leaving out one stretch at a time."""
-    if np.unique(labels).size < FEWEST:
-        # Of so many Gaussian readings in three coordinates each.
-        return 1.0 / (6.0 * squares.size)
-    return float(jackknife(_log_sizes(squares, labels)))
-
-
 def _log_sizes(squares: Array, labels: Array) -> Array:
     """Return the logarithm of an RMS with each stretch left out in turn."""
     means = [squares[labels != name].mean() for name in np.unique(labels)]
@@ -170,7 +134,7 @@ def _rms(squares: Array) -> float:
 def _waterfall(
     unseen: Unseen, model: Model
 ) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, float], ...]]:
-    """Return RMS on unseen stretches as families are added in turn, and with one mended alone."""
+    """Return RMS on unseen stretches as families are added, the best alone first, and of each alone."""
     members: dict[str, list[int]] = {}
     single = len(model.found) <= 8
     for k, effect in enumerate(model.found):
@@ -179,18 +143,9 @@ def _waterfall(
     alone = {name: unseen.rms(unseen.predict(index)) for name, index in members.items()}
     steps: list[tuple[str, float]] = []
     kept: list[int] = []
-    rest = dict(members)
-    if unseen.columns.count > LARGE:
-        # Trying every family at every step costs too much here; how far each gets alone orders.
-        for name in sorted(members, key=lambda n: alone[n]):
-            kept += members[name]
-            steps.append((name, unseen.rms(unseen.predict(kept))))
-        return tuple(steps), tuple(alone.items())
-    while rest:
-        trials = {n: unseen.rms(unseen.predict(kept + index)) for n, index in rest.items()}
-        best = min(trials, key=lambda n: trials[n])
-        kept += rest.pop(best)
-        steps.append((best, trials[best]))
+    for name in sorted(members, key=lambda n: alone[n]):
+        kept += members[name]
+        steps.append((name, unseen.rms(unseen.predict(kept))))
     return tuple(steps), tuple(alone.items())
 
 

@@ -410,6 +410,10 @@ class Base:
         tried = self.extended(extra, RIDGES)
         return max(gain(before, self.unseen.squares(after), labels) for after in tried)
 
+    def errors(self, residual: Array) -> Array:
+        """Return the square of a residual, (rows,), in units of noise on every stretch."""
+        return np.bincount(self.unseen.labels, residual**2)
+
     @cached_property
     def _known(self) -> tuple[Array, Array]:
         """Return stretch and squared error of every trusted sample."""

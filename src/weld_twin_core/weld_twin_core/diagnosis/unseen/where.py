@@ -9,25 +9,24 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...arrays import Array
-from ...twin.features import Features
 from ..algebra.fit import trusted
 from ..algebra.problem import Model, Problem
 from ..hypotheses.search import Search
 from ..result import Cause, Where
-from .leftover_structure import of_joint
-from .unseen_stretches import Unseen
+from .leftover_structure import Structure
 
-REGRESSORS = (
-    'constant',
-    'angle, low order',
-    'angle, high order',
-    'reversal',
-    'speed',
-    'acceleration',
-    'load',
-    'temperature',
-    'time',
-)
+REGRESSORS = {
+    'constant': 'constant',
+    'angle, low order': 'angle',
+    'angle, high order': 'waves',
+    'reversal': 'direction',
+    'speed': 'speed',
+    'acceleration': 'acceleration',
+    'load': 'load',
+    'temperature': 'temperature',
+    'time': 'time',
+}
+"""Columns of the map, and the dependence that each stands for."""
 REGIMES = ('static', 'reversal', 'speed', 'acceleration', 'load', 'temperature', 'time')
 REGIME_OF = {
     'constant': 'static',
@@ -41,7 +40,7 @@ STRETCHES = 12
 """Stretches of time that the gap is told for: as many as a figure can show."""
 
 
-def locate(result: Search, final: Unseen, causes: Sequence[Cause] = ()) -> Where:
+def locate(result: Search, found: Structure, causes: Sequence[Cause] = ()) -> Where:
     """
     Return where the gap lies.
 
@@ -49,32 +48,31 @@ def locate(result: Search, final: Unseen, causes: Sequence[Cause] = ()) -> Where
     ----------
     result : Search
         Its baseline is the model before any effect was found.
+    found : Structure
+        What groups without a formula take off the whole gap.
     causes : sequence of Cause
         Of the answer, if there are any: joints and regimes are then theirs, so that they say what
         the answer says, also where a cause sits at no joint or its place is not certain.
 
     """
     problem, start = result.problem, result.baseline.model
-    baseline = Unseen.of(problem, result.scale, result.baseline, np.zeros(0))
-    shares = _map(problem, baseline, start)
+    names = start.robot.joint_names
+    shares = np.array(
+        [[max(found.of_gap.get((n, on), 0.0), 0.0) for on in REGRESSORS.values()] for n in names]
+    )
     if causes:
-        joints, regimes = _of_causes(causes, start.robot.joint_names)
-    elif result.final.model.found:
-        joints, regimes = _explained(final, result.final.model)
+        joints, regimes = _of_causes(causes, names)
     else:
-        joints = {
-            name: float(row.max())
-            for name, row in zip(start.robot.joint_names, shares, strict=True)
-        }
+        joints = dict(zip(names, map(float, shares.max(axis=1)), strict=True))
         regimes = _map_regimes(shares)
     ordered = sorted(joints.items(), key=lambda item: -item[1])
-    good = trusted(final.scale.weights)
+    good = trusted(result.scale.weights)
     return Where(
         joints=tuple(ordered),
         regimes=regimes,
         path=_path(problem, start, good),
         direction=_direction(problem, start, good),
-        map_regressors=REGRESSORS,
+        map_regressors=tuple(REGRESSORS),
         map_shares=tuple(tuple(float(v) for v in row) for row in shares),
     )
 
@@ -94,86 +92,9 @@ def _of_causes(
     return joints, regimes
 
 
-def _explained(final: Unseen, result: Model) -> tuple[dict[str, float], dict[str, float]]:
-    """Return how much of the unseen squared gap the effects of every joint and regime explain."""
-    everything = range(len(result.found))
-    total = final.squares(final.bare).mean()
-    after = final.squares(final.whole).mean()
-
-    def fall(members: list[int]) -> float:
-        if not members:
-            return 0.0
-        less = final.predict([k for k in everything if k not in members])
-        return max(float(final.squares(less).mean() - after), 0.0)
-
-    at = {
-        name: [k for k in everything if result.found[k].site == name]
-        for name in result.robot.joint_names
-    }
-    under = {
-        name: [k for k in everything if REGIME_OF[result.found[k].on] == name] for name in REGIMES
-    }
-    free = [k for k in everything if result.found[k].site is None]
-    return (
-        _shares({name: fall(members) for name, members in at.items()}, fall(free), total, after),
-        _shares({name: fall(members) for name, members in under.items()}, 0.0, total, after),
-    )
-
-
-def _shares(falls: dict[str, float], rest: float, total: float, after: float) -> dict[str, float]:
-    """Return each fall's part of the share of the squared gap that the model explains."""
-    explained = max(total - after, 0.0) / max(total, 1e-300)
-    scale = explained / max(sum(falls.values()) + rest, 1e-300)
-    return {name: value * scale for name, value in falls.items()}
-
-
-def _map(problem: Problem, baseline: Unseen, model: Model) -> Array:
-    """Return the share of unseen squared gap that each joint x regressor explains, (n, R)."""
-    features = problem.features(model)
-    base = baseline.base(range(len(baseline.parts)))
-    before = baseline.squares(base.residual).mean()
-    out = np.zeros((model.robot.n, len(REGRESSORS)))
-    for i in range(model.robot.n):
-        for r, name in enumerate(REGRESSORS):
-            each = [_regressor(maker, i, name) for maker in features]
-            block = of_joint(problem, features, baseline.scale, i, each)
-            if block.shape[0]:
-                after = baseline.squares(base.extended(block, [1.0])[0]).mean()
-                out[i, r] = max(0.0, 1.0 - float(after / max(before, 1e-300)))
-    return out
-
-
-def _regressor(maker: Features, i: int, name: str) -> Array:
-    view = maker.view
-    q, qd = view.q[:, i], view.qd[:, i]
-    one = np.ones_like(q)
-    match name:
-        case 'constant':
-            return one[None]
-        case 'angle, low order':
-            return np.stack([q, np.sin(q), np.cos(q), np.sin(2 * q), np.cos(2 * q)])
-        case 'angle, high order':
-            return np.stack([f(n * q) for n in range(3, 41) for f in (np.sin, np.cos)])
-        case 'reversal':
-            if view.static:
-                return np.sign(np.diff(q, prepend=q[:1]))[None]
-            fast = max(float(np.abs(qd).max()), 1e-12)
-            return np.tanh(qd / (0.02 * fast))[None]
-        case 'speed':
-            return qd[None]
-        case 'acceleration':
-            return np.zeros((1, q.size)) if view.static else np.gradient(qd, view.t)[None]
-        case 'load':
-            return np.asarray(view.shift[('tau', i)])[None] * one
-        case 'temperature':
-            return np.zeros((1, q.size)) if view.temperature is None else view.temperature[None]
-        case _:
-            return view.elapsed[None]
-
-
 def _map_regimes(shares: Array) -> dict[str, float]:
     best = {name: float(shares[:, r].max()) for r, name in enumerate(REGRESSORS)}
-    best['static'] = max(best[name] for name in REGRESSORS[:3])
+    best['static'] = max(best[name] for name in list(REGRESSORS)[:3])
     return {name: best[name] for name in REGIMES}
 
 

@@ -34,9 +34,6 @@ class Evidence:
         What generic columns still find.
     gap, after, floor : float
         RMS on unseen data before and after, and of the noise, [m].
-    fitted : float
-        RMS after on unseen stretches of the recordings fitted, [m]; the same as ``after`` where
-        nothing was held out.
     independent : bool
         Whether the floor was measured apart from any model.
     parts : tuple of float
@@ -47,11 +44,6 @@ class Evidence:
         What was taken out of the library and fits clearly better than what was found, in words.
     families : tuple of Family, optional
         Where many small errors were fitted together: what each kind accounts for.
-    least : float, optional
-        Least RMS [m] on held-out data over what could be in the model, one rival at a time; left
-        out, it is ``after``.
-    chance : float
-        Ratio of ``after`` to ``fitted`` that chance alone reaches: few stations vary much.
     leverage : float
         Ratio of ``after`` to ``floor`` that noise alone hardly ever exceeds: few stations are taken
         up in part by the fit.
@@ -72,14 +64,11 @@ class Evidence:
     gap: float
     after: float
     floor: float
-    fitted: float
     independent: bool
     parts: tuple[float, ...]
     refused: tuple[str, ...] = ()
     lacking: tuple[str, ...] = ()
     families: tuple[Family, ...] | None = None
-    least: float | None = None
-    chance: float = 1.0
     leverage: float = 1.0
     believed: tuple[float, ...] = ()
     nameless: float = 0.0
@@ -93,8 +82,6 @@ def gathered(
     shrink: Shrink,
     floor: NoiseFloor,
     beliefs: Beliefs,
-    least: float | None = None,
-    chance: float = 1.0,
 ) -> Evidence:
     """
     Return the evidence for a verdict.
@@ -107,10 +94,6 @@ def gathered(
         What generic columns still find beside it.
     shrink : Shrink
         On held-out recordings or on stretches taking their turn.
-    least : float or None
-        As `borne_out` gives it.
-    chance : float
-        As `reached_by_chance` gives it.
 
     """
     robot = result.final.model.robot
@@ -120,14 +103,11 @@ def gathered(
         gap=shrink.rms_before_m,
         after=shrink.rms_after_m,
         floor=floor.rms_m,
-        fitted=unseen.rms(unseen.whole),
         independent=floor.independent,
         parts=_parts(unseen),
         refused=tuple(_refused(robot, e) for e in result.refused if beyond(robot, e)),
         lacking=tuple(_lacking(e) for e in result.refused if not beyond(robot, e)),
         families=weighed_families(result, unseen, beliefs) if result.dense else None,
-        least=least,
-        chance=chance,
         leverage=_leverage(unseen, floor),
     )
 

@@ -8,15 +8,16 @@ curve can be carried over to another motion, by plain columns. Groups compete as
 
 Some places no single joint shows: the instrument, all links alike, a weight at the tool. A wrong unit
 of length looks like small constants of several joints, a weight like several springs, links that warm
-up like several lengths. One group for each lets the simplest explanation win. Beside them stand loops
-of joints: lost motion that builds up over a travel, without a formula for how. None of these can be
-carried to another motion as a curve; they say where, and on what it depends.
+up like several lengths. One group for each lets the simplest explanation win. Beside them stands lost
+motion of every joint without a formula: free in the gaps it trails in, and in angle, speed and load by
+the way it goes. Few of these can be carried to another motion as a curve; they say where, and on what
+it depends.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -44,13 +45,22 @@ WANDERS = 16
 LOOSE = 100.0
 """Carriers may be so many times their typical size: their group has been found by its columns."""
 OFF_AXIS = ('d', 'a', 'alpha', 'beta')
+FIELD = 27
+"""Columns of a smooth field: every coordinate over the place, up to its squares."""
 RANGES = 4
 """Knots over the distance from the instrument: straight, bent, and bent back."""
 WARM = 3
 """Knots over the temperature."""
-LOOPS = (2e-3, 1e-2, 4e-2, 0.16)
-"""Widths [rad, or tens of centimetres] of the gaps in series that make up a loop: from what acts
-like a gap to what takes a quarter of a radian to build up."""
+GAPS = (5e-5, 2e-4, 8e-4, 2e-3, 1e-2, 4e-2)
+"""Widths [rad, or tens of centimetres] of gaps in series: from half of what the finest play is to
+what takes a tenth of a radian to build up."""
+TURNED = 1e-4
+"""Travel [rad, or tens of centimetres] after which a joint counts as going the other way: teeth
+have changed flanks by then."""
+BENT = 4
+"""Knots over the angle for each way: straight, bent, and bent back."""
+SHARES = (0.02, 0.1, 0.4)
+"""Shares of the joint's largest speed about which what depends on the way may set in."""
 SLIDING = 0.1
 """Metres of a joint that slides which are looked at as a radian of one that turns."""
 NEAR = 1e-3
@@ -101,68 +111,48 @@ class Group:
         return f'{self.at}, depending on {self.on}' if self.on != 'constant' else self.at
 
 
-def all_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
-    """Return the groups that these data can show at all."""
+def all_groups(
+    problem: Problem, model: Model, scale: Scale, *, wandering: bool = False
+) -> Iterator[Group]:
+    """
+    Yield the groups that these data can show at all.
+
+    Parameters
+    ----------
+    wandering : bool
+        Whether what a joint loses by its direction may be more and less as time goes on.
+
+    """
     features = problem.features(model)
-    out = []
     for at, on, curves in _curved(features, model):
         parts = [problem.effect_columns(features, curve, atoms=False) for curve in curves]
         joined = [np.concatenate(blocks) for blocks in zip(*parts, strict=True)]
-        out.append(spanned(problem, scale, at, on, tuple(curves), joined))
-    for at, on, blocks in _plain(problem, features, model):
-        group = spanned(problem, scale, at, on, (), blocks)
-        out.append(replace(group, carriers=_late(features, model) if at == 'clock' else ()))
-    return [group for group in out if group.columns.size]
+        yield from _spanned(problem, scale, at, on, joined, curves=tuple(curves))
+    plain = [*_of_joints(problem, features, wandering=wandering), *_of_all(problem, features)]
+    for at, on, blocks, carriers in plain:
+        parts = [problem.seen(k, block) for k, block in enumerate(blocks)]
+        yield from _spanned(problem, scale, at, on, parts, carriers=carriers)
 
 
-def wandering_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
-    """Return groups of what a joint loses by its direction, more and less as time goes on."""
-    features = problem.features(model)
-    if problem.at_rest:
-        return []
-    out = []
-    for index, joint in enumerate(model.robot.joint_names):
-        parts = []
-        for k, maker in enumerate(features):
-            way = QUANTITIES['direction'](maker.view, index)
-            since = np.linspace(0.0, WANDERS - 1.0, way.size)
-            near = np.maximum(1.0 - np.abs(since - np.arange(WANDERS)[:, None]), 0.0)
-            column = maker.column(('q', index))[None, : problem.rows[k]]
-            parts.append(column * (near * way)[:, None, :])
-        out.append(spanned(problem, scale, joint, 'direction', (), parts))
-    return [group for group in out if group.columns.size]
-
-
-def spanned(
+def _spanned(
     problem: Problem,
     scale: Scale,
     at: str,
     on: str,
-    curves: tuple[Effect, ...],
     parts: list[Array],
-) -> Group:
-    """
-    Return the group of some columns, without any where these data do not show it.
-
-    Parameters
-    ----------
-    at, on : str
-        Place and dependence.
-    curves : tuple of Effect
-        What the columns stand for; empty for plain columns.
-    parts : list of array, each (E, c, M)
-        Columns, one array per recording.
-
-    """
+    *,
+    curves: tuple[Effect, ...] = (),
+    carriers: tuple[Effect, ...] = (),
+) -> Iterator[Group]:
+    """Yield the group of some columns, (E, c, M) per recording; none where these data do not show it."""
     columns = problem.whitened(parts, scale)
     size = np.sqrt((columns**2).mean(axis=1))
     if not curves:
         columns, size = columns[size > 1e-12], size[size > 1e-12]
-    if size.max(initial=0.0) <= 1e-12:
-        return Group(at, on, curves, np.zeros((0, columns.shape[1])), size)
-    # Knots that little was recorded at keep their small columns, or a ridge would free them.
-    size = np.maximum(size, 0.2 * size.max())
-    return Group(at, on, curves, columns / size[:, None], size)
+    if size.max(initial=0.0) > 1e-12:
+        # Knots that little was recorded at keep their small columns, or a ridge would free them.
+        size = np.maximum(size, 0.2 * size.max())
+        yield Group(at, on, curves, columns / size[:, None], size, carriers)
 
 
 def _curved(features: list[Features], model: Model) -> Iterator[tuple[str, str, list[Effect]]]:
@@ -211,66 +201,89 @@ def _knots(features: list[Features], index: int, on: str) -> tuple[float, ...] |
     return tuple(float(k) for k in np.linspace(low, high, KNOTS[on]))
 
 
-def _plain(
-    problem: Problem, features: list[Features], model: Model
-) -> Iterator[tuple[str, str, list[Array]]]:
-    """Yield groups that no curve stands for: columns (E, c, M) per recording."""
-    moving = not problem.at_rest
-    for index, joint in enumerate(model.robot.joint_names):
-        if moving and min(m.at.size for m in features) > 8:
-            parts = []
-            for k, maker in enumerate(features):
-                push = np.gradient(maker.view.qd[:, index], maker.view.t)
-                parts.append(problem.seen(k, maker.column(('q', index)))[None] * push)
-            yield joint, 'acceleration', parts
-    if moving:
-        yield 'clock', 'speed', [_velocity(problem, k, m) for k, m in enumerate(features)]
+Plain = tuple[str, str, list[Array], tuple[Effect, ...]]
+"""Place, dependence, columns (E, 6, M) per recording, and the curves that carry them."""
+
+
+def _of_joints(problem: Problem, features: list[Features], *, wandering: bool) -> Iterator[Plain]:
+    """Yield what a joint does that no curve stands for."""
+    if problem.at_rest:
+        return
+    for index, joint in enumerate(features[0].twin.robot.joint_names):
+        columns = [maker.column(('q', index)) for maker in features]
+        if min(m.at.size for m in features) > 8:
+            pushes = (np.gradient(m.view.qd[:, index], m.view.t) for m in features)
+            each = zip(columns, pushes, strict=True)
+            yield joint, 'acceleration', [column[None] * push for column, push in each], ()
+        if max(float(np.ptp(m.run.view.q[:, index])) for m in features) > LEAST['angle']:
+            shapes = [_lost(maker, features, index) for maker in features]
+            each = zip(columns, shapes, strict=True)
+            curve = JointCurve(joint, (0.0, 0.0), (-1.0, 1.0), 'direction')
+            yield joint, 'direction', [c[None] * s[:, None, :] for c, s in each], (curve,)
+        if wandering:
+            each = zip(columns, (_wandering(maker, index) for maker in features), strict=True)
+            yield joint, 'direction', [c[None] * s[:, None, :] for c, s in each], ()
+
+
+def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
+    """Yield what no single joint shows."""
+    if not problem.at_rest:
+        yield 'clock', 'speed', [_velocity(maker) for maker in features], _late(features)
     if not problem.untracked:
-        yield 'instrument', 'place', [smooth_field(problem, k, m) for k, m in enumerate(features)]
+        field = [smooth_field(maker) for maker in features]
+        yield 'instrument', 'place', field, ()
+        # Where noise hides the squares of the place, its linear part may still show.
+        linear = [np.concatenate([f[k : k + 3] for k in range(0, len(f), 9)]) for f in field]
+        yield 'instrument', 'place', linear, ()
+        yield 'instrument', 'place', [_sighted(maker, None) for maker in features], ()
+        knots = _spaced([_distance(maker) for maker in features], RANGES, NEAR)
+        if knots is not None:
+            yield 'instrument', 'place', [_sighted(maker, knots) for maker in features], ()
     if all(m.view.wrench is not None for m in features):
-        yield 'tool', 'load', [_yielding(problem, k, m) for k, m in enumerate(features)]
+        yield 'tool', 'load', [_yielding(maker) for maker in features], ()
+    if any(maker.view.effort is None for maker in features):  # else what hangs there was measured
+        yield 'load', 'load', [_weighed_down(maker) for maker in features], ()
+        yield 'load', 'load', [_carried(maker) for maker in features], ()
+    if all(maker.view.temperature is not None for maker in features):
+        warmth = [np.asarray(maker.view.temperature) for maker in features]
+        knots = _spaced(warmth, WARM, LEAST['temperature'])
+        if knots is not None:
+            each = [(_grown(maker)[None], w) for maker, w in zip(features, warmth, strict=True)]
+            yield 'base', 'temperature', [g * basis(knots, w)[:, None] for g, w in each], ()
+            middle = 0.5 * (knots[0] + knots[-1])
+            yield 'base', 'temperature', [g * (w - middle) for g, w in each], ()
 
 
-def _late(features: list[Features], model: Model) -> tuple[Effect, ...]:
+def _late(features: list[Features]) -> tuple[Effect, ...]:
     """Return what a late clock does to every joint: behind in proportion to its speed."""
     out = []
-    for index, joint in enumerate(model.robot.joint_names):
+    for index, joint in enumerate(features[0].twin.robot.joint_names):
         fastest = max(float(np.abs(m.view.qd[:, index]).max()) for m in features)
         if fastest > LEAST['speed']:
             out.append(JointCurve(joint, (0.0, 0.0), (-fastest, fastest), 'speed'))
     return tuple(out)
 
 
-def _velocity(problem: Problem, k: int, maker: Features) -> Array:
-    """Return the tool's twist, shape (1, c, M): what a late clock shows."""
+def _velocity(maker: Features) -> Array:
+    """Return the tool's twist, shape (1, 6, M): what a late clock shows."""
     joints = range(maker.twin.robot.n)
     total = sum(maker.column(('q', i)) * maker.view.qd[:, i] for i in joints)
-    return problem.seen(k, np.asarray(total))[None]
+    return np.asarray(total)[None]
 
 
-def smooth_field(problem: Problem, k: int, maker: Features) -> Array:
-    """
-    Return every coordinate of the position over the place, up to its squares, (27, c, M).
-
-    Parameters
-    ----------
-    k : int
-        Which recording, counted from 0.
-    maker : Features
-        Of that recording.
-
-    """
+def smooth_field(maker: Features) -> Array:
+    """Return every coordinate of the position over the place, up to its squares, (FIELD, 6, M)."""
     p = maker.run.poses.position
     x = ((p - p.mean(axis=0)) / np.maximum(p.std(axis=0), 1e-9)).T
     shapes = [*x, *(x[a] * x[b] for a in range(3) for b in range(a, 3))]
     out = np.zeros((3, len(shapes), 6, x.shape[1]))
     for axis in range(3):
         out[axis, :, axis] = shapes
-    return problem.seen(k, out.reshape(-1, 6, x.shape[1]))
+    return out.reshape(-1, 6, x.shape[1])
 
 
-def _yielding(problem: Problem, k: int, maker: Features) -> Array:
-    """Return the tool pushed along its axes by the force on it, shape (3, c, M)."""
+def _yielding(maker: Features) -> Array:
+    """Return the tool pushed along its axes by the force on it, shape (3, 6, M)."""
     rotation, wrench = maker.run.poses.rotation, maker.view.wrench
     assert wrench is not None
     out = np.zeros((3, 6, wrench.shape[0]))
@@ -280,46 +293,7 @@ def _yielding(problem: Problem, k: int, maker: Features) -> Array:
         force = np.einsum('mji,mj->mi', rotation, (axes @ force[..., None])[..., 0])
     for axis in range(3):
         out[axis, :3] = (rotation[:, :, axis] * force[:, axis, None]).T
-    return problem.seen(k, out)
-
-
-def whole_arm_groups(problem: Problem, model: Model, scale: Scale) -> list[Group]:
-    """Return the groups of causes that act at several joints at once, and loops of each joint."""
-    features = problem.features(model)
-    out = [
-        spanned(
-            problem, scale, at, on, (), [problem.seen(k, part) for k, part in enumerate(parts)]
-        )
-        for at, on, parts in _yielded(features)
-        if not (at == 'instrument' and problem.untracked)
-    ]
-    return [group for group in out if group.columns.size]
-
-
-def _yielded(features: list[Features]) -> Iterator[tuple[str, str, list[Array]]]:
-    yield 'instrument', 'place', [_sighted(maker, None) for maker in features]
-    knots = _spaced([_distance(maker) for maker in features], RANGES, NEAR)
-    if knots is not None:
-        yield 'instrument', 'place', [_sighted(maker, knots) for maker in features]
-    if any(maker.view.effort is None for maker in features):  # else what hangs there was measured
-        yield 'load', 'load', [_weighed_down(maker) for maker in features]
-        yield 'load', 'load', [_carried(maker) for maker in features]
-    if all(maker.view.temperature is not None for maker in features):
-        warmth = [np.asarray(maker.view.temperature) for maker in features]
-        knots = _spaced(warmth, WARM, LEAST['temperature'])
-        if knots is not None:
-            pairs = zip(features, warmth, strict=True)
-            yield (
-                'base',
-                'temperature',
-                [_grown(m)[None] * basis(knots, w)[:, None] for m, w in pairs],
-            )
-            pairs = zip(features, warmth, strict=True)
-            middle = 0.5 * (knots[0] + knots[-1])
-            yield 'base', 'temperature', [_grown(m)[None] * (w - middle) for m, w in pairs]
-    if not all(maker.run.view.static for maker in features):
-        for index, joint in enumerate(features[0].twin.robot.joint_names):
-            yield joint, 'direction', [_looped(maker, index) for maker in features]
+    return out
 
 
 def _spaced(values: list[Array], count: int, least: float) -> tuple[float, ...] | None:
@@ -361,12 +335,31 @@ def _grown(maker: Features) -> Array:
     return np.asarray(sum(length * maker.column(channel) for channel, length in lengths if length))
 
 
-def _looped(maker: Features, index: int) -> Array:
-    """Return a joint that trails in gaps of several widths in series, (L, 6, M)."""
-    view = maker.joint_view
-    unit = SLIDING if view.robot.prismatic[index] else 1.0
-    q = view.joint(index)
-    widths = unit * np.array(LOOPS)[:, None]
-    trails = play(q, widths, np.full(len(LOOPS), q[0])) - q
-    at = Picker(maker.recording.joints, maker.run.view.t).pick(trails)
-    return np.asarray(maker.column(('q', index))[None] * at[:, None, :])
+def _wandering(maker: Features, index: int) -> Array:
+    """Return what a joint loses by its direction, more and less as time goes on, (WANDERS, M)."""
+    way = QUANTITIES['direction'](maker.view, index)
+    since = np.linspace(0.0, WANDERS - 1.0, way.size)
+    return np.maximum(1.0 - np.abs(since - np.arange(WANDERS)[:, None]), 0.0) * way
+
+
+def _lost(maker: Features, features: list[Features], index: int) -> Array:
+    """Return what a joint may lose by the way it goes, (E, M): in gaps, by angle, speed and load."""
+    view, unit = maker.view, SLIDING if maker.twin.robot.prismatic[index] else 1.0
+    q = maker.joint_view.joint(index)
+    widths = unit * np.array([*GAPS, TURNED])[:, None]
+    trails = play(q, widths, np.full(len(widths), q[0])) - q
+    trails = Picker(maker.recording.joints, maker.run.view.t).pick(trails)
+    way = trails[-1] / (-0.5 * widths[-1])
+    angles = [m.view.q[:, index] for m in features]
+    knots = np.linspace(min(map(np.min, angles)), max(map(np.max, angles)), BENT)
+    speed = view.qd[:, index]
+    fastest = max(float(np.abs(m.view.qd[:, index]).max()) for m in features)
+    rest = QUANTITIES['direction'](view, index)
+    about = np.tanh(speed / (np.array(SHARES)[:, None] * max(fastest, LEAST['speed'])))
+    shapes = [
+        *trails[:-1],
+        *(way * basis(knots.tolist(), view.q[:, index])),
+        *about,
+        *(rest, np.abs(rest), speed, way * QUANTITIES['load'](view, index)),
+    ]
+    return np.asarray(shapes)

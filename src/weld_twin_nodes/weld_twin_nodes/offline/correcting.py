@@ -77,19 +77,9 @@ def program_model(
     """
     Return what a model file says acts on the arm that runs a program.
 
-    Parameters
-    ----------
-    path : Path or str
-        diagnosis.json, or an effects file.
-    temperature : float, optional [degC]
-    setup : int
-        Which base frame of the diagnosis, counted from 0.
-
-    Raises
-    ------
-    ModelError
-        The file is of no use, of another robot, or its data were unsound.
-
+    ``path``: diagnosis.json, or an effects file. ``temperature`` [degC]. ``setup``: which base
+    frame of the diagnosis, counted from 0.
+    Raises ModelError: the file is of no use, of another robot, or its data were unsound.
     """
     content = diagnosis_of(path)
     if 'model' in content or content.get('unsound'):

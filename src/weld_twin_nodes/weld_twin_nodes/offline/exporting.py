@@ -109,17 +109,9 @@ def write_program(
     """
     Write a program and the sheet that says how to load it; return what to tell.
 
-    Parameters
-    ----------
-    out : Path
-        Program to write; the sheet goes beside it.
-    told_as : Path
-        Where it will be found.
-    path, context, language, how
-        As `export` takes them.
-    **more
-        ``trigger`` and ``seam_speed`` of `export`; ``faster``, how to have it run faster.
-
+    ``out``: program to write; the sheet goes beside it. ``told_as``: where it will be found.
+    ``path`` and ``context`` and ``language`` and ``how``: as `export` takes them. ``more``:
+    ``trigger`` and ``seam_speed`` of `export`; ``faster``, how to have it run faster.
     """
     faster = str(more.pop('faster', ''))
     made, text, notes = export(path, context, language, out.stem, how, **more)

@@ -38,15 +38,8 @@ def begin(robot: str, options: Sequence[str], budget: float) -> State:
     """
     Return the state of an investigation without any recording yet.
 
-    Parameters
-    ----------
-    robot : str
-        As the user named it.
-    options : sequence of str
-        Further words for every diagnosis.
-    budget : float [min]
-        That all experiments together may take.
-
+    ``robot``: as the user named it. ``options``: further words for every diagnosis. ``budget``
+    ([min]): that all experiments together may take.
     """
     return {
         'schema': SCHEMA,
@@ -162,17 +155,9 @@ def question(
     """
     Return the next experiment, or why there is none: a word for the state, and a sentence.
 
-    Parameters
-    ----------
-    result : mapping
-        The content of diagnosis.json.
-    remaining : float [min]
-        Of the budget.
-    asked : sequence of str
-        Kinds of experiment that were made already.
-    why : str, optional
-        Why the question is closed, as `weighed` tells it; left out, this diagnosis alone counts.
-
+    ``result``: the content of diagnosis.json. ``remaining`` [min]: of the budget. ``asked``:
+    kinds of experiment that were made already. ``why``: why the question is closed, as `weighed`
+    tells it; left out, this diagnosis alone counts.
     """
     if result['verdict']['status'] == 'unsound':
         return 'unsound', 'data or set-up are wrong; the page of the last round says what'

@@ -85,18 +85,9 @@ def new_file(path: Path | str, *, force: bool = False) -> Iterator[Path]:
     """
     Yield where to write what comes to ``path`` when the block succeeds, and more files beside it.
 
-    Parameters
-    ----------
-    path : Path or str
-        A file, in a folder that may be anybody's. A link is followed.
-    force : bool
-        As `new_directory` takes it.
-
-    Raises
-    ------
-    DataError
-        What is there is not ours, or the place cannot be written.
-
+    ``path``: a file, in a folder that may be anybody's. A link is followed. ``force``: as
+    `new_directory` takes it.
+    Raises DataError: what is there is not ours, or the place cannot be written.
     """
     target = followed(path)
     if target.is_dir():

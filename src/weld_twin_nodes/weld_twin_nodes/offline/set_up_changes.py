@@ -71,20 +71,9 @@ def with_changes(
     """
     Return recordings that say what was changed, and which errors may differ between them.
 
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        The first is what the others are compared with.
-    changes : mapping from int to SetUpChange
-        By recording, counted from 0.
-    robot : Robot
-        As it is without the changes.
-
-    Raises
-    ------
-    DataError
-        The first recording is said to differ.
-
+    ``recordings``: the first is what the others are compared with. ``changes``: by recording,
+    counted from 0. ``robot``: as it is without the changes.
+    Raises DataError: the first recording is said to differ.
     """
     differs = {change.kind for change in changes.values()} & set(FRAMES)
     if 0 in changes and changes[0].kind in FRAMES:

@@ -227,20 +227,9 @@ def pool_of(scheduler: str = '', workers: int = 0, ahead: str = '') -> Pool:
     """
     Return the cluster at an address, or the cores of this machine.
 
-    Parameters
-    ----------
-    scheduler : str
-        Address of the cluster; empty for this machine.
-    workers : int
-        Processes of this machine; 0 means one for every core.
-    ahead : str
-        A module that these begin to import at once.
-
-    Raises
-    ------
-    DataError
-        A negative number of workers.
-
+    ``scheduler``: address of the cluster; empty for this machine. ``workers``: processes of this
+    machine; 0 means one for every core. ``ahead``: a module that these begin to import at once.
+    Raises DataError: a negative number of workers.
     """
     if workers < 0:
         raise DataError(f'the number of workers must not be negative, got {workers}')

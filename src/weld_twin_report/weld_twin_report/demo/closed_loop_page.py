@@ -59,15 +59,8 @@ def closed_loop_page(robot: str, seams: tuple[Seam, Seam], how: str, noise: floa
     """
     Return the page.
 
-    Parameters
-    ----------
-    seams : tuple of two Seam
-        As it is, and corrected.
-    how : str
-        A key of `WAYS`.
-    noise : float [m]
-        RMS distance that measuring alone makes.
-
+    ``seams``: as it is, and corrected. ``how``: a key of `WAYS`. ``noise`` [m]: RMS distance
+    that measuring alone makes.
     """
     before, after = seams
     head = (

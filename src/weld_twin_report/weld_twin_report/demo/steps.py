@@ -74,19 +74,9 @@ def run_demo(out: Path | str, *, closed_loop: bool = False, force: bool = False)
     """
     Run the steps into a directory that appears when all are done.
 
-    Parameters
-    ----------
-    out : Path or str
-    closed_loop : bool
-        Weld the seam again through the compensator, on an arm without play.
-    force : bool
-        As `new_directory` takes it.
-
-    Raises
-    ------
-    TwinError
-        The directory cannot be made, or a step fails.
-
+    ``closed_loop``: weld the seam again through the compensator, on an arm without play.
+    ``force``: as `new_directory` takes it.
+    Raises TwinError: the directory cannot be made, or a step fails.
     """
     console = Console()
     robot = catalog.load(ROBOT)

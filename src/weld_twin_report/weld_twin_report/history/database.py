@@ -173,18 +173,8 @@ class Database:
         """
         Return the diagnoses of a cell, in the order of time.
 
-        Parameters
-        ----------
-        newest : int, optional
-            Only so many, the last ones.
-
-        Raises
-        ------
-        DataError
-            There is no such cell.
-        Damaged
-            One of them cannot be read.
-
+        ``newest``: only so many, the last ones.
+        Raises DataError: there is no such cell. Raises Damaged: one of them cannot be read.
         """
         cells, verdicts = self.table('cells'), self.table('verdicts')
         if cell not in (known := self.cells()):

@@ -86,20 +86,10 @@ def entry_of(path: Path | str, at: datetime | None = None) -> Entry:
     """
     Return the entry of a diagnosis.
 
-    Parameters
-    ----------
-    path : Path or str
-        A ``diagnosis.json``, or the directory that holds it.
-    at : datetime, optional
-        When it was recorded; left out, the stamps of the recording tell.
-
-    Raises
-    ------
-    ModelError
-        It is no diagnosis.
-    DataError
-        It lacks what a history needs; the sentence says what.
-
+    ``path``: a ``diagnosis.json``, or the directory that holds it. ``at``: when it was recorded;
+    left out, the stamps of the recording tell.
+    Raises ModelError: it is no diagnosis. Raises DataError: it lacks what a history needs; the
+    sentence says what.
     """
     file = Path(path)
     file = file / 'diagnosis.json' if file.is_dir() else file

@@ -78,18 +78,10 @@ def version_of(connection: Connection, shown: str, *, make: bool) -> int:
     """
     Return the version of a history; 0 where an empty database may become one.
 
-    Parameters
-    ----------
-    shown : str
-        The database, as people may read it.
-    make : bool
-        Whether an empty database may become a history.
-
-    Raises
-    ------
-    DataError
-        It is empty and nothing may be made, it is of a newer version, or of another application.
-
+    ``shown``: the database, as people may read it. ``make``: whether an empty database may become
+    a history.
+    Raises DataError: it is empty and nothing may be made, it is of a newer version, or of another
+    application.
     """
     import sqlalchemy
 

@@ -130,15 +130,8 @@ def main(
     """
     Return the frame of a page: what it is of, its headline and figures, and its sections.
 
-    Parameters
-    ----------
-    kind : tuple of two str
-        What sort of page it is, the second part in bold.
-    subject : str
-        What it is of.
-    cells : Html
-        The figures.
-
+    ``kind``: what sort of page it is, the second part in bold. ``subject``: what it is of.
+    ``cells``: the figures.
     """
     bold = tag('b', kind[1]) if kind[1] else None
     head = tag('header', tag('p.kind', kind[0], bold), tag('p.subject', subject))

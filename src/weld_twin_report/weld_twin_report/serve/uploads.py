@@ -63,18 +63,9 @@ async def save_program(
     """
     Write a program, and what it is corrected by, and return the names of the program's files.
 
-    Parameters
-    ----------
-    model : sequence of Upload
-        A ``diagnosis.json``, and a robot file; none where a recording's are taken.
-    place, beside : Path
-        For the program, in a new folder of its title; for the model.
-
-    Raises
-    ------
-    DataError
-        There is no program, or a file is of no kind that is read.
-
+    ``model``: a ``diagnosis.json``, and a robot file; none where a recording's are taken.
+    ``place`` and ``beside``: for the program, in a new folder of its title; for the model.
+    Raises DataError: there is no program, or a file is of no kind that is read.
     """
     names = _names(uploads, PROGRAMS, 'a program nor a file that belongs to one', 8)
     if not names:

@@ -22,6 +22,10 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
+from weld_twin_core.twin.features import Features
+from weld_twin_core.twin.posterior import Drawn, places
+from weld_twin_core.twin.program_accuracy import SURE, accuracy
+from weld_twin_core.twin.twin import Twin
 
 from ..belief.mix import drawn
 from ..belief.trial import diagnosed, recordings_of
@@ -33,13 +37,15 @@ from ..blind.displacement import rms
 from ..blind.making import SealedCase
 from ..blind.one_arm import one_arm
 from ..transfer.flags import flagged
-from .held import held, within
+from .held import held, twin_for, within
 from .oracle import oracle_sigma
 from .planned import small_errors
 
 PART = (0.005, 0.1)
 """Small errors, in parts of what machines have: a zero of 5 to 100 microradians, as an arm has it that
 was calibrated well or never."""
+PATH = 600
+"""Poses of the middle of a sealed motion that are taken for a program: ten seconds of it."""
 FEWEST = 15
 """Poses of a motion below which their share says nothing."""
 ROUNDING = 1e-9
@@ -109,7 +115,9 @@ def of_drawn(
     if exact_arm and not case.cell.align and not case.also:
         promises['shares'] = list(_of_shares(case, found))
     promises['parameters'] = list(_of_parameters(named, found))
-    regions = of_motion(found, recordings[0], true_test(case), case)
+    true = true_test(case)
+    promises |= {kind: [told] for kind, told in _of_path(found, recordings[0], true)}
+    regions = of_motion(found, recordings[0], true, case)
     return {**entry, **regions, 'promises': promises}, found
 
 
@@ -147,6 +155,38 @@ def of_motion(
             out[region] = held(found, train, test, sigma, mask)
             out[region] |= {} if case is None else oracle_sigma(case, (train, test), mask)
     return out
+
+
+def _of_path(
+    found: Diagnosis, train: Recording, test: Recording
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """
+    Yield what is promised of a sealed motion as if it were a program, and what came of it [m].
+
+    As it is meant by the nominal arm, before; and where the model has the tool, after. RMS over the
+    way, and the largest distance that is kept with 95 %: the user's tolerance.
+    """
+    measured, posterior = test.measured, found.posterior
+    assert measured is not None
+    assert posterior is not None
+    inside = within(test, measured) & ~flagged(posterior, test, measured.t)
+    here = np.flatnonzero(inside)
+    here = here[max(here.size - PATH, 0) // 2 :][:PATH]
+    if here.size < FEWEST:
+        return
+    t, real = measured.t[here], measured.position[here]
+    twin = twin_for(found.model, train, test)
+    foretold, nominal = (each.poses(test, t).position for each in (twin, Twin(twin.robot)))
+    at, near = places(t.size)
+    drawn = Drawn(near, posterior.drawn(Features(twin, test, t[at])))
+    for when, wanted in (('before', nominal), ('after', foretold)):
+        told = accuracy([wanted - foretold], [drawn])
+        assert told is not None
+        assert told.worsts is not None
+        off = np.linalg.norm(wanted - real, axis=1)
+        yield f'path {when}', {'ci90': list(told.same or ()), 'true': rms(wanted - real)}
+        sure = float(np.quantile(told.worsts[0], SURE))
+        yield f'path {when}, within (95 %)', {'ci90': [0.0, sure], 'true': float(off.max())}
 
 
 def true_test(case: SealedCase) -> Recording:

@@ -179,10 +179,39 @@ def _planned(
     judged = len(region[0])
     still = posterior.at_rest(twin, np.concatenate(region))
     ways, rest = posterior.position_ways(Features(twin, still, still.joints.t))
+    seen, offered = ways[:judged], ways[judged:]
     noise = rest[judged:] + given.noise**2 * np.eye(3)
-    seen = _Region(ways[:judged], ways[judged:], given.tolerance, noise, rest[:judged], choice)
-    taken, sigma, within = _chosen(seen, count)
-    return MeasurementPlan(region[1][taken], sigma, within)
+    draws = np.random.default_rng(1).standard_normal((DRAWS, 3))
+
+    def sure(factor: float) -> tuple[float, float]:
+        """Return the usual standard deviation, and how probably the tool is within the tolerance."""
+        spread = seen @ np.swapaxes(seen, 1, 2) + rest[:judged]
+        size = factor * np.sqrt(np.maximum(np.linalg.eigvalsh(spread), 0.0))
+        length = np.linalg.norm(draws[:, None] * size, axis=-1)
+        return float(np.median(size[:, -1])), float((length < given.tolerance).mean())
+
+    taken: list[int] = []
+    told = [sure(1.0)]
+    for number in range(1, count + 1):
+        gain = _gains(seen, offered, noise)
+        gain[taken] = -np.inf
+        taken.append(int(gain.argmax()))
+        rows = offered[taken[-1]]
+        shown = rows.T @ np.linalg.solve(rows @ rows.T + noise[taken[-1]], rows)
+        # What is still open of every way, as ways of one standard deviation again.
+        root = np.linalg.cholesky(np.eye(len(shown)) - shown)
+        seen, offered = seen @ root, offered @ root
+        sigma, within = sure(1.0 + (choice / number) ** 3)
+        told.append((min(sigma, told[0][0]), within))
+    return MeasurementPlan(region[1][taken], *np.array(told).T)
+
+
+def _gains(seen: Array, offered: Array, noise: Array) -> Array:
+    """Return what each station offered takes off the variance of the poses judged, shape (C,)."""
+    spread = offered @ np.swapaxes(offered, 1, 2) + noise
+    cross = np.tensordot(seen, offered, axes=(2, 2))
+    joint = np.einsum('miks,mikt->kst', cross, cross, optimize=True)
+    return np.asarray(np.trace(np.linalg.solve(spread, joint), axis1=1, axis2=2))
 
 
 def clear_postures(robot: Robot, spread: float) -> Array:
@@ -216,63 +245,3 @@ def _room(robot: Robot, q: Array) -> tuple[Array, Array]:
     points = np.stack([*wrist, chain.flange_point, chain.position], axis=1)
     heights = (rising(robot) * points[..., 2]).min(axis=1)
     return heights, np.linalg.norm(points[..., :2], axis=-1).min(axis=1)
-
-
-class _Region(NamedTuple):
-    """
-    Postures of a region.
-
-    ``judged`` (K, 3, P) and ``offered`` (C, 3, P) are the ways in which the tool may be off there, each
-    of unit size before the first station; ``noise`` (C, 3, 3) [m^2] is that of a station,
-    ``rest`` (K, 3, 3) what no station takes away, ``choice`` as `CHOICE`.
-    """
-
-    judged: Array
-    offered: Array
-    tolerance: float
-    noise: Array
-    rest: Array
-    choice: float
-
-
-def _chosen(region: _Region, count: int) -> tuple[list[int], Array, Array]:
-    """Take stations one by one."""
-    covariance = np.eye(region.judged.shape[2])
-    draws = np.random.default_rng(1).standard_normal((DRAWS, 3))
-    noise = np.broadcast_to(region.noise, (len(region.offered), 3, 3))
-    taken: list[int] = []
-    result = [_judged(region, covariance, 1.0, draws)]
-    for number in range(1, count + 1):
-        best = _best(region, covariance, noise, taken)
-        taken.append(best)
-        rows = region.offered[best]
-        gain = covariance @ rows.T
-        covariance -= gain @ np.linalg.solve(rows @ gain + noise[best], gain.T)
-        factor = 1.0 + (region.choice / number) ** 3
-        result.append(_judged(region, covariance, factor, draws))
-        result[-1] = (min(result[-1][0], result[0][0]), result[-1][1])
-    sigma, within = np.array(result).T
-    return taken, sigma, within
-
-
-def _best(region: _Region, covariance: Array, noise: Array, taken: list[int]) -> int:
-    """Return the station that takes most off the variance of the poses judged."""
-    judged, offered = region.judged, region.offered
-    rows = offered.reshape(-1, offered.shape[2]) @ covariance
-    spread = np.einsum('kip,kjp->kij', rows.reshape(offered.shape), offered) + noise
-    cross = (judged.reshape(-1, judged.shape[2]) @ rows.T).reshape(-1, *offered.shape[:2])
-    joint = np.einsum('mki,mkj->kij', cross, cross)
-    gain = np.trace(np.linalg.solve(spread, joint), axis1=1, axis2=2)
-    gain[taken] = -np.inf
-    return int(gain.argmax())
-
-
-def _judged(
-    region: _Region, covariance: Array, factor: float, draws: Array
-) -> tuple[float, float]:
-    """Return the usual standard deviation, and how probably the tool is within the tolerance."""
-    judged = region.judged
-    spread = np.einsum('mip,pq,mjq->mij', judged, covariance, judged, optimize=True) + region.rest
-    size = factor * np.sqrt(np.maximum(np.linalg.eigvalsh(spread), 0.0))
-    length = np.linalg.norm(draws[:, None] * size, axis=-1)
-    return float(np.median(size[:, -1])), float((length < region.tolerance).mean())

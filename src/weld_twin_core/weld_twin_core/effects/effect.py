@@ -31,7 +31,7 @@ __all__ = ['Effect', 'LinearEffect', 'MemoryEffect', 'Parameter', 'Stage', 'Valu
 _RELATIVE_STEP = 1e-5
 """Step of numerical derivatives, in typical magnitudes of the parameter."""
 
-_SLIDING_UNITS = {'rad': 'm', 'rad/(N m)': 'm/N'}
+SLIDING_UNITS = {'rad': 'm', 'rad/(N m)': 'm/N'}
 """Units of a joint that turns, and those in their place where it slides."""
 
 E = TypeVar('E', bound='Effect')
@@ -232,7 +232,7 @@ class Effect(Parametric, ABC):
 
         """
         slides = robot is not None and self.on_slide(robot)
-        return _SLIDING_UNITS.get(parameter.unit, parameter.unit) if slides else parameter.unit
+        return SLIDING_UNITS.get(parameter.unit, parameter.unit) if slides else parameter.unit
 
     def check(self, robot: Robot) -> None:
         """

@@ -234,23 +234,16 @@ class _System:
         """
         series, count = self._series, len(self._series.names)
         ratios = []
-        for w in range(series.days.size):
+        for w, (own, whitening) in enumerate(series.whitening):
             state = self.solution[:count].copy()
             at = count
             for each in self._found:
                 width = each.shape.columns.shape[1]
                 state[each.place] += each.shape.columns[w] @ self.solution[at : at + width]
                 at += width
-            precision = series.precision[w]
-            values, axes = np.linalg.eigh(
-                precision / np.sqrt(np.outer(series.prior, series.prior))
-            )
-            live = values > 1.0
-            if not live.any():
-                continue
-            unit = axes[:, live] / np.sqrt(values[live])
-            gap = unit.T @ ((series.told[w] - precision @ state) / np.sqrt(series.prior))
-            ratios.append(float(gap @ gap) / live.sum())
+            if whitening.size:
+                gap = whitening.T @ (series.told[w, own] - series.precision[w, own] @ state)
+                ratios.append(float(gap @ gap) / gap.size)
         return max(1.0, float(np.median(ratios))) if ratios else 1.0
 
     def now(self, place: int) -> tuple[Array, Array]:

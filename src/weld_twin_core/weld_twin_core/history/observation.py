@@ -72,17 +72,34 @@ class Observation:
 
     @cached_property
     def _information(self) -> tuple[Array, Array]:
+        variance, axes, shown = self._shown
         width = self.prior_std
-        # At unit prior the posterior variance along a direction is 1 less what the data showed.
-        scaled = self.covariance / np.outer(width, width)
-        variance, axes = np.linalg.eigh(0.5 * (scaled + scaled.T))
-        variance = np.clip(variance, 1e-300, 1.0)
-        shown = np.where(variance < 1.0 - _SHOWN, 1.0 / variance - 1.0, 0.0)
         # value = variance * (precision of the data) * (what the data say), along each axis
         along = axes.T @ (self.value / width)
         reported = np.where(shown > 0.0, along / variance, 0.0)
         precision = (axes * shown) @ axes.T / np.outer(width, width)
         return precision, (axes @ reported) / width
+
+    @cached_property
+    def _shown(self) -> tuple[Array, Array, Array]:
+        """Variances at unit prior, (P,), their axes in columns, and the precision of the data, (P,)."""
+        width = self.prior_std
+        # At unit prior the posterior variance along a direction is 1 less what the data showed.
+        scaled = self.covariance / np.outer(width, width)
+        variance, axes = np.linalg.eigh(0.5 * (scaled + scaled.T))
+        variance = np.clip(variance, 1e-300, 1.0)
+        return variance, axes, np.where(variance < 1.0 - _SHOWN, 1.0 / variance - 1.0, 0.0)
+
+    @cached_property
+    def whitening(self) -> Array:
+        """
+        Return directions the data show better than what was believed before, shape (P, L).
+
+        The precision of the data along each is 1, and they say nothing of one another.
+        """
+        _, axes, shown = self._shown
+        live = shown > 1.0
+        return np.asarray(axes[:, live] / np.sqrt(shown[live]) * self.prior_std[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +117,8 @@ class Series:
     """Precision of what was believed before any of them, shape (P,)."""
     changing: NDArray[np.int_]
     """Places of the coordinates that may change, shape (C,)."""
+    whitening: tuple[tuple[NDArray[np.int_], Array], ...]
+    """Of every observation, the places of its coordinates and its `Observation.whitening`."""
 
 
 def series_of(observations: Sequence[Observation]) -> Series:
@@ -123,9 +142,11 @@ def series_of(observations: Sequence[Observation]) -> Series:
     error: list[list[float]] = [[] for _ in names]
     precision = np.zeros((days.size, len(names), len(names)))
     reported = np.zeros((days.size, len(names)))
+    whitening = []
     for w, each in enumerate(ordered):
         at = np.array([place[name] for name in each.names], int)
         precision[w][np.ix_(at, at)], reported[w, at] = each.information()
+        whitening.append((at, each.whitening))
         width[at] = np.maximum(width[at], each.prior_std)
         for k, std in zip(at, np.sqrt(np.diag(each.covariance)), strict=True):
             error[k].append(float(std))
@@ -135,4 +156,12 @@ def series_of(observations: Sequence[Observation]) -> Series:
         for w, each in enumerate(ordered):
             if names[k] not in each.names:
                 precision[w, k, k] += 1.0 / (_ABSENT * float(np.median(error[k]))) ** 2
-    return Series(days, names, precision, reported, 1.0 / width**2, np.array(changing, dtype=int))
+    return Series(
+        days,
+        names,
+        precision,
+        reported,
+        1.0 / width**2,
+        np.array(changing, dtype=int),
+        tuple(whitening),
+    )

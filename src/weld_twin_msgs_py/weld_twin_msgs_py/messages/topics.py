@@ -97,12 +97,14 @@ class Topic:
         return getattr(import_module(f'{package}.{kind}'), name)
 
 
-def _stream(name: str, kind: str, depth: int, meaning: str) -> Topic:
+def _stream(name: str, kind: str, meaning: str, depth: int = DEEP) -> Topic:
     """Return a topic that anybody's node may publish."""
     return Topic(name, kind, Qos(RELIABLE, depth), Qos(BEST_EFFORT, depth), meaning)
 
 
-def _result(name: str, kind: str, depth: int, meaning: str, *, steady: bool = True) -> Topic:
+def _result(
+    name: str, kind: str, meaning: str, depth: int = DEEP, *, steady: bool = True
+) -> Topic:
     """Return a topic that only this project's nodes publish."""
     return Topic(name, kind, Qos(RELIABLE, depth), Qos(RELIABLE, depth), meaning, steady)
 
@@ -115,89 +117,75 @@ def _latched(name: str, kind: str, meaning: str) -> Topic:
 JOINT_STATES = _stream(
     '/joint_states',
     'sensor_msgs/msg/JointState',
-    DEEP,
     'commanded joint motion: position [rad or m], velocity where known',
 )
 ACTUAL_JOINT_STATES = _result(
     '/actual/joint_states',
     'sensor_msgs/msg/JointState',
-    DEEP,
     'joint motion with the joint-space effects in it',
 )
 MEASURED_POSE = _stream(
     '/measured/tool_pose',
     'geometry_msgs/msg/PoseStamped',
-    DEEP,
     'where the tool really is, in the measuring frame [m]',
 )
 MEASURED_POINT = _stream(
     '/measured/tool_point',
     'geometry_msgs/msg/PointStamped',
-    DEEP,
     'the same from an instrument that gives no orientation [m]',
 )
 MEASURED_SIGMA = _stream(
     '/measured/sigma',
     'geometry_msgs/msg/Vector3Stamped',
-    DEEP,
     'standard deviation of the measured position of the same stamp, per axis [m]',
 )
 CONTACT = _stream(
     '/contact',
     'sensor_msgs/msg/Range',
-    DEEP,
     'the tool point touches what header.frame_id names; range is the measured length where that is '
     'what a contact gives, else 0 [m], variance its variance where known [m^2]',
 )
 IMAGE_POINTS = _stream(
     '/measured/image_points',
     'sensor_msgs/msg/PointCloud2',
-    DEEP,
     'points of targets that the camera named in header.frame_id saw: target, point, u, v [px]',
 )
 TWIN_POSE = _result(
-    '/twin/tool_pose',
-    'geometry_msgs/msg/PoseStamped',
-    DEEP,
-    'where the twin says the tool is [m]',
+    '/twin/tool_pose', 'geometry_msgs/msg/PoseStamped', 'where the twin says the tool is [m]'
 )
 TWIN_COVARIANCE = _result(
     '/twin/tool_pose_with_covariance',
     'geometry_msgs/msg/PoseWithCovarianceStamped',
-    DEEP,
     'the same pose and how sure it is: of the true pose, turns about the world axes [m^2, rad^2]',
 )
 DEVIATION = _result(
     '/deviation',
     'geometry_msgs/msg/Vector3Stamped',
-    DEEP,
     'measured minus twin in the base frame, at the stamp of the measurement [m]',
 )
 DEVIATION_METRICS = _result(
     '/deviation/metrics',
     'diagnostic_msgs/msg/DiagnosticArray',
-    DEEP,
     'D(t), D_norm, D_cum, RMS, max, samples, dropped',
     steady=False,
 )
 DIAGNOSIS = _result(
     '/diagnosis',
     'diagnostic_msgs/msg/DiagnosticArray',
-    DEEP,
     'verdict over the last minute: status, effects found, gap before and after',
     steady=False,
 )
 TOOL_WRENCH = _stream(
     '/tool_wrench',
     'geometry_msgs/msg/WrenchStamped',
-    100,
     'load on the tool, in the tool frame unless the header names another [N, N m]',
+    depth=100,
 )
 TEMPERATURE = _stream(
     '/temperature',
     'sensor_msgs/msg/Temperature',
-    10,
     'temperature of the arm or around it [degC]',
+    depth=10,
 )
 
 TOPICS = (
@@ -231,15 +219,15 @@ TWIN_BASE = _latched(
 JOINT_TRAJECTORY = _result(
     '/joint_trajectory',
     'trajectory_msgs/msg/JointTrajectory',
-    10,
     'motion the trajectory generator is to run, planned by somebody else',
+    depth=10,
     steady=False,
 )
 PATH = _result(
     '/path',
     'nav_msgs/msg/Path',
-    10,
     'seam the trajectory generator is to plan and run, in the measuring frame',
+    depth=10,
     steady=False,
 )
 PLANNED_TRAJECTORY = _latched(
@@ -247,40 +235,33 @@ PLANNED_TRAJECTORY = _latched(
     'trajectory_msgs/msg/JointTrajectory',
     'the motion the trajectory generator runs',
 )
-PLANNED_PATH = _latched(
-    '/planned/path',
-    'nav_msgs/msg/Path',
-    'the tool path of that motion',
-)
+PLANNED_PATH = _latched('/planned/path', 'nav_msgs/msg/Path', 'the tool path of that motion')
 MARKERS = _result(
     '/deviation/markers',
     'visualization_msgs/msg/MarkerArray',
-    10,
     'the seam coloured by deviation, and the deviations magnified',
+    depth=10,
 )
 DIAGNOSTICS = _result(
     '/diagnostics',
     'diagnostic_msgs/msg/DiagnosticArray',
-    10,
     'health of every node: each input with its rate, age, refusals and the last reason',
+    depth=10,
 )
 
 POSE_IN = _stream(
     '~/pose_in',
     'geometry_msgs/msg/PoseStamped',
-    DEEP,
     "where the controller is to have the tool, in the robot's base [m]",
 )
 POSE_OUT = _result(
     '~/pose_out',
     'geometry_msgs/msg/PoseStamped',
-    DEEP,
     'the same, corrected so that the real tool goes there [m]',
 )
 CORRECTION = _result(
     '~/correction',
     'geometry_msgs/msg/TwistStamped',
-    DEEP,
     "what was or would be added to a pose or to a point of a goal: way and turn in the robot's base "
     '[m, rad]',
     steady=False,
@@ -299,8 +280,8 @@ COMPENSATED = (POSE_IN, POSE_OUT, CORRECTION, AUDIT)
 TF = _stream(
     '/tf',
     'tf2_msgs/msg/TFMessage',
-    100,
     'where frames are that move: those of measurements and of the base',
+    depth=100,
 )
 TF_STATIC = Topic(
     '/tf_static',

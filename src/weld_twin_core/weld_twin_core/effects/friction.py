@@ -33,8 +33,6 @@ from .view import Parameter, Plausible, Stage, Value, View
 
 SHORTEST, LONGEST = 3e-5, 1.8e-3
 """Pre-sliding travels [rad] that a search considers: a longer one is a loop, `hysteresis`."""
-_SLIDING = 0.1
-"""Metres of a joint that slides which are looked at as a radian of one that turns."""
 _UNEVEN = 0.6
 """Asymmetry beyond which one direction would hardly rub at all. A judgement."""
 _A_LITTLE = 1e-9
@@ -52,7 +50,7 @@ class _Fit(FitHooks):
         """Return friction of all travels: a start that is far off ends beside the best."""
         if zoom or view.static:
             return None
-        unit = _SLIDING if view.robot.prismatic[view.robot.index(self.effect.joint)] else 1.0
+        unit = view.radian(view.robot.index(self.effect.joint))
         travels = unit * np.geomspace(SHORTEST, LONGEST, 7)
         each = [
             Friction(self.effect.joint, 1.0, self.effect.asymmetry, float(x), self.effect.release)
@@ -209,7 +207,7 @@ class Friction(MemoryEffect):
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield friction of short and long pre-sliding, even and uneven."""
-        unit = _SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
+        unit = view.radian(view.robot.index(str(joint)))
         for travel in (1e-4, 6e-4):
             for asymmetry in (0.0, _A_LITTLE):
                 yield cls(str(joint), 0.0, asymmetry, travel * unit)

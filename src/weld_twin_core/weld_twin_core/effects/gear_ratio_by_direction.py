@@ -30,8 +30,6 @@ from .wording import size
 
 _TRAVELS = (3e-5, 3e-4)
 """Travels [rad] that a search starts from: a longer one is a loop, `hysteresis`."""
-_SLIDING = 0.1
-"""Metres of a joint that slides which are looked at as a radian of one that turns."""
 _SHOWN = 0.04
 """
 Angle [rad] that must be left, RMS, of what one unit of it does: less is play and a constant ratio.
@@ -139,7 +137,7 @@ class GearRatioByDirection(MemoryEffect):
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield a quick and a slow change of flanks where the joint went both ways over its angle."""
         i = view.robot.index(str(joint))
-        unit = _SLIDING if view.robot.prismatic[i] else 1.0
+        unit = view.radian(i)
         angle = view.joint(i)
         for travel in _TRAVELS:
             made = cls(str(joint), 0.0, travel * unit)

@@ -207,10 +207,6 @@ class SearchHooks(_Hooks):
         """Return its waves of these orders and no others, shape (K,); new ones of no size yet."""
         return self.effect
 
-    def causes(self) -> int:
-        """Return how many separate causes this instance stands for."""
-        return max(1, self.orders().size)
-
 
 class FitHooks(_Hooks):
     """

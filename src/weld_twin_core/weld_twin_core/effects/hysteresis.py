@@ -37,8 +37,6 @@ from .view import Parameter, Plausible, Stage, Value, View
 
 SHORTEST, LONGEST = 4e-3, 0.3
 """Travels [rad] that a search considers: shorter is a gap, longer a wrong gear ratio."""
-SLIDING = 0.1
-"""Metres of a joint that slides which are looked at as a radian of one that turns."""
 
 
 class _Fit(FitHooks):
@@ -49,8 +47,7 @@ class _Fit(FitHooks):
         if zoom:
             return None
         i = view.robot.index(self.effect.joint)
-        unit = SLIDING if view.robot.prismatic[i] else 1.0
-        travels = unit * np.geomspace(SHORTEST, LONGEST, 10)
+        travels = view.radian(i) * np.geomspace(SHORTEST, LONGEST, 10)
         z = Hysteresis(self.effect.joint, 1.0, travels)._loop(view.joint(i), None)[0]
         return [Hysteresis(self.effect.joint, 1.0, float(travel)) for travel in travels], -z
 
@@ -155,7 +152,7 @@ class Hysteresis(MemoryEffect):
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
         """Yield a short, a usual and a long loop."""
-        unit = SLIDING if view.robot.prismatic[view.robot.index(str(joint))] else 1.0
+        unit = view.radian(view.robot.index(str(joint)))
         for travel in (0.01, 0.04, 0.16):
             yield cls(str(joint), 0.0, travel * unit)
 

@@ -21,6 +21,10 @@ Value = Any
 """A parameter: a number, a list of numbers, or the same with a leading axis of draws."""
 
 
+_SLIDING = 0.1
+"""Metres of a joint that slides which are looked at as a radian of one that turns."""
+
+
 class Stage(IntEnum):
     """
     When an effect acts. Stages run in this order; effects of one stage see the same input.
@@ -166,6 +170,10 @@ class View:
     def joint(self, index: int) -> Array:
         """Return the position of one joint, shape (..., N)."""
         return self.q[..., index]
+
+    def radian(self, index: int) -> float:
+        """Return what is looked at as a radian of one joint: one, or some metres where it slides."""
+        return _SLIDING if self.robot.prismatic[index] else 1.0
 
     def displaced(self, *more: Shift, keep_frames: bool = False) -> View:
         """

@@ -61,8 +61,6 @@ BENT = 4
 """Knots over the angle for each way: straight, bent, and bent back."""
 SHARES = (0.02, 0.1, 0.4)
 """Shares of the joint's largest speed about which what depends on the way may set in."""
-SLIDING = 0.1
-"""Metres of a joint that slides which are looked at as a radian of one that turns."""
 NEAR = 1e-3
 """Span of distances [m] below which there is one distance."""
 
@@ -344,7 +342,7 @@ def _wandering(maker: Features, index: int) -> Array:
 
 def _lost(maker: Features, features: list[Features], index: int) -> Array:
     """Return what a joint may lose by the way it goes, (E, M): in gaps, by angle, speed and load."""
-    view, unit = maker.view, SLIDING if maker.twin.robot.prismatic[index] else 1.0
+    view, unit = maker.view, maker.view.radian(index)
     q = maker.joint_view.joint(index)
     widths = unit * np.array([*GAPS, TURNED])[:, None]
     trails = play(q, widths, np.full(len(widths), q[0])) - q

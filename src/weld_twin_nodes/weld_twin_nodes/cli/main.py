@@ -11,7 +11,8 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from importlib.util import find_spec
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
+from typing import Any
 
 from weld_twin_core import __version__
 from weld_twin_core.errors import TwinError
@@ -165,7 +166,7 @@ def _add(subparsers: argparse._SubParsersAction[Parser], name: str, chosen: str)
     parser.example = module.EXAMPLE
     places = parser.add_subparsers(required=True, metavar='JOB', title='jobs')
     for word, job in jobs.items():
-        add_command(places, word, job).set_defaults(run=job.run)
+        add_command(places, word, job).set_defaults(run=job)
 
 
 def _path(name: str) -> str:
@@ -176,7 +177,7 @@ def _module(name: str) -> ModuleType:
     return import_module(_path(name))
 
 
-def _jobs(module: ModuleType | None) -> dict[str, SimpleNamespace]:
+def _jobs(module: ModuleType | None) -> dict[str, Any]:
     """Return the jobs of a command by name; none of a command that has one job."""
     return getattr(module, 'JOBS', {})
 

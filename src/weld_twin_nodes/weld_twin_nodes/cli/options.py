@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from weld_twin_core.errors import DataError
@@ -235,9 +234,7 @@ def refuse(args: argparse.Namespace, names: Sequence[str], why: str) -> None:
             raise DataError(f'--{name.replace("_", "-")} {why}')
 
 
-def add_command(
-    subparsers: Any, name: str, command: ModuleType | SimpleNamespace
-) -> argparse.ArgumentParser:
+def add_command(subparsers: Any, name: str, command: Any) -> argparse.ArgumentParser:
     """
     Add a command to what ``add_subparsers`` returned.
 

@@ -10,21 +10,30 @@ that can be typed, ``OPTIONS``, which are tables as `..parsing` reads them, and 
 
 `run` returns the exit code and raises `weld_twin_core.errors.TwinError` for anything the user
 can mend. Modules import what is slow to import (numpy, rclpy, matplotlib) inside functions. A command
-with several jobs has them in ``JOBS``, as `job` makes them. Options that few need are rare: `--help`
-fits on one screen without them.
+with several jobs has a function for each, marked by `job`, in ``JOBS``. Options that few need are rare:
+`--help` fits on one screen without them.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from types import SimpleNamespace
 
 from ..parsing import Options
 
+Run = Callable[[argparse.Namespace], int]
 
-def job(
-    run: Callable[[argparse.Namespace], int], example: str, *options: Options
-) -> SimpleNamespace:
-    """Return a job of a command; its help is the docstring of what runs it."""
-    return SimpleNamespace(__doc__=run.__doc__, run=run, EXAMPLE=example, OPTIONS=options)
+
+def job(example: str, *options: Options) -> Callable[[Run], Run]:
+    """Mark what runs a job of a command with an example and its options; its docstring is the help."""
+
+    def marked(run: Run) -> Run:
+        vars(run).update(EXAMPLE=example, OPTIONS=options)
+        return run
+
+    return marked
+
+
+def jobs(*runs: Run) -> dict[str, Run]:
+    """Return the jobs of a command by their names."""
+    return {run.__name__: run for run in runs}

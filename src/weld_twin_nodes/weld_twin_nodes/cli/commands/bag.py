@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from weld_twin_core.errors import DataError
 
 from ..options import TOPICS, topics_of
-from . import job
+from . import job, jobs
 
 if TYPE_CHECKING:
     from weld_twin_msgs_py.bags import BagInfo
@@ -44,6 +44,7 @@ BAG                      bag, its .unfinished directory, or a file
 """
 
 
+@job('weld-twin bag info bags/elbow_play', INFO, TOPICS)
 def info(args: argparse.Namespace) -> int:
     """What is in a bag, what of it is usable, its rates and gaps."""
     if args.robots:
@@ -126,6 +127,7 @@ def _print_robots() -> int:
     return 0
 
 
+@job('weld-twin bag recover my_recording', RECOVER)
 def recover(args: argparse.Namespace) -> int:
     """Make a bag of what is whole of a damaged one.
 
@@ -143,6 +145,7 @@ def recover(args: argparse.Namespace) -> int:
     return 0
 
 
+@job('weld-twin bag play bags/elbow_play --clock', PLAY)
 def play(args: argparse.Namespace) -> int:
     """Play a bag into running nodes, without `ros2 bag play`.
 
@@ -158,8 +161,4 @@ def play(args: argparse.Namespace) -> int:
     return 0
 
 
-JOBS = {
-    'info': job(info, 'weld-twin bag info bags/elbow_play', INFO, TOPICS),
-    'recover': job(recover, 'weld-twin bag recover my_recording', RECOVER),
-    'play': job(play, 'weld-twin bag play bags/elbow_play --clock', PLAY),
-}
+JOBS = jobs(info, recover, play)

@@ -23,7 +23,7 @@ from ..options import (
     write_or_print,
 )
 from ..program_options import PROGRAM, TRIGGER, check_program, context_of, quantity
-from . import job
+from . import job, jobs
 
 USUAL = 'model'
 """The job that is meant where none is named."""
@@ -47,6 +47,13 @@ POLICY = """
 """
 
 
+@job(
+    'weld-twin export model found/diagnosis.json --robot ur5 --format offsets',
+    'MODEL                    diagnosis.json',
+    ROBOT,
+    MODEL,
+    OUT,
+)
 def model(args: argparse.Namespace) -> int:
     """Write the model of a diagnosis as other software loads it."""
     from tempfile import TemporaryDirectory
@@ -73,6 +80,18 @@ def model(args: argparse.Namespace) -> int:
         return write_or_print(args, (Path(scratch) / name).read_text(encoding='utf-8'))
 
 
+@job(
+    'weld-twin export program spline --robot ur5 --controller urscript --out seam.script',
+    'PATH                     path file, experiment, or a bundled seam such as line',
+    ROBOT,
+    """
+--controller NAME, required  urscript, krl, rapid, inform, fanuc-ls, joint-trajectory or csv
+""",
+    file_output('program to write'),
+    SEAM,
+    TRIGGER,
+    PROGRAM,
+)
 def program(args: argparse.Namespace) -> int:
     """Write a seam or an experiment as a robot program.
 
@@ -98,6 +117,11 @@ def program(args: argparse.Namespace) -> int:
     return 0
 
 
+@job(
+    'weld-twin export policy --namespace left --remap joint_states:=/cell/states --out left.xml',
+    POLICY,
+    OUT,
+)
 def policy(args: argparse.Namespace) -> int:
     """Write the security policy of the nodes, for SROS2.
 
@@ -112,6 +136,11 @@ def policy(args: argparse.Namespace) -> int:
     return write_or_print(args, text, f'{args.out}: policy for {nodes}')
 
 
+@job(
+    'weld-twin export schema robot --out robot.schema.json',
+    'KIND                     robot, effects, seam or artefact',
+    OUT,
+)
 def schema(args: argparse.Namespace) -> int:
     """The JSON Schema of a robot, effects, seam or artefact file."""
     import json
@@ -123,38 +152,4 @@ def schema(args: argparse.Namespace) -> int:
     return write_or_print(args, json.dumps(schema(args.kind), indent=1) + '\n')
 
 
-JOBS = {
-    'model': job(
-        model,
-        'weld-twin export model found/diagnosis.json --robot ur5 --format offsets',
-        'MODEL                    diagnosis.json',
-        ROBOT,
-        MODEL,
-        OUT,
-    ),
-    'program': job(
-        program,
-        'weld-twin export program spline --robot ur5 --controller urscript --out seam.script',
-        'PATH                     path file, experiment, or a bundled seam such as line',
-        ROBOT,
-        """
---controller NAME, required  urscript, krl, rapid, inform, fanuc-ls, joint-trajectory or csv
-""",
-        file_output('program to write'),
-        SEAM,
-        TRIGGER,
-        PROGRAM,
-    ),
-    'policy': job(
-        policy,
-        'weld-twin export policy --namespace left --remap joint_states:=/cell/states --out left.xml',
-        POLICY,
-        OUT,
-    ),
-    'schema': job(
-        schema,
-        'weld-twin export schema robot --out robot.schema.json',
-        'KIND                     robot, effects, seam or artefact',
-        OUT,
-    ),
-}
+JOBS = jobs(model, program, policy, schema)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from weld_twin_core.errors import DataError
-from weld_twin_nodes.cli.commands import job
+from weld_twin_nodes.cli.commands import job, jobs
 from weld_twin_nodes.cli.options import POOL, folder_output, output, pair
 
 if TYPE_CHECKING:
@@ -73,6 +73,7 @@ def opened(args: argparse.Namespace, *, make: bool = False) -> closing[Database]
     return closing(Database(args.db, make=make))
 
 
+@job('weld-twin history add found --cell line3 --at 2026-03-31', ADD, USUAL_DATABASE)
 def add(args: argparse.Namespace) -> int:
     """Add diagnoses to the history of a cell."""
     from ...history.entry import entry_of, instant
@@ -100,6 +101,11 @@ def add(args: argparse.Namespace) -> int:
     return 0
 
 
+@job(
+    'weld-twin history show --cell line3',
+    '--cell NAME              left out: list the cells',
+    USUAL_DATABASE,
+)
 def show(args: argparse.Namespace) -> int:
     """Show the diagnoses of a cell, or which cells there are."""
     from rich.console import Console
@@ -154,6 +160,7 @@ def _verified(result: list[Verified]) -> Table:
     return table
 
 
+@job('weld-twin history changed --cell line3 --since 2026-03-31', CHANGED, USUAL_DATABASE)
 def changed(args: argparse.Namespace) -> int:
     """Say what changed, since when, and where it leads.
 
@@ -208,6 +215,13 @@ def _limits(given: Sequence[str]) -> dict[str, float]:
     return out
 
 
+@job(
+    'weld-twin history run examples/files/cells.csv --db plant.db',
+    'LIST                     table of recordings',
+    DATABASE,
+    POOL,
+    RUN,
+)
 def run(args: argparse.Namespace) -> int:
     """Diagnose the recordings of a list into a database.
 
@@ -263,6 +277,11 @@ def _progress() -> Iterator[Tell]:
         yield tell
 
 
+@job(
+    'weld-twin history page --db plant.db --out plant',
+    DATABASE,
+    folder_output('directory for the pages'),
+)
 def page(args: argparse.Namespace) -> int:
     """Write a page that ranks cells, and one for each cell."""
     from weld_twin_msgs_py.files.whole_files import write_text
@@ -284,34 +303,4 @@ def page(args: argparse.Namespace) -> int:
     return 0
 
 
-JOBS = {
-    'add': job(
-        add, 'weld-twin history add found --cell line3 --at 2026-03-31', ADD, USUAL_DATABASE
-    ),
-    'show': job(
-        show,
-        'weld-twin history show --cell line3',
-        '--cell NAME              left out: list the cells',
-        USUAL_DATABASE,
-    ),
-    'changed': job(
-        changed,
-        'weld-twin history changed --cell line3 --since 2026-03-31',
-        CHANGED,
-        USUAL_DATABASE,
-    ),
-    'run': job(
-        run,
-        'weld-twin history run examples/files/cells.csv --db plant.db',
-        'LIST                     table of recordings',
-        DATABASE,
-        POOL,
-        RUN,
-    ),
-    'page': job(
-        page,
-        'weld-twin history page --db plant.db --out plant',
-        DATABASE,
-        folder_output('directory for the pages'),
-    ),
-}
+JOBS = jobs(add, show, changed, run, page)

@@ -44,14 +44,6 @@ def of_no_size(site: Site) -> Effect:
     return REGISTRY[site.effect](**({'joint': site.joint} if site.joint is not None else {}))
 
 
-def settable(robot: Robot, exclude: frozenset[str]) -> Iterator[Effect]:
-    """Yield every error of no size that a person can set."""
-    for name, kind in REGISTRY.items():
-        if kind.traits.set_at_controller and name not in exclude:
-            for joint in joints_of(kind, robot):
-                yield of_no_size(Site(name, joint))
-
-
 def same_error(robot: Robot, one: Effect, other: Effect) -> bool:
     """
     Return whether one of two constant errors can always do what the other does.

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -86,11 +87,17 @@ class UsualErrors:
     def beyond(self, result: Fit) -> tuple[Array, float]:
         """Return the residual beside them, (rows,), and its squares with what their sizes cost."""
         own = design(self.problem, result.model, self.scale)
-        both = np.concatenate([own, self.columns])
-        normal, right = both @ both.T, both @ result.residual
-        normal[np.diag_indices_from(normal)] += np.arange(len(both)) >= len(own)
+        cross = own @ self.columns.T
+        normal = np.block([[own @ own.T, cross], [cross.T, self._normal]])
+        right = np.concatenate([own @ result.residual, self.columns @ result.residual])
         step = solve_scaled(normal, right, 0.0)
-        return result.residual - step @ both, result.rss - float(right @ step)
+        explained = step[: len(own)] @ own + step[len(own) :] @ self.columns
+        return result.residual - explained, result.rss - float(right @ step)
+
+    @cached_property
+    def _normal(self) -> Array:
+        """Return the normal matrix of their columns, each believed to be as large as usual."""
+        return np.asarray(self.columns @ self.columns.T + np.eye(len(self.columns)))
 
 
 def _sized(problem: Problem, scale: Scale, columns: Array, now: Fit) -> Array:

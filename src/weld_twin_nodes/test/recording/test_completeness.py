@@ -205,8 +205,8 @@ def longer_for_neighbours(cell, out):
 
 
 def test_a_recorder_ends_soon_though_its_neighbours_stand_still(cell, tmp_path):
-    for name in 'abc':  # a busy machine makes an end longer, and none shorter
-        longer = longer_for_neighbours(cell, tmp_path / name)
+    for trial in range(10):  # a busy machine makes an end longer, and none shorter
+        longer = longer_for_neighbours(cell, tmp_path / f'{trial}')
         if longer < 2.7:
             break
     assert longer < 2.7

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The model with curves in place of names: fitted, judged as any model is, and carried or not."""
+"""Curves for what has no name: chosen, fitted, judged as any model is, and carried or not."""
 
 from __future__ import annotations
 
@@ -46,11 +46,6 @@ class Curved:
     kept: tuple[Effect, ...]
     found: Search
     unseen: Unseen
-
-    @property
-    def rms_m(self) -> float:
-        """Return what it leaves on unseen stretches, RMS [m]."""
-        return self.unseen.rms(self.unseen.whole)
 
 
 def curved(result: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
@@ -108,21 +103,6 @@ def _beside(
     return Curved(form, bare.model.found, changed, unseen)
 
 
-def gain_of(named: Unseen, alternative: Unseen) -> tuple[float, float]:
-    """
-    Return what a rival takes off the squared unseen error, as a share and in standard errors.
-
-    Parameters
-    ----------
-    named, alternative : Unseen
-        The model held against the rival, and the rival, both whole.
-
-    """
-    before, after = named.squares(named.whole), alternative.squares(alternative.whole)
-    reported = gain(before, after, named.trusted_labels(), alternative.trusted_labels())
-    return reported.share, reported.steady
-
-
 def carried(
     result: Search,
     unseen: Unseen,
@@ -164,8 +144,9 @@ def _worth(named: Unseen, alternative: Curved, verdict: Verdict, beliefs: Belief
 
     Curves that hardly help beside names would put places under suspicion for nothing.
     """
-    if verdict.sets:
-        share, steady = gain_of(named, alternative.unseen)
-        return share >= beliefs.beaten_share and steady >= beliefs.beaten_steady
-    remaining = named.rms(named.whole)
-    return alternative.rms_m <= beliefs.curve_room * remaining
+    there = alternative.unseen
+    before, after = named.squares(named.whole), there.squares(there.whole)
+    if not verdict.sets:
+        return float(after.mean()) <= beliefs.curve_room**2 * float(before.mean())
+    taken = gain(before, after, named.trusted_labels(), there.trusted_labels())
+    return taken.share >= beliefs.beaten_share and taken.steady >= beliefs.beaten_steady

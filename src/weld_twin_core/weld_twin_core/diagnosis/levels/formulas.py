@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Do the formulas of the names hold? Free forms instead of them and at their places, and noise.
+Do the formulas of the names hold? Free forms at their places, and noise.
 
 At their places lost motion of a joint is free in the gaps it trails in, and in angle, speed and
 load by the way it goes; what the instrument and the frames do is a free smooth field over the
@@ -20,7 +20,7 @@ from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..hypotheses.usual_errors import UsualErrors
 from ..unseen.folds import least_gain
-from ..unseen.groups import all_groups
+from ..unseen.groups import plain_groups
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .curved import Curved
@@ -157,9 +157,8 @@ def beside_names(result: Search, unseen: Unseen) -> list[Beside]:
     sizes = [unseen.rms(part) for part in unseen.targets[1:]]
     bases, places = unseen.bases(), {e.at for e in model.found}
     out = []
-    for group in all_groups(problem, model, unseen.scale):
-        lost = group.on == 'direction' and not group.curves and group.at in places
-        if not lost and group.at != FIELD:
+    for group in plain_groups(problem, model, unseen.scale):
+        if group.at != FIELD and (group.on != 'direction' or group.at not in places):
             continue
         own = [s for e, s in zip(model.found, sizes, strict=False) if group.at in (e.at, FIELD)]
         reported = least_gain([base.gain(group.columns) for base in bases])

@@ -11,7 +11,7 @@ import pytest
 from small_arm import small_arm
 
 import weld_twin_core as wt
-from weld_twin_core.diagnosis.algebra.designed import Design
+from weld_twin_core.diagnosis.algebra.columns import Columns, Piece
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.levels.formulas import Missed, no_noise
 from weld_twin_core.diagnosis.levels.free_form import Choosing, Member, chosen, worth
@@ -114,8 +114,9 @@ def test_friction_that_wanders_is_placed_though_nothing_predicts_it():
 def choice(target, ways, *groups):
     """Return a choice of groups of columns that are to explain a target, nothing else fitted."""
     none = np.zeros(0)
-    taken, columns = lambda: np.zeros((0, target.size)), Design.of(np.zeros((0, target.size)))
-    fitted = Unseen(None, None, ways[0], columns, (), target, taken, none, none)
+    empty = np.zeros((0, target.size))
+    columns = Columns((Piece(empty),))
+    fitted = Unseen(None, None, ways[0], columns, (), target, lambda: empty, none, none)
     told = [Group(str(k), '', (), np.atleast_2d(g), np.ones(1)) for k, g in enumerate(groups)]
     return Choosing(told, [fitted.by(labels) for labels in ways])
 

@@ -77,14 +77,6 @@ class SeamDraws:
     ModelError
         The robot has modified rows, Hayati angles, joints that slide or a positioner.
 
-    Attributes
-    ----------
-    samples : array
-        The samples at which draws are worked out.
-    remainder : float
-        What the other samples' features differ from those the samples determine, relative to
-        the largest; 0 when all samples are worked on.
-
     """
 
     def __init__(self, robot: Robot, q: Array, *, smooth: bool = True) -> None:
@@ -100,8 +92,11 @@ class SeamDraws:
         turn = rotation_matrix(q[:, :1] * np.array([0.0, 0.0, 1.0]))
         self._first = robot.T_world_base[:3, :3] @ turn
         self.samples: NDArray[np.int_] = np.arange(len(q))
+        """Those at which draws are worked out."""
         self.spread: Array | None = None
         self.remainder = 0.0
+        """What the other samples' features differ from those that these determine, relative to the
+        largest; 0 when all samples are worked on."""
         self._of_squares: _Determining | None = None
         if smooth:
             both = (features[0][:, None] * features[1][None]).reshape(-1, len(q))

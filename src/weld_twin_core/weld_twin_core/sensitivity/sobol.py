@@ -35,37 +35,23 @@ SETTLED = 0.05
 
 @dataclass(frozen=True, eq=False)
 class SobolIndices:
-    """
-    First-order and total indices of G inputs or groups of inputs.
-
-    Attributes
-    ----------
-    names : tuple of str, length G
-    first, total : array, shape (G,)
-    first_half, total_half : array, shape (G,)
-        Half-widths of the 95 % intervals.
-    base_samples, runs : int
-    mean, std : float
-        Of the result over the runs.
-    change : float
-        Largest change of a total index from half to all of the base samples.
-    converged : bool
-        Whether the change and every half-width of a total index are below `SETTLED`.
-    seed : int
-
-    """
+    """First-order and total indices of G inputs or groups of inputs."""
 
     names: tuple[str, ...]
     first: Array
     first_half: Array
     total: Array
     total_half: Array
+    """Both indices with the half-widths of their 95 % intervals, shape (G,) each."""
     base_samples: int
     runs: int
     mean: float
     std: float
+    """Of the result over the runs."""
     change: float
+    """Largest change of a total index from half to all of the base samples."""
     converged: bool
+    """Whether the change and every half-width of a total index are below `SETTLED`."""
     seed: int
 
     def as_dict(self) -> dict[str, Any]:

@@ -49,34 +49,22 @@ class Probability:
 
 @dataclass(frozen=True, eq=False)
 class ToleranceStack:
-    """
-    What the tolerances add up to.
-
-    Attributes
-    ----------
-    runs, seed : int
-    percentiles : mapping
-        For d_norm, max_m, across_m and stickout_m: value and 95 % interval at `PERCENTILES`,
-        shape (K, 3).
-    inside_across, inside_stickout, inside_both : Probability
-        That the whole seam stays inside the weld's tolerance.
-    tolerance : WeldTolerance
-    half : float
-        Half-width of the widest of the three intervals; tells whether there were enough runs.
-
-    """
+    """What the tolerances add up to."""
 
     runs: int
     seed: int
     percentiles: dict[str, Array]
+    """For d_norm, max_m, across_m and stickout_m: value and 95 % interval at `PERCENTILES`, shape
+    (K, 3)."""
     inside_across: Probability
     inside_stickout: Probability
     inside_both: Probability
+    """That the whole seam stays inside the weld's tolerance."""
     tolerance: WeldTolerance
 
     @property
     def half(self) -> float:
-        """Return the half-width of the widest interval of a probability."""
+        """Return the half-width of the widest of the three intervals: whether there were enough runs."""
         all_three = (self.inside_across, self.inside_stickout, self.inside_both)
         return max(0.5 * (p.high - p.low) for p in all_three)
 

@@ -39,20 +39,12 @@ class BackgroundBag:
     flush_every: longest time a message is only in memory while the disk keeps up [s].
     most_bytes: memory the queue may take.
 
-    Attributes
-    ----------
-    failure : TwinError, optional
-        Why nothing is written any more.
-
-    Raises
-    ------
-    TwinError
-        The bag cannot be opened.
-
+    Raises TwinError: the bag cannot be opened.
     """
 
     def __init__(self, bag: GrowingBag, *, flush_every: float, most_bytes: int) -> None:
         self.failure: TwinError | None = None
+        """Why nothing is written any more."""
         self._bag = bag
         self._flush_every = flush_every
         self._most = most_bytes

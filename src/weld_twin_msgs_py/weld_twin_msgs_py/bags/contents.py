@@ -61,36 +61,24 @@ class TopicInfo:
 
 @dataclass(frozen=True)
 class BagInfo:
-    """
-    A bag at a glance.
-
-    Attributes
-    ----------
-    duration_s : float [s]
-        From the first to the last stamp of the topics in use, else of all.
-    usable : bool
-        A diagnosis can start from it.
-    missing : tuple of str
-        What keeps it from being usable, a sentence each.
-    notes : tuple of str
-        What a diagnosis will do without or work around.
-    incomplete : tuple of str
-        What of the messages sent is not in it, and which streams begin late or end early.
-
-    """
+    """A bag at a glance."""
 
     path: Path
     topics: tuple[TopicInfo, ...]
     start_ns: int
     duration_s: float
+    """From the first to the last stamp of the topics in use, else of all [s]."""
     missing: tuple[str, ...]
+    """What keeps it from being usable, a sentence each."""
     notes: tuple[str, ...]
+    """What a diagnosis will do without or work around."""
     provenance: dict[str, Any]
     incomplete: tuple[str, ...] = ()
+    """What of the messages sent is not in it, and which streams begin late or end early."""
 
     @property
     def usable(self) -> bool:
-        """Return whether nothing is missing."""
+        """Return whether nothing is missing, so that a diagnosis can start from it."""
         return not self.missing
 
 

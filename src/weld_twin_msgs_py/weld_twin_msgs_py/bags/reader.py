@@ -44,22 +44,14 @@ class BagMessage(NamedTuple):
 
 
 class BagReader:
-    """
-    An open bag; use as a context manager so that the storage is never left open.
-
-    Attributes
-    ----------
-    topics : dict
-        Message type and count of each topic.
-    provenance : dict
-        What the writer said about the bag's making; empty for bags made elsewhere.
-
-    """
+    """An open bag; use as a context manager so that the storage is never left open."""
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self.topics: dict[str, tuple[str, int]] = {}
+        """Message type and count of each topic."""
         self.provenance: dict[str, Any] = {}
+        """What the writer said about the bag's making; empty for bags made elsewhere."""
         self._packed = False
         self._definitions: dict[str, tuple[str, bool]] = {}
         self._readers: list[Reader] = []

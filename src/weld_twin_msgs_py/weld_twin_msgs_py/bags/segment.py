@@ -142,20 +142,14 @@ class Segment:
 
     folder: directory to make for it; the file in it has the same name and the storage's suffix.
     storage: 'mcap' or 'sqlite3'.
-
-    Attributes
-    ----------
-    size : int
-        Bytes written, about.
-    first_ns : int, optional [ns]
-        When the first message was recorded.
-
     """
 
     def __init__(self, folder: Path, storage: str) -> None:
         self.folder = folder
         self.size = 0
+        """Bytes written, about."""
         self.first_ns: int | None = None
+        """When the first message was recorded [ns]."""
         self._pending = 0
         self._unflushed = False
         self._connections: dict[tuple[str, str], Connection] = {}

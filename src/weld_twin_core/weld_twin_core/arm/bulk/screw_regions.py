@@ -56,14 +56,6 @@ class Division:
     A robot's chain of factors, divided in two pieces at one of its joints.
 
     channels: what is asked for.
-
-    Attributes
-    ----------
-    sizes : tuple of int
-        Joints of either piece.
-    places : list of Place
-        Of the channels.
-
     """
 
     def __init__(self, robot: Robot, channels: Sequence[Channel]) -> None:
@@ -73,6 +65,7 @@ class Division:
         self._moving = [k for k, f in enumerate(self._factors) if len(f.matrices) > 1]
         half = (robot.n + 1) // 2
         self.sizes = (half, robot.n - half)
+        """Joints of either piece."""
         self._cut = self._moving[half] if half < robot.n else len(self._factors)
         self.near = Piece(self._factors[: self._cut], robot.T_world_base, np.eye(4))
         self.far = Piece(self._factors[self._cut :], np.eye(4), robot.T_flange_tool)

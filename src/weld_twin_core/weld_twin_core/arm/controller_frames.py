@@ -28,11 +28,7 @@ class ControllerFrames:
     """
     Where a controller has its base and its flange.
 
-    Raises
-    ------
-    DataError
-        A frame has the wrong shape or a value that is not finite.
-
+    Raises DataError: a frame has the wrong shape or a value that is not finite.
     """
 
     base: Array = field(default_factory=lambda: np.eye(4))

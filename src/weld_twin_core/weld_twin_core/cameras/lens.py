@@ -38,10 +38,7 @@ class Lens:
     """
     Intrinsics of a camera.
 
-    Raises
-    ------
-    DataError
-        A focal length is not positive, or there are another number of coefficients.
+    Raises DataError: a focal length is not positive, or there are another number of coefficients.
 
     Examples
     --------

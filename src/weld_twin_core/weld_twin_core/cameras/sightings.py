@@ -54,11 +54,8 @@ class Target:
     """
     Points that a camera can find, such as the corners of a board.
 
-    Raises
-    ------
-    DataError
-        A label comes twice, there are no three points, or an uncertainty is not positive.
-
+    Raises DataError: a label comes twice, there are no three points, or an uncertainty is not
+    positive.
     """
 
     name: str
@@ -113,11 +110,8 @@ class Sightings:
     """
     Points seen, one row each.
 
-    Raises
-    ------
-    DataError
-        Shapes that do not fit, or no camera sees a target that the arm moves before it.
-
+    Raises DataError: shapes that do not fit, or no camera sees a target that the arm moves before
+    it.
     """
 
     cameras: tuple[Camera, ...]

@@ -20,10 +20,8 @@ class Artefact:
     """
     What is touched, and what is known of it.
 
-    Raises
-    ------
-    DataError
-        A label comes twice, a tie names an unknown label, or its value makes no sense.
+    Raises DataError: a label comes twice, a tie names an unknown label, or its value makes no
+    sense.
 
     Examples
     --------

@@ -27,11 +27,7 @@ class Contact:
     """
     One thing that the tool point touches in many postures.
 
-    Raises
-    ------
-    DataError
-        There is no such kind, or a known place is not whole.
-
+    Raises DataError: there is no such kind, or a known place is not whole.
     """
 
     label: str

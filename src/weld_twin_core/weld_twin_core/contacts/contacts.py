@@ -19,11 +19,7 @@ class Contacts:
     """
     Contacts of the tool point, one for every posture.
 
-    Raises
-    ------
-    DataError
-        A label is not in the artefact, or a length has no value.
-
+    Raises DataError: a label is not in the artefact, or a length has no value.
     """
 
     artefact: Artefact

@@ -27,11 +27,7 @@ class Observation:
     """
     One diagnosis: values of coordinates, and how sure they are.
 
-    Raises
-    ------
-    DataError
-        The shapes do not agree, a name comes twice, or a number is not finite.
-
+    Raises DataError: the shapes do not agree, a name comes twice, or a number is not finite.
     """
 
     day: float

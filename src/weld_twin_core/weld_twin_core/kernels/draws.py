@@ -72,11 +72,8 @@ class SeamDraws:
     q: shape (N, n) [rad].
     smooth: look for samples that determine the others; False works on all samples.
 
-    Raises
-    ------
-    ModelError
-        The robot has modified rows, Hayati angles, joints that slide or a positioner.
-
+    Raises ModelError: the robot has modified rows, Hayati angles, joints that slide or a
+    positioner.
     """
 
     def __init__(self, robot: Robot, q: Array, *, smooth: bool = True) -> None:

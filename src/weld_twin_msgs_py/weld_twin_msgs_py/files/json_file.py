@@ -41,11 +41,7 @@ def read_json(path: Path | str) -> dict[str, Any]:
     """
     Return the mapping that a file holds.
 
-    Raises
-    ------
-    DataError
-        It cannot be read, or holds something else.
-
+    Raises DataError: it cannot be read, or holds something else.
     """
     try:
         content = json.loads(Path(path).read_text(encoding='utf-8'))

@@ -33,11 +33,7 @@ class Scratch:
     prefix: of the name, which is drawn. What killed processes left of this prefix is swept first.
     rescue: told every directory that is swept, before it goes.
 
-    Raises
-    ------
-    OSError
-        The place cannot be written.
-
+    Raises OSError: the place cannot be written.
     """
 
     def __init__(

@@ -32,11 +32,7 @@ class CarriedArm:
 
     Inverse kinematics is that of the arm behind them, with its base where they put it.
 
-    Raises
-    ------
-    DataError
-        A joint of the positioner is not told, or no joint is left.
-
+    Raises DataError: a joint of the positioner is not told, or no joint is left.
     """
 
     robot: Robot

@@ -13,6 +13,7 @@ worth as much as a new one.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -91,10 +92,26 @@ class Topic:
 
     def message_class(self) -> Any:
         """Return the rclpy message class; needs a ROS installation."""
-        from importlib import import_module
+        return message_class(self.type)
 
-        package, kind, name = self.type.split('/')
-        return getattr(import_module(f'{package}.{kind}'), name)
+
+def message_class(kind: str) -> Any:
+    """
+    Return the rclpy class of a message type.
+
+    Raises
+    ------
+    ImportError
+        The package is not installed here, or has no such message.
+
+    """
+    package, space, name = kind.split('/')
+    try:
+        return getattr(import_module(f'{package}.{space}'), name)
+    except (ImportError, AttributeError):
+        raise ImportError(
+            f'the message type {kind} is not installed here; install the package {package}'
+        ) from None
 
 
 def _stream(name: str, kind: str, meaning: str, depth: int = DEEP) -> Topic:

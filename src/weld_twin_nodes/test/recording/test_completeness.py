@@ -23,12 +23,11 @@ from std_msgs.msg import Float64MultiArray, String
 from weld_twin_core.arm import catalog
 from weld_twin_msgs_py.bags import BagReader, bag_info, provenance
 from weld_twin_msgs_py.messages import from_messages
-from weld_twin_msgs_py.messages.topics import JOINT_STATES
+from weld_twin_msgs_py.messages.topics import JOINT_STATES, message_class
 from weld_twin_msgs_py.robots import write_urdf
 from weld_twin_nodes.harness import Cell
 from weld_twin_nodes.harness.health_listener import HealthListener
 from weld_twin_nodes.live.cell_node import CellNode
-from weld_twin_nodes.live.message_classes import message_class
 
 pytestmark = pytest.mark.cells
 

@@ -163,7 +163,7 @@ def _outputs(
         qos = BY_NAME[name].offered if name in BY_NAME else Qos(RELIABLE, 1000)
         try:
             message = Topic(name, kind, qos, qos, '').message_class()
-        except (ImportError, AttributeError):
+        except ImportError:
             tell(f'{name}: the type {kind} is not installed here; it is left out')
             continue
         publisher = node.create_publisher(message, name, qos.to_rclpy())

@@ -11,7 +11,6 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 from weld_twin_msgs_py.assembly.transforms import NoTransform
 
-from .awaiting import spin_until
 from .cell_node import CellNode
 from .tf_frames import Frames, frames_of
 
@@ -48,7 +47,7 @@ def base_on_tf(node: CellNode) -> Array:
         return True
 
     if not told():
-        spin_until(node, told, f'/tf to tell where {base!r} is in {measuring!r}')
+        node.serve_until(told, f'/tf to tell where {base!r} is in {measuring!r}')
     node.keep('frames', '')
     T = frames.tree.latest(measuring, base)
     node.remark(f'the base is where /tf has {base!r} in {measuring!r}')

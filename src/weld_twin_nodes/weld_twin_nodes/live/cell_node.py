@@ -14,6 +14,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
@@ -44,6 +45,8 @@ from .words import ALIVE
 
 READY_EVERY = 0.02
 """Seconds between two looks at whether the listeners are there."""
+TURN = 0.1
+"""Seconds of one turn of the loop that serves a node before it can begin."""
 MEETS = 0.5
 """Seconds in which listeners that are known find a publisher: some tenths on busy cores."""
 LAST_WORDS = 8.0
@@ -375,6 +378,29 @@ class CellNode(TellingNode):
         if said and 'waiting' not in self.health.lasting:
             self.get_logger().info(said)
         self.keep('waiting', said, logged=False)
+
+    def serve_until(self, told: Callable[[], bool], what: str) -> None:
+        """
+        Serve until something is told that the node can do nothing without; say what it waits for.
+
+        Raises
+        ------
+        ModelError
+            The node is stopped before.
+
+        """
+        self.wait_for(what)
+        runner = SingleThreadedExecutor(context=self.context)
+        runner.add_node(self)
+        try:
+            while not told():
+                if not self.context.ok():
+                    raise ModelError(f'stopped while waiting for {what}')
+                runner.spin_once(timeout_sec=TURN)
+        finally:
+            runner.remove_node(self)
+            runner.shutdown()
+        self.wait_for('')
 
     def _look_who_listens(self) -> None:
         now = time.monotonic()

@@ -12,9 +12,7 @@ from rclpy.serialization import deserialize_message
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.assembly.foreign_types import CONTROLLER, FedBack, plain_messages
 from weld_twin_msgs_py.messages.cdr_read import READERS, decoder
-from weld_twin_msgs_py.messages.topics import JOINT_STATES
-
-from .message_classes import message_class
+from weld_twin_msgs_py.messages.topics import JOINT_STATES, message_class
 
 Turn = Callable[[str, Any], Iterable[Any]]
 """A type and a message of it, to the messages that it stands for."""

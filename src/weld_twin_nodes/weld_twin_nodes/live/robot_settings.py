@@ -14,7 +14,6 @@ from weld_twin_msgs_py.messages.cdr_read import decoder
 from weld_twin_msgs_py.messages.topics import ROBOT_DESCRIPTION
 from weld_twin_msgs_py.robots import load_robot, parse_urdf
 
-from .awaiting import spin_until
 from .cell_frames import FRAME_SETTINGS, placed
 from .cell_node import CellNode
 from .input_settings import joint_names
@@ -93,5 +92,5 @@ def _described(node: CellNode, topic: str, read: Callable[[str], Robot]) -> Robo
         ROBOT_DESCRIPTION.requested.to_rclpy(),
         raw=True,
     )
-    spin_until(node, lambda: bool(first), f'the robot on {topic}')
+    node.serve_until(lambda: bool(first), f'the robot on {topic}')
     return first[0]

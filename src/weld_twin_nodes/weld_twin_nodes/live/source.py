@@ -12,9 +12,8 @@ from typing import Any
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 
-from weld_twin_msgs_py.messages.topics import BEST_EFFORT, VOLATILE, Qos
+from weld_twin_msgs_py.messages.topics import BEST_EFFORT, VOLATILE, Qos, message_class
 
-from .message_classes import message_class
 from .partners import Senders, elsewhere, unheard_publishers
 from .telling_node import TellingNode
 

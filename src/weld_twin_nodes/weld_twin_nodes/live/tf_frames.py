@@ -23,7 +23,6 @@ from weld_twin_msgs_py.messages.cdr_types import Header, PointStamped, Xyz
 from weld_twin_msgs_py.messages.topics import MEASURED_POINT, MEASURED_POSE, TF, TF_STATIC
 
 from .cell_node import CellNode
-from .message_classes import message_class
 
 PATIENCE = 1.0
 """Seconds a measurement waits for the transforms of its time: ten steps of a slow tracker of frames."""
@@ -42,7 +41,7 @@ class Frames:
         self.lack = ''
         """Why `/tf` is not listened to; empty where it is."""
         try:
-            message_class(TF.type)
+            TF.message_class()
         except ImportError as error:
             self.lack = f'/tf is not listened to: {error}'
             node.remark(self.lack)

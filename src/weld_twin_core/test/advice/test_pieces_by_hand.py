@@ -2,21 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """How pieces of a measurement are weighed and put together, against what can be said by hand."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from weld_twin_core.arm.catalog import load
-from weld_twin_core.diagnosis.advice.candidates import Piece
+from weld_twin_core.diagnosis.advice.candidates import MASS, PRESS, RISE, Piece, candidates
 from weld_twin_core.diagnosis.advice.chosen_pieces import SAFE, Plan, _by_turns, _longer
 from weld_twin_core.diagnosis.advice.experiment import _apart, _name, _side
 from weld_twin_core.diagnosis.advice.next_step import _promise
+from weld_twin_core.diagnosis.advice.next_touches import MOST, _Option
 from weld_twin_core.diagnosis.advice.postures import Limits, Room, joined, widened
 from weld_twin_core.diagnosis.advice.separation import Parting
-from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.algebra.problem import Model, Problem
 from weld_twin_core.effects import Backlash, JointCompliance, JointOffset
-from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 
 
 @pytest.fixture
@@ -185,3 +187,108 @@ def test_explanations_are_told_by_what_each_has_alone():
         {'effect': 'backlash', 'joint': 'b', 'at': 'b', 'on': 'direction'}
     ]
     assert _name(play, [spring]) == 'backlash of b'
+
+
+def test_while_nothing_shows_what_comes_nearest_to_it_is_next():
+    plan = Plan(candidate(10.0, 10.0, 10.0), (), others=(1,))
+    assert _longer(plan, gaining([0.5, 2.0, 1.0]), (0, 1, 2)).chosen == (1,)
+    assert _longer(plan, gaining([0.5, 2.0, 1.0]), (0, 1, 2)).score == 0.0
+
+
+@pytest.mark.parametrize('count', [3, MOST])
+def test_touches_are_needed_until_most_of_what_they_can_narrow_is_narrowed(count):
+    spread = [100.0, *(64.0 * 0.5**k for k in range(count))]
+    known = [SimpleNamespace(open=lambda _, each=each: each) for each in spread]
+    option = _Option([], None, list(range(count)), known)
+    gone = 10.0 - np.sqrt(spread)
+    expected = int(np.flatnonzero(gone >= 0.9 * gone[-1])[0])
+    assert option.needed(np.zeros(0)) == (expected if count == MOST else None)
+
+
+# What could be measured -------------------------------------------------------------------------
+
+
+def could_be(problem, robot=None, **limits):
+    robot = robot or load('ur5')
+    model = Model(robot, (robot.T_world_base,) * len(problem.recordings))
+    return {each.kind: each for each in candidates(problem, model, Limits(**limits))}
+
+
+def beside(problem, **signals):
+    """Return the problem with signals in its recording."""
+    (recording,) = problem.recordings
+    return replace(problem, recordings=(replace(recording, **signals),))
+
+
+def test_what_needs_a_hand_or_another_set_up_is_offered_where_that_may_be(problem):
+    changing = {'warm_up', 'payload_swap', 'longer_tool', 'moved_instrument'}
+    assert set(could_be(problem)) == {'path', 'stations', 'bidirectional'} | changing
+    assert set(could_be(problem, set_up=False)) == {'stations', 'bidirectional'}
+
+
+def test_a_tool_that_is_pressed_is_pressed_along_each_axis_in_turn(problem):
+    t = problem.recordings[0].joints.t
+    wrench = Signal(t, np.tile([0.0, 0.0, -40.0, 0.0, 0.0, 0.0], (t.size, 1)))
+    pressed = could_be(beside(problem, wrench=wrench))['press']
+    (recording,) = pressed.recordings
+    assert recording.wrench_frame == 'base' and recording.wrench.value.shape[1] == 6
+    for piece in pressed.pieces:
+        np.testing.assert_array_equal(
+            recording.wrench.value[list(piece.rows)], PRESS * np.eye(3, 6)
+        )
+
+
+def test_an_arm_that_warms_up_grows_warmer_from_where_it_was(problem):
+    t = problem.recordings[0].joints.t
+    warm = beside(problem, temperature=Signal(t, np.full(t.size, 31.0)))
+    made = could_be(warm)
+    ramp = made['warm_up'].recordings[0].temperature.value
+    assert (ramp[0], ramp[-1]) == (31.0, 31.0 + RISE) and (np.diff(ramp) > 0.0).all()
+    assert np.ptp(made['stations'].recordings[0].temperature.value) == 0.0
+    assert made['warm_up'].whole and len(made['warm_up'].pieces) == 1
+
+
+def test_a_weight_that_hung_in_one_recording_hangs_in_none_to_come(problem):
+    t = problem.recordings[0].joints.t
+    load_on_it = Signal(t, np.tile([0.0, 0.0, -40.0, 0.0, 0.0, 0.0], (t.size, 1)))
+    loaded = beside(problem, wrench=load_on_it)
+    both = replace(problem, recordings=(*problem.recordings, *loaded.recordings))
+    assert could_be(loaded)['stations'].recordings[0].wrench.value[0, 2] == -40.0
+    assert could_be(both)['stations'].recordings[0].wrench is None
+    assert 'press' not in could_be(both)
+
+
+def test_what_is_changed_is_changed_in_the_model_that_foresees_it(problem):
+    robot = load('ur5')
+    made = could_be(problem)
+    heavy, longer, moved = (
+        made[k].model for k in ('payload_swap', 'longer_tool', 'moved_instrument')
+    )
+    assert heavy.robot.payload_mass == robot.payload_mass + MASS
+    assert made['payload_swap'].changed == f'load={MASS:g}'
+    step = np.linalg.inv(robot.T_flange_tool) @ longer.robot.T_flange_tool
+    assert step[:3, 3] == pytest.approx([0.0, 0.0, 0.2]) and made['longer_tool'].new_tool
+    assert np.linalg.norm(moved.bases[0][:3, 3] - robot.T_world_base[:3, 3]) > 1.0
+    assert made['moved_instrument'].new_base and not made['stations'].new_base
+
+
+def test_both_sides_of_a_station_are_equally_far_and_one_measurement(problem):
+    both = could_be(problem)['bidirectional']
+    q = both.recordings[0].joints.q
+    for piece in both.pieces:
+        low, middle, high, again = q[list(piece.rows)]
+        np.testing.assert_array_equal(middle, again)
+        np.testing.assert_allclose(high - middle, middle - low)
+        assert (high > middle).all()
+
+
+def test_a_way_that_leaves_the_box_is_not_free(problem):
+    robot = load('ur5')
+    tips = Room(problem, robot, Limits())
+    free = tips.spread(20)
+    assert ((free >= tips.low) & (free <= tips.high)).all() and tips.way(list(free[:1]) * 2)
+    box = np.array([[-0.6, -0.9, 0.05], [0.9, 0.9, 0.9]])
+    inside = Room(problem, robot, Limits(box=box))
+    assert inside.way([inside.home, inside.home])
+    upright = np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0])
+    assert not inside.way([inside.home, upright, inside.home])

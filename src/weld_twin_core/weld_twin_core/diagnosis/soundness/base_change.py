@@ -248,7 +248,7 @@ def _whitened(problem: Problem, parts: Sequence[Array], scale: Scale) -> Array:
 
 def _rows(columns: Array) -> Array:
     """Return (M, c, P) columns as (P, rows)."""
-    return columns.reshape(columns.shape[0] * columns.shape[1], -1).T
+    return np.asarray(columns.reshape(columns.shape[0] * columns.shape[1], -1).T)
 
 
 def _strong(columns: Array) -> Array:

@@ -19,7 +19,7 @@ from ...effects.effect import Effect
 from ...effects.frame_errors import BasePose, ToolPose
 from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
 from ...effects.joint_compliance import JointCompliance
-from ...effects.plausible import plausible
+from ...effects.plausible import beyond
 from ...effects.root_pose import RootPose
 from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem
@@ -205,16 +205,11 @@ def _within(
 
 def _plausible(robot: Robot, model: Model) -> bool:
     """Return whether fitted frames are off the given ones by no more than a cause may be."""
-    pairs = [('base_pose', np.linalg.inv(robot.T_world_base) @ base) for base in model.bases] + [
-        ('tool_pose', np.linalg.inv(robot.T_flange_tool) @ model.robot.T_flange_tool)
-    ]
-    for effect, off in pairs:
-        turn = np.linalg.norm(rotation_vector(off[:3, :3]))
-        if np.linalg.norm(off[:3, 3]) > plausible(robot, effect, 'xyz').high:
-            return False
-        if turn > plausible(robot, effect, 'rotvec').high:
-            return False
-    return True
+    bases = [np.linalg.inv(robot.T_world_base) @ base for base in model.bases]
+    tool = np.linalg.inv(robot.T_flange_tool) @ model.robot.T_flange_tool
+    pairs = [(BasePose, off) for off in bases] + [(ToolPose, tool)]
+    errors = (kind(tuple(off[:3, 3]), tuple(rotation_vector(off[:3, :3]))) for kind, off in pairs)
+    return not any(beyond(robot, error) for error in errors)
 
 
 def _framed(

@@ -238,7 +238,7 @@ class _Seen:
             shape = self._placed((np.arange(t.size) >= at).astype(np.float64), k)
             # Every instant was asked; the best of many is better than it should be.
             log_bayes_factor = change.nats(shape) - float(np.log(t.size))
-            slip = replace(effect, time=float(t[at - 1] + t[at]) / 2.0)  # type: ignore[type-var]
+            slip = replace(effect, time=float(t[at - 1] + t[at]) / 2.0)  # type: ignore[call-arg]
             yield _Trial(log_bayes_factor, change, shape, k, slip, at)
 
     def named(self, smooth: _Trial) -> Iterator[Slip | Settling]:

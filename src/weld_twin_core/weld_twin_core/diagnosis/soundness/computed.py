@@ -24,7 +24,7 @@ from ..algebra.problem import FRAMES, Model, Problem, Scale
 from ..frames.changes import constant_errors
 from .evidence import Case, Finding, mistake, note
 from .lengths import length
-from .limits import CLEAR, COMPUTED, ENOUGH, MOVED, SAMPLES, STEPS, UNEXPLAINED, WORTH
+from .limits import CLEAR, COMPUTED, ENOUGH, MOVED, NOISE, SAMPLES, STEPS, UNEXPLAINED, WORTH
 from .stamps import written
 
 SMOOTH = 2e-8
@@ -64,8 +64,9 @@ def _left(case: Case, k: int) -> float | None:
     for model in (nominal, nominal.with_found(constant_errors(robot))):
         tried = [_stations(recording, model) for recording in _paired(case, k)]
         trials = [(one, _fitted(one, model, 1)) for one in tried if one is not None]
-        if trials:
-            problem, start = min(trials, key=lambda pair: _gap(*pair))
+        near = [pair for pair in trials if _gap(*pair) < CLEAR * NOISE]  # after a linear step
+        if near:
+            problem, start = min(near, key=lambda pair: _gap(*pair))
             remaining = _gap(problem, _fitted(problem, start, 2 * STEPS))
             if remaining < max(COMPUTED, _rounding(problem, start)):
                 return remaining

@@ -195,12 +195,12 @@ class Domain:
     def _postures(self, q: Array) -> Iterator[_Look]:
         away = self.beyond(q)
         for i, name in enumerate(self.joints):
-            yield (
-                away[:, i] > self.margins[i],
-                lambda part, i=i, name=name: (
-                    f'{name} is {away[part, i].max():.2g} {self._unit(i)} beyond what was recorded'
-                ),
-            )
+
+            def why(part: slice, i: int = i, name: str = name) -> str:
+                far = f'{away[part, i].max():.2g} {self._unit(i)}'
+                return f'{name} is {far} beyond what was recorded'
+
+            yield away[:, i] > self.margins[i], why
         if self.spots is not None:
             far, reach = self.spots.away(q), self.spots.reach
             yield (
@@ -233,13 +233,18 @@ class Domain:
         for size, known, name, unit in zip(
             sizes, self.load or (0.0, 0.0), ('force', 'torque'), ('N', 'N m'), strict=True
         ):
-            yield (
-                size > LOAD_MARGIN[0] * known + LOAD_MARGIN[1],
-                lambda part, size=size, known=known, name=name, unit=unit: (
-                    f'the {name} on the tool is up to {size[part].max():.3g} {unit}, at most '
-                    f'{known:.3g} {unit} was recorded'
-                ),
-            )
+
+            def why(
+                part: slice,
+                size: Array = size,
+                known: float = known,
+                name: str = name,
+                unit: str = unit,
+            ) -> str:
+                most = f'{size[part].max():.3g} {unit}, at most {known:.3g} {unit} was recorded'
+                return f'the {name} on the tool is up to {most}'
+
+            yield size > LOAD_MARGIN[0] * known + LOAD_MARGIN[1], why
 
     def _warmth(self, temperature: Array, low: float, high: float) -> _Look:
         off = np.maximum(low - temperature, temperature - high)

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
 
 from . import layout, seal
 from .achieved import over_floor
-from .judging import NAMING, NOT_IN_LIBRARY, Judged, judge
+from .judging import NOT_IN_LIBRARY, Judged, judge
 from .measures import (
     Measure,
     alias_measure,

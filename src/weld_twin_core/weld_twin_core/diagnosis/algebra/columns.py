@@ -130,7 +130,7 @@ class Piece:
         if other.joint is None:
             return self.products(other.each)
         if self.joint is None:
-            return other.products(self.each).T
+            return np.asarray(other.products(self.each).T)
         return np.asarray((self.each * self.joint.summed(other.joint.row)) @ other.each.T)
 
     def peaks(self) -> Array:
@@ -177,7 +177,7 @@ class Columns:
     @property
     def count(self) -> int:
         """Return how many columns there are."""
-        return self.places[-1].stop
+        return int(self.places[-1].stop)
 
     def written_out(self) -> Array:
         """Return the columns, shape (P, rows)."""

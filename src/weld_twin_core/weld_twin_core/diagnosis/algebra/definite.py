@@ -40,7 +40,7 @@ def inverted(matrix: Array) -> Array:
     """
     # A symmetric matrix is its own transpose, and that lies as LAPACK wants it.
     lower = dpotri(_factor(matrix), lower=1, overwrite_c=1)[0]
-    out = np.tril(lower, -1)
+    out: Array = np.tril(lower, -1)
     out += out.T
     out[np.diag_indices_from(out)] = lower.diagonal()
     return out

@@ -142,7 +142,7 @@ class Foretold:
             by_sample(ways),
             by_sample(levers),
             seen,
-            labels[np.flatnonzero(place[1] == 0)],
+            labels[np.flatnonzero(place[1] == 0)].astype(int),
             good,
             _middle(error[use], ways[-1, use], labels[use]),
         )

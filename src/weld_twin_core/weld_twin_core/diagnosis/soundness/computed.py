@@ -156,4 +156,5 @@ def _noise(q: Array) -> Array:
     """Return the noise of every joint from its fifth differences, which a smooth path has not."""
     differences = np.poly(np.ones(5))
     fifth = [np.convolve(column, differences, mode='valid') for column in q.T]
-    return np.asarray([robust_spread(each) for each in fifth] / np.linalg.norm(differences))
+    spread = np.array([robust_spread(each) for each in fifth])
+    return np.asarray(spread / np.linalg.norm(differences))

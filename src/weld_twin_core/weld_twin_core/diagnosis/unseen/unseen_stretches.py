@@ -412,7 +412,7 @@ class Base:
 
     def errors(self, residual: Array) -> Array:
         """Return the square of a residual, (rows,), in units of noise on every stretch."""
-        return np.bincount(self.unseen.labels, residual**2)
+        return np.bincount(self.unseen.labels, residual**2).astype(float)
 
     @cached_property
     def _known(self) -> tuple[Array, Array]:

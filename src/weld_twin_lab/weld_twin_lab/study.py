@@ -74,15 +74,9 @@ def options(
     """
     Return what adds the options of a study.
 
-    Parameters
-    ----------
-    *rows : str or callable
-        Tables as `add_options` reads them, or what `option` returns.
-    out, of : str
-        What ``--out`` says; it must be given. An empty text adds none.
-    pool : bool
-        Whether tasks run on several cores or on a cluster.
-
+    *rows: tables as `add_options` reads them, or what `option` returns.
+    out, of: what ``--out`` says; it must be given. An empty text adds none.
+    pool: whether tasks run on several cores or on a cluster.
     """
     last = option('--out', REQUIRED, of, out)
     every: list[Options] = [*rows, *([POOL] * pool), *([last] * bool(out))]
@@ -102,13 +96,8 @@ class Parts:
     """
     The parts of a study, a file each.
 
-    Parameters
-    ----------
-    folder : Path
-        Made where it is not there.
-    tell : callable
-        Told the name of each part that is made.
-
+    folder: made where it is not there.
+    tell: told the name of each part that is made.
     """
 
     def __init__(self, folder: Path, tell: Tell = lambda text: None) -> None:

@@ -71,34 +71,22 @@ class Check:
 
 @dataclass(frozen=True)
 class Unsound:
-    """
-    A mistake in data or set-up that no cause in the arm can be told from.
-
-    Attributes
-    ----------
-    kind : str
-        One of `MISTAKES`.
-    at : tuple of str
-        Joints by name, 'base', 'tool', 'instrument', 'clock' or 'robot'.
-    sentence, remedy : str
-        What is wrong, and what to do about it.
-    applied : bool
-        Whether the remedy was made and the diagnosis went on with mended data.
-    alike : tuple of (str, tuple of str)
-        Kinds and places of other mistakes that would explain the data as well.
-    mend : mapping, optional
-        The correction as plain values, to be made again on the same source; None where nothing
-        can undo it.
-
-    """
+    """A mistake in data or set-up that no cause in the arm can be told from."""
 
     kind: str
+    """One of `MISTAKES`."""
     at: tuple[str, ...]
+    """Joints by name, 'base', 'tool', 'instrument', 'clock' or 'robot'."""
     sentence: str
     remedy: str
+    """What is wrong, and what to do about it."""
     applied: bool = False
+    """Whether the remedy was made and the diagnosis went on with mended data."""
     alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    """Kinds and places of other mistakes that would explain the data as well."""
     mend: Mapping[str, Any] | None = None
+    """The correction as plain values, to be made again on the same source; None where nothing can
+    undo it."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``unsound``."""
@@ -140,23 +128,14 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Changed:
-    """
-    What one recording has that the first has not.
-
-    Attributes
-    ----------
-    recording : int
-        Counted from 0.
-    effect : Effect
-        By how much; a model of the first recording's arm with it is the arm of this one.
-    std : dict
-        Standard errors by parameter.
-
-    """
+    """What one recording has that the first has not."""
 
     recording: int
+    """Counted from 0."""
     effect: Effect
+    """By how much; a model of the first recording's arm with it is the arm of this one."""
     std: dict[str, Any]
+    """Standard errors by parameter."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``changed``; a lone parameter is given as a plain number."""
@@ -190,43 +169,29 @@ class Site:
 
 @dataclass(frozen=True)
 class Family:
-    """
-    Many small errors of one kind, fitted together, and how much worse unseen data get without it.
-
-    Attributes
-    ----------
-    growths : tuple of float
-        By what share the RMS error of each part left out, stretches of time and regions of
-        posture, grows without it, all other kinds chosen and the frames fitted anew. Of a kind that
-        was not chosen: by what share it shrinks with it.
-    chosen : bool
-        Whether it is among the kinds that explain unseen data together.
-    members : tuple of (Site, float)
-        Its members and how far each moves the tool, RMS [m], largest first.
-    rms_m : float
-        What it accounts for at the tool on unseen data: the root of how much the squared error
-        grows without it, the other kinds that are needed fitted anew, [m].
-    needed : tuple of (Site, float)
-        The members without which unseen data get worse, each with its share of the kind.
-    like : tuple of (Site, float)
-        What would do nearly as well in its place, and how nearly: 1 is as well.
-    share : float
-        Share of the squared unseen gap that it takes off; all that are chosen add up to what they
-        take off together.
-    named : bool
-        Whether the verdict names it; one that it does not is exchangeable here.
-
-    """
+    """Many small errors of one kind, fitted together, and how much worse unseen data get without it."""
 
     effect: str
     growths: tuple[float, ...]
+    """By what share the RMS error of each part left out, stretches of time and regions of posture,
+    grows without it, all other kinds chosen and the frames fitted anew. Of a kind that was not
+    chosen: by what share it shrinks with it."""
     chosen: bool
+    """Whether it is among the kinds that explain unseen data together."""
     members: tuple[tuple[Site, float], ...]
+    """Its members and how far each moves the tool, RMS [m], largest first."""
     rms_m: float = 0.0
+    """What it accounts for at the tool on unseen data: the root of how much the squared error
+    grows without it, the other kinds that are needed fitted anew, [m]."""
     needed: tuple[tuple[Site, float], ...] = ()
+    """The members without which unseen data get worse, each with its share of the kind."""
     like: tuple[tuple[Site, float], ...] = ()
+    """What would do nearly as well in its place, and how nearly: 1 is as well."""
     share: float = 0.0
+    """Share of the squared unseen gap that it takes off; all that are chosen add up to what they
+    take off together."""
     named: bool = False
+    """Whether the verdict names it; one that it does not is exchangeable here."""
 
     @property
     def growth(self) -> float:
@@ -253,47 +218,30 @@ class Family:
 
 @dataclass(frozen=True)
 class Cause:
-    """
-    What is certain of one cause, level by level, most probable first.
-
-    Attributes
-    ----------
-    place : tuple of (str, float)
-        A joint's name, 'base', 'tool', 'instrument', 'clock' or 'load', and its probability.
-    dependence : tuple of (str, float)
-        What it depends on; several may be certain at once.
-    name : tuple of (Site, float)
-        Effects of the library, or curves.
-    share : float
-        Of the squared gap.
-    share_ci90 : (float, float)
-    members : tuple of int
-        The effects of the model that stand for it, as `Model.found` counts them; none where
-        nothing that can be carried over stands for it.
-    probability : float
-        That one of its names is right; that its place is, where it has no name of an effect.
-    sure : bool
-        Whether that keeps the promise of being wrong hardly ever.
-    effect : int or None
-        Its index in `Diagnosis.effects` and in `Diagnosis.indistinguishable`.
-    rest : bool
-        Whether it is what is left beside everything that is told; its share is the unexplained.
-    slot : int or None
-        Which effect found by the search it is; for the steps of a diagnosis alone.
-
-    """
+    """What is certain of one cause, level by level, most probable first."""
 
     place: tuple[tuple[str, float], ...]
+    """A joint's name, 'base', 'tool', 'instrument', 'clock' or 'load', and its probability."""
     dependence: tuple[tuple[str, float], ...]
+    """What it depends on; several may be certain at once."""
     name: tuple[tuple[Site, float], ...]
+    """Effects of the library, or curves."""
     share: float
+    """Of the squared gap."""
     share_ci90: tuple[float, float]
     members: tuple[int, ...] = ()
+    """The effects of the model that stand for it, as `Model.found` counts them; none where nothing
+    that can be carried over stands for it."""
     probability: float = 0.0
+    """That one of its names is right; that its place is, where it has no name of an effect."""
     sure: bool = False
+    """Whether that keeps the promise of being wrong hardly ever."""
     effect: int | None = None
+    """Its index in `Diagnosis.effects` and in `Diagnosis.indistinguishable`."""
     rest: bool = False
+    """Whether it is what is left beside everything that is told; its share is the unexplained."""
     slot: int | None = None
+    """Which effect found by the search it is; for the steps of a diagnosis alone."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of ``verdict.causes``."""
@@ -383,40 +331,25 @@ class Contributions:
 
     Each stretch is predicted from the others. What is left and all parts add up to the residual
     of the model without effects, so any combination of causes can be thought away.
-
-    Attributes
-    ----------
-    left : tuple of array, shape (M, 3)
-        With the whole model.
-    parts : tuple of array, shape (K, M, 3)
-        Of every cause in the order of `Diagnosis.causes`; then, if there are any, of the effects
-        that the model holds and no cause stands for.
-
     """
 
     left: tuple[Array, ...]
+    """With the whole model, shape (M, 3)."""
     parts: tuple[Array, ...]
+    """Of every cause in the order of `Diagnosis.causes`, shape (K, M, 3); then, if there are any,
+    of the effects that the model holds and no cause stands for."""
 
 
 @dataclass(frozen=True)
 class Touched:
-    """
-    How far tool points are from one contact, on average [m].
-
-    Attributes
-    ----------
-    label : str
-    postures : int
-    before_m, after_m, held_out_m : float [m]
-        With the nominal robot, with the effects found, and where its place was not fitted.
-
-    """
+    """How far tool points are from one contact, on average [m]."""
 
     label: str
     postures: int
     before_m: float
     after_m: float
     held_out_m: float
+    """With the nominal robot, with the effects found, and where its place was not fitted [m]."""
 
 
 @dataclass(frozen=True)
@@ -440,76 +373,47 @@ class KnownLength:
 
 @dataclass(frozen=True)
 class JointEffort:
-    """
-    One joint: measured load beside the model's.
-
-    Attributes
-    ----------
-    joint : str
-    model_rms, difference_rms : float [N m, or N of a slide]
-        Load by the statics, about its mean, and measured minus statics.
-    factor : float or None
-        Measured load for each N m of the statics; None where the statics hardly load the joint.
-
-    """
+    """One joint: measured load beside the model's."""
 
     joint: str
     model_rms: float
     difference_rms: float
+    """Load by the statics, about its mean, and measured minus statics [N m, or N of a slide]."""
     factor: float | None
+    """Measured load for each N m of the statics; None where the statics hardly load the joint."""
 
 
 @dataclass(frozen=True)
 class EffortCause:
-    """
-    What explains the difference by itself.
-
-    Attributes
-    ----------
-    name : str
-        'payload', 'torque_constant', 'link_mass' or 'link_masses'.
-    joint : str or None
-    value, std : float
-        Mass beyond the declared one [kg], what is measured for each N m, or the factor on masses.
-    left : float
-        Share of the squared difference that it leaves.
-
-    """
+    """What explains the difference by itself."""
 
     name: str
+    """'payload', 'torque_constant', 'link_mass' or 'link_masses'."""
     joint: str | None
     value: float
     std: float
+    """Mass beyond the declared one [kg], what is measured for each N m, or the factor on
+    masses."""
     left: float
+    """Share of the squared difference that it leaves."""
 
 
 @dataclass(frozen=True)
 class Efforts:
-    """
-    Measured efforts beside the model's statics.
-
-    Attributes
-    ----------
-    holds : bool
-        The effort holds the load; else it is the load itself.
-    correlation : float
-        Of effort so taken and statics, all joints together; 0 where nothing is loaded.
-    weighed : bool
-        Whether the model has masses; without, every link counts alike, and only the sign is told.
-    joints : tuple of JointEffort
-    difference : float
-        RMS difference for each of the statics' load.
-    causes : tuple of EffortCause
-        What explains the difference by itself, what leaves least first.
-
-    """
+    """Measured efforts beside the model's statics."""
 
     holds: bool
+    """The effort holds the load; else it is the load itself."""
     correlation: float
+    """Of effort so taken and statics, all joints together; 0 where nothing is loaded."""
     weighed: bool
+    """Whether the model has masses; without, every link counts alike, and only the sign is
+    told."""
     joints: tuple[JointEffort, ...]
     difference: float
+    """RMS difference for each of the statics' load."""
     causes: tuple[EffortCause, ...]
+    """What explains the difference by itself, what leaves least first."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, lists and strings in the public schema."""
@@ -518,27 +422,17 @@ class Efforts:
 
 @dataclass(frozen=True)
 class ContactResult:
-    """
-    How well contacts agree: mean distances of the tool points from where they touched [m].
-
-    Attributes
-    ----------
-    spread_before_m, spread_after_m, held_out_spread_m : float [m]
-        With the nominal robot (its tool fitted where asked), with the effects found, and with
-        each place predicted from the others.
-    touched : tuple of Touched
-    lengths : tuple of KnownLength
-    not_seen : tuple of str
-        What no contact shows, in words.
-
-    """
+    """How well contacts agree: mean distances of the tool points from where they touched [m]."""
 
     spread_before_m: float
     spread_after_m: float
     held_out_spread_m: float
+    """With the nominal robot (its tool fitted where asked), with the effects found, and with each
+    place predicted from the others [m]."""
     touched: tuple[Touched, ...] = ()
     lengths: tuple[KnownLength, ...] = ()
     not_seen: tuple[str, ...] = ()
+    """What no contact shows, in words."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers."""
@@ -559,40 +453,6 @@ class Diagnosis:
 
     With status 'unsound' there is none: no effects, and every figure is not a number.
 
-    Attributes
-    ----------
-    gap : Gap
-        Measured against the twin, before any effect that was found [m, rad].
-    where : Where
-        On which joints, in which regimes, where on the path and in which direction it lies.
-    status : str
-        'identified', 'ambiguous', 'unknown', 'none' or 'unsound'.
-    effects : tuple of Found
-        The effects found, whatever the status, with standard errors; those that move the tool most
-        first.
-    confidence : float
-        Probability that the whole answer is right, as such answers were.
-    indistinguishable : tuple of tuple of Site
-        One group per effect: what these data cannot tell apart.
-    reasons : tuple of str
-        Why the status is what it is, in sentences.
-    candidates : tuple of Candidate
-        Hypotheses with their probabilities.
-    shrink : Shrink
-        The gap before and after on data not used for fitting.
-    unexplained : Unexplained
-        What remains, and what it depends on.
-    next_experiment : dict, optional
-        What to measure so that the remaining alternatives part.
-    actions : tuple of str
-        What to do about every effect found.
-    checks : tuple of Check
-        Whether the data are sound.
-    model : Model
-        The fitted frames and effects.
-    traces : Traces
-        Residuals before and after, as arrays.
-
     Examples
     --------
     `diagnose` makes it; its example shows how.
@@ -604,20 +464,36 @@ class Diagnosis:
     """
 
     gap: Gap
+    """Measured against the twin, before any effect that was found [m, rad]."""
     where: Where
+    """On which joints, in which regimes, where on the path and in which direction it lies."""
     status: str
+    """'identified', 'ambiguous', 'unknown', 'none' or 'unsound'."""
     effects: tuple[Found, ...]
+    """The effects found, whatever the status, with standard errors; those that move the tool most
+    first."""
     confidence: float
+    """Probability that the whole answer is right, as such answers were."""
     indistinguishable: tuple[tuple[Site, ...], ...]
+    """One group per effect: what these data cannot tell apart."""
     reasons: tuple[str, ...]
+    """Why the status is what it is, in sentences."""
     candidates: tuple[Candidate, ...]
+    """Hypotheses with their probabilities."""
     shrink: Shrink
+    """The gap before and after on data not used for fitting."""
     unexplained: Unexplained
+    """What remains, and what it depends on."""
     next_experiment: dict[str, Any] | None
+    """What to measure so that the remaining alternatives part."""
     actions: tuple[str, ...]
+    """What to do about every effect found."""
     checks: tuple[Check, ...]
+    """Whether the data are sound."""
     model: Model
+    """The fitted frames and effects."""
     traces: Traces
+    """Residuals before and after, as arrays."""
     absent: dict[str, str] = field(default_factory=dict)
     recordings: tuple[Recording, ...] = ()
     families: tuple[Family, ...] = ()

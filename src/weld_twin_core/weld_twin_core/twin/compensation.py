@@ -40,15 +40,6 @@ class Compensation:
     """
     Compensated commands and what they gain by the model.
 
-    Attributes
-    ----------
-    motion : JointMotion
-        Same stamps as the nominal commands.
-    before, after : array, shape (N, 6) [m, rad]
-        Tool minus wanted, linear part first, with the nominal and the compensated commands.
-    left_out : tuple of Effect
-        Effects of the model that no joint command can mend.
-
     Examples
     --------
     `compensate` makes it.
@@ -60,9 +51,13 @@ class Compensation:
     """
 
     motion: JointMotion
+    """Same stamps as the nominal commands."""
     before: Array
     after: Array
+    """Tool minus wanted, linear part first, with the nominal and the compensated commands, shape
+    (N, 6) [m, rad]."""
     left_out: tuple[Effect, ...]
+    """Effects of the model that no joint command can mend."""
 
     @property
     def rms(self) -> tuple[float, float]:

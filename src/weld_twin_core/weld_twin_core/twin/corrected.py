@@ -65,12 +65,6 @@ def joint_offsets(robot: Robot, effects: Sequence[Effect]) -> np.ndarray:
 
     The joint really stands this much further than its reading; a controller that keeps its
     own offsets adds it to the reading.
-
-    Parameters
-    ----------
-    robot : Robot
-    effects : sequence of Effect
-
     """
     out = np.zeros(robot.n)
     for effect in effects:

@@ -58,37 +58,24 @@ class Outside(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Domain:
-    """
-    What the recordings have shown.
-
-    Attributes
-    ----------
-    ranges : tuple of tuple of (float, float)
-        For every joint, where it was measured: separate intervals, in order [rad or m]; angles
-        within half a turn of their median.
-    margins : tuple of float
-        How far beyond an interval a joint still counts as recorded there [rad or m].
-    turns : tuple of bool
-        Joints whose angle means the same after a full turn.
-    speeds : tuple of float, optional
-        Fastest measured motion of every joint [rad/s or m/s]; None for stations at rest.
-    load : tuple of float, optional
-        Largest force [N] and torque [N m] on the tool; None where no wrench was recorded.
-    temperature : tuple of float, optional
-        Lowest and highest [degC]; None where it was not recorded.
-    spots : Spots, optional
-        The places that were touched; None where an instrument measured.
-
-    """
+    """What the recordings have shown."""
 
     joints: tuple[str, ...]
     ranges: tuple[tuple[tuple[float, float], ...], ...]
+    """For every joint, where it was measured: separate intervals, in order [rad or m]; angles
+    within half a turn of their median."""
     margins: tuple[float, ...]
+    """How far beyond an interval a joint still counts as recorded there [rad or m]."""
     turns: tuple[bool, ...]
+    """Joints whose angle means the same after a full turn."""
     speeds: tuple[float, ...] | None = None
+    """Fastest measured motion of every joint [rad/s or m/s]; None for stations at rest."""
     load: tuple[float, float] | None = None
+    """Largest force [N] and torque [N m] on the tool; None where no wrench was recorded."""
     temperature: tuple[float, float] | None = None
+    """Lowest and highest [degC]; None where it was not recorded."""
     spots: Spots | None = None
+    """The places that were touched; None where an instrument measured."""
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], robot: Robot) -> Domain:
@@ -120,10 +107,7 @@ class Domain:
 
         Angles count modulo a full turn.
 
-        Parameters
-        ----------
-        q : array, shape (M, n)
-
+        q: shape (M, n).
         """
         out = np.empty(q.shape)
         for i, intervals in enumerate(self.ranges):
@@ -144,14 +128,9 @@ class Domain:
         the square of the correction over that square and the variance of what it is based on, so
         that a correction smaller than its own uncertainty is mostly left away.
 
-        Parameters
-        ----------
-        q : array, shape (M, n)
-        correction : array, shape (M, 3) [m]
-            By how much the model would move the tool.
-        covariance : array, shape (M, 3, 3) [m^2]
-            Of the position that the model gives.
-
+        q: shape (M, n).
+        correction: by how much the model would move the tool, shape (M, 3) [m].
+        covariance: of the position that the model gives, shape (M, 3, 3) [m^2].
         """
         size = (correction**2).sum(axis=1)
         doubt = np.trace(covariance, axis1=1, axis2=2)
@@ -171,13 +150,9 @@ class Domain:
         """
         Return the stretches of a motion that lie outside what was recorded, by reason.
 
-        Parameters
-        ----------
-        q, qd : array, shape (M, n)
-            ``qd`` is left out for stations at rest.
-        wrench : array, shape (M, 6), optional [N, N m]
-        temperature : array, shape (M,), optional [degC]
-
+        q, qd: ``qd`` is left out for stations at rest, shape (M, n).
+        wrench: shape (M, 6) [N, N m].
+        temperature: shape (M,) [degC].
         """
         looks = [*self._postures(q)]
         if qd is not None:

@@ -18,15 +18,9 @@ def with_expected_effort(recording: Recording, robot: Robot, load_of_effort: flo
     """
     Return a motion with the effort that the model's statics expect, where efforts are measured.
 
-    Parameters
-    ----------
-    recording : Recording
-        A motion that is thought of: a measurement to come, postures elsewhere.
-    robot : Robot
-        Links without masses weigh nothing.
-    load_of_effort : float
-        Load torque for each N m of effort, 1 or -1; of 0 the motion stays as it is.
-
+    recording: a motion that is thought of: a measurement to come, postures elsewhere.
+    robot: links without masses weigh nothing.
+    load_of_effort: load torque for each N m of effort, 1 or -1; of 0 the motion stays as it is.
     """
     if not load_of_effort:
         return recording

@@ -31,15 +31,10 @@ class Features:
     """
     First-order features of effects, for one recording and one set of stamps.
 
-    Parameters
-    ----------
-    twin : Twin
-        Where the features are taken: its effects act, the ones asked about come on top.
-    at : array, shape (M,) [s]
-    remembered : dict, optional
-        Keeps what effects with memory make of the commanded motion, which no frame and no other
-        effect changes. Features of one recording at other models may share it.
-
+    twin: where the features are taken: its effects act, the ones asked about come on top.
+    at: shape (M,) [s].
+    remembered: keeps what effects with memory make of the commanded motion, which no frame and no
+    other effect changes. Features of one recording at other models may share it.
     """
 
     def __init__(
@@ -134,13 +129,8 @@ class Features:
         """
         Return the instances a search for this kind of effect starts from, and among how many.
 
-        Parameters
-        ----------
-        joint : str or None
-            The joint it would sit on; None for the robot as a whole.
-        pull : array, shape (M,), optional
-            How strongly what is to be explained pulls at the joint.
-
+        joint: the joint it would sit on; None for the robot as a whole.
+        pull: how strongly what is to be explained pulls at the joint, shape (M,).
         """
         view = self.joint_view if kind.stage in (Stage.SERVO, Stage.PLAY) else self.view
         seeds = list(kind.seeds(view, joint, pull))

@@ -59,88 +59,54 @@ SMOOTH_SPEED = 1.875
 
 
 class GoalLimits(NamedTuple):
-    """
-    What a correction may do at most.
-
-    Attributes
-    ----------
-    length, turn : float [m, rad]
-        By how much a pose may be moved.
-    rate, turn_rate : float [m/s, rad/s]
-        How fast that may change.
-    acceleration : float [rad/s^2 or m/s^2]
-        Of a joint in the corrected goal, beside what the robot file says.
-
-    """
+    """What a correction may do at most."""
 
     length: float = 2e-3
     turn: float = np.pi / 180.0
+    """By how much a pose may be moved [m, rad]."""
     rate: float = 0.05
     turn_rate: float = 0.2
+    """How fast that may change [m/s, rad/s]."""
     acceleration: float = np.inf
+    """Of a joint in the corrected goal, beside what the robot file says [rad/s^2 or m/s^2]."""
 
 
 class Start(NamedTuple):
-    """
-    Where the arm is when a goal comes.
-
-    Attributes
-    ----------
-    q : array, shape (n,), optional [rad or m]
-        As commanded; None where it is not known.
-    came : array, shape (n,), optional
-        Sign of the last motion of every joint; 0 where it is not known.
-
-    """
+    """Where the arm is when a goal comes."""
 
     q: Array | None = None
+    """As commanded, shape (n,) [rad or m]; None where it is not known."""
     moving: bool = False
     came: Array | None = None
+    """Sign of the last motion of every joint, shape (n,); 0 where it is not known."""
 
 
 class Refusal(NamedTuple):
-    """
-    A goal that is not corrected.
-
-    Attributes
-    ----------
-    largest : (float, float), optional [m, rad]
-        The correction that it would have taken.
-
-    """
+    """A goal that is not corrected."""
 
     reason: str
     largest: tuple[float, float] | None = None
+    """The correction that it would have taken [m, rad]."""
 
 
 @dataclass(frozen=True, eq=False)
 class CorrectedGoal:
-    """
-    A corrected goal and what is expected of it.
-
-    Attributes
-    ----------
-    added : array, shape (N, 6) [m, rad]
-        What was added to the pose at every point, in the axes of the robot's base.
-    before, after : float [m]
-        Expected RMS distance of the real tool from where the goal means it.
-    bound : float, optional [m]
-        Largest distance on the way that is told beforehand not to be exceeded; None where the model
-        says nothing of how sure it is.
-    waits : float [s]
-        How much later the goal begins, so that the correction sets in smoothly.
-    notes : tuple of str
-        What is not corrected, in sentences.
-
-    """
+    """A corrected goal and what is expected of it."""
 
     goal: Goal
     added: Array
+    """What was added to the pose at every point, in the axes of the robot's base, shape (N, 6) [m,
+    rad]."""
     before: float
     after: float
+    """Expected RMS distance of the real tool from where the goal means it [m]."""
     bound: float | None
+    """Largest distance on the way that is told beforehand not to be exceeded [m]; None where the
+    model says nothing of how sure it is."""
     waits: float = 0.0
+    """How much later the goal begins, so that the correction sets in smoothly [s]."""
     notes: tuple[str, ...] = ()
+    """What is not corrected, in sentences."""
 
     @property
     def largest(self) -> tuple[float, float]:
@@ -158,18 +124,8 @@ def corrected_goal(
     """
     Return a goal corrected at every point, or why it is not.
 
-    Parameters
-    ----------
-    model : ProgramModel
-    goal : Goal
-    limits : GoalLimits, optional
-    start : Start, optional
-
-    Raises
-    ------
-    DataError
-        The goal is none: no point, times that do not increase, numbers that are not finite.
-
+    Raises DataError: the goal is none: no point, times that do not increase, numbers that are not
+    finite.
     """
     checked = goal.checked(model.robot.n)
     work = _Work(model, checked, limits or GoalLimits(), start or Start())

@@ -19,33 +19,22 @@ MOST = 1500
 
 
 class Goal(NamedTuple):
-    """
-    Points in joint space.
-
-    Attributes
-    ----------
-    t : array, shape (N,) [s]
-        From the start of the goal; not negative, increasing.
-    q : array, shape (N, n) [rad or m]
-    qd, qdd : array, shape (N, n), optional [per s, per s^2]
-        Accelerations only where there are velocities.
-
-    """
+    """Points in joint space."""
 
     t: Array
+    """From the start of the goal, shape (N,) [s]; not negative, increasing."""
     q: Array
+    """Shape (N, n) [rad or m]."""
     qd: Array | None = None
     qdd: Array | None = None
+    """Accelerations only where there are velocities, shape (N, n) [per s, per s^2]."""
 
     def checked(self, joints: int) -> Goal:
         """
         Return the goal as finite arrays of the shapes they should have.
 
-        Raises
-        ------
-        DataError
-            There is no point, a shape or a number is wrong, or the times do not increase.
-
+        Raises DataError: there is no point, a shape or a number is wrong, or the times do not
+        increase.
         """
         t = readonly(self.t, (None,), 'time_from_start')
         if t.size == 0:
@@ -89,10 +78,7 @@ def course(goal: Goal, at: Array) -> Course:
     """
     Return the motion through the points: straight, cubic or quintic, by what the points tell.
 
-    Parameters
-    ----------
-    at : array, shape (K,) [s]
-        Within the goal.
+    at: within the goal, shape (K,) [s].
 
     References
     ----------

@@ -52,15 +52,11 @@ class LivePosterior:
         """
         Return the covariance of the true pose, shape (6, 6), held between two looks.
 
-        Parameters
-        ----------
-        t : float [s]
-            Stamp of the joint state.
-        q : array, shape (n,)
-        wrench : array, shape (6,), optional [N, N m]
-        temperature : float, optional [degC]
-        effort : array, shape (n,), optional [N m, or N of a slide]
-
+        t: stamp of the joint state [s].
+        q: shape (n,).
+        wrench: shape (6,) [N, N m].
+        temperature: [degC]
+        effort: shape (n,) [N m, or N of a slide].
         """
         since = t - self._time
         if self._q is None or since < 0.0:

@@ -35,13 +35,8 @@ def run_all(
     """
     Return displacements of the joints, shape (..., N, n) or None, and their derivatives.
 
-    Parameters
-    ----------
-    view : View
-        The commanded motion on the joint stamps.
-    want : bool
-        Whether derivatives are wanted.
-
+    view: the commanded motion on the joint stamps.
+    want: whether derivatives are wanted.
     """
     moved: Array | None = None
     tangents: list[Tangent] = []

@@ -51,23 +51,15 @@ LEVER = 0.5
 
 
 class Looked(NamedTuple):
-    """
-    An exact correction.
-
-    Attributes
-    ----------
-    pose : array, shape (4, 4)
-        The pose that was wanted, in the robot's base.
-    values : array, shape (6 + n,)
-        What takes it to where the tool is to be commanded [m, rad], and the joints there.
-    slope : array, shape (6 + n, 6)
-        How those change with the pose.
-
-    """
+    """An exact correction."""
 
     pose: Array
+    """The pose that was wanted, in the robot's base, shape (4, 4)."""
     values: Array
+    """What takes it to where the tool is to be commanded [m, rad], and the joints there, shape (6
+    + n,)."""
     slope: Array
+    """How those change with the pose, shape (6 + n, 6)."""
 
     @property
     def added(self) -> Array:
@@ -84,13 +76,9 @@ class PoseCorrection:
     """
     The correction of poses of a tool that follow each other.
 
-    Parameters
-    ----------
-    model : ProgramModel
-        Its effects without memory are corrected; a stream does not tell where a joint will turn.
-    tool : array, shape (4, 4)
-        ``T_flange_tool`` that the poses are given for.
-
+    model: its effects without memory are corrected; a stream does not tell where a joint will
+    turn.
+    tool: ``T_flange_tool`` that the poses are given for, shape (4, 4).
     """
 
     def __init__(self, model: ProgramModel, tool: Array) -> None:
@@ -129,11 +117,7 @@ class PoseCorrection:
         Its joints are those at which the real tool is at the pose: Newton, with the real arm's own
         slope. What is added takes the pose to where the nominal arm has the tool at them.
 
-        Raises
-        ------
-        DataError
-            It cannot be reached from there.
-
+        Raises DataError: it cannot be reached from there.
         """
         q, size = near, np.inf
         for _ in range(ROUNDS):
@@ -158,11 +142,7 @@ class PoseCorrection:
         """
         Return the exact correction of a pose, found from the latest one.
 
-        Raises
-        ------
-        DataError
-            It cannot be reached.
-
+        Raises DataError: it cannot be reached.
         """
         return self.first(pose, self.joints(pose))
 
@@ -187,9 +167,7 @@ class PoseCorrection:
         """
         Return what is to be added to a pose, and how far the latest look is.
 
-        Parameters
-        ----------
-        pose : array, shape (4, 4)
+        pose: shape (4, 4).
 
         Returns
         -------

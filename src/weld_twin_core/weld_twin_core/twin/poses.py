@@ -19,12 +19,6 @@ class Poses(NamedTuple):
     """
     Tool poses in the world frame.
 
-    Attributes
-    ----------
-    position : array, shape (..., M, 3) [m]
-    rotation : array, shape (..., M, 3, 3)
-        ``R_world_tool``.
-
     Examples
     --------
     >>> import numpy as np
@@ -36,7 +30,9 @@ class Poses(NamedTuple):
     """
 
     position: Array
+    """Shape (..., M, 3) [m]."""
     rotation: Array
+    """``R_world_tool``, shape (..., M, 3, 3)."""
 
     @property
     def matrices(self) -> Array:

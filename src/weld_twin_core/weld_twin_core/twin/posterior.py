@@ -54,28 +54,18 @@ CURVE = 'curve of '
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """
-    What may differ between the models that the recordings allow.
-
-    Attributes
-    ----------
-    frames : tuple of str
-        Of 'base' and 'tool', those that were fitted; six coordinates each (xyz, rotvec), the
-        base once for every set-up.
-    setups : int
-        Number of base frames.
-    effects : tuple of Effect
-        Each with all its fit coordinates, as instances at which derivatives are taken.
-    knots : tuple of array, shapes (K,) [rad or m]
-        For every joint, where the heights of a curve of its own angle are coordinates: straight
-        lines between, nothing beyond. Evenly spaced; none for no curve.
-
-    """
+    """What may differ between the models that the recordings allow."""
 
     frames: tuple[str, ...]
+    """Of 'base' and 'tool', those that were fitted; six coordinates each (xyz, rotvec), the base
+    once for every set-up."""
     setups: int
+    """Number of base frames."""
     effects: tuple[Effect, ...]
+    """Each with all its fit coordinates, as instances at which derivatives are taken."""
     knots: tuple[Array, ...] = ()
+    """For every joint, where the heights of a curve of its own angle are coordinates: straight
+    lines between, nothing beyond [rad or m]. Evenly spaced; none for no curve."""
 
     def __post_init__(self) -> None:
         knots = tuple(readonly(k, (None,), 'knots') for k in self.knots)
@@ -169,35 +159,23 @@ def _hats(q: Array, knots: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Discrepancy:
-    """
-    What no parameter explains.
-
-    Attributes
-    ----------
-    position : float [m]
-        Standard deviation per axis of what is left over at the tool, alike everywhere.
-    orientation : float [rad]
-        The same about each axis.
-    gears : array, shape (n,) [rad or m]
-        What is left over in every joint where it was recorded; it reaches the tool by the
-        joint's lever.
-    curves : array, shape (n,) [rad or m]
-        How far every joint may be off its reading, on top of that, where it was never seen: gear
-        errors too fine to be carried over.
-    reach : float [rad or m]
-        Distance beyond what was recorded at which a curve counts in full.
-    turns : array, shape (n,), optional [rad or m]
-        How far every joint may be off, on top of that, where it has just turned around: laws of lost
-        motion differ there alone. None for nothing.
-
-    """
+    """What no parameter explains."""
 
     position: float
+    """Standard deviation per axis of what is left over at the tool, alike everywhere [m]."""
     orientation: float
+    """The same about each axis [rad]."""
     gears: Array
+    """What is left over in every joint where it was recorded, shape (n,) [rad or m]; it reaches
+    the tool by the joint's lever."""
     curves: Array
+    """How far every joint may be off its reading, on top of that, where it was never seen: gear
+    errors too fine to be carried over, shape (n,) [rad or m]."""
     reach: float
+    """Distance beyond what was recorded at which a curve counts in full [rad or m]."""
     turns: Array | None = None
+    """How far every joint may be off, on top of that, where it has just turned around: laws of
+    lost motion differ there alone, shape (n,) [rad or m]. None for nothing."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'gears', readonly(self.gears, (None,), 'gears'))
@@ -209,15 +187,9 @@ class Discrepancy:
         """
         Return its part of the covariance, shape (M, 6, 6).
 
-        Parameters
-        ----------
-        joint_columns : array, shape (n, 6, M)
-            d pose / d joint.
-        beyond : array, shape (M, n)
-            How far every joint is from where it was recorded.
-        turned : array of bool, shape (M, n)
-            Whether it has just turned around.
-
+        joint_columns: d pose / d joint, shape (n, 6, M).
+        beyond: how far every joint is from where it was recorded, shape (M, n).
+        turned: whether it has just turned around, shape (M, n).
         """
         everywhere, gears = self.sizes(beyond, turned)
         moved = joint_columns * gears[:, None]
@@ -229,13 +201,8 @@ class Discrepancy:
         """
         Return standard deviations at the tool, shape (M, 6), and in every joint, shape (n, M).
 
-        Parameters
-        ----------
-        beyond : array, shape (M, n)
-            How far every joint is from where it was recorded.
-        turned : array of bool, shape (M, n)
-            Whether it has just turned around.
-
+        beyond: how far every joint is from where it was recorded, shape (M, n).
+        turned: whether it has just turned around, shape (M, n).
         """
         apart = np.minimum(beyond.T / self.reach, 1.0)
         grown = 1.0 + (ELSEWHERE - 1.0) * apart
@@ -247,45 +214,32 @@ class Discrepancy:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """
-    The models that the recordings allow, about the one that was fitted.
-
-    Attributes
-    ----------
-    mean : array, shape (P,)
-        Where the middle of the allowed models lies, counted from the fitted one.
-    covariance : array, shape (P, P)
-    domain : Domain
-        What was recorded.
-    left_open : tuple of str
-        Directions that the recordings do not show, in words; they are as they were given.
-    recorded_m, anywhere_m : float
-        Standard deviation of position in its worst direction [m], in the middle of the postures
-        that were recorded and of those that the joints' limits allow.
-    prior_std : array, shape (P,), optional
-        Standard deviation of every coordinate on machines at large.
-    single : (array, shape (P,), array, shape (P, P)), optional
-        Mean and covariance under that one prior, of which it can be taken off again: what the data
-        alone say. ``mean`` and ``covariance`` are weighed over many.
-    middle : float
-        How far to go from the fitted model to the middle to predict best, from 0 to 1.
-    region : (str, float), optional
-        A region that was asked for, as it was told, and the same standard deviation there [m].
-
-    """
+    """The models that the recordings allow, about the one that was fitted."""
 
     directions: Directions
     mean: Array
+    """Where the middle of the allowed models lies, counted from the fitted one, shape (P,)."""
     covariance: Array
+    """Shape (P, P)."""
     discrepancy: Discrepancy
     domain: Domain
+    """What was recorded."""
     left_open: tuple[str, ...] = ()
+    """Directions that the recordings do not show, in words; they are as they were given."""
     recorded_m: float = 0.0
     anywhere_m: float = 0.0
+    """Standard deviation of position in its worst direction [m], in the middle of the postures
+    that were recorded and of those that the joints' limits allow."""
     prior_std: Array | None = None
+    """Standard deviation of every coordinate on machines at large, shape (P,)."""
     single: tuple[Array, Array] | None = None
+    """Mean and covariance under that one prior, of which it can be taken off again: what the data
+    alone say, shape (P,), array, shape (P, P)). ``mean`` and ``covariance`` are weighed over
+    many."""
     region: tuple[str, float] | None = None
+    """A region that was asked for, as it was told, and the same standard deviation there [m]."""
     middle: float = 0.0
+    """How far to go from the fitted model to the middle to predict best, from 0 to 1."""
 
     def __post_init__(self) -> None:
         count = self.directions.count
@@ -301,11 +255,7 @@ class Posterior:
         """
         Return a factor S, shape (P, R), with S S' the covariance.
 
-        Raises
-        ------
-        DataError
-            A variance is negative.
-
+        Raises DataError: a variance is negative.
         """
         size = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         unit = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
@@ -324,11 +274,7 @@ class Posterior:
         Position first [m^2], then turns about the world's fixed axes [rad^2]; without the noise
         of the instrument that will measure it.
 
-        Raises
-        ------
-        ModelError
-            There is no such base frame.
-
+        Raises ModelError: there is no such base frame.
         """
         moved, rest = self._ways(features, setup)
         return np.asarray(np.einsum('rim,rjm->mij', moved, moved, optimize=True) + rest)
@@ -359,15 +305,10 @@ class Posterior:
 
         Zero where the models differ by other coordinates than its own, as waves of a joint do.
 
-        Parameters
-        ----------
-        effect : Effect
-            Of the fitted model.
-        instead : collection of (str, str), optional
-            Names and joints of effects that may be at work in its place. Its size is told for the
-            case that it is the one and they are not, so it is that given theirs (conditional
-            covariance of a normal vector, e.g. Bishop 2006, eq. 2.82).
-
+        effect: of the fitted model.
+        instead: names and joints of effects that may be at work in its place. Its size is told for
+        the case that it is the one and they are not, so it is that given theirs (conditional
+        covariance of a normal vector, e.g. Bishop 2006, eq. 2.82).
         """
         what = self.directions
         for mine, here in zip(what.effects, what.own, strict=True):
@@ -421,11 +362,7 @@ class Posterior:
         recordings say of these is kept here. Frames go along. A parameter that bends the twin, and
         the height of a curve, stay.
 
-        Parameters
-        ----------
-        result : sequence of Effect
-            Of the fitted model.
-
+        result: of the fitted model.
         """
         if self.middle == 0.0:
             return tuple(result), self
@@ -453,13 +390,8 @@ class Posterior:
         """
         Return how sure a model will be once its poses were measured too, and it was fitted anew.
 
-        Parameters
-        ----------
-        features : Features
-            Of the stations, in the set-up that was recorded.
-        noise : float [m]
-            Standard deviation of a measured coordinate.
-
+        features: of the stations, in the set-up that was recorded.
+        noise: standard deviation of a measured coordinate [m].
         """
         columns = self._columns(features, 0)[:, :3].transpose(0, 2, 1)
         own = self.discrepancy.covariance(*self._levers(features))[:, :3, :3]
@@ -485,11 +417,7 @@ class Posterior:
         with the frames that were fitted to it: their second moment is that of `pose_covariance`. Then
         of the arm between its own base and flange, which such frames hide.
 
-        Raises
-        ------
-        ModelError
-            There is no such base frame.
-
+        Raises ModelError: there is no such base frame.
         """
         unit = np.random.default_rng(SEED).standard_normal
         own, joints = unit((count, 3)), unit((count, features.twin.robot.n))
@@ -512,10 +440,7 @@ class Posterior:
 
         Springs that go by measured efforts are told those that the model's statics expect.
 
-        Parameters
-        ----------
-        q : array, shape (M, n)
-
+        q: shape (M, n).
         """
         t, warm = np.arange(float(len(q))), self.domain.temperature
         stations = Recording(
@@ -548,20 +473,12 @@ class Posterior:
 
 
 class Drawn(NamedTuple):
-    """
-    By how much the models that the recordings allow are off the fitted one along a motion.
-
-    Attributes
-    ----------
-    near : array of int, shape (N,)
-        The nearest of some places of the motion for every sample.
-    off : array, shape (K, 2, D, 3) [m]
-        At the places, as `Posterior.drawn` returns it.
-
-    """
+    """By how much the models that the recordings allow are off the fitted one along a motion."""
 
     near: NDArray[np.int_]
+    """The nearest of some places of the motion for every sample, shape (N,)."""
     off: Array
+    """At the places, as `Posterior.drawn` returns it, shape (K, 2, D, 3) [m]."""
 
     def where(self, keep: NDArray[np.bool_]) -> Drawn:
         """Return some of the samples."""
@@ -585,14 +502,9 @@ def pose_covariances(
     """
     Return `Posterior.pose_covariance` of a long motion, shape (M, 6, 6), in pieces.
 
-    Parameters
-    ----------
-    twin : Twin
-        The fitted model for this recording.
-    at : array, shape (M,) [s]
-    setup : int
-        Which base frame of the posterior.
-
+    twin: the fitted model for this recording.
+    at: shape (M,) [s].
+    setup: which base frame of the posterior.
     """
     parts = [
         posterior.pose_covariance(Features(twin, recording, piece), setup) for piece in _pieces(at)
@@ -609,10 +521,7 @@ def usual_sigma(posterior: Posterior, twin: Twin, q: Array) -> float:
     """
     Return the median of `largest_sigma` over postures at rest [m].
 
-    Parameters
-    ----------
-    q : array, shape (M, n)
-
+    q: shape (M, n).
     """
     still = posterior.at_rest(twin, q)
     return float(

@@ -22,32 +22,22 @@ leaves to chance, five in a hundred."""
 
 
 class Accuracy(NamedTuple):
-    """
-    Distance of the real tool from where it is wanted [m].
-
-    Attributes
-    ----------
-    rms : float
-        Expected; what the model is not sure of adds to it.
-    worst : float
-        By the model's own prediction.
-    low, high : float or None
-        Nine of ten models that the recordings allow, and the one found, have their RMS between these,
-        in the set-up recorded and in the robot's own base; None where the model says nothing of how
-        sure it is.
-    same : (float, float) or None
-        The same in the set-up that was recorded.
-    worsts : array, shape (2, D), optional [m]
-        Largest distance under every model drawn, in the set-up recorded and in the robot's own base.
-
-    """
+    """Distance of the real tool from where it is wanted [m]."""
 
     rms: float
+    """Expected; what the model is not sure of adds to it."""
     worst: float
+    """By the model's own prediction."""
     low: float | None = None
     high: float | None = None
+    """Nine of ten models that the recordings allow, and the one found, have their RMS between
+    these, in the set-up recorded and in the robot's own base; None where the model says nothing of
+    how sure it is."""
     same: tuple[float, float] | None = None
+    """The same in the set-up that was recorded."""
     worsts: Array | None = None
+    """Largest distance under every model drawn, in the set-up recorded and in the robot's own
+    base, shape (2, D) [m]."""
 
     def within(self, tolerance: float) -> float | None:
         """Return the probability that the tool stays within a tolerance [m] all the way."""
@@ -84,15 +74,9 @@ def accuracy(
     """
     Return the accuracy over samples, or None without any.
 
-    Parameters
-    ----------
-    gaps : sequence of array, each of shape (N, 6) [m, rad]
-        What is missing by the model.
-    drawn : sequence of Drawn or None
-        Of the same samples.
-    ways : sequence of array, each of shape (N,), optional [m]
-        How much of the way each sample stands for; all alike without.
-
+    gaps: what is missing by the model, shape (N, 6) [m, rad].
+    drawn: of the same samples.
+    ways: how much of the way each sample stands for, shape (N,) [m]; all alike without.
     """
     gap = np.concatenate([np.zeros((0, 3)), *(g[:, :3] for g in gaps)])
     if not len(gap):

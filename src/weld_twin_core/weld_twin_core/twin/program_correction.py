@@ -60,71 +60,47 @@ class Caps(NamedTuple):
 
 
 class MoveResult(NamedTuple):
-    """
-    What a correction does to one move.
-
-    Attributes
-    ----------
-    length, turn : float
-        How far the place it leads to was moved [m, rad].
-    before, after : float or None [m]
-        Expected distance of the real tool from that place; None where the move could not be
-        followed.
-    outside : str
-        Why the move leaves what was recorded; empty where it does not.
-    sigma : float or None [m]
-        Standard deviation of where the real tool will be, in its worst direction; None where the
-        model says nothing of how sure it is.
-
-    """
+    """What a correction does to one move."""
 
     length: float
     turn: float
+    """How far the place it leads to was moved [m, rad]."""
     before: float | None = None
     after: float | None = None
+    """Expected distance of the real tool from that place [m]; None where the move could not be
+    followed."""
     outside: str = ''
+    """Why the move leaves what was recorded; empty where it does not."""
     sigma: float | None = None
+    """Standard deviation of where the real tool will be, in its worst direction [m]; None where
+    the model says nothing of how sure it is."""
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramCorrection:
-    """
-    A corrected program and what is expected of it.
-
-    Attributes
-    ----------
-    program : MoveProgram
-        With the points moved.
-    travel : Travel
-        The motion of the program as it was.
-    left : dict of int to str
-        Seams that were left as they were, with the reason.
-    calm : dict of int to str
-        Seams that were corrected without play, friction and lag, with the reason.
-    held : frozenset of int
-        Points that were not moved.
-    before, after : tuple of array, each of shape (N, 6) [m, rad]
-        What is missing to the real tool at every sample of every piece, with what no program mends.
-    ways : tuple of array, each of shape (N,) [m]
-        How far the tool goes to every sample.
-    covariances : tuple of array or None, each of shape (N, 6, 6)
-        In the set-up that was recorded.
-    results : tuple of MoveResult
-        One for every move, in the order of the program.
-
-    """
+    """A corrected program and what is expected of it."""
 
     program: MoveProgram
+    """With the points moved."""
     travel: Travel
+    """The motion of the program as it was."""
     left: dict[int, str]
+    """Seams that were left as they were, with the reason."""
     calm: dict[int, str]
+    """Seams that were corrected without play, friction and lag, with the reason."""
     held: frozenset[int]
+    """Points that were not moved."""
     before: tuple[Array, ...]
     after: tuple[Array, ...]
+    """What is missing to the real tool at every sample of every piece, with what no program mends,
+    shape (N, 6) [m, rad]."""
     ways: tuple[Array, ...]
+    """How far the tool goes to every sample, shape (N,) [m]."""
     covariances: tuple[Array | None, ...]
+    """In the set-up that was recorded, shape (N, 6, 6)."""
     drawn: tuple[Drawn | None, ...]
     results: tuple[MoveResult, ...]
+    """One for every move, in the order of the program."""
 
 
 def correct_program(
@@ -139,15 +115,9 @@ def correct_program(
     """
     Return a program whose points are moved so that the real tool goes where it was to go.
 
-    Parameters
-    ----------
-    held : dict of int to str, optional
-        Points that must not be moved, with the reason; their seams are left as they were.
-    start : array, shape (n,), optional
-        Joint positions before the first move.
-    written : callable, optional
-        Returns points as they read once they are written; a language has only so many digits.
-
+    held: points that must not be moved, with the reason; their seams are left as they were.
+    start: joint positions before the first move, shape (n,).
+    written: returns points as they read once they are written; a language has only so many digits.
     """
     way = travel(model.robot, program, start, model.recorded if model.posterior else None)
     work = _Work(model, program, way, caps or Caps(), model.without_memory(), written)
@@ -288,15 +258,9 @@ class _Work(NamedTuple):
         """
         Return how far a place moved [m, rad].
 
-        Parameters
-        ----------
-        moved : MoveProgram
-            The corrected program.
-        use : Use
-            Where the place is used.
-        tool : array, shape (4, 4)
-            The tool frame there.
-
+        moved: the corrected program.
+        use: where the place is used.
+        tool: the tool frame there, shape (4, 4).
         """
         old, new = self.program.place(use), moved.place(use)
         if old.ndim == 1:

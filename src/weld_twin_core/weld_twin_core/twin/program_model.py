@@ -30,31 +30,20 @@ TOOL_EFFECT = 'tool_pose'
 
 @dataclass(frozen=True, eq=False)
 class ProgramModel:
-    """
-    What acts on the arm that runs a program.
-
-    Attributes
-    ----------
-    robot : Robot
-        Nominal, with its own base and the tool that the effects were found with.
-    temperature : float, optional [degC]
-        While the program runs.
-    setup : int
-        Which base frame of the posterior.
-    wrench : array, shape (6,), optional [N, N m]
-        On the tool meanwhile, in ``wrench_frame``.
-    wrench_frame : str
-        'tool' or 'base'.
-
-    """
+    """What acts on the arm that runs a program."""
 
     robot: Robot
+    """Nominal, with its own base and the tool that the effects were found with."""
     effects: tuple[Effect, ...]
     posterior: Posterior | None = None
     temperature: float | None = None
+    """While the program runs [degC]."""
     setup: int = 0
+    """Which base frame of the posterior."""
     wrench: Array | None = None
+    """On the tool meanwhile, in ``wrench_frame``, shape (6,) [N, N m]."""
     wrench_frame: str = 'tool'
+    """'tool' or 'base'."""
     _twins: dict[tuple[bytes, bool], Twin] = field(default_factory=dict, repr=False)
 
     @property

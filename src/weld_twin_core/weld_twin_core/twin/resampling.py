@@ -14,11 +14,7 @@ class Picker:
     """
     Straight-line interpolation from joint stamps to measurement stamps, draws and all.
 
-    Parameters
-    ----------
-    t : array, shape (M,) or (D, M) [s]
-        Where to look; static stations give the nearest in time.
-
+    t: where to look, shape (M,) or (D, M) [s]; static stations give the nearest in time.
     """
 
     def __init__(self, motion: JointMotion, t: Array) -> None:

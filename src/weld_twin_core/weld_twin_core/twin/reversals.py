@@ -57,13 +57,8 @@ def approached(recording: Recording, came: Array | None, stands: Array | None = 
     """
     Return a recording that begins with a motion to its first sample from where joints came.
 
-    Parameters
-    ----------
-    came : array, shape (n,), optional
-        Sign of the last motion of every joint; 0 where it is not known.
-    stands : array, shape (n,), optional [rad or m]
-        Where that motion ended; left out, at the first sample.
-
+    came: sign of the last motion of every joint, shape (n,); 0 where it is not known.
+    stands: where that motion ended, shape (n,) [rad or m]; left out, at the first sample.
     """
     motion = recording.joints
     way = np.zeros((0, motion.q.shape[1]))
@@ -87,13 +82,9 @@ def play_steps(
     """
     Return what takes play away at every sample, as steps, shape (K, n) [rad or m].
 
-    Parameters
-    ----------
-    recording : Recording
-        The motion that the joints are to make behind the gaps.
-    came : array, shape (n,), optional
-        Sign of the last motion of every joint before the first sample; 0 where it is not known.
-
+    recording: the motion that the joints are to make behind the gaps.
+    came: sign of the last motion of every joint before the first sample, shape (n,); 0 where it is
+    not known.
     """
     motion = recording.joints
     steps = np.zeros_like(motion.q)
@@ -116,20 +107,12 @@ def spread(
     """
     Return steps spread over the standstill of each reversal, looked up at stamps.
 
-    Parameters
-    ----------
-    steps : array, shape (K, n) [rad or m]
-        From `play_steps`, at the samples of the course.
-    share : float
-        How far a joint may be from where it turns around while its step is made, in units of
-        what is added for play at most.
-    at : array, shape (N,) [s]
-        Samples of the course.
-    came : array, shape (n,), optional
-        As for `play_steps`.
-    rests : bool
-        The arm stands still before the first sample, and makes its first steps there.
-
+    steps: from `play_steps`, at the samples of the course, shape (K, n) [rad or m].
+    share: how far a joint may be from where it turns around while its step is made, in units of
+    what is added for play at most.
+    at: samples of the course, shape (N,) [s].
+    came: as for `play_steps`, shape (n,).
+    rests: the arm stands still before the first sample, and makes its first steps there.
     """
     out = Spread(*np.zeros((3, at.size, steps.shape[1])))
     place = np.searchsorted(course.t, at)

@@ -24,35 +24,22 @@ plate with sockets. Of an arm touched at one place alone, a third of the others 
 
 @dataclass(frozen=True, eq=False)
 class Spots:
-    """
-    Where contacts were, as the arm has it.
-
-    Attributes
-    ----------
-    robot : Robot
-        It says where a posture has the tool point.
-    at : array, shape (P, 3) [m]
-        The middle of every place, seen from the base.
-    reach : float [m]
-        How far from the nearest of them the model was tested: the greatest distance from a place
-        to the next, as each was foretold from the others.
-
-    """
+    """Where contacts were, as the arm has it."""
 
     robot: Robot
+    """It says where a posture has the tool point."""
     at: Array
+    """The middle of every place, seen from the base, shape (P, 3) [m]."""
     reach: float
+    """How far from the nearest of them the model was tested: the greatest distance from a place to
+    the next, as each was foretold from the others [m]."""
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], robot: Robot) -> Spots | None:
         """
         Return the places of contacts; None where an instrument measured.
 
-        Parameters
-        ----------
-        recordings : sequence of Recording
-            One for every place.
-
+        recordings: one for every place.
         """
         if any(recording.contacts is None for recording in recordings):
             return None

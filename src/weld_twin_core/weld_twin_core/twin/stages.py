@@ -64,10 +64,7 @@ class EffectStages:
         """
         Return how much later measurements are stamped than the instants they show.
 
-        Parameters
-        ----------
-        elapsed : array, shape (N,), or float [s]
-            Instants, since the first joint stamp.
+        elapsed: instants, since the first joint stamp, shape (N,), or float [s].
 
         Returns
         -------
@@ -85,13 +82,8 @@ class EffectStages:
         """
         Return how far before their stamps measurements show the robot, shape (..., N) [s].
 
-        Parameters
-        ----------
-        elapsed : array, shape (N,) [s]
-            Stamps of measurements, since the first joint stamp.
-        static : bool
-            The measurements are of stations at rest.
-
+        elapsed: stamps of measurements, since the first joint stamp, shape (N,) [s].
+        static: the measurements are of stations at rest.
         """
         still = np.zeros((1, self.robot.n))
         view = View(self.robot, elapsed, elapsed, still, still, static)
@@ -156,11 +148,7 @@ class EffectStages:
 
         (1 - C dtau/dq)^-1, the derivative of q = theta + C tau(q) by theta.
 
-        Parameters
-        ----------
-        view : View
-            Behind all stages, as `pointwise` leaves it.
-
+        view: behind all stages, as `pointwise` leaves it.
         """
         springs = [spring for spring in self.of_stage(Stage.ELASTIC) if spring.twin.settles]
         if not springs:

@@ -21,11 +21,8 @@ def just_turned(motion: JointMotion, at: Array) -> NDArray[np.bool_]:
     """
     Return whether joints turned around less than `TAKEN_UP` ago, shape (M, n).
 
-    Parameters
-    ----------
-    at : array, shape (M,) [s]
-        Stamps within it. Nothing has turned at rest at stations, or before a first turn.
-
+    at: stamps within it, shape (M,) [s]. Nothing has turned at rest at stations, or before a first
+    turn.
     """
     out = np.zeros((at.size, motion.q.shape[1]), dtype=bool)
     if motion.static:

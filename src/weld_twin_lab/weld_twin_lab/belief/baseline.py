@@ -38,11 +38,7 @@ def brief(row: Mapping[str, Any]) -> dict[str, Any]:
     """
     Return what is kept of a row: its truth and what was said, without the signs.
 
-    Parameters
-    ----------
-    row : mapping
-        As `trial.tried` gives it of this mix.
-
+    row: as `trial.tried` gives it of this mix.
     """
     if row['error']:
         return {'name': row['name'], 'error': row['error']}
@@ -81,36 +77,25 @@ def _brief(cause: Mapping[str, Any]) -> dict[str, Any]:
 
 
 class Scored(NamedTuple):
-    """
-    One case, scored.
-
-    Attributes
-    ----------
-    causes : int
-        At work.
-    named, modelled : tuple of bool
-        Of every visible cause that the library holds: is it in a set, is it in the model?
-    told : tuple of (float, bool, bool)
-        Of every cause told with a name: its probability, whether it is right, whether it is sure.
-    innocent : tuple of str
-        Places accused at which nothing is wrong.
-    disowned : bool
-        No cause is told although the model explains much on sealed data.
-    right, sure : bool
-        The whole answer.
-
-    """
+    """One case, scored."""
 
     name: str
     causes: int
+    """At work."""
     withheld: bool
     named: tuple[bool, ...]
     modelled: tuple[bool, ...]
+    """Of every visible cause that the library holds: is it in a set, is it in the model?"""
     told: tuple[tuple[float, bool, bool], ...]
+    """Of every cause told with a name: its probability, whether it is right, whether it is
+    sure."""
     innocent: tuple[str, ...]
+    """Places accused at which nothing is wrong."""
     disowned: bool
+    """No cause is told although the model explains much on sealed data."""
     right: bool
     sure: bool
+    """The whole answer."""
     confidence: float
     seconds: float
     status: str
@@ -120,11 +105,7 @@ def scored(row: Mapping[str, Any]) -> Scored:
     """
     Return a row held against its truth.
 
-    Parameters
-    ----------
-    row : mapping
-        As `brief` gives it, without an error.
-
+    row: as `brief` gives it, without an error.
     """
     truth, verdict = row['truth'], row['verdict']
     held = whole(truth, verdict)
@@ -184,11 +165,7 @@ def scores(rows: Sequence[Mapping[str, Any]]) -> dict[str, Estimate]:
     """
     Return the measures of an engine, each with its interval.
 
-    Parameters
-    ----------
-    rows : sequence of mappings
-        As `brief` gives them.
-
+    rows: as `brief` gives them.
     """
     cases = [
         scored(row) for row in rows if not row['error'] and row['verdict']['status'] != 'unsound'
@@ -233,11 +210,7 @@ def page(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
     """
     Return one table of the measures, a column for every engine.
 
-    Parameters
-    ----------
-    tables : mapping from str to rows
-        By the name of the engine.
-
+    tables: by the name of the engine.
     """
     each = {name: scores(rows) for name, rows in tables.items()}
     first = next(iter(each.values()))

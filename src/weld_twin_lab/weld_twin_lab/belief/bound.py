@@ -29,30 +29,19 @@ from weld_twin_core.arrays import Array
 
 
 class Bound(NamedTuple):
-    """
-    A threshold, and what is known of it.
-
-    Attributes
-    ----------
-    sure_from : float
-        Above 1 where no threshold keeps the risk: then nothing is told as sure.
-    wrong, cases : int
-        Sure and wrong at this threshold, of how many cases.
-    expected : float
-        Bound on the probability that one more such case is sure and wrong.
-    most : float
-        Upper limit of the share that is sure and wrong, with 90 % confidence.
-    sure : float
-        Share of the cases that are sure.
-
-    """
+    """A threshold, and what is known of it."""
 
     sure_from: float
+    """Above 1 where no threshold keeps the risk: then nothing is told as sure."""
     wrong: int
     cases: int
+    """Sure and wrong at this threshold, of how many cases."""
     expected: float
+    """Bound on the probability that one more such case is sure and wrong."""
     most: float
+    """Upper limit of the share that is sure and wrong, with 90 % confidence."""
     sure: float
+    """Share of the cases that are sure."""
 
 
 NEVER = 1.01
@@ -67,14 +56,9 @@ def bounded(probability: Array, right: Array, risk: float) -> Bound:
     """
     Return the lowest threshold at which one more case is sure and wrong too seldom to matter.
 
-    Parameters
-    ----------
-    probability : array, shape (N,)
-        Of cases that took no part in the fit.
-    right : array of bool, shape (N,)
-    risk : float
-        Probability that a case may be sure and wrong.
-
+    probability: of cases that took no part in the fit, shape (N,).
+    right: shape (N,).
+    risk: probability that a case may be sure and wrong.
     """
     p, good = np.asarray(probability, dtype=float), np.asarray(right, dtype=bool)
     best = NEVER
@@ -90,14 +74,9 @@ def precise(probability: Array, right: Array, risk: float) -> Bound:
     """
     Return the lowest threshold at which one more sure case is wrong too seldom to matter.
 
-    Parameters
-    ----------
-    probability : array, shape (N,)
-        Of cases that took no part in the fit.
-    right : array of bool, shape (N,)
-    risk : float
-        Share of the sure cases that may be wrong.
-
+    probability: of cases that took no part in the fit, shape (N,).
+    right: shape (N,).
+    risk: share of the sure cases that may be wrong.
     """
     p, good = np.asarray(probability, dtype=float), np.asarray(right, dtype=bool)
     best = NEVER
@@ -112,11 +91,8 @@ def at(threshold: float, probability: Array, right: NDArray[np.bool_]) -> Bound:
     """
     Return what is known of a threshold.
 
-    Parameters
-    ----------
-    probability : array, shape (N,)
-    right : array of bool, shape (N,)
-
+    probability: shape (N,).
+    right: shape (N,).
     """
     sure = probability >= threshold
     wrong, cases = int((sure & ~right).sum()), probability.size
@@ -130,11 +106,7 @@ def upper_limit(wrong: int, cases: int, error: float) -> float:
     """
     Return the exact upper limit of a share.
 
-    Parameters
-    ----------
-    error : float
-        Probability that the share is larger.
-
+    error: probability that the share is larger.
     """
     if wrong >= cases:
         return 1.0

@@ -22,11 +22,7 @@ def goal_measures(rows: Sequence[Kept]) -> list[Measure]:
     """
     Return the measures of verdicts and of levels.
 
-    Parameters
-    ----------
-    rows : sequence of mappings
-        As `judged.kept` gives them; none of them was learned from.
-
+    rows: as `judged.kept` gives them; none of them was learned from.
     """
     return [*_of_causes(rows), *_of_foreign(rows)]
 

@@ -38,11 +38,7 @@ def grown(seed: int, number: int) -> dict[str, Any]:
     """
     Return what is said of a cell with one recording, two, ..., and with all in reverse.
 
-    Parameters
-    ----------
-    seed, number : int
-        Of the cell, as `several.several` takes them.
-
+    seed, number: of the cell, as `several.several` takes them.
     """
     name = f'{seed}/{number}'
     try:
@@ -91,11 +87,7 @@ def steps(row: Mapping[str, Any]) -> Iterator[GrowingStep]:
     """
     Yield every right cause that was sure, with what a recording more made of it.
 
-    Parameters
-    ----------
-    row : mapping
-        As `grown` gives it, without an error.
-
+    row: as `grown` gives it, without an error.
     """
     truth = row['truth']
     for effect, joint in truth['sites']:
@@ -120,11 +112,7 @@ def apart(row: Mapping[str, Any]) -> float:
     """
     Return by how much probabilities differ where only the order does; 1 where names do.
 
-    Parameters
-    ----------
-    row : mapping
-        As `grown` gives it, without an error.
-
+    row: as `grown` gives it, without an error.
     """
     one, other = (
         {
@@ -145,11 +133,7 @@ def page(rows: Sequence[Mapping[str, Any]]) -> str:
     """
     Return the measures, and every sure cause that fell.
 
-    Parameters
-    ----------
-    rows : sequence of mappings
-        As `grown` gives them.
-
+    rows: as `grown` gives them.
     """
     good = [row for row in rows if not row['error']]
     every = [step for row in good for step in steps(row)]

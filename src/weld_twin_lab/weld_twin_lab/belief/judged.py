@@ -28,42 +28,27 @@ LARGE = 0.1
 
 
 class Example(NamedTuple):
-    """
-    One statement, the features it was made on, and whether it was right.
-
-    Attributes
-    ----------
-    case : str
-        Name of the case; statements on one case are kept together.
-    kind : str
-        As `weld_twin_core.diagnosis.calibration.features.KINDS` has it.
-    told : float
-        What was told of it.
-    sure : bool
-        Whether it was told as sure.
-    weight : float
-        How much it counts.
-
-    """
+    """One statement, the features it was made on, and whether it was right."""
 
     case: str
+    """Name of the case; statements on one case are kept together."""
     kind: str
+    """As `weld_twin_core.diagnosis.calibration.features.KINDS` has it."""
     features: Mapping[str, float]
     right: bool
     told: float
+    """What was told of it."""
     sure: bool = False
+    """Whether it was told as sure."""
     weight: float = 1.0
+    """How much it counts."""
 
 
 def kept(row: Mapping[str, Any]) -> dict[str, Any]:
     """
     Return what is kept of a case: what its answer was worth, and every statement as an example.
 
-    Parameters
-    ----------
-    row : mapping
-        As `trial.tried` gives it.
-
+    row: as `trial.tried` gives it.
     """
     if row['error'] or not row['statements']:
         return {key: row.get(key) for key in ('name', 'error', 'unsound')}
@@ -179,11 +164,7 @@ def examples_of(rows: Sequence[Mapping[str, Any]]) -> list[Example]:
     """
     Return every statement made on some cases.
 
-    Parameters
-    ----------
-    rows : sequence of mappings
-        As `kept` gives them.
-
+    rows: as `kept` gives them.
     """
     return [
         Example._make((str(row['name']), *one, float(row.get('weight', 1.0))))

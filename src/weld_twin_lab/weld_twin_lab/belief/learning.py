@@ -54,18 +54,10 @@ def learned(
     """
     Return the content of a file of weights.
 
-    Parameters
-    ----------
-    card : mapping
-        Seeds, engines and mix, to be kept with the weights.
-    risk : float
-        Probability that an answer may be sure and wrong.
+    card: seeds, engines and mix, to be kept with the weights.
+    risk: probability that an answer may be sure and wrong.
 
-    Raises
-    ------
-    DataError
-        There are too few examples of a kind of statement.
-
+    Raises DataError: there are too few examples of a kind of statement.
     """
     statements, parts = {}, {}
     for kind in TERMS:
@@ -103,11 +95,7 @@ def unseen(examples: Sequence[Example], content: Mapping[str, Any]) -> list[Exam
     """
     Return examples as they are told by weights that had not seen their cases.
 
-    Parameters
-    ----------
-    content : mapping
-        As `learned` returned it.
-
+    content: as `learned` returned it.
     """
     out = []
     for kind in TERMS:

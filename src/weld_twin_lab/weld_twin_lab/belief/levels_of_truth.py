@@ -57,11 +57,7 @@ def levels_of(truth: Mapping[str, Any]) -> list[Levels]:
     """
     Return the right words for every cause of a case.
 
-    Parameters
-    ----------
-    truth : mapping
-        As `making.truth_of` gives it; words that were kept with it hold.
-
+    truth: as `making.truth_of` gives it; words that were kept with it hold.
     """
     if 'levels' in truth:
         return [Levels(frozenset(at), frozenset(on)) for at, on in truth['levels']]
@@ -75,11 +71,7 @@ def alike_by_structure(robot: str, site: Site) -> frozenset[Site]:
     """
     Return the constant errors that are always the same error as one, itself included.
 
-    Parameters
-    ----------
-    robot : str
-        Of the catalogue.
-
+    robot: of the catalogue.
     """
     return frozenset(_alike(robot, site))
 

@@ -37,20 +37,13 @@ def fitted(
     """
     Return the weights of least penalised log loss.
 
-    Parameters
-    ----------
-    columns : array, shape (N, P)
-        Standardised.
-    right : array of bool, shape (N,)
-    signs : array, shape (P,)
-        1 where a weight may not be negative, -1 where it may not be positive, 0 where it is free.
-    ridge : float
-        Of half the squared distance from the prior, against log loss in nats.
-    weight : array, shape (N,)
-        Of every example.
-    prior : array, shape (P,), optional
-        Weights that the ridge pulls to; zeros when left out.
-
+    columns: standardised, shape (N, P).
+    right: shape (N,).
+    signs: 1 where a weight may not be negative, -1 where it may not be positive, 0 where it is
+    free, shape (P,).
+    ridge: of half the squared distance from the prior, against log loss in nats.
+    weight: of every example, shape (N,).
+    prior: weights that the ridge pulls to, shape (P,); zeros when left out.
     """
     prior = np.zeros(columns.shape[1]) if prior is None else prior
     # One more case of each outcome, with every sign at its middle: few cases are never certain.
@@ -79,10 +72,7 @@ def log_loss(probability: Array, right: Array | NDArray[np.bool_], weight: Array
     """
     Return the mean log loss in nats.
 
-    Parameters
-    ----------
-    probability, right, weight : array, shape (N,)
-
+    probability, right, weight: shape (N,).
     """
     held = np.clip(probability, 1e-4, 1.0 - 1e-4)
     loss = -np.where(np.asarray(right, dtype=bool), np.log(held), np.log(1.0 - held))

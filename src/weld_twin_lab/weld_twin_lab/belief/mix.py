@@ -37,11 +37,7 @@ def drawn(seed: int, number: int) -> Drawn:
     """
     Return case ``number`` of a seed; it depends on nothing else.
 
-    Raises
-    ------
-    DataError
-        No cell and motion show such causes.
-
+    Raises DataError: no cell and motion show such causes.
     """
     lot = mixed(seed, number + 1)[number]
     ways = Deck(POOR, seed, 60)

@@ -32,11 +32,7 @@ def write_rows(path: Path, rows: Iterable[Mapping[str, Any]]) -> None:
     """
     Write a table of cases.
 
-    Parameters
-    ----------
-    rows : iterable of mappings
-        As `judged.kept` gives them. A path that ends in .gz is packed.
-
+    rows: as `judged.kept` gives them. A path that ends in .gz is packed.
     """
     lines = (json.dumps(rounded(row), separators=(',', ':')) for row in rows)
     text = '\n'.join(lines) + '\n'
@@ -50,11 +46,7 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
     """
     Return a table of cases.
 
-    Raises
-    ------
-    DataError
-        There is no such table.
-
+    Raises DataError: there is no such table.
     """
     try:
         raw = path.read_bytes()

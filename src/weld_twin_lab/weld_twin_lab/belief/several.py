@@ -55,11 +55,7 @@ def several(seed: int, number: int) -> tuple[SealedCase, bool]:
     """
     Return case ``number`` of a seed, and whether its held-out recording is given.
 
-    Raises
-    ------
-    DataError
-        No cell and motion show such causes.
-
+    Raises DataError: no cell and motion show such causes.
     """
     rng = np.random.default_rng([seed, 3000 + number])
     lot = lot_of(seed, number, rng)
@@ -74,11 +70,7 @@ def lot_of(seed: int, number: int, rng: np.random.Generator) -> Lot:
     """
     Return what a case is to be.
 
-    Parameters
-    ----------
-    rng : Generator
-        Of the case.
-
+    rng: of the case.
     """
     count = 1 + number % MOST
     crowded = count >= MOST - 1

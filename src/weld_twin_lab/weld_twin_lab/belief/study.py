@@ -45,11 +45,7 @@ def rows_of(seed: int, count: int, runner: Runner, mix: str = USUAL) -> list[dic
     """
     Return the rows of the first cases of a seed; those in the runner's store are not made anew.
 
-    Parameters
-    ----------
-    mix : str
-        As `tried` takes it.
-
+    mix: as `tried` takes it.
     """
     tasks = [Task(tried, (seed, number, mix), f'case {number}') for number in range(count)]
     return [{'mix': mix, **kept(row)} for row in runner.run(tasks)]
@@ -59,13 +55,8 @@ def fit(rows: Sequence[Mapping[str, Any]], risk: float = terms.RISK) -> dict[str
     """
     Return the content of the file of weights that some cases teach.
 
-    Parameters
-    ----------
-    rows : sequence of mappings
-        As `judged.kept` gives them.
-    risk : float
-        Probability that an answer may be sure and wrong.
-
+    rows: as `judged.kept` gives them.
+    risk: probability that an answer may be sure and wrong.
     """
     own = [row for row in rows if row.get('examples')]
     card = {
@@ -83,16 +74,10 @@ def judged(
     """
     Return what answers were worth on cases that nothing was learned from.
 
-    Parameters
-    ----------
-    content : mapping
-        Of the file of weights that they were told by.
-    rows : sequence of mappings
-        As `judged.kept` gives them; none where the cases learned from are judged by weights that
-        had not seen them.
-    examples : sequence of Example
-        What was told.
-
+    content: of the file of weights that they were told by.
+    rows: as `judged.kept` gives them; none where the cases learned from are judged by weights that
+    had not seen them.
+    examples: what was told.
     """
     own = [row for row in rows if row.get('examples')]
     foreign = {str(row['name']) for row in own if row['kind'] in NOT_IN_LIBRARY}
@@ -167,16 +152,10 @@ def write(
     """
     Write the file of weights, what it is worth, and the page; return the page.
 
-    Parameters
-    ----------
-    content : mapping
-        Of the file of weights.
-    rows : sequence of mappings
-        Cases that it did not learn from; where there are none, those learned from are judged by
-        weights that had not seen them.
-    taught : sequence of mappings
-        Cases that it learned from.
-
+    content: of the file of weights.
+    rows: cases that it did not learn from; where there are none, those learned from are judged by
+    weights that had not seen them.
+    taught: cases that it learned from.
     """
     examples = examples_of(rows) if rows else learning.unseen(examples_of(taught), content)
     result = judged(content, rows, examples)

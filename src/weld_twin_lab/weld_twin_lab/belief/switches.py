@@ -75,16 +75,9 @@ def without(names: Sequence[str]) -> Iterator[None]:
     """
     Take mechanisms out for a while.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of `MECHANISMS`.
+    names: of `MECHANISMS`.
 
-    Raises
-    ------
-    DataError
-        There is no mechanism of a name.
-
+    Raises DataError: there is no mechanism of a name.
     """
     unknown = [name for name in names if name not in MECHANISMS]
     if unknown:
@@ -107,13 +100,8 @@ def tried_without(seed: int, number: int, mix: str, names: Sequence[str]) -> dic
     """
     Return the row of one case, as `tried` does, with some mechanisms taken out.
 
-    Parameters
-    ----------
-    seed, number, mix
-        As `tried` takes them.
-    names : sequence of str
-        Of `MECHANISMS`.
-
+    seed, number, mix: as `tried` takes them.
+    names: of `MECHANISMS`.
     """
     with without(names):
         return tried(seed, number, mix)

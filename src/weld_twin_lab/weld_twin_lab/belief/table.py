@@ -27,11 +27,7 @@ def page(result: Mapping[str, Any]) -> str:
     """
     Return the whole in Markdown.
 
-    Parameters
-    ----------
-    result : mapping
-        As `study.judged` gives it.
-
+    result: as `study.judged` gives it.
     """
     return '\n'.join(
         [

@@ -35,13 +35,8 @@ def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
     """
     Return the row of one case: its truth, what was said of it, and on what evidence.
 
-    Parameters
-    ----------
-    seed, number : int
-        Of the case, as the mix takes them.
-    mix : str
-        `USUAL` for `mix.drawn`; `SEVERAL` for `several.several`.
-
+    seed, number: of the case, as the mix takes them.
+    mix: `USUAL` for `mix.drawn`; `SEVERAL` for `several.several`.
     """
     name = f'{seed}/{number}'
     try:
@@ -66,11 +61,7 @@ def row_of(name: str, case: SealedCase, *, held_out: bool = True) -> dict[str, A
     """
     Return the row of a case.
 
-    Parameters
-    ----------
-    held_out : bool
-        Whether its held-out recording is given to the diagnosis.
-
+    held_out: whether its held-out recording is given to the diagnosis.
     """
     row: dict[str, Any] = {
         'name': name,
@@ -101,11 +92,7 @@ def recordings_of(case: SealedCase, more: Sequence[Take] = ()) -> list[Recording
     """
     Return the recordings of a case that are to be diagnosed.
 
-    Parameters
-    ----------
-    more : sequence of Take
-        Further ones of the same truth.
-
+    more: further ones of the same truth.
     """
     also = [
         as_recording(f'{layout.TRAIN}_{k + 2}', record(case.cell, case.causes, taken))
@@ -120,11 +107,7 @@ def diagnosed(
     """
     Return the diagnosis of recordings of a case.
 
-    Parameters
-    ----------
-    held_out : bool
-        Whether the held-out recording of the case is given.
-
+    held_out: whether the held-out recording of the case is given.
     """
     cell = case.cell
     return diagnose(

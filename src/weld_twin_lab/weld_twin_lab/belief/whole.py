@@ -22,37 +22,23 @@ WIDEST = 3
 
 
 class Whole(NamedTuple):
-    """
-    What an answer names, against what is at work.
-
-    Attributes
-    ----------
-    asked : tuple of frozenset of Site
-        Every visible cause that the library holds, as all that is the same error on any motion.
-    named : tuple of bool
-        Whether each of these is told, alone or in a small set.
-    right : bool
-        All of these are named, nothing else is, and where a visible cause was taken out of the
-        library, something is said to be left.
-
-    """
+    """What an answer names, against what is at work."""
 
     asked: tuple[frozenset[Site], ...]
+    """Every visible cause that the library holds, as all that is the same error on any motion."""
     named: tuple[bool, ...]
+    """Whether each of these is told, alone or in a small set."""
     right: bool
+    """All of these are named, nothing else is, and where a visible cause was taken out of the
+    library, something is said to be left."""
 
 
 def whole(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> Whole:
     """
     Return an answer held against its truth.
 
-    Parameters
-    ----------
-    truth : mapping
-        With what every cause shows.
-    verdict : mapping
-        As diagnosis.json has it, of any schema.
-
+    truth: with what every cause shows.
+    verdict: as diagnosis.json has it, of any schema.
     """
     at_work = [alike_by_structure(truth['robot'], (e, j)) for e, j in truth['sites']]
     out = [

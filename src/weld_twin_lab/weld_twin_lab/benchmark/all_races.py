@@ -44,11 +44,7 @@ def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
 
     They are ``benchmark.json`` and two tables of it, ``benchmark.md`` and ``brief.md``.
 
-    Raises
-    ------
-    DataError
-        A contender's result is not that of the others.
-
+    Raises DataError: a contender's result is not that of the others.
     """
     robot = calibrated_arm()
     peers, missing = find_peers(robot)

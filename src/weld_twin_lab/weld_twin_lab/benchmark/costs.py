@@ -39,17 +39,10 @@ def cost_of(
     The memory of this process does not count, however large it is: see `small_parent`, whose own
     ten megabytes are the least that can be told.
 
-    Parameters
-    ----------
-    words : sequence of str
-        The program and its arguments.
-    environment : mapping of str to str, optional
-        Left out, that of this process.
-    said : file or int
-        Where what it prints goes, errors too; left out, nowhere.
-    limit : float [s]
-        After so long it is killed; 0 for never.
-
+    words: the program and its arguments.
+    environment: left out, that of this process.
+    said: where what it prints goes, errors too; left out, nowhere.
+    limit: after so long it is killed [s]; 0 for never.
     """
     read, write = os.pipe()
     try:

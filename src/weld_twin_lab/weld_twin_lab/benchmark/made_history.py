@@ -36,11 +36,7 @@ def fill(database: Database, cells: int, diagnoses: int, seed: int = 1) -> None:
     """
     Fill an empty database.
 
-    Parameters
-    ----------
-    cells, diagnoses : int
-        So many cells, with so many diagnoses each.
-
+    cells, diagnoses: so many cells, with so many diagnoses each.
     """
 
     def work(connection: Connection) -> None:

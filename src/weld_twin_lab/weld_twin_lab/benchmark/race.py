@@ -19,25 +19,16 @@ REFERENCE = ('pinocchio',)
 
 @dataclass(frozen=True)
 class Contender:
-    """
-    One way to do a job.
-
-    Attributes
-    ----------
-    items : int
-        How many poses, draws or runs one call does; a slow contender may do fewer of them.
-    gap : float
-        Largest difference of its result to the reference.
-    once : bool
-        So slow that one round has to do.
-
-    """
+    """One way to do a job."""
 
     name: str
     run: Callable[[], object]
     items: int = 1
+    """How many poses, draws or runs one call does; a slow contender may do fewer of them."""
     gap: float = 0.0
+    """Largest difference of its result to the reference."""
     once: bool = False
+    """So slow that one round has to do."""
 
 
 @dataclass(frozen=True)
@@ -99,16 +90,9 @@ def race(workload: Workload, rounds: int, least: float) -> Outcome:
     """
     Time the contenders in turn.
 
-    Parameters
-    ----------
-    least : float [s]
-        How long each contender works in a round, in as many calls as that takes.
+    least: how long each contender works in a round, in as many calls as that takes [s].
 
-    Raises
-    ------
-    DataError
-        A contender's result is not that of the others.
-
+    Raises DataError: a contender's result is not that of the others.
     """
     for contender in workload.contenders:
         if not contender.gap <= workload.tolerance:

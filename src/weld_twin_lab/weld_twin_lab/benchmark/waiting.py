@@ -30,27 +30,17 @@ Keep = Callable[[Entry], None]
 
 @dataclass(frozen=True)
 class WaitingJob:
-    """
-    Something that a person waits for.
-
-    Attributes
-    ----------
-    words : tuple of str
-        What the interpreter is started with; '{out}' is a place that does not exist yet.
-    needs : str
-        Which data must be there, as `waiting_data.MAKERS` names them; '{data}' in the words.
-    divided_by : int
-        Pieces of work that one run does.
-    once : bool
-        Takes so long that it is run once.
-
-    """
+    """Something that a person waits for."""
 
     name: str
     words: tuple[str, ...]
+    """What the interpreter is started with; '{out}' is a place that does not exist yet."""
     needs: str = ''
+    """Which data must be there, as `waiting_data.MAKERS` names them; '{data}' in the words."""
     divided_by: int = 1
+    """Pieces of work that one run does."""
     once: bool = False
+    """Takes so long that it is run once."""
 
 
 _CLI = ('-m', 'weld_twin_nodes')
@@ -130,24 +120,14 @@ def measured(
     """
     Return what every job costs, here and in another checkout, in turn.
 
-    Parameters
-    ----------
-    base : Path or None
-        A checkout with an environment of its own in ``.venv``.
-    out : Path
-        Gets the data and, for a moment, what the commands write.
-    runs : int
-        Pairs of runs after one to warm up; jobs that take long are run once.
-    only : sequence of str
-        Parts of the names of jobs; empty for all.
-    keep : callable
-        Given each entry as soon as it has been measured.
+    base: a checkout with an environment of its own in ``.venv``.
+    out: gets the data and, for a moment, what the commands write.
+    runs: pairs of runs after one to warm up; jobs that take long are run once.
+    only: parts of the names of jobs; empty for all.
+    keep: given each entry as soon as it has been measured.
 
-    Raises
-    ------
-    DataError
-        There is no environment in ``base``, or no job has such a name, or a command fails here.
-
+    Raises DataError: there is no environment in ``base``, or no job has such a name, or a command
+    fails here.
     """
     pythons = {'here': sys.executable}
     if base is not None:
@@ -190,11 +170,7 @@ def merged(kept: Sequence[Entry], new: Sequence[Entry]) -> list[Entry]:
     """
     Return entries measured earlier with the new ones in their places, in the order of `JOBS`.
 
-    Parameters
-    ----------
-    kept, new : sequence of dict
-        As `measured` gives them. What is no job any more is left out.
-
+    kept, new: as `measured` gives them. What is no job any more is left out.
     """
     found = {entry['job']: entry for entry in (*kept, *new)}
     return [found[job.name] for job in JOBS if job.name in found]

@@ -33,11 +33,7 @@ def made(name: str, folder: Path) -> Path:
     """
     Return where data are, made where they are not there yet.
 
-    Parameters
-    ----------
-    name : str
-        One of `MAKERS`.
-
+    name: one of `MAKERS`.
     """
     place = folder / ('table.csv' if name == 'table' else name)
     if not place.exists():
@@ -61,10 +57,7 @@ def seen(commanded: Recording, robot: Robot, effects: list[Effect], at: Array) -
     """
     Return a recording with what a twin with effects and noise would measure.
 
-    Parameters
-    ----------
-    at : array, shape (M,) [s]
-
+    at: shape (M,) [s].
     """
     rng = np.random.default_rng(7)
     poses = Twin(robot, effects).poses(commanded, at)

@@ -32,11 +32,7 @@ def over_floor(cases: Path, truths: Path, truth: Mapping[str, Any], diagnosis: P
     """
     Return the RMS left on the sealed recording over what the true causes would leave.
 
-    Parameters
-    ----------
-    diagnosis : Path
-        The diagnosis.json with the model.
-
+    diagnosis: the diagnosis.json with the model.
     """
     name = str(truth['name'])
     robot = load_robot(str(cases / name / layout.ROBOT))
@@ -49,11 +45,7 @@ def aligned_on(model: Model, recording: Recording, align: list[str]) -> Model:
     """
     Return the model with the frames that a diagnosis of this recording starts from.
 
-    Parameters
-    ----------
-    align : list of str
-        Frames that are fitted.
-
+    align: frames that are fitted.
     """
     problem = Problem((usable(recording),), frozenset(align))
     return refined(problem, initial_frames(problem, model))
@@ -69,11 +61,7 @@ def counted(recording: Recording, outliers: list[int]) -> Array:
     """
     Return the samples to count: no outliers, none outside the joint stream, shape (M,).
 
-    Parameters
-    ----------
-    outliers : list of int
-        Numbers of the samples that are none of the arm's doing.
-
+    outliers: numbers of the samples that are none of the arm's doing.
     """
     t, joints = _measured(recording).t, recording.joints
     good = (t >= joints.t[0]) & (t <= joints.t[-1])

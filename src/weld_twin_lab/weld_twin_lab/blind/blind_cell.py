@@ -39,29 +39,19 @@ GROSS = 6.0
 
 @dataclass(frozen=True, eq=False)
 class BlindCell:
-    """
-    One cell with its instruments.
-
-    Attributes
-    ----------
-    known : tuple of effects
-        At work and told to the diagnosis.
-    align : tuple of str
-        Frames that the diagnosis is to fit.
-    loaded, warming : bool
-        Whether a wrench, or a temperature, is at work and recorded.
-    richness : float
-        How far the plant's physics goes beyond the textbook.
-
-    """
+    """One cell with its instruments."""
 
     robot: Robot
     tracker: Tracker
     known: tuple[Cause, ...] = ()
+    """At work and told to the diagnosis."""
     align: tuple[str, ...] = ()
+    """Frames that the diagnosis is to fit."""
     loaded: bool = False
     warming: bool = False
+    """Whether a wrench, or a temperature, is at work and recorded."""
     richness: float = 1.0
+    """How far the plant's physics goes beyond the textbook."""
 
     @property
     def noise(self) -> float:
@@ -106,11 +96,7 @@ def fitted_out(cell: BlindCell, align: tuple[str, ...] | None, noise_m: float | 
     """
     Return a cell with other frames to be fitted, and an instrument of another noise.
 
-    Parameters
-    ----------
-    noise_m : float, optional
-        RMS length [m].
-
+    noise_m: RMS length [m].
     """
     if align is not None:
         cell = replace(cell, align=align)

@@ -50,11 +50,7 @@ def draw(family: str, robot: Robot, span: float, rng: np.random.Generator) -> Ca
     """
     Return a cause of its typical size on a joint drawn at random.
 
-    Parameters
-    ----------
-    span : float [s]
-        Duration of the recording, for what happens at a time.
-
+    span: duration of the recording, for what happens at a time [s].
     """
     typical = CAUSES[family]
     drawn = typical.draw(robot, span, rng)
@@ -68,11 +64,7 @@ def plausible(robot: Robot, cause: Mapping[str, Any], factor: float) -> bool:
     """
     Tell whether a cause may be so many times its typical size.
 
-    Parameters
-    ----------
-    cause : mapping
-        Of its typical size.
-
+    cause: of its typical size.
     """
     family = cause['effect']
     if not LEAST.get(family, SPREAD[0]) < factor < MOST.get(family, SPREAD[1]):
@@ -88,11 +80,7 @@ def machines(robot: Robot, cause: Mapping[str, Any], key: str) -> float:
     """
     Return the largest value of a parameter that a machine has.
 
-    Parameters
-    ----------
-    key : str
-        Of the parameter that is its size.
-
+    key: of the parameter that is its size.
     """
     parameter = TWINS.get((cause['effect'], key), key)
     return plausible_of(robot, cause['effect'], parameter, cause.get('joint')).high
@@ -113,29 +101,18 @@ def site(cause: Mapping[str, Any]) -> tuple[str, str | None]:
 
 
 class Typical(NamedTuple):
-    """
-    A cause of its typical size.
-
-    Attributes
-    ----------
-    draw : callable
-        Takes robot, duration [s] and generator; returns the cause without its name.
-    sizes : tuple of str
-        The parameters that grow with it.
-    signed : bool
-        Whether it may be negative; what has a direction is drawn with it.
-    moving : bool
-        Whether stations at rest cannot show it.
-    outside : bool
-        Whether the library of effects has none of its kind.
-
-    """
+    """A cause of its typical size."""
 
     draw: Callable[..., Cause]
+    """Takes robot, duration [s] and generator; returns the cause without its name."""
     sizes: tuple[str, ...]
+    """The parameters that grow with it."""
     signed: bool = False
+    """Whether it may be negative; what has a direction is drawn with it."""
     moving: bool = False
+    """Whether stations at rest cannot show it."""
     outside: bool = False
+    """Whether the library of effects has none of its kind."""
 
 
 def _joint(robot: Robot, rng: np.random.Generator) -> str:

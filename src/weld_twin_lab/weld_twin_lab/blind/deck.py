@@ -61,29 +61,19 @@ MOTIONS = ('seams', 'free', 'free', 'stations')
 
 @dataclass(frozen=True)
 class Lot:
-    """
-    What a case is to be.
-
-    Attributes
-    ----------
-    families : tuple of str
-        Of the causes; the construction where the kind is 'ambiguous'.
-    strata : tuple of int
-        Which of `STRATA` each cause is to be in.
-    align : tuple of str, optional
-        Frames that the diagnosis is to fit; drawn with the cell where left out.
-    noise_m : float, optional
-        RMS length of the measurement noise [m]; drawn with the cell where left out.
-
-    """
+    """What a case is to be."""
 
     kind: str
     robot: str
     motion: str
     families: tuple[str, ...]
+    """Of the causes; the construction where the kind is 'ambiguous'."""
     strata: tuple[int, ...]
+    """Which of `STRATA` each cause is to be in."""
     align: tuple[str, ...] | None = None
+    """Frames that the diagnosis is to fit; drawn with the cell where left out."""
     noise_m: float | None = None
+    """RMS length of the measurement noise [m]; drawn with the cell where left out."""
 
 
 def lots(
@@ -96,20 +86,11 @@ def lots(
     """
     Return what the first cases of a seed are to be.
 
-    Parameters
-    ----------
-    kinds : sequence of str
-        Only these; empty for all.
-    constructions : sequence of str
-        Names of the ambiguous constructions.
-    shares : mapping from str to int
-        How often each kind comes.
+    kinds: only these; empty for all.
+    constructions: names of the ambiguous constructions.
+    shares: how often each kind comes.
 
-    Raises
-    ------
-    DataError
-        An unknown kind, or no cases asked for.
-
+    Raises DataError: an unknown kind, or no cases asked for.
     """
     for kind in kinds:
         if kind not in KINDS:

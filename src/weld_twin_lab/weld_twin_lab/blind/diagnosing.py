@@ -46,24 +46,14 @@ def diagnose_cases(
     """
     Diagnose all cases, write what was said, and return it case by case.
 
-    Parameters
-    ----------
-    out : Path
-        Gets a diagnosis.json for every case, and the list of them.
-    runner : Runner
-        Its store makes the work resumable; verdicts of another engine or other cases are not
-        taken for these.
-    allow_readable : bool
-        Go on although truths lie within reach.
-    with_holdout : bool
-        Give the diagnosis the held-out recording to judge its shrink on; without, it judges on
-        stretches of the training recording.
+    out: gets a diagnosis.json for every case, and the list of them.
+    runner: its store makes the work resumable; verdicts of another engine or other cases are not
+    taken for these.
+    allow_readable: go on although truths lie within reach.
+    with_holdout: give the diagnosis the held-out recording to judge its shrink on; without, it
+    judges on stretches of the training recording.
 
-    Raises
-    ------
-    DataError
-        Truths lie within reach, or the directory holds no cases.
-
+    Raises DataError: truths lie within reach, or the directory holds no cases.
     """
     readable = _truths_readable(cases, allow_readable)
     listed = layout.read(cases / layout.CASES)

@@ -25,46 +25,32 @@ NAMED = {'station_step': 'instrument_knock'}
 
 @dataclass(frozen=True)
 class Judged:
-    """
-    What a verdict was worth.
-
-    Attributes
-    ----------
-    kind, robot, motion : str
-        Of the case.
-    truth, said : str
-        Both in words.
-    status : str
-        Of the verdict, or 'error'.
-    stratum : float
-        Effect RMS over noise, of the weakest cause.
-    set : str
-        'exact', 'partial', 'wrong' or 'silent': the causes named, against those at work.
-    named : bool
-        Whether every cause at work is in a set of its own.
-    family, joint : bool or None
-        Whether family, and joint, of every cause at work are named; None where there is none.
-    right : bool
-        What the confidence is about: the set is exact, or nothing was to be found and nothing
-        was said, or the library lacks the cause and the verdict is 'unknown'.
-
-    """
+    """What a verdict was worth."""
 
     name: str
     kind: str
     robot: str
     motion: str
+    """Of the case."""
     truth: str
     said: str
+    """Both in words."""
     status: str
+    """Of the verdict, or 'error'."""
     confidence: float
     sure: bool
     stratum: float
+    """Effect RMS over noise, of the weakest cause."""
     set: str
+    """'exact', 'partial', 'wrong' or 'silent': the causes named, against those at work."""
     named: bool
+    """Whether every cause at work is in a set of its own."""
     family: bool | None
     joint: bool | None
+    """Whether family, and joint, of every cause at work are named; None where there is none."""
     right: bool
+    """What the confidence is about: the set is exact, or nothing was to be found and nothing was
+    said, or the library lacks the cause and the verdict is 'unknown'."""
 
     @property
     def confidently_wrong(self) -> bool:
@@ -118,12 +104,8 @@ def is_sure(verdict: Mapping[str, Any]) -> bool:
     """
     Return whether an answer is told as sure.
 
-    Parameters
-    ----------
-    verdict : mapping
-        As diagnosis.json has it; the first schema tells only a confidence, and 0.8 at the most of
-        what is not sure.
-
+    verdict: as diagnosis.json has it; the first schema tells only a confidence, and 0.8 at the
+    most of what is not sure.
     """
     told = verdict.get('sure')
     return float(verdict.get('confidence') or 0.0) > CONFIDENT if told is None else bool(told)
@@ -167,11 +149,7 @@ def answers_of(truth: Mapping[str, Any]) -> list[list[Site]]:
     """
     Return every list of sites that is as right as the truth, by the library's names.
 
-    Parameters
-    ----------
-    truth : mapping
-        As `making.truth_of` gives it.
-
+    truth: as `making.truth_of` gives it.
     """
     return [_sites(answer) for answer in (truth['sites'], *truth['alike'])]
 

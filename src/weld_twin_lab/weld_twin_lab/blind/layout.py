@@ -37,11 +37,7 @@ def read(path: Path) -> dict[str, Any]:
     """
     Return the content of one of the JSON files above.
 
-    Raises
-    ------
-    DataError
-        It cannot be read or is something else.
-
+    Raises DataError: it cannot be read or is something else.
     """
     try:
         data = json.loads(path.read_text(encoding='utf-8'))

@@ -54,35 +54,24 @@ DECOY = 0.1
 
 @dataclass(frozen=True, eq=False)
 class SealedCase:
-    """
-    One case, all of it.
-
-    Attributes
-    ----------
-    alike : list of lists of (family, joint)
-        Answers as right as the truth.
-    ratios : list of float
-        Deviation of every cause over the noise, each alone.
-    excluded : tuple of str
-        Families taken out of the library.
-    fresh : bool
-        Whether hold-out and test are other motions than the training's.
-    also : tuple of Take
-        Further recordings to be diagnosed with the training's.
-
-    """
+    """One case, all of it."""
 
     lot: Lot
     cell: BlindCell
     causes: list[Cause]
     alike: list[list[tuple[str, str | None]]]
+    """Answers as right as the truth."""
     ratios: list[float]
+    """Deviation of every cause over the noise, each alone."""
     excluded: tuple[str, ...]
+    """Families taken out of the library."""
     train: Take
     holdout: Take
     test: Take
     fresh: bool
+    """Whether hold-out and test are other motions than the training's."""
     also: tuple[Take, ...] = ()
+    """Further recordings to be diagnosed with the training's."""
 
 
 def make(
@@ -97,20 +86,11 @@ def make(
     """
     Make cases and truths, and return the seal; what the same request made already stays.
 
-    Parameters
-    ----------
-    cases, truths : Path
-        Directories; the truths hold the seed, which is a truth as well.
-    kinds : sequence of str
-        Only these kinds of cases; empty for all.
-    spans : tuple of float [s]
-        Shortest and longest recording.
+    cases, truths: directories; the truths hold the seed, which is a truth as well.
+    kinds: only these kinds of cases; empty for all.
+    spans: shortest and longest recording [s].
 
-    Raises
-    ------
-    DataError
-        The directories hold other cases, or the numbers make no sense.
-
+    Raises DataError: the directories hold other cases, or the numbers make no sense.
     """
     asked = {'seed': seed, 'count': count, 'kinds': list(kinds), 'seconds': list(spans)}
     _refuse_other(cases, truths, asked)
@@ -172,18 +152,10 @@ def draw_case(
     """
     Return a case that shows its causes as large as the lot wants them.
 
-    Parameters
-    ----------
-    spans : tuple of float [s]
-        Shortest and longest recording.
-    poor : str
-        How the motion diagnosed is made poor, as `poor_motion.poorer` takes it.
+    spans: shortest and longest recording [s].
+    poor: how the motion diagnosed is made poor, as `poor_motion.poorer` takes it.
 
-    Raises
-    ------
-    DataError
-        No cell and motion drawn shows them.
-
+    Raises DataError: no cell and motion drawn shows them.
     """
     reason: Exception = NotVisible(lot.kind)
     for attempt in range(TRIES):

@@ -25,21 +25,14 @@ CLEAR = 3.0
 
 @dataclass(frozen=True)
 class Measure:
-    """
-    One number over many cases.
-
-    Attributes
-    ----------
-    at_least : bool
-        Whether the goal is a least or a most.
-
-    """
+    """One number over many cases."""
 
     key: str
     title: str
     estimate: Estimate
     goal: float | None = None
     at_least: bool = True
+    """Whether the goal is a least or a most."""
 
     @property
     def reached(self) -> bool | None:
@@ -58,11 +51,7 @@ def measure_table(measures: Sequence[Mapping[str, Any]]) -> str:
     """
     Return measures beside their goals in Markdown.
 
-    Parameters
-    ----------
-    measures : sequence of mappings
-        As `Measure.as_dict` gives them.
-
+    measures: as `Measure.as_dict` gives them.
     """
     return markdown.table(HEADS, *map(_row, measures))
 
@@ -87,26 +76,17 @@ def _row(item: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 class Question(NamedTuple):
-    """
-    What is asked of some of the cases.
-
-    Attributes
-    ----------
-    asked : callable
-        Tells which cases are asked.
-    told : callable
-        Tells whether the answer to a case is right; None where it cannot be said.
-    at_least : bool
-        Whether the goal is a least or a most.
-
-    """
+    """What is asked of some of the cases."""
 
     key: str
     title: str
     asked: Callable[[Judged], bool]
+    """Tells which cases are asked."""
     told: Callable[[Judged], bool | None]
+    """Tells whether the answer to a case is right; None where it cannot be said."""
     goal: float | None = None
     at_least: bool = True
+    """Whether the goal is a least or a most."""
 
 
 def _clear(kind: str) -> Callable[[Judged], bool]:

@@ -27,11 +27,7 @@ def one_arm(case: SealedCase) -> SealedCase:
     The plant has it as a share of a recording's largest load where it is not given. Where there is no
     load at all, rounding would decide on which flank the gear lies.
 
-    Raises
-    ------
-    DataError
-        A joint with such play carries nothing.
-
+    Raises DataError: a joint with such play carries nothing.
     """
     robot, command = case.cell.robot, case.train.command
     moved = Recording('first', JointMotion(command.t, command.q, static=command.static))

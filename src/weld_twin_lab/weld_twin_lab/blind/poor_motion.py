@@ -18,12 +18,8 @@ def poorer(taken: Take, poor: str, rng: np.random.Generator) -> Take:
     """
     Return the run with less motion.
 
-    Parameters
-    ----------
-    poor : str
-        One of `WAYS`, or empty for the run as it is: 'small' moves all joints little, 'still'
-        holds some of them, 'one' moves one alone, 'few' keeps few of the stations.
-
+    poor: one of `WAYS`, or empty for the run as it is: 'small' moves all joints little, 'still'
+    holds some of them, 'one' moves one alone, 'few' keeps few of the stations.
     """
     q, command = taken.command.q.copy(), taken.command
     middle = np.median(q, axis=0)

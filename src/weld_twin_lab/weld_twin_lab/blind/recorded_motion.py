@@ -35,13 +35,8 @@ def motion(kind: str, robot: Robot, span: float, rng: np.random.Generator) -> Mo
     """
     Return a motion drawn at random.
 
-    Parameters
-    ----------
-    kind : str
-        'seams', 'free' or 'stations'.
-    span : float [s]
-        About how long; two seconds for every station.
-
+    kind: 'seams', 'free' or 'stations'.
+    span: about how long [s]; two seconds for every station.
     """
     return {'seams': _seams, 'free': _free, 'stations': _stations}[kind](robot, span, rng)
 

@@ -31,27 +31,17 @@ MIB = 1 << 20
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """
-    Everything there is to say about a blind check.
-
-    Attributes
-    ----------
-    made : dict
-        Seed, seal, engine and how the diagnosis was run.
-    left : dict
-        RMS left over what the true causes leave, by case name, where causes were named.
-    costs : dict
-        Median and largest seconds and memory of a diagnosis.
-    errors : mapping
-        By case name, why there is no verdict.
-
-    """
+    """Everything there is to say about a blind check."""
 
     made: dict[str, Any]
+    """Seed, seal, engine and how the diagnosis was run."""
     cases: list[Judged]
     left: dict[str, float]
+    """RMS left over what the true causes leave, by case name, where causes were named."""
     costs: dict[str, float]
+    """Median and largest seconds and memory of a diagnosis."""
     errors: Mapping[str, str]
+    """By case name, why there is no verdict."""
 
     @property
     def measures(self) -> list[Measure]:
@@ -85,18 +75,10 @@ def score(
     """
     Return the score of verdicts.
 
-    Parameters
-    ----------
-    cases, truths, results : Path
-        As `make` and `diagnose_cases` wrote them.
-    seal_given : str, optional
-        The seal as printed before the diagnosis; left out, the one stored holds.
+    cases, truths, results: as `make` and `diagnose_cases` wrote them.
+    seal_given: the seal as printed before the diagnosis; left out, the one stored holds.
 
-    Raises
-    ------
-    DataError
-        A case or truth was changed, or the verdicts are on other cases.
-
+    Raises DataError: a case or truth was changed, or the verdicts are on other cases.
     """
     opened = seal.opened(cases, truths, seal_given)
     listed = _verdicts_on(cases, results)

@@ -69,16 +69,9 @@ def opened(cases: Path, truths: Path, seal: str = '') -> list[dict[str, Any]]:
     """
     Return the truths, in the order of the cases, once every hash has been found as committed.
 
-    Parameters
-    ----------
-    seal : str, optional
-        As printed when the cases were made; left out, the one stored with the cases holds.
+    seal: as printed when the cases were made; left out, the one stored with the cases holds.
 
-    Raises
-    ------
-    DataError
-        A case or a truth is not what it was when the seal was made.
-
+    Raises DataError: a case or a truth is not what it was when the seal was made.
     """
     listed = layout.read(cases / layout.CASES)
     entries = listed['cases']

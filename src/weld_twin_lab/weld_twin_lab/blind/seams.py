@@ -31,11 +31,7 @@ def seam_motion(robot: Robot, span: float, rate: float, rng: np.random.Generator
     """
     Return joint positions along one seam, smooth or aggressive, shape (N, n).
 
-    Raises
-    ------
-    PathError
-        None of the seams drawn can be welded.
-
+    Raises PathError: none of the seams drawn can be welded.
     """
     most = int(np.ceil(LONGEST * span * rate))
     for _ in range(TRIES):

@@ -13,11 +13,7 @@ def require_simulator() -> None:
     """
     Refuse to go on without the simulator.
 
-    Raises
-    ------
-    DataError
-        It is not installed.
-
+    Raises DataError: it is not installed.
     """
     if find_spec('mujoco') is None:
         raise DataError(

@@ -31,11 +31,7 @@ def sized(cell: BlindCell, cause: Cause, taken: Take, wanted: float) -> tuple[Ca
     """
     Return a cause grown until its deviation is so many times the noise, and the deviation.
 
-    Raises
-    ------
-    NotVisible
-        It would have to be implausibly large or small.
-
+    Raises NotVisible: it would have to be implausibly large or small.
     """
     factor = 1.0
     for _ in range(4):
@@ -62,11 +58,7 @@ def draw_causes(
     """
     Return causes of the families, and how many times the noise each is.
 
-    Raises
-    ------
-    NotVisible
-        A family cannot be seen on this motion.
-
+    Raises NotVisible: a family cannot be seen on this motion.
     """
     causes: list[Cause] = []
     offs: list[Array] = []
@@ -110,11 +102,7 @@ def sized_together(
     """
     Return causes grown together, and how many times the noise their deviation is.
 
-    Raises
-    ------
-    NotVisible
-        They would have to be implausibly large or small.
-
+    Raises NotVisible: they would have to be implausibly large or small.
     """
     wanted = float(np.exp(rng.uniform(*np.log(STRATA[stratum]))))
     factor = 1.0

@@ -42,13 +42,8 @@ def bootstrap(
     """
     Return a statistic with its percentile bootstrap interval.
 
-    Parameters
-    ----------
-    values : sequence, or array of shape (N, k)
-        Rows are cases.
-    statistic : callable
-        Takes values and ``axis``.
-
+    values: rows are cases, shape (N, k).
+    statistic: takes values and ``axis``.
     """
     rows = np.asarray(values, dtype=float)
     n = rows.shape[0]

@@ -64,15 +64,9 @@ def sealed(kind: str, seed: int, engine: str) -> Told:
     """
     Return what a tracker tells of one cause in a cell, opened.
 
-    Parameters
-    ----------
-    kind : str
-        One of `drawn.KINDS`.
-    seed : int
-        Decides arms, postures, cause and size.
-    engine : str
-        What diagnoses; a result of another one is not taken for this one's.
-
+    kind: one of `drawn.KINDS`.
+    seed: decides arms, postures, cause and size.
+    engine: what diagnoses; a result of another one is not taken for this one's.
     """
     rng = np.random.default_rng([seed, len(kind)])
     data = cell(kind, seed)

@@ -47,13 +47,8 @@ def cell(kind: str, seed: int) -> dict[str, Any]:
     """
     Return the robot file of a cell.
 
-    Parameters
-    ----------
-    kind : str
-        One of `KINDS`.
-    seed : int
-        Decides which arms.
-
+    kind: one of `KINDS`.
+    seed: decides which arms.
     """
     arm = catalog.load(ARMS[seed % len(ARMS)]).to_mapping()
     arm['tool'] = {'xyz': [0.02, -0.03, 0.15]}
@@ -106,16 +101,10 @@ def really(
     """
     Return the torch as the plant has it, seen from the workpiece where there is one.
 
-    Parameters
-    ----------
-    data : mapping
-        The robot file.
-    names : sequence of str
-        Joints in the order of ``q``.
-    causes : sequence of mapping
-        What is wrong, each with the joint that it is of.
-    q : array, shape (M, n) [rad or m]
-
+    data: the robot file.
+    names: joints in the order of ``q``.
+    causes: what is wrong, each with the joint that it is of.
+    q: shape (M, n) [rad or m].
     """
     arm = {key: value for key, value in data.items() if key != 'workpiece'}
     torch = _branch(arm, names, causes, q, rng)

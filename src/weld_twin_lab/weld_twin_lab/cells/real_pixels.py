@@ -38,15 +38,9 @@ def part(data: str, which: int, engine: str) -> dict[str, object]:
     Frames of base and tool are the tracker's, of the other stretches; all else is told from their
     pixels alone, or from their tracker by a plain fit of the geometry.
 
-    Parameters
-    ----------
-    data : str
-        Folder of published recordings; holds motoman_left.
-    which : int
-        The stretch left out, counted from 0.
-    engine : str
-        What diagnoses; a result of another one is not taken for this one's.
-
+    data: folder of published recordings; holds motoman_left.
+    which: the stretch left out, counted from 0.
+    engine: what diagnoses; a result of another one is not taken for this one's.
     """
     folder = Path(data)
     robot = motoman(folder, masses=False).robot

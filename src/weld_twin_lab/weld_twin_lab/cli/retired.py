@@ -43,11 +43,7 @@ def add_retired(places: Any, retired: Mapping[str, str]) -> None:
     """
     Add names that the help does not list, and that answer with where to ask now.
 
-    Parameters
-    ----------
-    retired : mapping from str to str
-        By the name, where its question is answered.
-
+    retired: by the name, where its question is answered.
     """
     for name, now in retired.items():
         parser = places.add_parser(name)
@@ -68,11 +64,7 @@ def refuse_retired(args: Any) -> None:
     """
     Refuse a proof that is no more, or an option.
 
-    Raises
-    ------
-    ModelError
-        It is one; the message says where its question is answered.
-
+    Raises ModelError: it is one; the message says where its question is answered.
     """
     if told := getattr(args, 'retired', ''):
         raise ModelError(told)

@@ -42,11 +42,7 @@ def places_of(data: Path, arm: str) -> tuple[str, ...]:
     """
     Return the places at which an arm was measured, in order of their names.
 
-    Raises
-    ------
-    DataError
-        There are none.
-
+    Raises DataError: there are none.
     """
     folder = data / arm
     found = sorted(item.name for item in folder.glob('*') if (item / 'hole_0.csv').is_file())
@@ -59,11 +55,7 @@ def touches(data: Path, arm: str, places: Sequence[str]) -> Recording:
     """
     Return the contacts of an arm at some places, as one recording.
 
-    Parameters
-    ----------
-    arm : str
-        One of `ARMS`.
-
+    arm: one of `ARMS`.
     """
     postures, labels = [], []
     contacts, ties = [], []

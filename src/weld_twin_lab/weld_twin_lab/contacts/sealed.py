@@ -62,11 +62,7 @@ def made(seed: int) -> Sealed:
     """
     Return one sealed case.
 
-    Parameters
-    ----------
-    seed : int
-        Decides the arm, the cause, its size, the slack and the postures.
-
+    seed: decides the arm, the cause, its size, the slack and the postures.
     """
     rng = np.random.default_rng(seed)
     tool = np.eye(4)

@@ -27,12 +27,8 @@ def postures_at(robot: Robot, place: Array, count: int, rng: np.random.Generator
     """
     Return nominal postures in which the tool point is at a place, within the limits.
 
-    Parameters
-    ----------
-    place : array, shape (3,) [m]
-    count : int
-        How many at the most.
-
+    place: shape (3,) [m].
+    count: how many at the most.
     """
     low, high = np.maximum(robot.lower, -TURN), np.minimum(robot.upper, TURN)
     start = rng.uniform(low, high, (TRIES * count, robot.n))
@@ -53,19 +49,11 @@ def touching(
     """
     Return the joint readings at which the plant's own tool point touches.
 
-    Parameters
-    ----------
-    robot : Robot
-        The nominal model.
-    causes : sequence of mapping
-        What is wrong with the plant, as in an effects file.
-    q : array, shape (M, n) [rad or m]
-        Postures to start from.
-    places : array, shape (M, 3) [m]
-        Where each touch takes place.
-    ties : sequence of Tie
-        Of the artefact.
-
+    robot: the nominal model.
+    causes: what is wrong with the plant, as in an effects file.
+    q: postures to start from, shape (M, n) [rad or m].
+    places: where each touch takes place, shape (M, 3) [m].
+    ties: of the artefact.
     """
     from ..plant.plant import run
     from ..plant.plant_recording import Command

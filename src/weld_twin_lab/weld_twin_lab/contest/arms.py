@@ -41,18 +41,10 @@ def arm_cases(ur5: Path, ur10: Path, out: Path) -> dict[str, Array]:
     Nobody measured base and tool frame; the nominal arm's are fitted on the stations of the case,
     the same for all methods. They are told as frames that are not known.
 
-    Parameters
-    ----------
-    ur5, ur10 : Path
-        Directories of the published tables; see docs/real_arms.md.
-    out : Path
-        Cases that are there already are left as they are.
+    ur5, ur10: directories of the published tables; see docs/real_arms.md.
+    out: cases that are there already are left as they are.
 
-    Raises
-    ------
-    DataError
-        A table is missing or cannot be read.
-
+    Raises DataError: a table is missing or cannot be read.
     """
     out.mkdir(parents=True, exist_ok=True)
     if (out / MEASURED).exists():

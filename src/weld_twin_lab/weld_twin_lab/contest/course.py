@@ -40,38 +40,24 @@ RUN = 'run.json'
 
 @dataclass(frozen=True)
 class Run:
-    """
-    One method on one case.
-
-    Attributes
-    ----------
-    answer : ContestAnswer, optional
-        None where it gave none.
-    seconds : float [s]
-        Of processor time, start of the interpreter included.
-    trouble : str
-        Why there is no answer.
-
-    """
+    """One method on one case."""
 
     answer: ContestAnswer | None
+    """None where it gave none."""
     seconds: float
+    """Of processor time, start of the interpreter included [s]."""
     memory_bytes: int
     trouble: str = ''
+    """Why there is no answer."""
 
 
 def opened(cases: Path, truths: Path, out: Path) -> list[str]:
     """
     Put sealed cases into the open form; return their names.
 
-    Parameters
-    ----------
-    cases, truths : Path
-        As ``weld-twin lab blind make`` writes them. Of the truths, only what was commanded while the
-        tool was measured is used.
-    out : Path
-        Cases that are there already are left as they are.
-
+    cases, truths: as ``weld-twin lab blind make`` writes them. Of the truths, only what was
+    commanded while the tool was measured is used.
+    out: cases that are there already are left as they are.
     """
     names = [str(entry['name']) for entry in layout.read(cases / layout.CASES)['cases']]
     for name in names:
@@ -96,19 +82,11 @@ def commands(names: list[str], entered: list[str]) -> dict[str, list[str]]:
     """
     Return the command of every method, with {case} and {out} in it.
 
-    Parameters
-    ----------
-    names : list of str
-        Of `ENTRANTS`.
-    entered : list of str
-        Others, as NAME=COMMAND.
+    names: of `ENTRANTS`.
+    entered: others, as NAME=COMMAND.
 
-    Raises
-    ------
-    DataError
-        There is no such entrant, or it cannot be loaded, or a command does not say where case and
-        answer go.
-
+    Raises DataError: there is no such entrant, or it cannot be loaded, or a command does not say
+    where case and answer go.
     """
     out: dict[str, list[str]] = {}
     for name in names:

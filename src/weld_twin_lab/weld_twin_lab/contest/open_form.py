@@ -40,35 +40,22 @@ Cause = tuple[Name, ...]
 
 @dataclass(frozen=True)
 class ContestCase:
-    """
-    What a method may know.
-
-    Attributes
-    ----------
-    robot : Robot
-        As its maker describes it.
-    train : Recording
-        What was commanded and measured.
-    ask : Recording
-        What was commanded on another occasion; nothing of what was measured then.
-    times : array, shape (M,) [s]
-        When the tool's position is asked for.
-    align : tuple of str
-        Frames that nobody measured: 'base', 'tool'.
-    exclude : tuple of str
-        Families of effects that are known not to be at work.
-    folder : Path
-        Where the case lies.
-
-    """
+    """What a method may know."""
 
     robot: Robot
+    """As its maker describes it."""
     train: Recording
+    """What was commanded and measured."""
     ask: Recording
+    """What was commanded on another occasion; nothing of what was measured then."""
     times: Array
+    """When the tool's position is asked for, shape (M,) [s]."""
     align: tuple[str, ...]
+    """Frames that nobody measured: 'base', 'tool'."""
     exclude: tuple[str, ...]
+    """Families of effects that are known not to be at work."""
     folder: Path
+    """Where the case lies."""
 
     @property
     def known(self) -> Path | None:
@@ -79,32 +66,22 @@ class ContestCase:
 
 @dataclass(frozen=True)
 class ContestAnswer:
-    """
-    What a method says.
-
-    Attributes
-    ----------
-    predicted : array, shape (M, 3) [m]
-        Where the tool was at the times asked for.
-    causes : tuple of causes
-        What is at work; each is told as names that may stand for it: effect, joint, and how
-        likely it is that one.
-    unknown, none : float
-        How likely something unnamed is at work, and nothing at all.
-    sure : tuple of bool, optional
-        Whether each cause is told as sure, then whether the whole is; left out, what is likelier
-        than `blind.judging.CONFIDENT` counts as sure.
-    sigma : array, shape (M, 3) [m], optional
-        Standard deviation of what will be measured of each coordinate, noise included.
-
-    """
+    """What a method says."""
 
     predicted: Array
+    """Where the tool was at the times asked for, shape (M, 3) [m]."""
     causes: tuple[Cause, ...] = ()
+    """What is at work; each is told as names that may stand for it: effect, joint, and how likely
+    it is that one."""
     unknown: float = 0.0
     none: float = 0.0
+    """How likely something unnamed is at work, and nothing at all."""
     sure: tuple[bool, ...] | None = None
+    """Whether each cause is told as sure, then whether the whole is; left out, what is likelier
+    than `blind.judging.CONFIDENT` counts as sure."""
     sigma: Array | None = None
+    """Standard deviation of what will be measured of each coordinate, noise included, shape (M, 3)
+    [m]."""
 
 
 def write_case(
@@ -113,17 +90,10 @@ def write_case(
     """
     Write a case.
 
-    Parameters
-    ----------
-    folder : Path
-        Must not exist.
-    robot : Path
-        Robot file.
-    recordings : tuple of Recording
-        To learn from, and to be asked about; of the latter, positions are left out.
-    said : mapping
-        ``align`` and ``exclude``; ``known``, the text of a file of effects, or empty.
-
+    folder: must not exist.
+    robot: robot file.
+    recordings: to learn from, and to be asked about; of the latter, positions are left out.
+    said: ``align`` and ``exclude``; ``known``, the text of a file of effects, or empty.
     """
     folder.mkdir(parents=True)
     (folder / _ROBOT).write_text(robot.read_text(encoding='utf-8'), encoding='utf-8')
@@ -182,11 +152,7 @@ def read_case(folder: Path) -> ContestCase:
     """
     Return a case.
 
-    Raises
-    ------
-    DataError
-        A file is missing or no table.
-
+    Raises DataError: a file is missing or no table.
     """
     try:
         said = json.loads((folder / _CASE).read_text(encoding='utf-8'))
@@ -248,16 +214,9 @@ def read_answer(folder: Path, count: int) -> ContestAnswer:
     """
     Return an answer.
 
-    Parameters
-    ----------
-    count : int
-        Positions that were asked for.
+    count: positions that were asked for.
 
-    Raises
-    ------
-    DataError
-        It is missing or not in the form that is asked for.
-
+    Raises DataError: it is missing or not in the form that is asked for.
     """
     try:
         said = json.loads((folder / ANSWER).read_text(encoding='utf-8'))

@@ -17,32 +17,20 @@ LIMIT = 300.0
 
 
 class Ended(NamedTuple):
-    """
-    How a run ended.
-
-    Attributes
-    ----------
-    seconds : float [s]
-        Of processor time, the start of the interpreter and its imports included.
-    trouble : str
-        The last that it said where it failed; empty where it did not.
-
-    """
+    """How a run ended."""
 
     seconds: float
+    """Of processor time, the start of the interpreter and its imports included [s]."""
     memory_bytes: int
     trouble: str = ''
+    """The last that it said where it failed; empty where it did not."""
 
 
 def ended(words: Sequence[str], case: Path, place: Path) -> Ended:
     """
     Have the answer to a case written to a place.
 
-    Parameters
-    ----------
-    words : sequence of str
-        The command of a method, with {case} and {out} in it.
-
+    words: the command of a method, with {case} and {out} in it.
     """
     filled = [word.replace('{case}', str(case)).replace('{out}', str(place)) for word in words]
     with (place / SAID).open('w', encoding='utf-8') as said:

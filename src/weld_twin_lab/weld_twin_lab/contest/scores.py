@@ -66,19 +66,6 @@ class Point:
     """
     What one answer was worth; None where the question does not arise.
 
-    Attributes
-    ----------
-    belief : float or None
-        In the true families, of cases detected.
-    left : float
-        Gap with the prediction over the gap of the nominal arm.
-    over_floor : float
-        Gap with the prediction over what the true causes would leave.
-    held, width_m, crps_m : float or None
-        Share of the measured coordinates within their 90 % interval; the median of its width; and the
-        mean continuous ranked probability score, which is less the sharper and the truer an answer is
-        [1]_. None where a method does not say how sure it is.
-
     References
     ----------
     .. [1] T. Gneiting, A. E. Raftery, "Strictly proper scoring rules, prediction, and estimation",
@@ -91,23 +78,25 @@ class Point:
     family: bool | None
     joint: bool | None
     belief: float | None
+    """In the true families, of cases detected."""
     sure_wrong: bool
     left: float
+    """Gap with the prediction over the gap of the nominal arm."""
     over_floor: float
+    """Gap with the prediction over what the true causes would leave."""
     held: float | None = None
     width_m: float | None = None
     crps_m: float | None = None
+    """Share of the measured coordinates within their 90 % interval; the median of its width; and
+    the mean continuous ranked probability score, which is less the sharper and the truer an answer
+    is [1]_. None where a method does not say how sure it is."""
 
 
 def promised(off: Array, sigma: Array) -> tuple[float, float, float]:
     """
     Return the share held by 90 % intervals, their median width and the mean CRPS of normal answers.
 
-    Parameters
-    ----------
-    off, sigma : array, shape (M, 3) [m]
-        Measured minus predicted, and how sure that was said to be.
-
+    off, sigma: measured minus predicted, and how sure that was said to be, shape (M, 3) [m].
     """
     z = off / sigma
     score = sigma * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * DENSITY * np.exp(-0.5 * z**2) - APART)
@@ -184,11 +173,7 @@ def page(runs: Mapping[str, Mapping[str, Run]], cases: Mapping[str, Sealed], nom
     """
     Return the table of all methods in Markdown.
 
-    Parameters
-    ----------
-    nominal : str
-        What is said of a method that gave no answer: it is taken for the nominal arm, silent.
-
+    nominal: what is said of a method that gave no answer: it is taken for the nominal arm, silent.
     """
     head = (
         *('method', 'answers', 'detected', 'false alarms', 'family', 'joint', 'belief (FIA)'),

@@ -15,15 +15,9 @@ def page(table: str, errors: Errors, measured: Mapping[str, Array]) -> str:
     """
     Return the page in Markdown.
 
-    Parameters
-    ----------
-    table : str
-        All methods on the sealed cases, as `scores.page` gives it.
-    errors : mapping
-        On the measured arms, as `arms.lefts` gives them; empty where these were not asked.
-    measured : mapping of case to array, shape (M, 3) [m]
-        What was measured there.
-
+    table: all methods on the sealed cases, as `scores.page` gives it.
+    errors: on the measured arms, as `arms.lefts` gives them; empty where these were not asked.
+    measured: what was measured there, shape (M, 3) [m].
     """
     parts = [f'## On sealed cases\n\n{table}']
     if errors:

@@ -29,15 +29,9 @@ def inside_region(errors: Array, covariances: Array, sigma: Array) -> Mask:
     """
     Return which errors lie in their 90 % region, shape (M,).
 
-    Parameters
-    ----------
-    errors : array, shape (M, 3) [m]
-        Measured minus predicted.
-    covariances : array, shape (M, 3, 3) [m^2]
-        Of the true position about the predicted one.
-    sigma : array, shape (M,) [m]
-        Noise of the instrument per axis; it comes on top.
-
+    errors: measured minus predicted, shape (M, 3) [m].
+    covariances: of the true position about the predicted one, shape (M, 3, 3) [m^2].
+    sigma: noise of the instrument per axis, shape (M,) [m]; it comes on top.
     """
     whole = covariances + (sigma**2)[:, None, None] * np.eye(3)
     solved = np.linalg.solve(whole, errors[..., None])[..., 0]
@@ -54,15 +48,9 @@ def held(
     """
     Return how well the regions hold on a recording that was not fitted, as plain JSON values.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        Of ``train``.
-    sigma : array, shape (M,) [m]
-        The instrument's noise at the other's measurements.
-    good : array of bool, shape (M,), optional
-        Measurements that count.
-
+    diagnosis: of ``train``.
+    sigma: the instrument's noise at the other's measurements, shape (M,) [m].
+    good: measurements that count, shape (M,).
     """
     posterior, measured = diagnosis.posterior, other.measured
     assert posterior is not None

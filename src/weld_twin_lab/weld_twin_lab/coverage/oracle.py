@@ -47,12 +47,8 @@ def oracle_sigma(
     hold nine of ten true poses of the very motion that is predicted: nobody who is right nine times
     in ten can be narrower by the same model.
 
-    Parameters
-    ----------
-    pair : (Recording, Recording)
-        What is fitted, and the motion that is predicted, seen where the tool really is.
-    mask : array of bool, shape (M,)
-        Poses of it that count.
+    pair: what is fitted, and the motion that is predicted, seen where the tool really is.
+    mask: poses of it that count, shape (M,).
 
     Returns
     -------

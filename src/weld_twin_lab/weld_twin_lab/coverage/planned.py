@@ -43,11 +43,7 @@ def carried_out(seed: int) -> dict[str, Any]:
     """
     Return what a plan promised and what an arm, measured by it, keeps.
 
-    Parameters
-    ----------
-    seed : int
-        Decides arm, its errors, the count and the noise.
-
+    seed: decides arm, its errors, the count and the noise.
     """
     rng = np.random.default_rng(seed)
     robot = catalog.load(ARMS[seed % len(ARMS)])

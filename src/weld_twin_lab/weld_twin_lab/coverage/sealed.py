@@ -56,11 +56,7 @@ def of_case(seed: int, number: int) -> dict[str, Any] | None:
     """
     Return what the promises of one sealed case are worth; None of one that has none.
 
-    Parameters
-    ----------
-    seed, number : int
-        As `mix.drawn` takes them.
-
+    seed, number: as `mix.drawn` takes them.
     """
     try:
         case, poor = drawn(seed, number)
@@ -84,13 +80,8 @@ def of_drawn(
     """
     Return what all promises of one diagnosis are worth, and the diagnosis.
 
-    Parameters
-    ----------
-    named : sequence of causes
-        Those of the case that a diagnosis should name; the others are the arm's small errors.
-    poor : str
-        How the motion was made poor.
-
+    named: those of the case that a diagnosis should name; the others are the arm's small errors.
+    poor: how the motion was made poor.
     """
     exact_arm = len(named) == len(case.causes)
     entry: dict[str, Any] = {
@@ -135,15 +126,9 @@ def of_motion(
     """
     Return what regions of poses hold on a motion that was not recorded, inside and outside.
 
-    Parameters
-    ----------
-    found : Diagnosis
-        Of ``train``.
-    train, test : Recording
-        The motion is seen where the tool really is.
-    case : SealedCase, optional
-        For an oracle, which knows its causes.
-
+    found: of ``train``.
+    train, test: the motion is seen where the tool really is.
+    case: for an oracle, which knows its causes.
     """
     assert test.measured is not None
     assert found.posterior is not None

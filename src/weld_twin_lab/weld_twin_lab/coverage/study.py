@@ -36,44 +36,28 @@ UR5_NOISE = 2e-5
 
 
 class Wanted(NamedTuple):
-    """
-    What is asked for.
-
-    Attributes
-    ----------
-    arms : (Path, Path) or None
-        Directories with the published tables of the UR5 and the UR10.
-    seed : int
-        Of all that is drawn.
-    cases, seams, touches, cells, plans : int
-        Sealed cases; seams of each language of programs; arms that touch things; cells that live
-        through years; plans that are carried out.
-
-    """
+    """What is asked for."""
 
     arms: tuple[Path, Path] | None
+    """Directories with the published tables of the UR5 and the UR10."""
     seed: int
+    """Of all that is drawn."""
     cases: int
     seams: int
     touches: int
     cells: int
     plans: int
+    """Sealed cases; seams of each language of programs; arms that touch things; cells that live
+    through years; plans that are carried out."""
 
 
 def entries_of(wanted: Wanted, part: Parts) -> list[dict[str, Any]]:
     """
     Return what every promise came to.
 
-    Parameters
-    ----------
-    part : Parts
-        Keeps every recording's result.
+    part: keeps every recording's result.
 
-    Raises
-    ------
-    DataError
-        Data are missing or cannot be read, or the simulator is not there.
-
+    Raises DataError: data are missing or cannot be read, or the simulator is not there.
     """
     if any(wanted[2:]):
         require_simulator()

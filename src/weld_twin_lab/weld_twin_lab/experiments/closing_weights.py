@@ -27,22 +27,15 @@ TRIED = (0.9, 0.93, 0.95, 0.98)
 
 
 class Heard(NamedTuple):
-    """
-    Every answer that was heard in the rounds of many cells.
-
-    Attributes
-    ----------
-    signs : array, shape (N, 3)
-    right : array of bool, shape (N,)
-    cell, turn : array of int, shape (N,)
-        Which cell, and which of its rounds.
-
-    """
+    """Every answer that was heard in the rounds of many cells."""
 
     signs: NDArray[Any]
+    """Shape (N, 3)."""
     right: NDArray[Any]
+    """Shape (N,)."""
     cell: NDArray[Any]
     turn: NDArray[Any]
+    """Which cell, and which of its rounds, shape (N,)."""
 
     def only(self, rows: NDArray[Any]) -> Heard:
         """Return some of them."""
@@ -53,11 +46,7 @@ def heard(cases: Sequence[Mapping[str, Any]]) -> Heard:
     """
     Return the answers that say what the causes are, of cells as a study keeps them.
 
-    Parameters
-    ----------
-    cases : sequence of mapping
-        As in investigate.json.
-
+    cases: as in investigate.json.
     """
     rows = [
         (answer['signs'], answer['right'], k, turn)
@@ -92,12 +81,8 @@ def reached(all_: Heard, probability: Array, least: float) -> tuple[int, int]:
     """
     Return in how many cells the first answer that is believed so far is right, and in how many wrong.
 
-    Parameters
-    ----------
-    probability : array, shape (N,)
-    least : float
-        Belief that it has to have.
-
+    probability: shape (N,).
+    least: belief that it has to have.
     """
     counts = [0, 0]
     for cell in np.unique(all_.cell):

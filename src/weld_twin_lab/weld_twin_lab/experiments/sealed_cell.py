@@ -49,12 +49,8 @@ class SealedCell:
     """
     One cell with causes at work that only `opened` tells.
 
-    Parameters
-    ----------
-    lot : Lot
-        What the case is to be.
-    seed, number : int
-        Decide everything random in it.
+    lot: what the case is to be.
+    seed, number: decide everything random in it.
 
     Attributes
     ----------
@@ -98,13 +94,8 @@ class SealedCell:
         """
         Return the recording of a motion.
 
-        Parameters
-        ----------
-        seed : int
-            Decides noise and surroundings.
-        changed : str
-            What is changed in the cell for it, as `set_up_change` reads it.
-
+        seed: decides noise and surroundings.
+        changed: what is changed in the cell for it, as `set_up_change` reads it.
         """
         rng = np.random.default_rng([seed, *name.encode()])
         cell = self._case.cell
@@ -183,16 +174,9 @@ def as_motion(asked: Mapping[str, Any], robot: Robot) -> Motion:
     """
     Return a motion as it stands in an experiment, as the controller runs it.
 
-    Parameters
-    ----------
-    asked : mapping
-        'static', 'joint_names', 't' [s], 'q' [rad or m].
+    asked: 'static', 'joint_names', 't' [s], 'q' [rad or m].
 
-    Raises
-    ------
-    DataError
-        It names other joints than the robot's.
-
+    Raises DataError: it names other joints than the robot's.
     """
     if list(asked['joint_names']) != list(robot.joint_names):
         raise DataError(f'the experiment is not for {robot.name}')

@@ -31,19 +31,11 @@ def investigated(
     """
     Investigate sealed cells that poor motions leave open.
 
-    Parameters
-    ----------
-    seed : int
-        Decides the cells.
-    wanted : int
-        Cells that poor motions leave open.
-    runner : Runner
-        Keeps what came of every cell drawn.
-    tell : callable
-        Told how many were drawn.
-    minutes : float
-        No further cells are begun after so long.
-
+    seed: decides the cells.
+    wanted: cells that poor motions leave open.
+    runner: keeps what came of every cell drawn.
+    tell: told how many were drawn.
+    minutes: no further cells are begun after so long.
     """
     end, engine = time.monotonic() + 60.0 * minutes, engine_digest()
     drawn: list[dict[str, Any]] = []
@@ -75,13 +67,8 @@ def investigated_cell(seed: int, number: int, engine: str) -> dict[str, Any]:
     """
     Return what came of one cell, in plain values; the simulator is loaded where it is needed.
 
-    Parameters
-    ----------
-    seed, number : int
-        Decide the cell.
-    engine : str
-        Only tells the results of one version of the core from those of another.
-
+    seed, number: decide the cell.
+    engine: only tells the results of one version of the core from those of another.
     """
     from ..blind.simulator import require_simulator
 

@@ -52,10 +52,7 @@ def answered(
     """
     Return the answer from the first recording and later ones, why it closes the question, and how.
 
-    Parameters
-    ----------
-    limits : Limits
-        What the next experiment may take.
+    limits: what the next experiment may take.
 
     Returns
     -------
@@ -107,13 +104,8 @@ def looped(cell: SealedCell, found: Mapping[str, Any], first: Mapping[str, Any])
     """
     Return what came of one cell that was investigated.
 
-    Parameters
-    ----------
-    found : mapping
-        The first diagnosis.
-    first : mapping
-        The same in short.
-
+    found: the first diagnosis.
+    first: the same in short.
     """
     rounds, end, answer = investigated(cell, cell.first, found, dict(first))
     return {

@@ -29,13 +29,8 @@ def cheap_year(seed: int, number: int, bases: Sequence[Mapping[str, Any]]) -> di
     """
     Return what a year of weekly looks came to.
 
-    Parameters
-    ----------
-    seed, number : int
-        Of the year; the same numbers give the same year.
-    bases : sequence of mappings
-        Entries of the cell's checks.
-
+    seed, number: of the year; the same numbers give the same year.
+    bases: entries of the cell's checks.
     """
     rng = np.random.default_rng([seed, 1_000_000 + number])
     checks = _common([Entry.of_plain(base) for base in bases])

@@ -37,29 +37,18 @@ SEASONS = {'link_length': (1e-5, 8e-5), 'joint_offset': (3e-5, 3e-4)}
 
 
 class Event(NamedTuple):
-    """
-    One thing that happens.
-
-    Attributes
-    ----------
-    kind : str
-        'step', 'trend' or 'season'.
-    name : str
-        The coordinate that it moves.
-    begin : int
-        Week from which on.
-    size : float
-        Height of a step, rise of a trend in a week, half the swing of a season.
-    phase : float [rad]
-        Of a season.
-
-    """
+    """One thing that happens."""
 
     kind: str
+    """'step', 'trend' or 'season'."""
     name: str
+    """The coordinate that it moves."""
     begin: int
+    """Week from which on."""
     size: float
+    """Height of a step, rise of a trend in a week, half the swing of a season."""
     phase: float = 0.0
+    """Of a season [rad]."""
 
     def columns(self, weeks: Array) -> Array:
         """Return the shape in time at some weeks, shape (W, 1), of a season (W, 2)."""
@@ -83,21 +72,13 @@ class Event(NamedTuple):
 
 @dataclass(frozen=True)
 class Year:
-    """
-    A year of a cell.
-
-    Attributes
-    ----------
-    weeks : tuple of int
-        Those with a check.
-    set_ups : tuple of int
-        Number of the tracker's set-up at each check.
-
-    """
+    """A year of a cell."""
 
     events: tuple[Event, ...]
     weeks: tuple[int, ...]
+    """Those with a check."""
     set_ups: tuple[int, ...]
+    """Number of the tracker's set-up at each check."""
 
 
 def year(entry: Entry, rng: np.random.Generator) -> Year:

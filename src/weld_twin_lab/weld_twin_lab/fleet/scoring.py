@@ -45,20 +45,12 @@ def score(
     """
     Return what a year of weekly looks came to.
 
-    Parameters
-    ----------
-    observations : sequence of Observation
-        Of each check, in the order of time; day 0 is that of week 0.
-    year : Year
-        The truth.
-    named : collection of str
-        Coordinates that a diagnosis has named as causes.
-    likely : collection of str
-        Coordinates that use can change.
-    joints : sequence of str
-        Of the arm, the first joint first.
-    truth : mapping of str to float
-        Values before anything happened.
+    observations: of each check, in the order of time; day 0 is that of week 0.
+    year: the truth.
+    named: coordinates that a diagnosis has named as causes.
+    likely: coordinates that use can change.
+    joints: of the arm, the first joint first.
+    truth: values before anything happened.
 
     Returns
     -------

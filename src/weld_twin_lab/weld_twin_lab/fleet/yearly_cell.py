@@ -36,21 +36,13 @@ MOVED = 0.05
 
 @dataclass(frozen=True, eq=False)
 class YearlyCell:
-    """
-    A cell, and the checks it is measured with.
-
-    Attributes
-    ----------
-    as_built : tuple of mappings
-        Its flaws on the first day.
-    checks : tuple of Take
-        Sets of stations; a new set-up of the tracker may mean another one.
-
-    """
+    """A cell, and the checks it is measured with."""
 
     cell: BlindCell
     as_built: tuple[Cause, ...]
+    """Its flaws on the first day."""
     checks: tuple[Take, ...]
+    """Sets of stations; a new set-up of the tracker may mean another one."""
 
 
 def draw(seed: int, number: int) -> YearlyCell:
@@ -82,11 +74,7 @@ def diagnosed(
     """
     Return the entry of one check: simulated, written as a bag, diagnosed by the command.
 
-    Raises
-    ------
-    DataError
-        The command refused it.
-
+    Raises DataError: the command refused it.
     """
     taken = yearly.checks[check]._replace(seed=seed)
     made = as_recording('check', record(yearly.cell, causes, taken))

@@ -29,15 +29,9 @@ def run_years(
     """
     Return all figures of the study.
 
-    Parameters
-    ----------
-    seed, years, cells : int
-        So many drawn years of so many cells.
-    full : int
-        Years that are diagnosed in full, of cells of their own.
-    engine : str
-        Digest of the program: what another one found is not taken for this one's.
-
+    seed, years, cells: so many drawn years of so many cells.
+    full: years that are diagnosed in full, of cells of their own.
+    engine: digest of the program: what another one found is not taken for this one's.
     """
     wanted = [
         Task(_base, (seed, number, check, engine), f'cell {number + 1}')

@@ -31,41 +31,25 @@ TRIES = 40
 
 @dataclass(frozen=True, eq=False)
 class Sound:
-    """
-    A sound recording.
-
-    Attributes
-    ----------
-    robot : Robot
-        The nominal arm with its tool as it is told to the diagnosis.
-    real : Robot
-        The same arm with its tool as it is; the base as it was told.
-    told : dict
-        Robot, motion, causes, how the motion was made poor.
-
-    """
+    """A sound recording."""
 
     robot: Robot
+    """The nominal arm with its tool as it is told to the diagnosis."""
     recording: Recording
     align: tuple[str, ...]
     real: Robot
+    """The same arm with its tool as it is; the base as it was told."""
     told: dict[str, object]
+    """Robot, motion, causes, how the motion was made poor."""
 
 
 def draw(rng: np.random.Generator, *, rich: bool = False) -> Sound:
     """
     Return a sound recording drawn at random.
 
-    Parameters
-    ----------
-    rich : bool
-        Only motions that show every joint.
+    rich: only motions that show every joint.
 
-    Raises
-    ------
-    DataError
-        None came about.
-
+    Raises DataError: none came about.
     """
     for _ in range(TRIES):
         with suppress(NotVisible, FloatingPointError, DataError):

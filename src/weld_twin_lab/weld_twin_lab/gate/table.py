@@ -25,11 +25,7 @@ def result(trials: Sequence[Mapping[str, Any]], seed: int) -> dict[str, Any]:
 
     What stands only among the alike of another mistake is counted beside, and not as named.
 
-    Parameters
-    ----------
-    trials : sequence of mapping
-        Those without a ``kind`` are of sound recordings.
-
+    trials: those without a ``kind`` are of sound recordings.
     """
     mistakes = [t for t in trials if 'kind' in t]
     sound = [t for t in trials if 'kind' not in t]

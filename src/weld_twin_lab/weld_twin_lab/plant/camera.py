@@ -11,26 +11,17 @@ from .screws import Motion, compose, inverse
 
 @dataclass(frozen=True, eq=False)
 class Eye:
-    """
-    A camera as it really is.
-
-    Attributes
-    ----------
-    focal, centre : array, shape (2,) [px]
-    bent : tuple of float
-        Radial k1 and k2, tangential p1 and p2.
-    stands : Motion
-        Camera in the measuring frame: z ahead, x to the right.
-    size : tuple of int [px]
-        Width and height of its images.
-
-    """
+    """A camera as it really is."""
 
     focal: np.ndarray
     centre: np.ndarray
+    """Shape (2,) [px]."""
     bent: tuple[float, float, float, float]
+    """Radial k1 and k2, tangential p1 and p2."""
     stands: Motion
+    """Camera in the measuring frame: z ahead, x to the right."""
     size: tuple[int, int]
+    """Width and height of its images [px]."""
 
 
 def looking(place: np.ndarray, aim: np.ndarray) -> Motion:
@@ -47,15 +38,9 @@ def seen(
     """
     Return where points appear, shape (M, P, 2) [px]; NaN where they are outside of the image.
 
-    Parameters
-    ----------
-    board : Motion, of (M,)
-        In the measuring frame.
-    points : array, shape (P, 3) [m]
-        In the board's own frame.
-    noise : float [px]
-        Standard deviation of each coordinate.
-
+    board: in the measuring frame.
+    points: in the board's own frame, shape (P, 3) [m].
+    noise: standard deviation of each coordinate [px].
     """
     there = compose(inverse(eye.stands), board)
     at = np.einsum('mij,pj->mpi', there.rotation, points) + there.position[:, None]

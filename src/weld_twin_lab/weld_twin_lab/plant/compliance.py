@@ -27,11 +27,7 @@ class Compliant:
     """
     The joints that give.
 
-    Parameters
-    ----------
-    robot : mapping
-        The robot file.
-
+    robot: the robot file.
     """
 
     def __init__(self, robot: Entry, arm: Arm, causes: Causes, richness: float) -> None:

@@ -38,53 +38,33 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """
-    The robot file, as geometry needs it.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Joints in chain order.
-    rows : Rows, each (n,)
-    sliding : array, shape (n,), bool
-        True where the joint is prismatic.
-    modified : bool
-        Craig's convention instead of the standard one.
-    base, tool : Motion
-        World to base, flange to tool centre point.
-
-    """
+    """The robot file, as geometry needs it."""
 
     names: tuple[str, ...]
+    """Joints in chain order."""
     rows: Rows
     sliding: np.ndarray
+    """True where the joint is prismatic, shape (n,), bool."""
     modified: bool
+    """Craig's convention instead of the standard one."""
     base: Motion
     tool: Motion
+    """World to base, flange to tool centre point."""
 
 
 @dataclass(frozen=True, eq=False)
 class Home:
-    """
-    Screws of the joints and poses of the links with every joint at zero, in the base frame.
-
-    Attributes
-    ----------
-    omega, v : array, shape (..., n, 3)
-    point : array, shape (..., n, 3) [m]
-        A point on each axis.
-    across : array, shape (..., n, 3)
-        A unit vector square to each axis, fixed to the link before it.
-    links : tuple of Motion
-        DH frame at the end of each link; the last is the flange.
-
-    """
+    """Screws of the joints and poses of the links with every joint at zero, in the base frame."""
 
     omega: np.ndarray
     v: np.ndarray
+    """Shape (..., n, 3)."""
     point: np.ndarray
+    """A point on each axis, shape (..., n, 3) [m]."""
     across: np.ndarray
+    """A unit vector square to each axis, fixed to the link before it, shape (..., n, 3)."""
     links: tuple[Motion, ...]
+    """DH frame at the end of each link; the last is the flange."""
 
 
 def arm_from(robot: Entry) -> Arm:
@@ -123,11 +103,7 @@ def home(arm: Arm, rows: Rows | None = None) -> Home:
     """
     Place the joint axes and the links of the arm at its home position.
 
-    Parameters
-    ----------
-    rows : Rows, each (..., n), optional
-        The rows as built, where they differ from the file's.
-
+    rows: the rows as built, where they differ from the file's.
     """
     rows = arm.rows if rows is None else rows
     at = screws.identity()
@@ -165,12 +141,9 @@ def flange(arm: Arm, at: Home, q: np.ndarray, wobble: np.ndarray | None = None) 
     """
     Return the flange in the base frame.
 
-    Parameters
-    ----------
-    q : array, shape (..., n) [rad or m]
-    wobble : array, shape (..., n) [rad], optional
-        Lean of each axis about its `across` vector: a bearing that tilts as it turns.
-
+    q: shape (..., n) [rad or m].
+    wobble: lean of each axis about its `across` vector: a bearing that tilts as it turns, shape
+    (..., n) [rad].
     """
     total = screws.identity()
     for i in range(len(arm.names)):

@@ -24,12 +24,8 @@ def pull(causes: Causes, arm: Arm, q: np.ndarray) -> np.ndarray | None:
     """
     Return the pull of the hoses as a wrench on the tool, tool frame, (N, 6) [N, N m], or None.
 
-    Parameters
-    ----------
-    causes : Causes
-        Entries of hose_pull: hook [m] in the base frame, tension [N], length [m].
-    q : array, shape (N, n)
-
+    causes: entries of hose_pull: hook [m] in the base frame, tension [N], length [m].
+    q: shape (N, n).
     """
     hoses = list(causes.of('hose_pull'))
     if not hoses:

@@ -41,12 +41,8 @@ def on_joints(causes: Causes, t: np.ndarray, q: np.ndarray, richness: float) -> 
     """
     Return the displacement of the links, shape (N, n) [rad or m].
 
-    Parameters
-    ----------
-    t : array, shape (N,) [s]
-    q : array, shape (N, n)
-        Motor side; a sequence in time.
-
+    t: shape (N,) [s].
+    q: motor side, shape (N, n); a sequence in time.
     """
     out = np.zeros_like(q)
     for item in causes.of('friction'):

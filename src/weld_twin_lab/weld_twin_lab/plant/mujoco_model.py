@@ -32,19 +32,12 @@ STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """
-    What the flange carries besides the tool.
-
-    Attributes
-    ----------
-    mass : float [kg]
-    com : array, shape (3,) [m]
-        Centre of mass in the tool frame.
-
-    """
+    """What the flange carries besides the tool."""
 
     mass: float
+    """[kg]"""
     com: np.ndarray
+    """Centre of mass in the tool frame, shape (3,) [m]."""
 
 
 def load_from(robot: Entry, extra: list[tuple[float, np.ndarray]]) -> Load:
@@ -142,12 +135,8 @@ class Statics:
         """
         Return the load torque on each joint, shape (N, n) [N m, or N for a slide].
 
-        Parameters
-        ----------
-        q : array, shape (N, n)
-        wrench : array, shape (N, 6), optional
-            Force and torque on the tool, tool frame.
-
+        q: shape (N, n).
+        wrench: force and torque on the tool, tool frame, shape (N, 6).
         """
         data, tau = self._data, np.empty_like(q)
         for k, row in enumerate(q):

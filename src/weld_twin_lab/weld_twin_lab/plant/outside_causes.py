@@ -56,14 +56,9 @@ def on_joints(
     """
     Return the displacement of the links, shape (N, n) [rad or m].
 
-    Parameters
-    ----------
-    t : array, shape (N,) [s]
-    q : array, shape (N, n)
-        Motor side; a sequence in time.
-    torque : callable
-        Gives the load torque, shape (N, n); asked only where needed.
-
+    t: shape (N,) [s].
+    q: motor side, shape (N, n); a sequence in time.
+    torque: gives the load torque, shape (N, n); asked only where needed.
     """
     out = np.zeros_like(q)
     for item in causes.items:

@@ -29,11 +29,7 @@ class Pedestal:
     """
     The springs under an arm.
 
-    Parameters
-    ----------
-    parts : Compliant
-        The arm with its load.
-
+    parts: the arm with its load.
     """
 
     def __init__(self, parts: Compliant, causes: Causes) -> None:
@@ -55,16 +51,10 @@ class Pedestal:
         """
         Return how the base of a moving arm has turned, in its own frame.
 
-        Parameters
-        ----------
-        grid : array, shape (N,) [s]
-            Evenly spaced; wrenches are given there.
-        motor : CubicSpline
-            Joint positions over time.
-        wrench : array, shape (N, 6), optional
-        t : array, shape (M,) [s]
-            When the lean is wanted.
-
+        grid: evenly spaced, shape (N,) [s]; wrenches are given there.
+        motor: joint positions over time.
+        wrench: shape (N, 6).
+        t: when the lean is wanted, shape (M,) [s].
         """
         coarse = np.arange(0, len(grid), max(1, round(COARSE / float(grid[1] - grid[0]))))
         at = grid[coarse]

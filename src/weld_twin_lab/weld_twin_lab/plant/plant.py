@@ -151,17 +151,11 @@ def run(
     """
     Move a robot with flaws and record it.
 
-    Parameters
-    ----------
-    robot : mapping
-        A robot file (interface section 2).
-    effects : sequence of mappings
-        The flaws, as in an effects file; also those of `outside_causes`.
-    rng : Generator
-        Source of everything random; the same seed gives the same recording.
-    richness : float
-        How far the physics of servo, gap, spring and flywheel goes beyond the textbook form of
-        the effect: 0 is the textbook, 1 a plausible machine.
+    robot: a robot file (interface section 2).
+    effects: the flaws, as in an effects file; also those of `outside_causes`.
+    rng: source of everything random; the same seed gives the same recording.
+    richness: how far the physics of servo, gap, spring and flywheel goes beyond the textbook form
+    of the effect: 0 is the textbook, 1 a plausible machine.
 
     Returns
     -------

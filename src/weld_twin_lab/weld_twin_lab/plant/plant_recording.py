@@ -10,28 +10,19 @@ from scipy.interpolate import CubicSpline
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """
-    What the controller commanded, and what the surroundings did meanwhile.
-
-    Attributes
-    ----------
-    t : array, shape (N,) [s]
-        Strictly increasing; evenly spaced unless static.
-    q : array, shape (N, n) [rad or m]
-    static : bool
-        Each row is a pose at rest; the rows are visited in order.
-    wrench : array, shape (N, 6) [N, N m], optional
-        Force and torque on the tool, in the tool frame, at the tool centre point.
-    temperature : array, shape (N,) [degC], optional
-        The arm's own temperature.
-
-    """
+    """What the controller commanded, and what the surroundings did meanwhile."""
 
     t: np.ndarray
+    """Strictly increasing, shape (N,) [s]; evenly spaced unless static."""
     q: np.ndarray
+    """Shape (N, n) [rad or m]."""
     static: bool = False
+    """Each row is a pose at rest; the rows are visited in order."""
     wrench: np.ndarray | None = None
+    """Force and torque on the tool, in the tool frame, at the tool centre point, shape (N, 6) [N,
+    N m]."""
     temperature: np.ndarray | None = None
+    """The arm's own temperature, shape (N,) [degC]."""
 
     def __post_init__(self) -> None:
         """Keep read-only copies of the arrays, of the right shape."""
@@ -59,34 +50,26 @@ class Command:
 
 @dataclass(frozen=True, eq=False)
 class PlantRecording:
-    """
-    What the cell recorded: several streams, each with its own stamps.
-
-    Attributes
-    ----------
-    t_joint : array, shape (N,) [s]
-    q : array, shape (N, n) [rad or m]
-        As commanded: the controller does not know better.
-    qd : array, shape (N, n) [rad/s or m/s] or None
-    t_measured : array, shape (M,) [s]
-    position : array, shape (M, 3) [m]
-        Tool centre point in the measuring frame.
-    quaternion : array, shape (M, 4) x y z w, or None
-    wrench_t, wrench : arrays, shapes (W,) [s] and (W, 6) [N, N m], or None
-    temperature_t, temperature : arrays, shapes (K,) [s] and (K,) [degC], or None
-
-    """
+    """What the cell recorded: several streams, each with its own stamps."""
 
     t_joint: np.ndarray
+    """Shape (N,) [s]."""
     q: np.ndarray
+    """As commanded: the controller does not know better, shape (N, n) [rad or m]."""
     qd: np.ndarray | None
+    """Shape (N, n) [rad/s or m/s] or None."""
     t_measured: np.ndarray
+    """Shape (M,) [s]."""
     position: np.ndarray
+    """Tool centre point in the measuring frame, shape (M, 3) [m]."""
     quaternion: np.ndarray | None
+    """Shape (M, 4) x y z w, or None."""
     wrench_t: np.ndarray | None
     wrench: np.ndarray | None
+    """[s] and (W, 6) [N, N m], or None"""
     temperature_t: np.ndarray | None
     temperature: np.ndarray | None
+    """[s] and (K,) [degC], or None"""
     static: bool
 
 

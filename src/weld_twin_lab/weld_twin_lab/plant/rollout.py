@@ -35,11 +35,8 @@ def follow(q: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     """
     Return what makes a follower hinge pass through every sample of its course.
 
-    Parameters
-    ----------
-    q : array, shape (N,)
-        Course [rad or m].
-    step : float [s]
+    q: course [rad or m], shape (N,).
+    step: [s]
 
     Returns
     -------
@@ -66,13 +63,9 @@ def run(
     """
     Return the joint positions at every step, the start included.
 
-    Parameters
-    ----------
-    start, velocity : array, shape (nv,)
-    force : array, shape (N, nv)
-        Generalised force held over the step that begins at each sample.
-    pull : array, shape (N, nbody, 6), optional
-        Force and torque on each body at its centre of mass, world frame.
+    start, velocity: shape (nv,).
+    force: generalised force held over the step that begins at each sample, shape (N, nv).
+    pull: force and torque on each body at its centre of mass, world frame, shape (N, nbody, 6).
 
     Returns
     -------

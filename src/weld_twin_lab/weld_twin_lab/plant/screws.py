@@ -14,18 +14,12 @@ from scipy.spatial.transform import Rotation
 
 
 class Motion(NamedTuple):
-    """
-    Rigid motion, equally the pose of a frame.
-
-    Attributes
-    ----------
-    rotation : array, shape (..., 3, 3)
-    position : array, shape (..., 3) [m]
-
-    """
+    """Rigid motion, equally the pose of a frame."""
 
     rotation: np.ndarray
+    """Shape (..., 3, 3)."""
     position: np.ndarray
+    """Shape (..., 3) [m]."""
 
 
 def identity() -> Motion:
@@ -60,14 +54,9 @@ def exp_screw(omega: np.ndarray, v: np.ndarray, amount: np.ndarray) -> Motion:
     """
     Return the motion along a screw.
 
-    Parameters
-    ----------
-    omega : array, shape (..., 3)
-        Unit axis, or zero for a slide.
-    v : array, shape (..., 3)
-        Velocity of the origin per unit of the amount [m/rad or -].
-    amount : array, shape (...) [rad or m]
-
+    omega: unit axis, or zero for a slide, shape (..., 3).
+    v: velocity of the origin per unit of the amount [m/rad or -], shape (..., 3).
+    amount: shape (...) [rad or m].
     """
     w = skew(np.asarray(omega, dtype=float))
     ww = w @ w

@@ -62,17 +62,10 @@ LIBRARY = frozenset(ROW_EFFECTS) | {
 
 @dataclass(frozen=True)
 class Causes:
-    """
-    The effects at work, and the joints they may name.
-
-    Attributes
-    ----------
-    items : tuple of mappings
-        As in an effects file.
-
-    """
+    """The effects at work, and the joints they may name."""
 
     items: tuple[Entry, ...]
+    """As in an effects file."""
     joints: tuple[str, ...]
 
     def of(self, effect: str) -> Iterator[Entry]:
@@ -117,15 +110,10 @@ def warm_up(item: Entry, t: np.ndarray, temperature: np.ndarray | None) -> np.nd
     """
     Return the warming against the reference, shape (len(t),) [K].
 
-    Parameters
-    ----------
-    item : mapping
-        A thermal_growth entry; `rise` [K] and `time_constant` [s] give a warm-up curve where
-        no temperature is recorded.
-    t : array, shape (M,) [s]
-        Since the recording's first stamp.
-    temperature : array, shape (M,) [degC], or None
-
+    item: a thermal_growth entry; `rise` [K] and `time_constant` [s] give a warm-up curve where no
+    temperature is recorded.
+    t: since the recording's first stamp, shape (M,) [s].
+    temperature: shape (M,) [degC], or None.
     """
     if temperature is not None:
         return temperature - float(item.get('reference', REFERENCE_TEMPERATURE))
@@ -170,11 +158,7 @@ def gearing(causes: Causes, q: np.ndarray) -> np.ndarray:
     """
     Return the error of the joints' transmissions, shape (..., n) [rad or m].
 
-    Parameters
-    ----------
-    q : array, shape (..., n)
-        Motor side, in units of the joint.
-
+    q: motor side, in units of the joint, shape (..., n).
     """
     error: np.ndarray = causes.per_joint('gear_ratio', 'scale') * q
     error += causes.per_joint('joint_offset', 'offset')

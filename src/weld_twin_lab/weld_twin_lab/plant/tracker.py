@@ -25,57 +25,40 @@ TICK = 1e-6
 
 @dataclass(frozen=True)
 class Tracker:
-    """
-    What records the cell. All zero and None: exact values at the command's own stamps.
-
-    Attributes
-    ----------
-    rate : float [Hz], optional
-        Of the pose stream; None measures at the command's stamps. Ignored at rest.
-    sigma : float [m]
-        White noise of each coordinate.
-    sigma_orientation : float [rad]
-        White noise about each axis.
-    orientation : bool
-        False records positions only.
-    jitter : float [s]
-        Standard deviation of the stamps about the true instants, in motion.
-    drop : float
-        Share of samples lost.
-    outlier_share, outlier_size : float, float [m]
-        Share of positions thrown off, and how far, in a random direction.
-    clock_offset : float [s]
-        Of the tracker's clock, added to its stamps: a time_delay by another name.
-    joint_rate : float [Hz], optional
-    joint_jitter : float [s]
-    velocity : bool
-        Whether joint velocity is published.
-    wrench_sigma : float [N]
-        White noise of the forces; torques have a tenth of it [N m].
-    temperature_rate : float [Hz], optional
-    temperature_lag : float [s]
-        First-order lag of the sensor; it starts in equilibrium.
-    temperature_sigma : float [K]
-
-    """
+    """What records the cell. All zero and None: exact values at the command's own stamps."""
 
     rate: float | None = None
+    """Of the pose stream [Hz]; None measures at the command's stamps. Ignored at rest."""
     sigma: float = 0.0
+    """White noise of each coordinate [m]."""
     sigma_orientation: float = 0.0
+    """White noise about each axis [rad]."""
     orientation: bool = True
+    """False records positions only."""
     jitter: float = 0.0
+    """Standard deviation of the stamps about the true instants, in motion [s]."""
     drop: float = 0.0
+    """Share of samples lost."""
     outlier_share: float = 0.0
     outlier_size: float = 0.0
+    """Share of positions thrown off, and how far, in a random direction [m]."""
     clock_offset: float = 0.0
+    """Of the tracker's clock, added to its stamps: a time_delay by another name [s]."""
     joint_rate: float | None = None
+    """[Hz]"""
     joint_jitter: float = 0.0
+    """[s]"""
     joint_drop: float = 0.0
     velocity: bool = True
+    """Whether joint velocity is published."""
     wrench_sigma: float = 0.0
+    """White noise of the forces [N]; torques have a tenth of it [N m]."""
     temperature_rate: float | None = None
+    """[Hz]"""
     temperature_lag: float = 0.0
+    """First-order lag of the sensor [s]; it starts in equilibrium."""
     temperature_sigma: float = 0.0
+    """[K]"""
 
 
 def instants(
@@ -107,11 +90,7 @@ def gained(causes: Causes, since: np.ndarray, richness: float) -> np.ndarray:
 
     Its quartz warms up with the instrument, and it counts whole ticks.
 
-    Parameters
-    ----------
-    since : array, shape (M,) [s]
-        True time since both were set.
-
+    since: true time since both were set, shape (M,) [s].
     """
     rate = float(causes.total('clock_rate', 'rate'))
     warm = richness * SETTLING * SETTLED * -np.expm1(-since / SETTLED)
@@ -124,11 +103,8 @@ def observe(
     """
     Return what the tracker reads of true poses.
 
-    Parameters
-    ----------
-    pose : Motion, shape (M,)
-    sigma : float [m]
-        White noise of each coordinate, the tracker's and any other.
+    pose: shape (M,).
+    sigma: white noise of each coordinate, the tracker's and any other [m].
 
     Returns
     -------

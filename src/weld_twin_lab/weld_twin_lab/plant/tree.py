@@ -52,14 +52,9 @@ def moving(
     """
     Return gaps and springs of the moving arm, shape (N, n) [rad or m].
 
-    Parameters
-    ----------
-    t : array, shape (N,) [s]
-        Evenly spaced by `STEP`.
-    motor : CubicSpline
-        Motor sides over time, values (n,).
-    wrench : array, shape (N, 6), optional
-
+    t: evenly spaced by `STEP`, shape (N,) [s].
+    motor: motor sides over time, values (n,).
+    wrench: shape (N, 6).
     """
     q: np.ndarray = motor(t)
     if parts.richness <= 0.0:
@@ -76,10 +71,7 @@ class Tree:
     """
     The MuJoCo arm of one recording, and the forces that drive it.
 
-    Parameters
-    ----------
-    wrench : array, shape (N, 6), optional
-
+    wrench: shape (N, 6).
     """
 
     def __init__(self, parts: Compliant, course: Course, wrench: np.ndarray | None) -> None:

@@ -63,11 +63,7 @@ def counted(cases: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """
     Return what cases add up to.
 
-    Parameters
-    ----------
-    cases : sequence of dict
-        As `corrected_seam` returns them; those that could not be drawn are told apart.
-
+    cases: as `corrected_seam` returns them; those that could not be drawn are told apart.
     """
     drawn = [case for case in cases if 'undrawn' not in case]
     outcomes = Counter(case['outcome'] for case in drawn)

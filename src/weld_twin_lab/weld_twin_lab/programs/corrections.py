@@ -95,13 +95,8 @@ def corrected_seam(language: str, seed: int, number: int, engine: str = '') -> d
     """
     Return what a correction does to one seam; a case that cannot be drawn says why.
 
-    Parameters
-    ----------
-    seed, number : int
-        Decide everything random in it.
-    engine : str
-        Only tells the results of one version of the core from those of another.
-
+    seed, number: decide everything random in it.
+    engine: only tells the results of one version of the core from those of another.
     """
     try:
         seam = sealed_seam(language, seed, number)

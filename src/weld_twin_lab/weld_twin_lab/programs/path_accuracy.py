@@ -15,35 +15,23 @@ APART = 1e-3
 
 
 class PathAccuracy(NamedTuple):
-    """
-    How far a tool was from a path [m].
-
-    Attributes
-    ----------
-    at : float
-        AT_p of ISO 9283, clause 8.2: the largest distance, over the points of the command path, of
-        where the tool passes the plane square to it. The plant repeats itself exactly, so one cycle is
-        the barycentre of ten.
-    rms : float
-        Of the same distances.
-
-    """
+    """How far a tool was from a path [m]."""
 
     at: float
+    """AT_p of ISO 9283, clause 8.2: the largest distance, over the points of the command path, of
+    where the tool passes the plane square to it. The plant repeats itself exactly, so one cycle is
+    the barycentre of ten."""
     rms: float
+    """Of the same distances."""
 
 
 def path_accuracy(attained: np.ndarray, wanted: np.ndarray) -> PathAccuracy:
     """
     Return how far a tool was from a path.
 
-    Parameters
-    ----------
-    attained : array, shape (K, 3) [m]
-    wanted : array, shape (m, 3) [m]
-        The command path. At its ends, where the tool may not pass the plane, the distance to the
-        nearest place of the tool counts.
-
+    attained: shape (K, 3) [m].
+    wanted: the command path, shape (m, 3) [m]. At its ends, where the tool may not pass the plane,
+    the distance to the nearest place of the tool counts.
     """
     fine = _finely(wanted)
     off = []

@@ -38,22 +38,16 @@ def about(axis: int, angle: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class ScrewArm:
-    """
-    An arm as axes in its base at joint position zero, and its flange there.
-
-    Attributes
-    ----------
-    axes, points : array, shape (n, 3) [1, m]
-        Direction of every axis, which its joint turns about by the right hand, and a point on it.
-    flange, T_flange_tool : array, shape (4, 4) [m]
-
-    """
+    """An arm as axes in its base at joint position zero, and its flange there."""
 
     name: str
     axes: np.ndarray
     points: np.ndarray
+    """Direction of every axis, which its joint turns about by the right hand, and a point on it,
+    shape (n, 3) [1, m]."""
     flange: np.ndarray
     T_flange_tool: np.ndarray = field(default_factory=lambda: np.eye(4))
+    """Shape (4, 4) [m]."""
 
     def frames(self, q: np.ndarray) -> list[np.ndarray]:
         """Return a frame on every axis, z along it, and the flange, each of shape (4, 4)."""

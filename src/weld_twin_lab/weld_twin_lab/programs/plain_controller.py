@@ -46,15 +46,9 @@ def driven(robot: Arm, moves: Moves, start: np.ndarray, speed: float) -> Driven:
     """
     Return what a controller makes of moves; it stands at the end of the first when it begins.
 
-    Parameters
-    ----------
-    moves : moves
-        As a reader returns them, their places in the robot's base.
-    start : array, shape (n,)
-        Joints near the end of the first move.
-    speed : float [m/s]
-        Of the tool.
-
+    moves: as a reader returns them, their places in the robot's base.
+    start: joints near the end of the first move, shape (n,).
+    speed: of the tool [m/s].
     """
     tool = np.array(robot.T_flange_tool)
     q, at = np.array(start), 0.0

@@ -53,39 +53,26 @@ MEASURING = frozenset(
 
 @dataclass(frozen=True, eq=False)
 class SealedSeam:
-    """
-    One arm with sealed causes, and a program for it.
-
-    Attributes
-    ----------
-    case : SealedCase
-        BlindCell, causes, and the free motion.
-    context : Context
-        What programs are read with.
-    kind : str
-        Of the seam.
-    text : str
-        The program.
-    start : array, shape (n,)
-        Joints where the seam begins.
-    points : int
-        Moves of the program.
-    speed, length : float [m/s, m]
-    temperature : float or None [degC]
-        Of the arm along the seam; None where it is not recorded.
-
-    """
+    """One arm with sealed causes, and a program for it."""
 
     language: str
     case: SealedCase
+    """BlindCell, causes, and the free motion."""
     context: Context
+    """What programs are read with."""
     kind: str
+    """Of the seam."""
     text: str
+    """The program."""
     start: Array
+    """Joints where the seam begins, shape (n,)."""
     points: int
+    """Moves of the program."""
     speed: float
     length: float
+    """[m/s, m]"""
     temperature: float | None
+    """Of the arm along the seam [degC]; None where it is not recorded."""
 
     @property
     def cell(self) -> BlindCell:
@@ -128,16 +115,9 @@ def sealed_seam(language: str, seed: int, number: int) -> SealedSeam:
     """
     Return a seam of a language.
 
-    Parameters
-    ----------
-    seed, number : int
-        Decide everything random in it.
+    seed, number: decide everything random in it.
 
-    Raises
-    ------
-    DataError
-        The causes dealt cannot be seen, or no seam drawn can be welded.
-
+    Raises DataError: the causes dealt cannot be seen, or no seam drawn can be welded.
     """
     rng = np.random.default_rng([seed, number, sorted(CELLS).index(language)])
     case = _dealt(language, seed, number, rng)

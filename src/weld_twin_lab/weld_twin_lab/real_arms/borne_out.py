@@ -74,18 +74,11 @@ Kinds = Mapping[str, Sequence[tuple[Effect, int]]]
 
 @dataclass(frozen=True)
 class Borne:
-    """
-    What unseen data say of one kind.
-
-    Attributes
-    ----------
-    median, least : float
-        Growth of the unseen RMS error without it, over the parts.
-
-    """
+    """What unseen data say of one kind."""
 
     median: float
     least: float
+    """Growth of the unseen RMS error without it, over the parts."""
     parts: int
 
     @property
@@ -100,12 +93,9 @@ def borne_out(
     """
     Return what unseen data say of every kind, and of every claim.
 
-    Parameters
-    ----------
-    told : sequence of Effect
-        What a diagnosis tells, as it found it: shapes that are not straight are taken from it.
-    claims : sequence of sequence of str
-        Kinds that are told, several where they are told as alike: those are taken out together.
+    told: what a diagnosis tells, as it found it: shapes that are not straight are taken from it.
+    claims: kinds that are told, several where they are told as alike: those are taken out
+    together.
 
     Returns
     -------

@@ -26,20 +26,12 @@ WAYS = ('frames', 'geometry', 'statics', 'efforts')
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """
-    One stretch of time that was not fitted.
-
-    Attributes
-    ----------
-    away : dict of str to array, shape (M,) [m]
-        Distance of measured from predicted, for each of `WAYS`.
-    told : tuple of str
-        What was found with efforts, one text each.
-
-    """
+    """One stretch of time that was not fitted."""
 
     away: dict[str, Array]
+    """Distance of measured from predicted, for each of `WAYS`, shape (M,) [m]."""
     told: tuple[str, ...]
+    """What was found with efforts, one text each."""
 
 
 def folds(
@@ -48,20 +40,11 @@ def folds(
     """
     Return every stretch predicted by models of all the others.
 
-    Parameters
-    ----------
-    recording : Recording
-        Stations with measured poses and efforts.
-    count : int
-        Stretches, of equal numbers of stations in the order of time.
-    tell : callable
-        Told of each stretch that is done.
+    recording: stations with measured poses and efforts.
+    count: stretches, of equal numbers of stations in the order of time.
+    tell: told of each stretch that is done.
 
-    Raises
-    ------
-    DataError
-        No efforts, no measurements, or no stations.
-
+    Raises DataError: no efforts, no measurements, or no stations.
     """
     if recording.effort is None or recording.measured is None or not recording.joints.static:
         raise DataError(f'{recording.name} needs stations with measured poses and efforts')

@@ -30,21 +30,14 @@ Make = Callable[[Source], tuple[Rows, Rows]]
 
 @dataclass(frozen=True, eq=False)
 class ArmRow:
-    """
-    One recording to diagnose, and what else was recorded of the same arm.
-
-    Attributes
-    ----------
-    other : Recording or None
-        None where everything is fitted.
-
-    """
+    """One recording to diagnose, and what else was recorded of the same arm."""
 
     name: str
     robot: Robot
     align: tuple[str, ...]
     fitted: Recording
     other: Recording | None
+    """None where everything is fitted."""
 
 
 @dataclass(frozen=True)

@@ -42,23 +42,14 @@ FIRST_POINT = -0.063
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """
-    One arm as it was recorded.
-
-    Attributes
-    ----------
-    robot : Robot
-        The nominal model.
-    recording : Recording
-        Everything that was recorded of it.
-    align : tuple of str
-        Frames that are not known.
-
-    """
+    """One arm as it was recorded."""
 
     robot: Robot
+    """The nominal model."""
     recording: Recording
+    """Everything that was recorded of it."""
     align: tuple[str, ...] = ('base', 'tool')
+    """Frames that are not known."""
 
 
 def tracked(data: Path, name: str) -> Source:

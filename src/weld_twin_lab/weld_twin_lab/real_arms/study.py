@@ -34,13 +34,8 @@ def judged(data: str, name: str) -> dict[str, Any]:
     """
     Return what is told of one row, and what unseen data say of it, as plain JSON values.
 
-    Parameters
-    ----------
-    data : str
-        Directory with the sources.
-    name : str
-        Of a row.
-
+    data: directory with the sources.
+    name: of a row.
     """
     plan = next(each for each in plans() if each.name == name)
     one = row(Path(data), plan)

@@ -18,10 +18,6 @@ def stations(robot: str, directory: Path) -> Recording:
     """
     Return the stations of one of the two arms, in the order they were measured.
 
-    Raises
-    ------
-    DataError
-        The table is missing or cannot be read.
-
+    Raises DataError: the table is missing or cannot be read.
     """
     return read_table(directory / TABLES[robot], catalog.load(robot)).recording

@@ -35,13 +35,8 @@ def plain_fit(
     Least squares with the priors of `weld_twin_core.effects.plausible`, the noise estimated from
     what is left; nothing is chosen and nothing is judged.
 
-    Parameters
-    ----------
-    families : tuple of str
-        One number per joint each; none for the frames alone.
-    align : frozenset of str
-        Frames that are fitted: 'base', 'tool'.
-
+    families: one number per joint each; none for the frames alone.
+    align: frames that are fitted: 'base', 'tool'.
     """
     problem = Problem((usable(train),), align)
     start = initial_frames(problem, Model(robot, (robot.T_world_base,)))

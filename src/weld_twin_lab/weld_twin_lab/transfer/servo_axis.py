@@ -41,11 +41,7 @@ def axis_recording(directory: Path) -> Recording:
 
     Across the axis nothing was measured; those coordinates are zero.
 
-    Raises
-    ------
-    DataError
-        The file is missing or holds something else.
-
+    Raises DataError: the file is missing or holds something else.
     """
     path = directory / FILE
     if not path.is_file():

@@ -47,40 +47,25 @@ All others were run without a change that they themselves had asked for.
 
 @dataclass(frozen=True, eq=False)
 class Split:
-    """
-    Stations to fit on, and stations to judge on.
-
-    Attributes
-    ----------
-    inside : Recording or None
-        Stations like those fitted on; None where there are none.
-    outside : Recording or None
-        Stations of the rest of the workspace; None where those fitted on are spread over it.
-
-    """
+    """Stations to fit on, and stations to judge on."""
 
     name: str
     kind: str
     robot: str
     train: Recording
     inside: Recording | None
+    """Stations like those fitted on; None where there are none."""
     outside: Recording | None
+    """Stations of the rest of the workspace; None where those fitted on are spread over it."""
 
 
 def all_splits(ur5: Path, ur10: Path) -> Iterator[Split]:
     """
     Yield the splits of both measured arms.
 
-    Parameters
-    ----------
-    ur5, ur10 : Path
-        Directories with the published tables.
+    ur5, ur10: directories with the published tables.
 
-    Raises
-    ------
-    DataError
-        A table is missing or cannot be read.
-
+    Raises DataError: a table is missing or cannot be read.
     """
     for robot, directory in (('ur5', ur5), ('ur10', ur10)):
         yield from splits(robot, stations(robot, directory), HOME[robot])
@@ -90,13 +75,8 @@ def splits(robot: str, table: Recording, first: int = 0) -> Iterator[Split]:
     """
     Yield twenty splits of one arm's stations.
 
-    Parameters
-    ----------
-    table : Recording
-        Stations at rest, in the order they were measured.
-    first : int
-        Stations before this one are left out.
-
+    table: stations at rest, in the order they were measured.
+    first: stations before this one are left out.
     """
     assert table.measured is not None
     rows = np.arange(first, table.measured.t.size)
@@ -147,11 +127,7 @@ def among(fitted: Array, others: Array) -> NDArray[np.bool_]:
     An arm that visits a grid plane by plane has been nowhere near most of it after a fifth of the
     time; one that visits places at random has been everywhere.
 
-    Parameters
-    ----------
-    fitted, others : array, shape (M, 3) and (K, 3) [m]
-        Measured positions of the tool.
-
+    fitted, others: measured positions of the tool, shape (M, 3) and (K, 3) [m].
     """
     tree = cKDTree(fitted)
     own = tree.query(fitted, k=2)[0][:, 1]

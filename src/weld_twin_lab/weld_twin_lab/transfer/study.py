@@ -20,20 +20,11 @@ def entries_of(ur5: Path, ur10: Path, emps: Path, only: str, part: Parts) -> lis
     """
     Return what came of every split.
 
-    Parameters
-    ----------
-    ur5, ur10, emps : Path
-        Directories with the published data.
-    only : str
-        Part of the names of the splits to run; all when empty.
-    part : Parts
-        Keeps every split.
+    ur5, ur10, emps: directories with the published data.
+    only: part of the names of the splits to run; all when empty.
+    part: keeps every split.
 
-    Raises
-    ------
-    DataError
-        Data are missing.
-
+    Raises DataError: data are missing.
     """
     chosen = [split for split in all_splits(ur5, ur10) if only in split.name]
     entries = [part(split.name, partial(judge, split)) for split in chosen]

@@ -16,11 +16,7 @@ def residual(model: Model, train: Recording, other: Recording) -> Array:
     """
     Return measured minus predicted, shape (3 or 6, M) [m, rad]; nothing is fitted.
 
-    Parameters
-    ----------
-    model : Model
-        Fitted on ``train``.
-
+    model: fitted on ``train``.
     """
     found = seen_from(model.found, train.epoch_ns, train.span_ns, other)
     placed = Model(model.robot, model.bases[:1], model.known, found)

@@ -15,14 +15,9 @@ class Beside:
     """
     Keeps the joints of messages that are none of the robot's, and which of them move.
 
-    Parameters
-    ----------
-    robot : str
-        Its name.
-    own : sequence of str
-        Its joints. Where all of them come behind another prefix, too, these are another robot's;
-        one alone is not: controllers call the track of a robot `rail_joint_1`, or `group_2/joint_1`.
-
+    robot: its name.
+    own: its joints. Where all of them come behind another prefix, too, these are another robot's;
+    one alone is not: controllers call the track of a robot `rail_joint_1`, or `group_2/joint_1`.
     """
 
     def __init__(self, robot: str, own: Sequence[str]) -> None:
@@ -64,11 +59,7 @@ class Beside:
         """
         Return which of them move, in a sentence; empty where none does.
 
-        Parameters
-        ----------
-        known : collection of str
-            Those that do not carry the arm.
-
+        known: those that do not carry the arm.
         """
         moving = sorted(set(self.moving).difference(known))
         if not moving:

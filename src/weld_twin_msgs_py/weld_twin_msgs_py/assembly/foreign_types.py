@@ -43,11 +43,7 @@ def _poses_of_tf(message: Any, frame: str) -> Iterator[Any]:
     """
     Yield the pose of one child frame out of many.
 
-    Raises
-    ------
-    DataError
-        No frame is named: which of them was measured, nobody knows.
-
+    Raises DataError: no frame is named: which of them was measured, nobody knows.
     """
     if not frame:
         children = ', '.join(sorted({each.child_frame_id for each in message.transforms}))
@@ -62,11 +58,7 @@ def _pose_of_rigid_bodies(message: Any, name: str) -> Iterator[Any]:
     """
     Yield the pose of one body that a motion capture system sees; of the only one if none is named.
 
-    Raises
-    ------
-    DataError
-        There are several, and none is named.
-
+    Raises DataError: there are several, and none is named.
     """
     bodies = message.rigidbodies
     if not name and len(bodies) > 1:
@@ -84,11 +76,7 @@ def _joints_of_controller_state(message: Any, part: str) -> Iterator[Any]:
     """
     Yield the joint state of a `JointTrajectoryControllerState`: what was commanded.
 
-    Raises
-    ------
-    DataError
-        The part that is named is none of the message.
-
+    Raises DataError: the part that is named is none of the message.
     """
     name = part or ('reference' if hasattr(message, 'reference') else 'desired')
     point = getattr(message, name, None)
@@ -106,11 +94,7 @@ def _joints_of_dynamic_state(message: Any, _: str) -> Iterator[Any]:
     """
     Yield the joint state of a `DynamicJointState`; a joint without a position is left out.
 
-    Raises
-    ------
-    DataError
-        Names and values are not as many.
-
+    Raises DataError: names and values are not as many.
     """
     if len(message.joint_names) != len(message.interface_values) or any(
         len(each.interface_names) != len(each.values) for each in message.interface_values
@@ -170,13 +154,8 @@ class FedBack:
 
     Held against the twin of what was commanded, it shows the servo's own part of a gap.
 
-    Parameters
-    ----------
-    part : str
-        Of the message; empty for what is fed back.
-    joint_names : sequence of str, optional
-        What the controller calls the joints.
-
+    part: of the message; empty for what is fed back.
+    joint_names: what the controller calls the joints.
     """
 
     def __init__(
@@ -205,18 +184,10 @@ def plain_messages(kind: str, message: Any, part: str = '') -> tuple[Any, ...]:
     """
     Return the plain messages that a message stands for, itself where it is one.
 
-    Parameters
-    ----------
-    kind : str
-        Its type.
-    part : str
-        The child frame of a transform, or the part of a controller's state, that is meant.
+    kind: its type.
+    part: the child frame of a transform, or the part of a controller's state, that is meant.
 
-    Raises
-    ------
-    DataError
-        It does not hold what is looked for.
-
+    Raises DataError: it does not hold what is looked for.
     """
     turn = FOREIGN.get(kind)
     return (message,) if turn is None else tuple(turn(message, part))

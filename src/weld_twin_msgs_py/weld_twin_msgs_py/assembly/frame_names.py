@@ -37,10 +37,7 @@ class MeasuringFrame:
     """
     The frame of a stream of measurements: the one that is expected, else the first that comes.
 
-    Parameters
-    ----------
-    expected : str
-        Empty for any.
+    expected: empty for any.
 
     Attributes
     ----------
@@ -61,11 +58,7 @@ class MeasuringFrame:
         """
         Take the frame of a measurement.
 
-        Raises
-        ------
-        OtherFrame
-            It is neither the frame expected nor that of the measurements before.
-
+        Raises OtherFrame: it is neither the frame expected nor that of the measurements before.
         """
         if frame_id == self._frame_id:
             return
@@ -123,13 +116,8 @@ class WrenchFrame:
         """
         Take the frame of a wrench.
 
-        Raises
-        ------
-        OtherFrame
-            It is not the frame of the wrenches before.
-        DataError
-            The name does not tell which frame is meant.
-
+        Raises OtherFrame: it is not the frame of the wrenches before. Raises DataError: the name
+        does not tell which frame is meant.
         """
         if frame_id == self._frame_id:
             return

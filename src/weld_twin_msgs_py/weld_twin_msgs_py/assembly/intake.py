@@ -42,42 +42,27 @@ class Role(Enum):
 
 
 class Taken(NamedTuple):
-    """
-    A message that has its place in its stream.
-
-    Attributes
-    ----------
-    stamp : int [ns]
-    row : array, shape (width,)
-        Joints: positions, then velocities, NaN where they are not told, then efforts where they
-        were asked for. Pose: position, quaternion x y z w, sigma [m] or NaN, and its covariance
-        where its type has one. Point, sigma: three numbers. Wrench: force and torque. Temperature:
-        one number.
-    restarted : bool
-        It begins a new run: the stamps before it lie in its future.
-
-    """
+    """A message that has its place in its stream."""
 
     stamp: int
+    """[ns]"""
     row: Array
+    """Joints: positions, then velocities, NaN where they are not told, then efforts where they
+    were asked for, shape (width,). Pose: position, quaternion x y z w, sigma [m] or NaN, and its
+    covariance where its type has one. Point, sigma: three numbers. Wrench: force and torque.
+    Temperature: one number."""
     restarted: bool
+    """It begins a new run: the stamps before it lie in its future."""
 
 
 class Intake:
     """
     Takes the messages of one cell.
 
-    Parameters
-    ----------
-    robot : Robot
-        Its joint names pick the columns.
-    limits : bool
-        Whether joint positions beyond the limits are refused; see `JointStates`.
-    measuring_frame : str
-        What poses and points must be given in; empty for the first frame that comes.
-    joint_names, mend, efforts
-        See `JointStates`.
-
+    robot: its joint names pick the columns.
+    limits: whether joint positions beyond the limits are refused; see `JointStates`.
+    measuring_frame: what poses and points must be given in; empty for the first frame that comes.
+    joint_names, mend, efforts: see `JointStates`.
     """
 
     def __init__(
@@ -143,13 +128,8 @@ class Intake:
         """
         Return the sample that a message gives, None if joints of other messages are awaited.
 
-        Raises
-        ------
-        Unstamped, Late, Incomplete, OtherFrame
-            The sample is to be left out, the stream goes on.
-        DataError
-            The message cannot be used.
-
+        Raises Unstamped, Late, Incomplete, OtherFrame: the sample is to be left out, the stream
+        goes on. Raises DataError: the message cannot be used.
         """
         if role is Role.JOINTS:
             return self._joints(message)

@@ -33,16 +33,9 @@ def names_called(
     """
     Return what joint states call the joints of a robot; None where nothing is said of it.
 
-    Parameters
-    ----------
-    called : mapping of str to str, optional
-        Joints of the robot, and what they are called behind the prefix.
+    called: joints of the robot, and what they are called behind the prefix.
 
-    Raises
-    ------
-    ModelError
-        A joint is none of the robot's, or two would be called alike.
-
+    Raises ModelError: a joint is none of the robot's, or two would be called alike.
     """
     given = called or {}
     if not prefix and not given:
@@ -97,19 +90,13 @@ class JointStates:
     together where their stamps are equal, as those of one controller manager are; to hold one
     joint at its last position while another moves on would be a pose the arm never had.
 
-    Parameters
-    ----------
-    limits : bool
-        Whether positions beyond the joints' limits are refused. A running node does; a recording
-        is read with them, for they tell of swapped joints and of degrees taken for radians.
-    joint_names : sequence of str, optional
-        What the joint states call the joints of the robot, in its order; left out, as the robot
-        does, or with one prefix.
-    efforts : bool
-        Whether every joint state has to tell the measured efforts of the joints.
-    mend : bool
-        Whether velocities are left out that stay zero while joints move. A running node does; of a
-        recording it is told as what it is.
+    limits: whether positions beyond the joints' limits are refused. A running node does; a
+    recording is read with them, for they tell of swapped joints and of degrees taken for radians.
+    joint_names: what the joint states call the joints of the robot, in its order; left out, as the
+    robot does, or with one prefix.
+    efforts: whether every joint state has to tell the measured efforts of the joints.
+    mend: whether velocities are left out that stay zero while joints move. A running node does; of
+    a recording it is told as what it is.
 
     Attributes
     ----------
@@ -171,13 +158,8 @@ class JointStates:
         """
         Return the sample that a message completes, None if it completes none.
 
-        Raises
-        ------
-        Incomplete
-            Joints are missing and will not come any more.
-        DataError
-            The message cannot be used.
-
+        Raises Incomplete: joints are missing and will not come any more. Raises DataError: the
+        message cannot be used.
         """
         sample = self._taken(message)
         if sample is not None and self.efforts:
@@ -205,13 +187,8 @@ class JointStates:
         """
         Return the sample as the message has it.
 
-        Raises
-        ------
-        Incomplete
-            Joints are missing and will not come any more.
-        DataError
-            The message cannot be used.
-
+        Raises Incomplete: joints are missing and will not come any more. Raises DataError: the
+        message cannot be used.
         """
         stamp = from_messages.stamp_ns(message)
         # A node's decoder repeats the very object, which is quicker than to compare the names.
@@ -265,11 +242,7 @@ class JointStates:
         """
         Take the names of a message for the robot's own with one prefix, if they are.
 
-        Raises
-        ------
-        DataError
-            There are several prefixes: those of several robots.
-
+        Raises DataError: there are several prefixes: those of several robots.
         """
         if self._given or self._usual is not None or self._spread:
             return False  # the names are known: these are the joints of another robot

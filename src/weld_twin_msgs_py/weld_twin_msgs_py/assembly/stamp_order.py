@@ -50,11 +50,7 @@ class Forward:
         """
         Take a stamp; return whether it begins a new run, as when a bag is played again.
 
-        Raises
-        ------
-        Late
-            The stamp is not after the last one.
-
+        Raises Late: the stamp is not after the last one.
         """
         if self.last is None and self._ended is not None and stamp > self._ended:
             self._late += 1

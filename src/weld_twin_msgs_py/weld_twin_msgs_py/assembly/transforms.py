@@ -49,19 +49,14 @@ class Placed(NamedTuple):
     Where a frame is in its parent.
 
     Most are never asked for, so that the numbers stay as they came.
-
-    Attributes
-    ----------
-    stamp : int [ns]
-    position : tuple of float [m]
-    quaternion : tuple of float
-        x y z w.
-
     """
 
     stamp: int
+    """[ns]"""
     position: tuple[float, float, float]
+    """[m]"""
     quaternion: tuple[float, float, float, float]
+    """x y z w."""
 
     @property
     def T_parent_child(self) -> Array:
@@ -153,11 +148,7 @@ class TransformTree:
         """
         Take the transforms of a message.
 
-        Raises
-        ------
-        DataError
-            One of them is none, or makes a loop; all others are taken.
-
+        Raises DataError: one of them is none, or makes a loop; all others are taken.
         """
         wrong: DataError | None = None
         for each in message.transforms:
@@ -199,13 +190,8 @@ class TransformTree:
         """
         Return T_target_source, shape (4, 4), at a stamp [ns].
 
-        Raises
-        ------
-        NotYet
-            A frame on the way has not told of itself up to the stamp.
-        NoTransform
-            No transforms join the two, or none of the time of the stamp is left.
-
+        Raises NotYet: a frame on the way has not told of itself up to the stamp. Raises
+        NoTransform: no transforms join the two, or none of the time of the stamp is left.
         """
         up = [target, *self._above(target)]
         down = [source, *self._above(source)]
@@ -221,11 +207,7 @@ class TransformTree:
         """
         Return T_target_source, shape (4, 4), at the last time that all of the way is known.
 
-        Raises
-        ------
-        NoTransform
-            No transforms join the two.
-
+        Raises NoTransform: no transforms join the two.
         """
         way = {target, *self._above(target)} ^ {source, *self._above(source)}
         branches = [self._branches[name] for name in way if name in self._branches]

@@ -55,24 +55,13 @@ def assembled(
     """
     Return the recording that streams make; it counts from the first joint state.
 
-    Parameters
-    ----------
-    streams : mapping
-        Rows as `Intake` gives them, the joints among them. Poses are used before points.
-    wrench_frame : str
-        'tool' or 'base'.
-    static : bool, optional
-        Whether the joint states are stations at rest; None looks at the stamps.
-    one_clock : bool
-        Refuse measurements that have no time in common with the joint states.
-    notes : tuple of str
-        What is to be said of the streams.
+    streams: rows as `Intake` gives them, the joints among them. Poses are used before points.
+    wrench_frame: 'tool' or 'base'.
+    static: whether the joint states are stations at rest; None looks at the stamps.
+    one_clock: refuse measurements that have no time in common with the joint states.
+    notes: what is to be said of the streams.
 
-    Raises
-    ------
-    DataError
-        The streams have no time in common, or numbers that cannot be used.
-
+    Raises DataError: the streams have no time in common, or numbers that cannot be used.
     """
     epoch = int(streams[Role.JOINTS].ns[0])
     motion, effort = _motion(robot, streams[Role.JOINTS])

@@ -60,11 +60,7 @@ class Cell:
     """
     A context manager that ends every node it started.
 
-    Parameters
-    ----------
-    folder : Path, optional
-        Where logs and parameter files go; left out, a temporary directory.
-
+    folder: where logs and parameter files go; left out, a temporary directory.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -108,13 +104,8 @@ class Cell:
         """
         Start a node in a process of its own.
 
-        Parameters
-        ----------
-        node : str or sequence of str
-            A node of this package, or a whole command.
-        **parameters
-            Its ROS parameters.
-
+        node: a node of this package, or a whole command.
+        **parameters: its ROS parameters.
         """
         assert self._folder is not None
         folder = self._folder / f'{self._started:02d}'
@@ -133,17 +124,11 @@ class Cell:
         """
         Put a node into this process; it is served while the cell waits.
 
-        Parameters
-        ----------
-        make : node class
-            Takes ``context``, ``parameter_overrides`` and ``cli_args`` as `rclpy.node.Node` does.
-        args
-            Its other arguments.
-        cli_args : list of str, optional
-            Such as remappings.
-        **parameters
-            Its ROS parameters.
-
+        make: takes ``context``, ``parameter_overrides`` and ``cli_args`` as `rclpy.node.Node`
+        does.
+        args: its other arguments.
+        cli_args: such as remappings.
+        **parameters: its ROS parameters.
         """
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         node = make(*args, context=self._context, parameter_overrides=overrides, cli_args=cli_args)
@@ -169,13 +154,8 @@ class Cell:
         """
         Return the answer to a question that may be put more than once.
 
-        Parameters
-        ----------
-        question : callable
-            Puts it to a service, and returns the future of the answer.
-        what : str
-            What is waited for, in words.
-
+        question: puts it to a service, and returns the future of the answer.
+        what: what is waited for, in words.
         """
         asked = _Asked(question)
         self.wait(asked.answered, what)
@@ -196,11 +176,7 @@ class Cell:
         """
         Listen to a topic from now on.
 
-        Parameters
-        ----------
-        kind : message class, optional
-            Not needed for topics of this project's table.
-
+        kind: not needed for topics of this project's table.
         """
         tap = Tap(topic)
         row = BY_NAME.get(topic)
@@ -238,14 +214,9 @@ class Cell:
         """
         Publish a motion as joint states, as fast as the cell keeps up.
 
-        Parameters
-        ----------
-        start_ns : int [ns]
-        listeners : int
-            How many subscribers to wait for.
-        follow : Tap, optional
-            The last result of a joint state; at most ``window`` are under way without one.
-
+        start_ns: [ns]
+        listeners: how many subscribers to wait for.
+        follow: the last result of a joint state; at most ``window`` are under way without one.
         """
         publisher = self.publisher()
         self.wait(lambda: publisher.get_subscription_count() >= listeners, 'all subscribers')
@@ -286,11 +257,8 @@ class Cell:
         """
         Wait until the recorder holds at least so many messages of each topic.
 
-        Raises
-        ------
-        CellTimeout
-            It has taken in nothing more for `LIMIT` seconds; the message says what is missing.
-
+        Raises CellTimeout: it has taken in nothing more for `LIMIT` seconds; the message says what
+        is missing.
         """
         held: dict[str, int] = {}
 
@@ -320,20 +288,11 @@ class Cell:
         """
         Serve the nodes of this process until a condition is true.
 
-        Parameters
-        ----------
-        what : str or callable
-            What is waited for, in words.
-        limit : float [s]
-            Longest wait; with ``progress`` longest time in which that stays the same.
-        progress : callable, optional
-            How far it is.
+        what: what is waited for, in words.
+        limit: longest wait [s]; with ``progress`` longest time in which that stays the same.
+        progress: how far it is.
 
-        Raises
-        ------
-        CellTimeout
-            It is not true in time, or a process has died of an error meanwhile.
-
+        Raises CellTimeout: it is not true in time, or a process has died of an error meanwhile.
         """
         end, so_far = time.monotonic() + limit, None
         while not condition():

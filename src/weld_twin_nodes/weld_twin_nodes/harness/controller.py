@@ -29,14 +29,9 @@ class Controller(Node):
     """
     Offers ``~/follow_joint_trajectory``, and runs one goal at a time; a new one takes its place.
 
-    Parameters
-    ----------
-    q : array, shape (n,)
-        Where the arm stands.
-    pace : float
-        How many times as fast as the goals say it runs them.
-    beside : callable, optional
-        Times [s] of a goal that it visits beside those of its beat.
+    q: where the arm stands, shape (n,).
+    pace: how many times as fast as the goals say it runs them.
+    beside: times [s] of a goal that it visits beside those of its beat.
 
     Attributes
     ----------

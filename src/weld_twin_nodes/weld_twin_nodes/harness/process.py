@@ -38,12 +38,8 @@ class NodeProcess:
     """
     A running node.
 
-    Parameters
-    ----------
-    node : str or sequence of str
-        A node of this package, or a whole command.
-    folder : Path
-        Where the parameter file and the log go.
+    node: a node of this package, or a whole command.
+    folder: where the parameter file and the log go.
 
     Attributes
     ----------

@@ -27,26 +27,14 @@ def recorded_experiment(
     Recorder and generator are processes of their own, on the domain of this one. What measures, and
     whatever follows the joint states, is part of the cell.
 
-    Parameters
-    ----------
-    experiment : Path
-        A file of kind 'joints'.
-    robot : str
-        As for the nodes.
-    seconds : float [s]
-        How long the motion takes.
-    out : Path
-        The bag; it must not exist.
-    moving
-        Further parameters of the generator.
+    experiment: a file of kind 'joints'.
+    robot: as for the nodes.
+    seconds: how long the motion takes [s].
+    out: the bag; it must not exist.
+    moving: further parameters of the generator.
 
-    Raises
-    ------
-    DataError
-        The bag exists already.
-    TwinError
-        The generator or the recorder failed; the message has what it said.
-
+    Raises DataError: the bag exists already. Raises TwinError: the generator or the recorder
+    failed; the message has what it said.
     """
     if out.exists():
         raise DataError(f"'{out}' exists already; it may be the recording of this experiment")

@@ -32,11 +32,7 @@ def own_domain() -> Iterator[int]:
     temporary files is, and is given back however the process ends. The environment names the
     domain meanwhile, and keeps discovery on this machine.
 
-    Raises
-    ------
-    TwinError
-        All of them are taken.
-
+    Raises TwinError: all of them are taken.
     """
     # Start somewhere else in every process: the domain is also somebody's who holds no lock.
     start = os.getpid() % len(DOMAINS)
@@ -59,11 +55,7 @@ def _port(number: int) -> socket.socket:
     """
     Return a port that is bound.
 
-    Raises
-    ------
-    OSError
-        Somebody has it.
-
+    Raises OSError: somebody has it.
     """
     out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:

@@ -48,11 +48,7 @@ def refuse_unknown(given: Iterable[str], own: Iterable[str]) -> None:
 
     A parameter file may hold those of the other nodes too.
 
-    Raises
-    ------
-    DataError
-        There is one; the message names the one that was meant, if it is like one.
-
+    Raises DataError: there is one; the message names the one that was meant, if it is like one.
     """
     known = {*own, *ROS_OWN}
     odd = [name for name in given if name not in known and not name.startswith(PREFIX)]

@@ -31,11 +31,7 @@ class AskedNodes:
     """
     Notes what the nodes of the recorder's own namespace say of themselves.
 
-    Parameters
-    ----------
-    note : callable
-        Takes a key of the bag's provenance and its value.
-
+    note: takes a key of the bag's provenance and its value.
     """
 
     def __init__(self, node: CellNode, note: Callable[[str, Any], None]) -> None:

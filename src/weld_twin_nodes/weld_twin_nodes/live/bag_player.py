@@ -37,43 +37,27 @@ TELL_EVERY = 1.0
 
 
 class Playing(NamedTuple):
-    """
-    How to play.
-
-    Attributes
-    ----------
-    rate : float
-        Speed against the recording.
-    clock : float [1/s]
-        How often to tell the recording's time on /clock; 0 never.
-    topics : collection of str
-        What to play; empty for all.
-    loop : int
-        How often; 0 until stopped.
-    subscribers : int
-        How many each topic is to have before the start.
-    wait : float [s]
-        Longest time to wait for them.
-
-    """
+    """How to play."""
 
     rate: float = 1.0
+    """Speed against the recording."""
     clock: float = 0.0
+    """How often to tell the recording's time on /clock [1/s]; 0 never."""
     topics: Collection[str] = ()
+    """What to play; empty for all."""
     loop: int = 1
+    """How often; 0 until stopped."""
     subscribers: int = 1
+    """How many each topic is to have before the start."""
     wait: float = 5.0
+    """Longest time to wait for them [s]."""
 
 
 def play(bag: Path | str, how: Playing, tell: Callable[[str], None]) -> int:
     """
     Play a bag; return how many messages were published.
 
-    Raises
-    ------
-    DataError
-        The bag cannot be read or has no such topic, or the rate makes no sense.
-
+    Raises DataError: the bag cannot be read or has no such topic, or the rate makes no sense.
     """
     if not 0.0 < how.rate < float('inf'):
         raise DataError(f'the rate must be positive, got {how.rate:g}')

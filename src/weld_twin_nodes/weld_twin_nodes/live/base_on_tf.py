@@ -24,12 +24,8 @@ def base_on_tf(node: CellNode) -> Array:
     """
     Return T_measuring_base, shape (4, 4), once `/tf` tells it.
 
-    Raises
-    ------
-    ModelError
-        The two frames have no names, `/tf` cannot be read here, or the node is stopped before
-        they are told.
-
+    Raises ModelError: the two frames have no names, `/tf` cannot be read here, or the node is
+    stopped before they are told.
     """
     measuring, base = node.setting('measuring_frame'), node.setting('base_frame')
     if not measuring or not base:

@@ -56,11 +56,8 @@ def placed(node: CellNode, robot: Robot) -> Robot:
     """
     Return the robot with its base where the node's parameters put it.
 
-    Raises
-    ------
-    ModelError
-        ``T_measuring_base`` is no pose, or the node is stopped before `/tf` tells one.
-
+    Raises ModelError: ``T_measuring_base`` is no pose, or the node is stopped before `/tf` tells
+    one.
     """
     values = node.setting('T_measuring_base')
     if values != NO_NUMBERS:
@@ -85,11 +82,8 @@ def frame_from(values: Sequence[float] | str) -> Array:
     """
     Return the 4 x 4 matrix of x y z and a rotation vector or a quaternion.
 
-    Raises
-    ------
-    ModelError
-        There are neither six nor seven finite numbers, or the quaternion is not of length 1.
-
+    Raises ModelError: there are neither six nor seven finite numbers, or the quaternion is not of
+    length 1.
     """
     try:
         numbers = np.asarray(values, dtype=np.float64)

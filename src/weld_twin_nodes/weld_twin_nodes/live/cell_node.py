@@ -140,11 +140,7 @@ class CellNode(TellingNode):
         """
         Take the robot: for the diagnostics to tell robots apart, and for what tells its joints.
 
-        Parameters
-        ----------
-        joint_names : sequence of str, optional
-            What its joint states call its joints.
-
+        joint_names: what its joint states call its joints.
         """
         self.arm, self.joint_names = robot, joint_names
         parts = self.get_namespace().strip('/'), '' if robot is None else robot.name
@@ -164,23 +160,14 @@ class CellNode(TellingNode):
         """
         Subscribe to a topic of the table once the outputs have their subscribers.
 
-        Parameters
-        ----------
-        callback : callable
-            Takes an object that `weld_twin_msgs_py.messages.from_messages` reads. Messages of
-            other types that stand for the same are turned into those of the table before.
-        required : bool
-            The node can do nothing without this input; health calls its absence stale.
-        at_once : bool
-            Do not wait for the subscribers of the outputs.
-        held
-            See `watch`.
+        callback: takes an object that `weld_twin_msgs_py.messages.from_messages` reads. Messages
+        of other types that stand for the same are turned into those of the table before.
+        required: the node can do nothing without this input; health calls its absence stale.
+        at_once: do not wait for the subscribers of the outputs.
+        held: see `watch`.
 
-        Raises
-        ------
-        ModelError
-            By a remap the node publishes the topic itself, or has it as another input.
-
+        Raises ModelError: by a remap the node publishes the topic itself, or has it as another
+        input.
         """
         name = self.resolve_topic_name(topic.relative)
         if any(output.topic == name for output in self._outputs):
@@ -383,11 +370,7 @@ class CellNode(TellingNode):
         """
         Serve until something is told that the node can do nothing without; say what it waits for.
 
-        Raises
-        ------
-        ModelError
-            The node is stopped before.
-
+        Raises ModelError: the node is stopped before.
         """
         self.wait_for(what)
         runner = SingleThreadedExecutor(context=self.context)

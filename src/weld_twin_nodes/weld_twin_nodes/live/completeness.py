@@ -82,19 +82,12 @@ def _ours(node: str) -> bool:
 
 
 class Shortfall(NamedTuple):
-    """
-    What a recording lacks of a topic.
-
-    Attributes
-    ----------
-    where : str
-        'at the start', 'at the end', 'at both ends', or 'in between'.
-
-    """
+    """What a recording lacks of a topic."""
 
     sent: int
     recorded: int
     where: str
+    """'at the start', 'at the end', 'at both ends', or 'in between'."""
 
     def sentence(self, topic: str) -> str:
         """Return it in words."""

@@ -44,11 +44,7 @@ class Part:
         """
         Take a sample, at a stamp [ns].
 
-        Raises
-        ------
-        DataError
-            The stamp is not after the last one.
-
+        Raises DataError: the stamp is not after the last one.
         """
         if self._order.restarted_at(stamp):
             self._lately.clear()

@@ -22,17 +22,10 @@ class DeviationLines:
     """
     Keeps the way of the twin with the deviations on it.
 
-    Parameters
-    ----------
-    magnification : float
-        How much longer than true a deviation is drawn.
-    tolerance : float [m]
-        Deviation drawn in full red; none is green.
-    spacing : float [m]
-        Shortest way between two points kept.
-    points : int
-        How many are kept; the oldest go.
-
+    magnification: how much longer than true a deviation is drawn.
+    tolerance: deviation drawn in full red [m]; none is green.
+    spacing: shortest way between two points kept [m].
+    points: how many are kept; the oldest go.
     """
 
     def __init__(

@@ -38,14 +38,9 @@ class Window:
     """
     Streams of the cell over a sliding window, bounded in time and number.
 
-    Parameters
-    ----------
-    duration : float [s]
-    measuring_frame : str
-        What measurements must be given in; empty for the first frame that comes.
-    joint_names : sequence of str, optional
-        What the joint states call the joints, in the order of the robot.
-
+    duration: [s]
+    measuring_frame: what measurements must be given in; empty for the first frame that comes.
+    joint_names: what the joint states call the joints, in the order of the robot.
     """
 
     def __init__(
@@ -87,11 +82,7 @@ class Window:
         """
         Take the points that a camera found in an image.
 
-        Raises
-        ------
-        DataError
-            It cannot be used; the window is as it was.
-
+        Raises DataError: it cannot be used; the window is as it was.
         """
         self._images.append((stamp_ns(message), message.header.frame_id, points(message)))
         while self._images[-1][0] - self._images[0][0] > self._duration:
@@ -101,11 +92,7 @@ class Window:
         """
         Take a message.
 
-        Raises
-        ------
-        DataError
-            It cannot be used; the window is as it was.
-
+        Raises DataError: it cannot be used; the window is as it was.
         """
         taken = self.intake.take(role, message)
         if taken is None:
@@ -128,11 +115,7 @@ class Window:
 
         What images tell is for whoever has the time: `images`.
 
-        Parameters
-        ----------
-        least : float [s]
-            Shortest time that measurements and joint states must overlap.
-
+        least: shortest time that measurements and joint states must overlap [s].
         """
         joints = self._streams.get(Role.JOINTS)
         role, measured = self._measured()

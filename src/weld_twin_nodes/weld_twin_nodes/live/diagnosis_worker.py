@@ -48,35 +48,22 @@ class Job(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """
-    What a diagnosis says, as plain values.
-
-    Attributes
-    ----------
-    stamp : int [ns]
-        Of the last measurement looked at.
-    sentence : str
-        The verdict in words.
-    values : dict
-        Keys and values of the diagnostic message.
-
-    """
+    """What a diagnosis says, as plain values."""
 
     stamp: int
+    """Of the last measurement looked at [ns]."""
     status: str
     sentence: str
+    """The verdict in words."""
     values: dict[str, Any]
+    """Keys and values of the diagnostic message."""
 
 
 class Worker:
     """
     Runs one job at a time in another process; nothing here waits for it.
 
-    Parameters
-    ----------
-    tell : callable
-        Takes what the process writes on its standard error.
-
+    tell: takes what the process writes on its standard error.
     """
 
     def __init__(self, tell: Callable[[str], object] = sys.stderr.write) -> None:

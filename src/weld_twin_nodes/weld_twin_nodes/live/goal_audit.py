@@ -55,14 +55,8 @@ class GoalAudit:
         """
         Tell what became of a goal.
 
-        Parameters
-        ----------
-        model : str, optional
-            Digest of the model.
-        result : CorrectedGoal or Refusal, optional
-        below : str
-            What the controller said where it did not take it.
-
+        model: digest of the model.
+        below: what the controller said where it did not take it.
         """
         largest = None if result is None else result.largest
         line: dict[str, Any] = {

@@ -48,11 +48,7 @@ class GoalJudge:
         """
         Work a goal out; then tell.
 
-        Parameters
-        ----------
-        names : tuple of str
-            What it calls the joints of the robot.
-
+        names: what it calls the joints of the robot.
         """
         try:
             points = self._read(goal, names)

@@ -35,26 +35,16 @@ GONE = 2.0
 
 
 class Decision(NamedTuple):
-    """
-    What becomes of a goal.
-
-    Attributes
-    ----------
-    goal : message, optional
-        To be sent on; None for none.
-    why : str
-        Why there is none.
-    settled : callable
-        Told whether the controller took it, in words: empty where it did.
-    token : object
-        Of the model it was decided with, for `GoalRelay.since`.
-
-    """
+    """What becomes of a goal."""
 
     goal: Any
+    """To be sent on; None for none."""
     why: str
+    """Why there is none."""
     settled: Callable[[str], None]
+    """Told whether the controller took it, in words: empty where it did."""
     token: object = None
+    """Of the model it was decided with, for `GoalRelay.since`."""
 
 
 class _Running:
@@ -71,17 +61,10 @@ class GoalRelay:
     """
     Serves ``~/follow_joint_trajectory``, and is a client of the controller's.
 
-    Parameters
-    ----------
-    kind : action class
-        `control_msgs/FollowJointTrajectory`.
-    controller : str
-        Name of the controller, or of its action.
-    decide : callable
-        Takes a goal and returns what becomes of it, when that is known.
-    since : callable
-        Takes the token of a decision; returns what has happened to the model since, in words.
-
+    kind: `control_msgs/FollowJointTrajectory`.
+    controller: name of the controller, or of its action.
+    decide: takes a goal and returns what becomes of it, when that is known.
+    since: takes the token of a decision; returns what has happened to the model since, in words.
     """
 
     def __init__(
@@ -238,11 +221,7 @@ def _action_of(node: CellNode, controller: str) -> str:
     """
     Return the name of a controller's action.
 
-    Raises
-    ------
-    ModelError
-        It is no name, or this node's own.
-
+    Raises ModelError: it is no name, or this node's own.
     """
     own = controller.rstrip('/')
     below = own if own.endswith(ACTION) else f'{own}/{ACTION}'

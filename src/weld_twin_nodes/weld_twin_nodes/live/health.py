@@ -30,14 +30,9 @@ class Input:
     """
     One input of a node.
 
-    Parameters
-    ----------
-    required : bool
-        Whether the node can do nothing without it.
-    patience : float [s]
-        Silence after which it is stale; five of its periods where that is longer. Infinite for
-        an input that comes when there is something to tell.
-
+    required: whether the node can do nothing without it.
+    patience: silence after which it is stale [s]; five of its periods where that is longer.
+    Infinite for an input that comes when there is something to tell.
     """
 
     def __init__(self, topic: str, required: bool, patience: float) -> None:

@@ -51,11 +51,8 @@ def joint_names(node: CellNode, robot: Robot) -> tuple[str, ...] | None:
     """
     Return what the joint states call the joints of a robot; None where nothing is said.
 
-    Raises
-    ------
-    ModelError
-        The map is no mapping of names, names a joint the robot has not, or gives a name twice.
-
+    Raises ModelError: the map is no mapping of names, names a joint the robot has not, or gives a
+    name twice.
     """
     prefix, text = node.setting('joint_prefix'), node.setting('joint_map')
     if not prefix and not text:

@@ -49,11 +49,7 @@ def beyond(book: Book, there: Collection[str], publishers: Count, subscribers: C
     """
     Return whom the nodes that are there have met and the own graph does not show yet.
 
-    Parameters
-    ----------
-    publishers, subscribers : callable
-        From the name of a topic to how many the own graph has.
-
+    publishers, subscribers: from the name of a topic to how many the own graph has.
     """
     out = []
     for word in book.latest():
@@ -79,11 +75,7 @@ class Meeting:
     one listener and no longer changes, on which the nodes of the project reach each other. Either
     wait has an end, at which it says what is missing.
 
-    Parameters
-    ----------
-    within : float [s]
-        Longest wait.
-
+    within: longest wait [s].
     """
 
     def __init__(self, node: CellNode, within: float, action: Callable[[], None]) -> None:

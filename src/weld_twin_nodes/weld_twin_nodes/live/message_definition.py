@@ -29,11 +29,7 @@ def definition(kind: str) -> str:
     """
     Return the definition of a message type and of all it is made of, as bags hold it.
 
-    Raises
-    ------
-    DataError
-        Its package, or one it needs, is not installed with its .msg files.
-
+    Raises DataError: its package, or one it needs, is not installed with its .msg files.
     """
     parts: dict[str, str] = {}
     _gather(kind, parts, _installed)

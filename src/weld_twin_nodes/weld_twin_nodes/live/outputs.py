@@ -19,11 +19,7 @@ class Output:
     """
     A publisher that counts.
 
-    Parameters
-    ----------
-    publisher : rclpy Publisher
-    stamped : bool
-        Its messages begin with a header.
+    stamped: its messages begin with a header.
 
     Attributes
     ----------

@@ -15,17 +15,10 @@ class Pump:
     """
     Hands out sample numbers to send.
 
-    Parameters
-    ----------
-    stamps : array of int64, shape (N,) [ns]
-        Header stamps, increasing.
-    playback : float
-        Run speed against the stamps; 0 is as fast as the listeners keep up.
-    window : int
-        How many samples may be under way that nobody has answered yet.
-    answered : bool
-        Whether answers will be told at all; without them the window is not kept.
-
+    stamps: header stamps, increasing, shape (N,) [ns].
+    playback: run speed against the stamps; 0 is as fast as the listeners keep up.
+    window: how many samples may be under way that nobody has answered yet.
+    answered: whether answers will be told at all; without them the window is not kept.
     """
 
     def __init__(

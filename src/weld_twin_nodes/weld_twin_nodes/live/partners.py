@@ -22,19 +22,11 @@ def unheard_publishers(
     """
     Return a sentence for every publisher of a topic of which nothing arrives.
 
-    Parameters
-    ----------
-    infos : sequence of TopicEndpointInfo
-        The publishers.
-    topic : str
-        Its name after remapping, with the namespace.
-    kind : str
-        Message type that is asked for.
-    wanted : Qos
-        Quality of service that is asked for.
-    understood : collection of str
-        Types that could be taken instead, if nobody published the one that is.
-
+    infos: the publishers.
+    topic: its name after remapping, with the namespace.
+    kind: message type that is asked for.
+    wanted: quality of service that is asked for.
+    understood: types that could be taken instead, if nobody published the one that is.
     """
     out = []
     for info in _named(infos):
@@ -53,15 +45,9 @@ def elsewhere(node: Node, topic: str, own: str, kinds: Sequence[str]) -> str:
     """
     Return where the input may be that nobody publishes, in a sentence; empty where nowhere.
 
-    Parameters
-    ----------
-    topic : str
-        The input's name after remapping, with the namespace.
-    own : str
-        Its name in the table of topics, which another namespace would go before.
-    kinds : sequence of str
-        Types that are understood.
-
+    topic: the input's name after remapping, with the namespace.
+    own: its name in the table of topics, which another namespace would go before.
+    kinds: types that are understood.
     """
     longer = tuple(name for name in BY_NAME if name != own and name.endswith(own))
     for name, there in node.get_topic_names_and_types():

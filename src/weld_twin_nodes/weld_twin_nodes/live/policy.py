@@ -38,20 +38,11 @@ def policy(
     """
     Return the policy as `ros2 security create_permission` reads it.
 
-    Parameters
-    ----------
-    namespace : str
-        Of all the nodes.
-    remaps : mapping of str to str, optional
-        Names as the nodes have them, with or without the namespace, to the names they get.
-    nodes : sequence of str
-        Nodes it is for; none for all.
+    namespace: of all the nodes.
+    remaps: names as the nodes have them, with or without the namespace, to the names they get.
+    nodes: nodes it is for; none for all.
 
-    Raises
-    ------
-    DataError
-        A node or the name that is remapped is unknown.
-
+    Raises DataError: a node or the name that is remapped is unknown.
     """
     chosen = tuple(nodes) or tuple(SPOKEN)
     unknown = [name for name in chosen if name not in SPOKEN]

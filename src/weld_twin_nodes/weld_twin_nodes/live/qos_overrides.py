@@ -29,18 +29,10 @@ class QosOverrides:
     """
     What the parameters of a node say of its topics.
 
-    Parameters
-    ----------
-    given : iterable of str
-        Names of the parameters that the node was started with.
-    topics : collection of str
-        What the node may have, under the names they have for it.
+    given: names of the parameters that the node was started with.
+    topics: what the node may have, under the names they have for it.
 
-    Raises
-    ------
-    DataError
-        A parameter names no such topic, or a policy that cannot be chosen.
-
+    Raises DataError: a parameter names no such topic, or a policy that cannot be chosen.
     """
 
     def __init__(self, node: Node, given: Iterable[str], topics: Collection[str]) -> None:
@@ -53,11 +45,7 @@ class QosOverrides:
         """
         Return the quality of service of a publisher or subscription.
 
-        Raises
-        ------
-        DataError
-            A value is none of those that there are.
-
+        Raises DataError: a value is none of those that there are.
         """
         policies = ('reliability', 'durability', 'depth')
         values = {policy: self._value(topic, role, policy) for policy in policies}

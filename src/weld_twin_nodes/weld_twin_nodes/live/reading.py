@@ -22,13 +22,8 @@ def measured_turn(part: str, fed_back: FedBack | None) -> Turn:
     """
     Return what turns messages that stand for a measured pose into poses.
 
-    Parameters
-    ----------
-    part : str
-        The frame that was measured, where a message holds several.
-    fed_back : FedBack, optional
-        Turns what a controller feeds back; None where the robot is not known.
-
+    part: the frame that was measured, where a message holds several.
+    fed_back: turns what a controller feeds back; None where the robot is not known.
     """
 
     def turn(kind: str, message: Any) -> Iterable[Any]:

@@ -31,12 +31,8 @@ class RecordedTopic:
     It asks for reliable delivery until a publisher is seen that does not offer it: what comes
     before the first look at the publishers is then not lost either.
 
-    Parameters
-    ----------
-    given : str
-        Name without a slash where it is in the namespace of the node.
-    write : callable
-        Takes the topic, the type and the bytes of a message.
+    given: name without a slash where it is in the namespace of the node.
+    write: takes the topic, the type and the bytes of a message.
 
     Attributes
     ----------

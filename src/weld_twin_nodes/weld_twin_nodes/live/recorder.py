@@ -60,11 +60,7 @@ class Recorder(ManagedNode):
         """
         Return what it is told to record.
 
-        Raises
-        ------
-        DataError
-            A name is none that a topic can have.
-
+        Raises DataError: a name is none that a topic can have.
         """
         topics: list[str] = self.setting('topics')
         for name in topics:

@@ -51,15 +51,9 @@ class RecordingRun:
     """
     Writes messages as they arrive, unread, until it is ended.
 
-    Parameters
-    ----------
-    node : CellNode
-        The recorder, with its parameters.
-    done : callable
-        Is told when everything is there, or nothing can be written any more.
-    joins : bool
-        It begins at a moment of its own: what was sent before is none of it.
-
+    node: the recorder, with its parameters.
+    done: is told when everything is there, or nothing can be written any more.
+    joins: it begins at a moment of its own: what was sent before is none of it.
     """
 
     def __init__(self, node: CellNode, done: Callable[[], None], *, joins: bool = False) -> None:
@@ -215,11 +209,7 @@ class RecordingRun:
         """
         Complete the bag and stop listening.
 
-        Raises
-        ------
-        TwinError
-            It could not all be written.
-
+        Raises TwinError: it could not all be written.
         """
         for timer in self._timers:
             self._node.destroy_timer(timer)

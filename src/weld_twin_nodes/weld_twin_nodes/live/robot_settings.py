@@ -40,11 +40,7 @@ def robot_of(node: CellNode) -> Robot:
     """
     Return the robot a node's parameters name.
 
-    Raises
-    ------
-    ModelError
-        There is no such robot, or its file or description cannot be used.
-
+    Raises ModelError: there is no such robot, or its file or description cannot be used.
     """
     name = node.setting('robot')
     base, tip = node.setting('base_link') or None, node.setting('tip_link') or None

@@ -161,11 +161,7 @@ def _open(args: list[str] | None) -> None:
     """
     Open ROS; raise a sentence where it cannot read the arguments.
 
-    Raises
-    ------
-    ModelError
-        An argument after ``--ros-args`` is no parameter or no remap.
-
+    Raises ModelError: an argument after ``--ros-args`` is no parameter or no remap.
     """
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
@@ -187,11 +183,7 @@ def _made(make: Callable[[], CellNode]) -> CellNode:
     """
     Return the node; raise a sentence where the middleware cannot keep it as safe as it must be.
 
-    Raises
-    ------
-    ModelError
-        Security is enforced, and the middleware has none, or not the node's keys.
-
+    Raises ModelError: security is enforced, and the middleware has none, or not the node's keys.
     """
     try:
         return make()

@@ -18,34 +18,22 @@ declared without a value makes `ros2 param dump` fail for the whole node.
 
 @dataclass(frozen=True)
 class Setting:
-    """
-    One parameter.
-
-    Attributes
-    ----------
-    default : bool, int, float, str or list of str
-        Also fixes the type, unless ``numbers`` is set.
-    description : str
-        What it is for, with its unit in square brackets.
-    low, high : float, optional
-        Range of a number, ends included.
-    live : bool
-        May be changed while the node runs.
-    numbers : bool
-        It is a list of numbers; `NO_NUMBERS` where it is not set.
-    choices : tuple of str
-        What it may be; empty for anything.
-
-    """
+    """One parameter."""
 
     name: str
     default: Any
+    """Also fixes the type, unless ``numbers`` is set."""
     description: str
+    """What it is for, with its unit in square brackets."""
     low: float | None = None
     high: float | None = None
+    """Range of a number, ends included."""
     live: bool = False
+    """May be changed while the node runs."""
     numbers: bool = False
+    """It is a list of numbers; `NO_NUMBERS` where it is not set."""
     choices: tuple[str, ...] = ()
+    """What it may be; empty for anything."""
 
     def odd(self, value: Any) -> str:
         """Return why a value is none that it may be; empty where it is one."""

@@ -33,44 +33,28 @@ MOST = 10_000
 
 @dataclass(frozen=True)
 class Wanted:
-    """
-    What is asked for of a topic.
-
-    Attributes
-    ----------
-    given : str
-        Its name, before remapping and without the namespace.
-    kinds : tuple of str
-        Message types that are understood, the usual one first.
-    qos : Qos
-    any_kind : bool
-        Whether any other type is taken too.
-    own : str
-        Its name in the table of topics, which another namespace would go before.
-    required : bool
-        Whether the node can do nothing without it.
-    yields : tuple of str
-        Policies of which less is asked for where a publisher offers less.
-
-    """
+    """What is asked for of a topic."""
 
     given: str
+    """Its name, before remapping and without the namespace."""
     kinds: tuple[str, ...]
+    """Message types that are understood, the usual one first."""
     qos: Qos
     any_kind: bool = False
+    """Whether any other type is taken too."""
     own: str = ''
+    """Its name in the table of topics, which another namespace would go before."""
     required: bool = False
+    """Whether the node can do nothing without it."""
     yields: tuple[str, ...] = ()
+    """Policies of which less is asked for where a publisher offers less."""
 
 
 class Source:
     """
     One input of a node, by a subscription that is made anew when its publishers are others.
 
-    Parameters
-    ----------
-    take : callable
-        Takes the type and the bytes of a message.
+    take: takes the type and the bytes of a message.
 
     Attributes
     ----------

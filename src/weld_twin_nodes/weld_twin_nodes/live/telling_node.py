@@ -139,11 +139,8 @@ class TellingNode(Node):
         """
         Return a new input, whose rate, age and losses are told from now on.
 
-        Parameters
-        ----------
-        held : bool
-            Its last value counts until the next one comes; that it does so without a source is told.
-
+        held: its last value counts until the next one comes; that it does so without a source is
+        told.
         """
         state = self.health.watch(name, required=required, steady=steady)
         self._losses[name] = Losses(state)

@@ -71,11 +71,7 @@ class MeasuredInputs:
 
     Without the parameter ``measuring_frame`` they are taken as they come.
 
-    Parameters
-    ----------
-    use : callable
-        Takes what a message tells, a pose or a point, and the message.
-
+    use: takes what a message tells, a pose or a point, and the message.
     """
 
     def __init__(self, node: CellNode, use: Callable[[Role, Any], None]) -> None:
@@ -154,14 +150,8 @@ def carried(message: Any, T: Array, frame_id: str) -> Any:
     """
     Return a pose or a point in another frame.
 
-    Parameters
-    ----------
-    message : PoseStamped, PoseWithCovarianceStamped or PointStamped
-    T : array, shape (4, 4)
-        Where the frame of the message is in the other.
-    frame_id : str
-        Name of the other.
-
+    T: where the frame of the message is in the other, shape (4, 4).
+    frame_id: name of the other.
     """
     header = Header(message.header.stamp, frame_id)
     if hasattr(message, 'point'):

@@ -27,62 +27,37 @@ Statuses = dict[str, dict[str, str]]
 
 
 class Sent(NamedTuple):
-    """
-    What was published on a topic.
-
-    Attributes
-    ----------
-    first, last : int, optional [ns]
-        Header stamps of the first and the last message, where the type has a header.
-
-    """
+    """What was published on a topic."""
 
     number: int
     first: int | None = None
     last: int | None = None
+    """Header stamps of the first and the last message, where the type has a header [ns]."""
 
 
 class Heard(NamedTuple):
-    """
-    What one input of a node has of its topic.
-
-    Attributes
-    ----------
-    publishers : int
-        Whose messages reach it, by the middleware of its own process.
-    received : int
-        Messages.
-
-    """
+    """What one input of a node has of its topic."""
 
     publishers: int
+    """Whose messages reach it, by the middleware of its own process."""
     received: int
+    """Messages."""
 
 
 class Word(NamedTuple):
-    """
-    What a node told at a time.
-
-    Attributes
-    ----------
-    run : str
-        Number of its start.
-    at : float [s]
-        When it was heard.
-    inputs : frozenset of str
-        Topics that it listens to.
-    sent, reached, heard : mapping
-        By topic: what it sent, how many subscriptions it reaches, what it has heard.
-
-    """
+    """What a node told at a time."""
 
     node: str
     run: str
+    """Number of its start."""
     at: float
+    """When it was heard [s]."""
     inputs: frozenset[str]
+    """Topics that it listens to."""
     sent: Mapping[str, Sent]
     reached: Mapping[str, int]
     heard: Mapping[str, Heard]
+    """By topic: what it sent, how many subscriptions it reaches, what it has heard."""
 
 
 def word(statuses: Statuses, at: float) -> Word | None:

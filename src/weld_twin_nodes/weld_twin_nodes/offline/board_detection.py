@@ -33,20 +33,12 @@ def detector(board: Mapping[str, Any]) -> Callable[[Path], Corners]:
     """
     Return what finds the corners of a board in an image file.
 
-    Parameters
-    ----------
-    board : mapping
-        ``board`` (charuco or chessboard), ``squares`` [columns, rows], ``square`` [m], and of a
-        ChArUco board ``marker`` [m] and ``dictionary``, as OpenCV calls it; or ``board: tags``,
-        their numbers and ``dictionary``.
+    board: ``board`` (charuco or chessboard), ``squares`` [columns, rows], ``square`` [m], and of a
+    ChArUco board ``marker`` [m] and ``dictionary``, as OpenCV calls it; or ``board: tags``, their
+    numbers and ``dictionary``.
 
-    Raises
-    ------
-    ModelError
-        OpenCV is not installed, or does not know the dictionary.
-    DataError
-        An image cannot be read.
-
+    Raises ModelError: OpenCV is not installed, or does not know the dictionary. Raises DataError:
+    an image cannot be read.
     """
     try:
         import cv2  # an extra of its own: few need it, and it weighs 60 MB

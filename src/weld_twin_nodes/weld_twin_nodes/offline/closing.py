@@ -43,12 +43,8 @@ def weighed(
     """
     Return which diagnosis to believe, and whether and why it closes the question.
 
-    Parameters
-    ----------
-    together : mapping
-        The diagnosis of all recordings.
-    alone : mapping, optional
-        That of the experiments without the recordings before them.
+    together: the diagnosis of all recordings.
+    alone: that of the experiments without the recordings before them.
 
     Returns
     -------

@@ -58,20 +58,11 @@ def region(
     """
     Return postures of a region, those that judge it, shape (K, n), and those that may be measured.
 
-    Parameters
-    ----------
-    given : str
-        ``x,y,z:x,y,z``, corners of a box in the robot's base frame [mm]; a program; or a bag.
-    context : Context, optional
-        For programs; with the frames of the program alone where left out.
-    language : str
-        Of a program, where its file does not tell it.
+    given: ``x,y,z:x,y,z``, corners of a box in the robot's base frame [mm]; a program; or a bag.
+    context: for programs; with the frames of the program alone where left out.
+    language: of a program, where its file does not tell it.
 
-    Raises
-    ------
-    DataError
-        The region is none of these, or the arm does not reach it.
-
+    Raises DataError: the region is none of these, or the arm does not reach it.
     """
     if Path(given).is_dir():
         q = read_recording(given, robot).joints.q

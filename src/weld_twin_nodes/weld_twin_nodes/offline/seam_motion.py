@@ -27,22 +27,13 @@ def plan_motion(
     """
     Return the planned motion along a seam.
 
-    Parameters
-    ----------
-    path : str
-        A kind of bundled seam, or the path of a path file.
-    profile : str
-        Name of a time law.
-    rate : float [1/s]
-    speed : float [m/s]
-        Speed of the time law, refused where a joint cannot follow; 0 is the law's own, slowed
-        down as far as the joints need it.
+    path: a kind of bundled seam, or the path of a path file.
+    profile: name of a time law.
+    rate: [1/s]
+    speed: speed of the time law, refused where a joint cannot follow [m/s]; 0 is the law's own,
+    slowed down as far as the joints need it.
 
-    Raises
-    ------
-    PathError
-        The seam cannot be read, reached or followed.
-
+    Raises PathError: the seam cannot be read, reached or followed.
     """
     law = _law(profile, speed)
     if path in KINDS:

@@ -64,13 +64,8 @@ class Runner:
     """
     Runs tasks on a pool and keeps their results; closes the pool when its block ends.
 
-    Parameters
-    ----------
-    store : Path, optional
-        Directory of results; a task whose result is there already is not run again.
-    tell : callable, optional
-        Told about progress.
-
+    store: directory of results; a task whose result is there already is not run again.
+    tell: told about progress.
     """
 
     def __init__(self, pool: Pool, store: Path | None = None, tell: Tell | None = None) -> None:
@@ -156,14 +151,9 @@ class Cores:
     The processes start anew, so that no library has chosen its threads before, and stay until
     the pool is closed.
 
-    Parameters
-    ----------
-    workers : int
-        0 means one for every core.
-    ahead : str
-        A module that the processes begin to import at once, while this one goes on; left out,
-        they start with the first task.
-
+    workers: 0 means one for every core.
+    ahead: a module that the processes begin to import at once, while this one goes on; left out,
+    they start with the first task.
     """
 
     def __init__(self, workers: int = 0, ahead: str = '') -> None:

@@ -30,20 +30,11 @@ def tolerance_entry(
     """
     Return how probably the tool keeps a tolerance all along, before and after, as plain JSON values.
 
-    Parameters
-    ----------
-    model : ProgramModel
-        It was corrected with.
-    tolerance : float [m]
-        Of the tool's distance from where the program means it.
-    noise : float [m]
-        Standard deviation of a measured coordinate, of postures measured in addition.
+    model: it was corrected with.
+    tolerance: of the tool's distance from where the program means it [m].
+    noise: standard deviation of a measured coordinate, of postures measured in addition [m].
 
-    Raises
-    ------
-    DataError
-        The tolerance means nothing, or the model does not say how sure it is.
-
+    Raises DataError: the tolerance means nothing, or the model does not say how sure it is.
     """
     if not 0.0 < tolerance < 1.0:
         raise DataError(f'--tolerance must be above zero, got {tolerance * 1e3:g} mm')

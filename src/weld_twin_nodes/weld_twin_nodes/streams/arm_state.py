@@ -31,11 +31,7 @@ class Moving:
     """
     Tells afterwards whether joints moved: at rest nobody knows on which side what they lose is.
 
-    Parameters
-    ----------
-    columns : sequence of int
-        Of the joints.
-
+    columns: of the joints.
     """
 
     def __init__(self, columns: Sequence[int]) -> None:

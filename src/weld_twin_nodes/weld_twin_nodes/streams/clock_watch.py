@@ -123,12 +123,9 @@ class ClockWatch:
         """
         Return what is to be told of the clocks, empty where nothing is.
 
-        Parameters
-        ----------
-        now : float [s]
-        paired, waiting, dropped : int
-            Measurements so far that met the twin, that wait for it, and that never will.
-
+        now: [s]
+        paired, waiting, dropped: measurements so far that met the twin, that wait for it, and that
+        never will.
         """
         if not (self.measured.alive(now) and self.twin.alive(now)):
             self._begun = None

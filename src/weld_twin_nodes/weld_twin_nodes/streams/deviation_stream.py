@@ -34,18 +34,11 @@ class Deviations:
     """
     Pairs measurements with twin poses and keeps the metrics of the pairs.
 
-    Parameters
-    ----------
-    robot : Robot
-        Its base frame is the one deviations are given in.
-    path_length : float [m]
-        Length of the seam; 0 takes the way the twin has gone.
-    depth, max_gap
-        See `Pairing`.
-    base_told : bool
-        Whether the base is yet to be told. Until it is, pairs are held back, at most ``depth``:
-        in other axes they would be other deviations.
-
+    robot: its base frame is the one deviations are given in.
+    path_length: length of the seam [m]; 0 takes the way the twin has gone.
+    depth, max_gap: see `Pairing`.
+    base_told: whether the base is yet to be told. Until it is, pairs are held back, at most
+    ``depth``: in other axes they would be other deviations.
     """
 
     def __init__(
@@ -75,11 +68,7 @@ class Deviations:
         """
         Take the axes of the base in the measuring frame; yield the deviations that waited for them.
 
-        Parameters
-        ----------
-        rotation : Array, shape (3, 3), optional
-            None for those of the robot: nobody tells them.
-
+        rotation: none for those of the robot: nobody tells them, shape (3, 3).
         """
         if rotation is not None:
             self._rotation_base_world = rotation.T

@@ -40,13 +40,8 @@ class Pairing:
     a step of more than four times the usual. A measurement waits until the twin has passed it. One
     that can never be paired is counted in `dropped`.
 
-    Parameters
-    ----------
-    depth : int
-        How many samples of each stream are kept.
-    max_gap : float [s]
-        Longest step between two twin poses that is still interpolated.
-
+    depth: how many samples of each stream are kept.
+    max_gap: longest step between two twin poses that is still interpolated [s].
     """
 
     def __init__(self, depth: int = 2000, max_gap: float = 0.5) -> None:
@@ -76,11 +71,7 @@ class Pairing:
         """
         Take a twin pose; return the pairs it completes.
 
-        Raises
-        ------
-        DataError
-            The stamp is not after the last one.
-
+        Raises DataError: the stamp is not after the last one.
         """
         if self._twin_order.restarted_at(stamp):
             self._twin.clear()
@@ -92,11 +83,7 @@ class Pairing:
         """
         Take a measurement; return the pairs it completes.
 
-        Raises
-        ------
-        DataError
-            The stamp is not after the last one.
-
+        Raises DataError: the stamp is not after the last one.
         """
         if self._measured_order.restarted_at(stamp):
             self.dropped += len(self._measured)

@@ -43,23 +43,14 @@ SPAN = 0.05
 
 
 class Given(NamedTuple):
-    """
-    What becomes of a pose.
-
-    Attributes
-    ----------
-    pose : array, shape (4, 4), optional
-        To be sent on; None for nothing.
-    added : array, shape (6,), optional [m, rad]
-        What was, or would be, added; None where it is not known.
-    why : str
-        Why it is not corrected; empty where it is.
-
-    """
+    """What becomes of a pose."""
 
     pose: Array | None
+    """To be sent on, shape (4, 4); None for nothing."""
     added: Array | None
+    """What was, or would be, added, shape (6,) [m, rad]; None where it is not known."""
     why: str = ''
+    """Why it is not corrected; empty where it is."""
 
 
 class _Ramp(NamedTuple):
@@ -86,16 +77,10 @@ class PoseStream:
     What is added to them follows the model as long as the stream moves. It is faded in before the
     first pose is followed, and faded in or out where the stream stands still, at no other time.
 
-    Parameters
-    ----------
-    passing : bool
-        What is refused passes as it came; else nothing is sent.
-    shadow : bool
-        Nothing is sent; what would be added is told.
-    beside : LooksBeside, optional
-        Makes exact looks meanwhile; left out, and until it is up, the stream makes them itself
-        after a pose.
-
+    passing: what is refused passes as it came; else nothing is sent.
+    shadow: nothing is sent; what would be added is told.
+    beside: makes exact looks meanwhile; left out, and until it is up, the stream makes them itself
+    after a pose.
     """
 
     def __init__(
@@ -145,17 +130,11 @@ class PoseStream:
         """
         Return what becomes of a pose.
 
-        Parameters
-        ----------
-        pose : array, shape (4, 4)
-            Of the tool in the robot's base, as the controller counts it.
-        now : float [s]
-            Its stamp.
-        arm : array, shape (n,), optional
-            Joints where the arm stands.
-        withdrawn : str
-            Why nothing is to be corrected from the next standstill on; empty where there is nothing.
-
+        pose: of the tool in the robot's base, as the controller counts it, shape (4, 4).
+        now: its stamp [s].
+        arm: joints where the arm stands, shape (n,).
+        withdrawn: why nothing is to be corrected from the next standstill on; empty where there is
+        nothing.
         """
         if not 0.0 <= now - self._last <= SILENT:
             self.forget()

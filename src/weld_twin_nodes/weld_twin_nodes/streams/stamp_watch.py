@@ -45,26 +45,16 @@ RUSH = 0.5
 
 
 class Seen(NamedTuple):
-    """
-    What a look at the stamps finds.
-
-    Attributes
-    ----------
-    missing : int
-        Messages, by the gaps of a stream on a beat.
-    step : float [s]
-        The beat, 0 where there is none.
-    ahead : float [s]
-        How far the stamps jumped forwards, 0 where they did not.
-    back : float [s]
-        How far behind the last ones the stamps begin anew, 0 where they do not.
-
-    """
+    """What a look at the stamps finds."""
 
     missing: int = 0
+    """Messages, by the gaps of a stream on a beat."""
     step: float = 0.0
+    """The beat, 0 where there is none [s]."""
     ahead: float = 0.0
+    """How far the stamps jumped forwards, 0 where they did not [s]."""
     back: float = 0.0
+    """How far behind the last ones the stamps begin anew, 0 where they do not [s]."""
 
 
 class StampWatch:
@@ -126,13 +116,8 @@ def _seen(step: Array, passed: Array, begin: int, end: int) -> Seen:
     """
     Return what steps of stamps show.
 
-    Parameters
-    ----------
-    step, passed : array, shape (N,) [s]
-        Between stamps, and between their arrivals.
-    begin, end : int
-        Of the steps that are judged; the others are there to judge them by.
-
+    step, passed: between stamps, and between their arrivals, shape (N,) [s].
+    begin, end: of the steps that are judged; the others are there to judge them by.
     """
     if begin >= end:
         return Seen()

@@ -33,36 +33,22 @@ LOST = 2.0
 
 
 class Promise(NamedTuple):
-    """
-    What a model leaves on data it has not seen.
-
-    Attributes
-    ----------
-    rms : float [m]
-        Distance of measurements from the twin, noise included.
-    beside_noise : float [m]
-        What a mean of many measurements of one posture may still be off by.
-
-    """
+    """What a model leaves on data it has not seen."""
 
     rms: float
+    """Distance of measurements from the twin, noise included [m]."""
     beside_noise: float
+    """What a mean of many measurements of one posture may still be off by [m]."""
 
     @classmethod
     def of(cls, remaining: float, unsure: float, samples: int) -> Promise:
         """
         Return it from what was left on unseen data.
 
-        Parameters
-        ----------
-        remaining : float [m]
-            RMS distance of measurements from the model.
-        unsure : float [m]
-            Standard deviation, in its worst direction, of what the model is not sure of.
-        samples : int
-            Measurements that told both. What hides in their noise, within two standard errors of
-            its square, may be the model's.
-
+        remaining: RMS distance of measurements from the model [m].
+        unsure: standard deviation, in its worst direction, of what the model is not sure of [m].
+        samples: measurements that told both. What hides in their noise, within two standard errors
+        of its square, may be the model's.
         """
         hidden = 2.0 * remaining**2 * sqrt(2.0 / (3.0 * samples))
         rms = hypot(remaining, unsure)
@@ -77,11 +63,7 @@ class Supervision:
     ones hides is seen in the medians of groups of so many: in their size, `SIZED` of them, and in the
     mean of `GROUPS`; how sure that is, the groups tell.
 
-    Parameters
-    ----------
-    promise : Promise, optional
-        None where it is not known.
-
+    promise: none where it is not known.
     """
 
     def __init__(self, promise: Promise | None = None) -> None:

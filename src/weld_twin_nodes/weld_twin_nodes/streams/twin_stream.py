@@ -16,36 +16,24 @@ from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 
 
 class Sample(NamedTuple):
-    """
-    The arm at one joint stamp.
-
-    Attributes
-    ----------
-    stamp : int [ns]
-        Of the joint state.
-    pose_stamp : int [ns]
-        Of a measurement that shows this pose; later by the delay of the measurement clock.
-    q : array, shape (n,) [rad or m]
-    poses : Poses
-        One position (3,) and rotation (3, 3).
-    wrench : array, shape (6,), optional [N, N m]
-        In force at the joint state, in ``wrench_frame``.
-    wrench_frame : str
-        'tool' or 'base'.
-    temperature : float, optional [degC]
-    effort : array, shape (n,), optional [N m, or N of a slide]
-        As measured, where effects of the twin take it.
-
-    """
+    """The arm at one joint stamp."""
 
     stamp: int
+    """Of the joint state [ns]."""
     pose_stamp: int
+    """Of a measurement that shows this pose [ns]; later by the delay of the measurement clock."""
     q: Array
+    """Shape (n,) [rad or m]."""
     poses: Poses
+    """One position (3,) and rotation (3, 3)."""
     wrench: Array | None = None
+    """In force at the joint state, in ``wrench_frame``, shape (6,) [N, N m]."""
     wrench_frame: str = 'tool'
+    """'tool' or 'base'."""
     temperature: float | None = None
+    """[degC]"""
     effort: Array | None = None
+    """As measured, where effects of the twin take it, shape (n,) [N m, or N of a slide]."""
 
 
 class JointStream:
@@ -55,11 +43,7 @@ class JointStream:
     Wrench and temperature are in force from their own stamp to the next one's. The poses are
     those that the twin gives over the recording of the same messages.
 
-    Parameters
-    ----------
-    joint_names : sequence of str, optional
-        What the joint states call the joints, in the order of the robot.
-
+    joint_names: what the joint states call the joints, in the order of the robot.
     """
 
     def __init__(self, twin: Twin, joint_names: tuple[str, ...] | None = None) -> None:
@@ -114,11 +98,7 @@ class JointStream:
         """
         Return the arm at a joint state, None while joints of other publishers are awaited.
 
-        Raises
-        ------
-        DataError
-            The message cannot be used; nothing has changed then.
-
+        Raises DataError: the message cannot be used; nothing has changed then.
         """
         taken = self.intake.joint_sample(message)
         if taken is None:

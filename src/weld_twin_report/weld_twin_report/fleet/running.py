@@ -144,11 +144,7 @@ class Threads:
     """
     Runs tasks that let a process do their work.
 
-    Parameters
-    ----------
-    workers : int
-        0 means one for every core.
-
+    workers: 0 means one for every core.
     """
 
     def __init__(self, workers: int = 0) -> None:

@@ -60,21 +60,13 @@ class Database:
     """
     The history of many cells.
 
-    Parameters
-    ----------
-    url : str
-        Of SQLAlchemy (``postgresql+psycopg://...``), or the path of an SQLite file.
-    make : bool
-        Whether an empty database, or a file that is not there, becomes a history.
-    patience : float, optional
-        Seconds for which a write is tried again while the database cannot be used; a minute unless
-        told.
+    url: of SQLAlchemy (``postgresql+psycopg://...``), or the path of an SQLite file.
+    make: whether an empty database, or a file that is not there, becomes a history.
+    patience: seconds for which a write is tried again while the database cannot be used; a minute
+    unless told.
 
-    Raises
-    ------
-    DataError
-        SQLAlchemy is not installed, or the database cannot be opened or is no history.
-
+    Raises DataError: SQLAlchemy is not installed, or the database cannot be opened or is no
+    history.
     """
 
     def __init__(self, url: str, *, make: bool = True, patience: float | None = None) -> None:

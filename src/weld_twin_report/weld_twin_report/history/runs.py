@@ -50,21 +50,16 @@ class Runs:
         """
         Write how a recording went, and its diagnosis, in one transaction.
 
-        Parameters
-        ----------
-        patience : float, optional
-            Seconds for which it is tried again; that of the database unless told.
+        patience: seconds for which it is tried again; that of the database unless told.
+
+        Raises Unavailable: the database cannot be used now. Nothing was written; it may be tried
+        again.
 
         Returns
         -------
         Run or None
             What was written: refused where the diagnosis does not fit its cell, failed where the
             database does not take it. None where it was there; what was written before stays as it is.
-
-        Raises
-        ------
-        Unavailable
-            The database cannot be used now. Nothing was written; it may be tried again.
 
         """
         try:

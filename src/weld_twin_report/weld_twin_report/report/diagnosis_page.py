@@ -147,19 +147,11 @@ def joint_labels(reported: str, joints: Sequence[str]) -> dict[str, str]:
     """
     Return what each joint is called on the page.
 
-    Parameters
-    ----------
-    reported : str
-        A prefix such as ``A`` or ``J``, which the number of the joint follows, or a YAML file that
-        gives a name to joints: ``shoulder_pan_joint: A1``. Empty for the names of the model.
-    joints : sequence of str
-        Of the model, in chain order.
+    reported: a prefix such as ``A`` or ``J``, which the number of the joint follows, or a YAML
+    file that gives a name to joints: ``shoulder_pan_joint: A1``. Empty for the names of the model.
+    joints: of the model, in chain order.
 
-    Raises
-    ------
-    ModelError
-        It is neither, or the file names a joint that the robot does not have.
-
+    Raises ModelError: it is neither, or the file names a joint that the robot does not have.
     """
     if not reported:
         return {}

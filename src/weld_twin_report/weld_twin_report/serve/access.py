@@ -237,13 +237,8 @@ class People:
     """
     Gives out keys and knows them again.
 
-    Parameters
-    ----------
-    directory : Path
-        Of the server; the secret lies there.
-    has : callable
-        Tells whether something is kept of a key: older versions gave keys without a signature.
-
+    directory: of the server; the secret lies there.
+    has: tells whether something is kept of a key: older versions gave keys without a signature.
     """
 
     def __init__(self, directory: Path, has: Callable[[str], bool]) -> None:

@@ -48,17 +48,10 @@ class Body:
     """
     The body of one request, read through `receive`.
 
-    Parameters
-    ----------
-    party : str
-        Who sends it.
-    receive : callable
-        What the server hands out.
-    most : int
-        Bytes allowed.
-    length : int or None
-        Bytes announced; None for what is no number.
-
+    party: who sends it.
+    receive: what the server hands out.
+    most: bytes allowed.
+    length: bytes announced; None for what is no number.
     """
 
     def __init__(
@@ -120,11 +113,7 @@ class Bodies:
     """
     All bodies that are being read.
 
-    Parameters
-    ----------
-    of_party, of_all : int
-        How many are read at the same time, of one party and of all.
-
+    of_party, of_all: how many are read at the same time, of one party and of all.
     """
 
     def __init__(self, of_party: int = OF_PARTY, of_all: int = OF_ALL) -> None:

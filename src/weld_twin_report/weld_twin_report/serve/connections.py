@@ -43,12 +43,8 @@ class Doors:
     """
     All connections of a server.
 
-    Parameters
-    ----------
-    of_address, of_all : int
-        How many may wait for a head, of one address; how many may be open.
-    head : float [s]
-
+    of_address, of_all: how many may wait for a head, of one address; how many may be open.
+    head: [s]
     """
 
     def __init__(

@@ -40,16 +40,9 @@ class Directory:
     """
     A directory in which this server alone works, until `close`.
 
-    Parameters
-    ----------
-    path : Path
-        A link is followed.
+    path: a link is followed.
 
-    Raises
-    ------
-    DataError
-        It holds something else, another server works in it, or it cannot be written.
-
+    Raises DataError: it holds something else, another server works in it, or it cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
@@ -196,22 +189,12 @@ def giving_way(
     """
     Return the finished jobs that go, so that a new one can be kept.
 
-    Parameters
-    ----------
-    jobs : sequence of Job
-        All but the new one.
-    sizes : mapping
-        Bytes by the key of each, the new one too.
-    allowed : int
-        Bytes of all.
-    most : int
-        Jobs of all.
+    jobs: all but the new one.
+    sizes: bytes by the key of each, the new one too.
+    allowed: bytes of all.
+    most: jobs of all.
 
-    Raises
-    ------
-    NoRoom
-        Nobody has more than a fair share, and it is too much all the same.
-
+    Raises NoRoom: nobody has more than a fair share, and it is too much all the same.
     """
     remaining = sorted(jobs, key=lambda job: job.since)
     out: list[Job] = []

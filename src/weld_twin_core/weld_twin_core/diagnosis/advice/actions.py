@@ -19,13 +19,8 @@ def actions(
     """
     Return what to do about every effect found, one sentence each, in their order.
 
-    Parameters
-    ----------
-    robot : Robot
-        The nominal model: what is entered in the controller now.
-    mends : sequence of mapping
-        What was undone of the data, as a model has it.
-
+    robot: the nominal model: what is entered in the controller now.
+    mends: what was undone of the data, as a model has it.
     """
     turned = turned_joints(mends, robot)
     return tuple(_action(effect, robot, turned) for effect in result)

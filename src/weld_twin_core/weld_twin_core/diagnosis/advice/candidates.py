@@ -60,46 +60,30 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """
-    A measurement that could be made.
-
-    Attributes
-    ----------
-    kind, sentence : str
-        The sentence has ``{count}`` where the number of stations goes.
-    set_up : float [min]
-        What has to be changed in the cell first.
-    recordings : tuple of Recording
-        Motions, with side signals, without measurements.
-    pieces : tuple of Piece
-        What is chosen from.
-    whole : bool
-        Whether none of the pieces may be left out.
-    model : Model
-        As the cell will be, without found effects; one base.
-    room : Room
-        Where the arm may go.
-    new_base, new_tool : bool
-        Whether the instrument or the tool is set up anew, so that its frame is not known.
-    alone : int
-        How many of the pieces, at the end, move one joint alone.
-    changed : str
-        What is changed in the cell, as a diagnosis is told of it; empty for nothing.
-
-    """
+    """A measurement that could be made."""
 
     kind: str
     sentence: str
+    """The sentence has ``{count}`` where the number of stations goes."""
     set_up: float
+    """What has to be changed in the cell first [min]."""
     recordings: tuple[Recording, ...]
+    """Motions, with side signals, without measurements."""
     pieces: tuple[Piece, ...]
+    """What is chosen from."""
     model: Model
+    """As the cell will be, without found effects; one base."""
     room: Room
+    """Where the arm may go."""
     whole: bool = False
+    """Whether none of the pieces may be left out."""
     new_base: bool = False
     new_tool: bool = False
+    """Whether the instrument or the tool is set up anew, so that its frame is not known."""
     alone: int = 0
+    """How many of the pieces, at the end, move one joint alone."""
     changed: str = ''
+    """What is changed in the cell, as a diagnosis is told of it; empty for nothing."""
 
     @property
     def static(self) -> bool:

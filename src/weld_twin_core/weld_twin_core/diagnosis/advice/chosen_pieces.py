@@ -44,31 +44,19 @@ SAFE = MARGIN * DECIDES
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """
-    A measurement with the pieces chosen, in order.
-
-    Attributes
-    ----------
-    candidate : Candidate
-    chosen : tuple of int
-    score : float
-        Sum over the explanations of what it adds, in standard deviations, no more than decides.
-    named : int
-        So many explanations, the first ones, are named by the verdict.
-    others : tuple of int
-        Explanations that the first one is to be parted from.
-    known, gains : array, one for each of these
-        How far the data at hand part it from them, and what is added.
-
-    """
+    """A measurement with the pieces chosen, in order."""
 
     candidate: Candidate
     chosen: tuple[int, ...]
     score: float = 0.0
+    """Sum over the explanations of what it adds, in standard deviations, no more than decides."""
     named: int = 1
+    """So many explanations, the first ones, are named by the verdict."""
     others: tuple[int, ...] = ()
+    """Explanations that the first one is to be parted from."""
     known: Array = field(default_factory=lambda: np.zeros(0))
     gains: Array = field(default_factory=lambda: np.zeros(0))
+    """How far the data at hand part it from them, and what is added."""
 
     @property
     def apart(self) -> float:

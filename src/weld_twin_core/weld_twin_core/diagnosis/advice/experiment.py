@@ -41,20 +41,14 @@ def next_experiment(
     """
     Return the measurement to make next, as plain numbers and strings.
 
-    Parameters
-    ----------
-    problem, model, scale
-        The data at hand, the model with its frames, and the noise.
-    alternatives : sequence of tuple of Effect
-        Explanations that fit alike. With fewer than two there is nothing to decide between, and
-        what widens the data most is proposed.
-    limits : Limits, optional
-        What it may cost, and where it has to stay.
-    closed : bool
-        Whether one of the alternatives is believed to be true. Where no motion parts them, this
-        is then said; otherwise the data are widened.
-    named : int
-        So many of the alternatives, the first ones, are named by the verdict: to part these comes first.
+    problem, model, scale: the data at hand, the model with its frames, and the noise.
+    alternatives: explanations that fit alike. With fewer than two there is nothing to decide
+    between, and what widens the data most is proposed.
+    limits: what it may cost, and where it has to stay.
+    closed: whether one of the alternatives is believed to be true. Where no motion parts them,
+    this is then said; otherwise the data are widened.
+    named: so many of the alternatives, the first ones, are named by the verdict: to part these
+    comes first.
 
     Returns
     -------

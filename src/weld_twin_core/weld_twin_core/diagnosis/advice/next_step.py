@@ -67,15 +67,9 @@ def next_step(
     """
     Return the next experiment as `next_experiment` does, None when the question is closed.
 
-    Parameters
-    ----------
-    verdict : Verdict
-        With the confidence that it has earned.
-    limits : Limits, optional
-        What an experiment may cost, and where it has to stay.
-    alternative : Curved, optional
-        What explains the gap without a formula.
-
+    verdict: with the confidence that it has earned.
+    limits: what an experiment may cost, and where it has to stay.
+    alternative: what explains the gap without a formula.
     """
     limits = limits or Limits()
     if result.problem.untracked:

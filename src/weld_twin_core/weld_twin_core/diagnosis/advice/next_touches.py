@@ -38,19 +38,12 @@ def next_touches(
     """
     Return the touches to make next, as plain numbers and strings; None where none can be reached.
 
-    Parameters
-    ----------
-    problem : Problem
-        Of contacts.
-    model : Model
-        As found, with its frames.
-    alternatives : sequence of tuple of Effect
-        Explanations that fit alike; with fewer than two, whatever narrows the arm's errors most is
-        proposed.
-    scale : Scale
-        The noise of a touch.
-    elsewhere : bool
-        Whether what is touched can be moved.
+    problem: of contacts.
+    model: as found, with its frames.
+    alternatives: explanations that fit alike; with fewer than two, whatever narrows the arm's
+    errors most is proposed.
+    scale: the noise of a touch.
+    elsewhere: whether what is touched can be moved.
 
     Returns
     -------

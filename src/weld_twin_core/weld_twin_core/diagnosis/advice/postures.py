@@ -27,32 +27,20 @@ class Limits:
     """
     What an experiment may cost, and where it has to stay.
 
-    Attributes
-    ----------
-    minutes : float [min]
-        Of robot motion and of what has to be set up for it, at most.
-    moving : float [min]
-        Of robot motion alone, at most.
-    set_up : bool
-        Whether something in the cell may be changed for it: another tool, a moved instrument.
-    box : array, shape (2, 3), optional [m]
-        Corners in the measuring frame that the arm stays between.
-    confirm : bool
-        Whether one is asked for where the question is closed, but some joints did not move widely:
-        what depends on their angle looks like something else.
-
-    Raises
-    ------
-    DataError
-        The minutes are not positive, or a box has no room.
-
+    Raises DataError: the minutes are not positive, or a box has no room.
     """
 
     minutes: float = USUAL_MINUTES
+    """Of robot motion and of what has to be set up for it, at most [min]."""
     moving: float = np.inf
+    """Of robot motion alone, at most [min]."""
     set_up: bool = True
+    """Whether something in the cell may be changed for it: another tool, a moved instrument."""
     box: Array | None = None
+    """Corners in the measuring frame that the arm stays between, shape (2, 3) [m]."""
     confirm: bool = False
+    """Whether one is asked for where the question is closed, but some joints did not move widely:
+    what depends on their angle looks like something else."""
 
     def __post_init__(self) -> None:
         least = min(self.minutes, self.moving)
@@ -93,8 +81,6 @@ class Room:
     ----------
     problem : Problem
         What was recorded: the arm has been there.
-    robot : Robot
-    limits : Limits
 
     Raises
     ------

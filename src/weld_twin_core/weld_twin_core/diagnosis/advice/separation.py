@@ -62,18 +62,13 @@ class Parting:
 
     Each of the two is taken for true in turn. Where one contains the other, as play that may be zero,
     only the truth of the larger one shows; so the mean over both counts.
-
-    Attributes
-    ----------
-    now : list of array, shape (P, P)
-        Normal matrix of the columns of the one that is not true and, last, of the difference.
-    pieces : list of array, shape (K, P, P)
-        The same of every piece.
-
     """
 
     now: list[Array]
+    """Normal matrix of the columns of the one that is not true and, last, of the difference, shape
+    (P, P)."""
     pieces: list[Array]
+    """The same of every piece, shape (K, P, P)."""
 
     @cached_property
     def before(self) -> Array:
@@ -116,13 +111,8 @@ def partings(
     """
     Return how a candidate's pieces part the first alternative, believed most, from every other.
 
-    Parameters
-    ----------
-    problem, model, alternatives, scale
-        As `at_hand` takes them.
-    now : Side
-        As `at_hand` returned it.
-
+    problem, model, alternatives, scale: as `at_hand` takes them.
+    now: as `at_hand` returned it.
     """
     ahead = [
         _ahead(problem, candidate, recording, alternatives, scale)
@@ -175,13 +165,8 @@ def at_hand(
     """
     Return what the alternatives say of the data at hand.
 
-    Parameters
-    ----------
-    model : Model
-        What is believed so far; everything is taken about it.
-    alternatives : sequence of Alternative
-        The explanations to tell apart.
-
+    model: what is believed so far; everything is taken about it.
+    alternatives: the explanations to tell apart.
     """
     few = problem.thinned(ROWS)
     return _side(few, model, alternatives, with_weights(scale, few), '')

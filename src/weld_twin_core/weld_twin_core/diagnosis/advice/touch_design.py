@@ -70,36 +70,24 @@ class Touchable:
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """
-    What is known of the unknowns: errors of the arm first, then places.
-
-    Attributes
-    ----------
-    model : Model
-        With every error that takes part.
-    tool : bool
-        Whether the tool point is among the unknowns.
-    sigma : float [m]
-        Noise of a touch.
-    errors : int
-        Number of unknowns that are no place.
-    starts : tuple of int
-        First unknown of every place.
-    surfaces : tuple of Places
-        Where contacts are.
-    root : array, shape (P, P)
-        Its product with its transpose is the covariance of the unknowns. Kept instead of it: with
-        errors of micrometres and places that may be anywhere, rounding would make it negative.
-
-    """
+    """What is known of the unknowns: errors of the arm first, then places."""
 
     model: Model
+    """With every error that takes part."""
     tool: bool
+    """Whether the tool point is among the unknowns."""
     sigma: float
+    """Noise of a touch [m]."""
     errors: int
+    """Number of unknowns that are no place."""
     starts: tuple[int, ...]
+    """First unknown of every place."""
     surfaces: tuple[Places, ...]
+    """Where contacts are."""
     root: Array
+    """Its product with its transpose is the covariance of the unknowns, shape (P, P). Kept instead
+    of it: with errors of micrometres and places that may be anywhere, rounding would make it
+    negative."""
 
     @property
     def covariance(self) -> Array:
@@ -111,15 +99,9 @@ class Design:
         """
         Return what the touches at hand tell.
 
-        Parameters
-        ----------
-        problem : Problem
-            Of contacts.
-        model : Model
-            With its frames as found.
-        effects : sequence of Effect
-            The errors that take part, as large as they were found.
-
+        problem: of contacts.
+        model: with its frames as found.
+        effects: the errors that take part, as large as they were found.
         """
         # A base that is fitted along counts as known: another touch tells more of it anyway.
         problem = replace(problem, align=problem.align & {'tool'})
@@ -210,13 +192,8 @@ def chosen(
     """
     Return which touches to make, in order, and what is known after each.
 
-    Parameters
-    ----------
-    rows : array, shape (N, 3, P)
-        Of every touch that could be made.
-    weight : array, shape (E, E)
-        How much the errors' variances and covariances count.
-
+    rows: of every touch that could be made, shape (N, 3, P).
+    weight: how much the errors' variances and covariances count, shape (E, E).
     """
     free = np.ones(len(rows), dtype=bool)
     order: list[int] = []

@@ -20,10 +20,7 @@ def span_of(columns: Array) -> Array:
     """
     Return orthonormal rows that span columns, (P, rows), of any size, which may repeat each other.
 
-    Parameters
-    ----------
-    columns : array, shape (P, rows)
-
+    columns: shape (P, rows).
     """
     size = np.linalg.norm(columns, axis=1)
     shown = columns[size > 0.0] / size[size > 0.0, None]

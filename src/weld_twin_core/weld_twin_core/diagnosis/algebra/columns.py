@@ -43,12 +43,8 @@ class MovedJoint:
     """
     What one joint does to the tool, whitened; all columns that move this joint share it.
 
-    Parameters
-    ----------
-    row : array, shape (rows,)
-    first : array of int, shape (samples,)
-        The first row of every sample.
-
+    row: shape (rows,).
+    first: the first row of every sample, shape (samples,).
     """
 
     def __init__(self, row: Array, first: Index) -> None:
@@ -92,20 +88,13 @@ class MovedJoint:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """
-    Some columns that are kept alike.
-
-    Attributes
-    ----------
-    each : array, shape (K, samples) [rad or m], or (K, rows)
-        By how much each moves the joint at every sample; whitened and written out without one.
-    joint : MovedJoint or None
-        The joint that all of them move.
-
-    """
+    """Some columns that are kept alike."""
 
     each: Array
+    """By how much each moves the joint at every sample, shape (K, samples) [rad or m], or (K,
+    rows); whitened and written out without one."""
     joint: MovedJoint | None = None
+    """The joint that all of them move."""
 
     @property
     def count(self) -> int:
@@ -236,13 +225,8 @@ class Maker:
     """
     Makes the columns of effects at a model.
 
-    Parameters
-    ----------
-    features : sequence of Features
-        Of every recording, at the model.
-    scale : Scale
-        What the rows are divided by.
-
+    features: of every recording, at the model.
+    scale: what the rows are divided by.
     """
 
     def __init__(self, problem: Problem, features: list[Features], scale: Scale) -> None:
@@ -274,11 +258,7 @@ def moved_joint(shifts: Sequence[Sequence[Shift]]) -> int | None:
     """
     Return the joint that is all that some features move; None where they move something else.
 
-    Parameters
-    ----------
-    shifts : sequence of sequence of mapping
-        The features of one effect in every recording; see `Features.shifts`.
-
+    shifts: the features of one effect in every recording; see `Features.shifts`.
     """
     channels = {channel for parts in shifts for shift in parts for channel in shift}
     if len(channels) != 1:

@@ -32,11 +32,7 @@ def inverted(matrix: Array) -> Array:
     """
     Return the inverse of a symmetric matrix, which is overwritten, shape (P, P).
 
-    Raises
-    ------
-    LinAlgError
-        The matrix is not positive definite.
-
+    Raises LinAlgError: the matrix is not positive definite.
     """
     # A symmetric matrix is its own transpose, and that lies as LAPACK wants it.
     lower = dpotri(_factor(matrix), lower=1, overwrite_c=1)[0]
@@ -58,16 +54,9 @@ def factored(matrix: Array) -> Callable[[Array], Array]:
     """
     Return what solves for one right-hand side, shape (P,), or several, shape (P, R).
 
-    Parameters
-    ----------
-    matrix : array, shape (P, P)
-        Symmetric, in C order; overwritten.
+    matrix: symmetric, in C order, shape (P, P); overwritten.
 
-    Raises
-    ------
-    LinAlgError
-        The matrix is not positive definite.
-
+    Raises LinAlgError: the matrix is not positive definite.
     """
     if not matrix.size:
         return np.array
@@ -83,11 +72,7 @@ def well_conditioned(matrix: Array, least: float) -> bool:
     """
     Return whether the least eigenvalue is above a share of the largest for certain.
 
-    Parameters
-    ----------
-    matrix : array, shape (P, P)
-        Symmetric.
-
+    matrix: symmetric, shape (P, P).
     """
     factor, failed = dpotrf(matrix.T, lower=1, clean=0)
     if failed:
@@ -100,17 +85,10 @@ def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
     """
     Return the solution and the diagonal of the inverse, shapes (P,).
 
-    Parameters
-    ----------
-    matrix : array, shape (P, P)
-        Symmetric, in C order; overwritten.
-    right : array, shape (P,)
+    matrix: symmetric, in C order, shape (P, P); overwritten.
+    right: shape (P,).
 
-    Raises
-    ------
-    LinAlgError
-        The matrix is not positive definite.
-
+    Raises LinAlgError: the matrix is not positive definite.
     """
     factor = _factor(matrix, clean=True)
     solution, _ = dpotrs(factor, right, lower=1)
@@ -122,11 +100,8 @@ def unit_diagonal(normal: Array, damping: float = 0.0) -> tuple[Array, Array]:
     """
     Return a normal matrix with ones on its diagonal, and the norms of its columns.
 
-    Parameters
-    ----------
-    normal : array, shape (P, P)
-    damping : float
-        Added to the diagonal of ones, so that columns that repeat others do no harm.
+    normal: shape (P, P).
+    damping: added to the diagonal of ones, so that columns that repeat others do no harm.
 
     Returns
     -------

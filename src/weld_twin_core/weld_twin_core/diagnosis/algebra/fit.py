@@ -54,25 +54,16 @@ LEAST_NOISE = 3e-5
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """
-    A fitted model.
-
-    Attributes
-    ----------
-    residual : array, shape (rows,)
-        Whitened residual at the solution.
-    coordinates : array, shape (K,)
-        Fit coordinates of all found effects.
-    prepared : list
-        What was last prepared of it for unseen stretches, as several steps ask for the same. It
-        lies here, and goes with the fit: it holds the fit itself.
-
-    """
+    """A fitted model."""
 
     model: Model
     residual: Array
+    """Whitened residual at the solution, shape (rows,)."""
     coordinates: Array
+    """Fit coordinates of all found effects, shape (K,)."""
     prepared: list[Any] = field(default_factory=list, init=False, repr=False)
+    """What was last prepared of it for unseen stretches, as several steps ask for the same. It
+    lies here, and goes with the fit: it holds the fit itself."""
 
     @property
     def rss(self) -> float:
@@ -89,11 +80,8 @@ def stepped(problem: Problem, model: Model, step: Array) -> Model:
     """
     Return the model after a step of frames and coordinates, in the order of `design`.
 
-    Parameters
-    ----------
-    step : array, shape (P,)
-        Of base and tool frames (xyz, rotvec), changes between recordings, and fit coordinates.
-
+    step: of base and tool frames (xyz, rotvec), changes between recordings, and fit coordinates,
+    shape (P,).
     """
     at = 0
     if 'base' in problem.align:
@@ -140,16 +128,10 @@ def fit(
     Least squares with the priors of `prior`, by Levenberg-Marquardt on column-scaled normal
     equations.
 
-    Parameters
-    ----------
-    problem, model, scale
-        ``model`` is the start; its known effects stay as they are.
-    precision : array, shape (K,), optional
-        Prior precision of every effect coordinate, about zero, in whitened units; that of
-        machines at large when left out.
-    tolerance : float
-        Stops when the objective falls by less than this share.
-
+    problem, model, scale: ``model`` is the start; its known effects stay as they are.
+    precision: prior precision of every effect coordinate, about zero, in whitened units, shape
+    (K,); that of machines at large when left out.
+    tolerance: stops when the objective falls by less than this share.
     """
     prior = effect_precision(model) if precision is None else precision
     here = _descended(_Point.at(problem, model, scale, prior), iterations, tolerance)
@@ -204,13 +186,8 @@ class _Point:
         """
         Return the cost of a model under a prior precision about zero, shape (K,).
 
-        Parameters
-        ----------
-        prior : array, shape (K,)
-            Prior precision of every effect coordinate, about zero.
-        share : float
-            How much of all priors counts.
-
+        prior: prior precision of every effect coordinate, about zero, shape (K,).
+        share: how much of all priors counts.
         """
         residual = problem.whitened(problem.residuals(model), scale)
         frames, off = frame_prior(problem, model)
@@ -256,15 +233,9 @@ def solve_scaled(normal: Array, right: Array, damping: float) -> Array:
     """
     Return the solution of damped, column-scaled normal equations; flat directions stay put.
 
-    Parameters
-    ----------
-    normal : array, shape (P, P)
-        Columns times columns.
-    right : array, shape (P,)
-        Columns times residual.
-    damping : float
-        Added to the unit diagonal of the scaled equations.
-
+    normal: columns times columns, shape (P, P).
+    right: columns times residual, shape (P,).
+    damping: added to the unit diagonal of the scaled equations.
     """
     size = np.sqrt(np.maximum(np.diag(normal), 0.0))
     live = size > 1e-12 * max(size.max(initial=0.0), 1e-300)
@@ -286,14 +257,10 @@ def robust_scale(
     """
     Return the noise of residuals by median absolute deviation, and Huber weights per sample.
 
-    Parameters
-    ----------
-    residuals : list of array, shape (c, M)
-    least : Scale, optional
-        Never return less noise than this.
-    freedom : float
-        Coordinates that the residuals' own data determined; they took their share of the noise.
-
+    residuals: shape (c, M).
+    least: never return less noise than this.
+    freedom: coordinates that the residuals' own data determined; they took their share of the
+    noise.
     """
     reported = problem.told_weights
     residuals = [part * np.sqrt(own) for part, own in zip(residuals, reported, strict=True)]
@@ -324,13 +291,8 @@ def trusted(weights: Sequence[Array], few: int = 1) -> list[NDArray[np.bool_]]:
     what many samples do is structure, and must show in what is left. Strays, each by itself and
     farther off than any structure, are left out all the same: one would be the whole RMS.
 
-    Parameters
-    ----------
-    weights : sequence of array, shape (M,)
-        Of every sample of every recording, as a robust fit gives them.
-    few : int
-        Outliers that may be left out however few samples there are.
-
+    weights: of every sample of every recording, as a robust fit gives them, shape (M,).
+    few: outliers that may be left out however few samples there are.
     """
     every = np.concatenate(list(weights)) if weights else np.zeros(0)
     aside = max(few, int(SET_ASIDE * every.size), _strays(weights))
@@ -354,13 +316,8 @@ def robust_fit(
     """
     Return a fit and the noise and weights that go with it, by reweighting a few times.
 
-    Parameters
-    ----------
-    precision : array, shape (K,), optional
-        Prior precision of the fit coordinates; left out, there is no prior.
-    rounds : int
-        How often the weights are taken anew.
-
+    precision: prior precision of the fit coordinates, shape (K,); left out, there is no prior.
+    rounds: how often the weights are taken anew.
     """
     result = fit(problem, model, scale, precision)
     for _ in range(rounds):

@@ -21,12 +21,8 @@ def effective_share(residual: Array, rows: tuple[int, ...], samples: tuple[int, 
 
     Initial positive sequence estimate [1]_ on every component of every recording.
 
-    Parameters
-    ----------
-    residual : array, shape (rows,)
-        Whitened, as `Problem.whitened` lays it out.
-    rows, samples : tuple of int
-        Components and samples of every recording.
+    residual: whitened, as `Problem.whitened` lays it out, shape (rows,).
+    rows, samples: components and samples of every recording.
 
     References
     ----------
@@ -64,13 +60,8 @@ def by_sample(
     """
     Return what is laid out in rows as one array per recording, shape (M, c, ...).
 
-    Parameters
-    ----------
-    values : array, shape (rows, ...)
-        As `Problem.whitened` lays it out.
-    rows, samples : tuple of int
-        Components c and samples M of every recording.
-
+    values: as `Problem.whitened` lays it out, shape (rows, ...).
+    rows, samples: components c and samples M of every recording.
     """
     ends = np.cumsum([c * m for c, m in zip(rows, samples, strict=True)])
     parts = np.split(values, ends[:-1])

@@ -44,16 +44,11 @@ def learned_precision(
 
     The freedom counts the coordinates that the data determine rather than the prior.
 
-    Parameters
-    ----------
-    normal, right, rss, rows
-        Normal equations of the coordinates with the nuisance frames projected out.
-    labels, scales : array, shape (K,)
-        As `groups` returns them.
-    believed : array, shape (K,), optional
-        Precision of machines at large: the spread learned of this one starts there and is never
-        wider, and what is fitted freely has it. Nothing is believed when left out.
-
+    normal, right, rss, rows: normal equations of the coordinates with the nuisance frames
+    projected out.
+    labels, scales: as `groups` returns them, shape (K,).
+    believed: precision of machines at large: the spread learned of this one starts there and is
+    never wider, and what is fitted freely has it, shape (K,). Nothing is believed when left out.
     """
     if not scales.size:
         return np.zeros(0), 0.0
@@ -132,14 +127,8 @@ def projected(normal: Array, right: Array, rss: float, frames: int) -> tuple[Arr
     """
     Return normal equations with their leading columns projected out.
 
-    Parameters
-    ----------
-    normal, right : array, shapes (P, P) and (P,)
-    rss : float
-        Sum of squares of the residual.
-    frames : int
-        How many columns lead.
-
+    rss: sum of squares of the residual.
+    frames: how many columns lead.
     """
     if not frames:
         return normal, right, rss

@@ -37,42 +37,26 @@ class Scale:
 
 
 class Change(NamedTuple):
-    """
-    What one recording has that the first has not, counted from the first.
-
-    Attributes
-    ----------
-    recording : int
-        Counted from 0; never 0.
-
-    """
+    """What one recording has that the first has not, counted from the first."""
 
     recording: int
+    """Counted from 0; never 0."""
     effect: Effect
 
 
 class Alone(NamedTuple):
-    """
-    What a robot file does by itself, without the effects that it cannot hold.
-
-    Attributes
-    ----------
-    changes : tuple of Effect
-        What the file has beside the constants of the model, so that it does well by itself; the
-        effects that go with it have the same with the other sign. None where the constants of the
-        model are as good.
-    recorded_m, unseen_m : float [m]
-        RMS that remains with the file alone, where it was recorded and on data not fitted.
-    whole_recorded_m, whole_unseen_m : float [m]
-        The same with the whole model.
-
-    """
+    """What a robot file does by itself, without the effects that it cannot hold."""
 
     changes: tuple[Effect, ...]
+    """What the file has beside the constants of the model, so that it does well by itself; the
+    effects that go with it have the same with the other sign. None where the constants of the
+    model are as good."""
     recorded_m: float
     unseen_m: float
+    """RMS that remains with the file alone, where it was recorded and on data not fitted [m]."""
     whole_recorded_m: float
     whole_unseen_m: float
+    """The same with the whole model [m]."""
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values."""
@@ -81,40 +65,27 @@ class Alone(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """
-    What is believed: the robot with its tool frame, a base frame per recording, and effects.
-
-    Attributes
-    ----------
-    bases : tuple of array, shape (4, 4)
-    known, found : tuple of Effect
-        Effects given by the user, and those this diagnosis put in.
-    mended : tuple of str
-        What was wrong with the data it stands on, and was undone.
-    changes : tuple of Change
-        What differs between the recordings.
-    given : tuple of int
-        Of which of the recordings given each is a part; see `Problem`.
-    mends : tuple of mapping
-        How it was undone, as plain values to be made again; see `soundness.mending`.
-    alone : Alone or None
-        What its robot file does by itself; None where that is not known.
-    common : tuple of array
-        Errors that all samples of an instrument share, one array for every recording, empty where
-        it has none; nothing before they are fitted.
-
-    """
+    """What is believed: the robot with its tool frame, a base frame per recording, and effects."""
 
     robot: Robot
     bases: tuple[Array, ...]
+    """Shape (4, 4)."""
     known: tuple[Effect, ...] = ()
     found: tuple[Effect, ...] = ()
+    """Effects given by the user, and those this diagnosis put in."""
     mended: tuple[str, ...] = ()
+    """What was wrong with the data it stands on, and was undone."""
     changes: tuple[Change, ...] = ()
+    """What differs between the recordings."""
     given: tuple[int, ...] = ()
+    """Of which of the recordings given each is a part; see `Problem`."""
     mends: tuple[Mapping[str, Any], ...] = ()
+    """How it was undone, as plain values to be made again; see `soundness.mending`."""
     alone: Alone | None = None
+    """What its robot file does by itself; None where that is not known."""
     common: tuple[Array, ...] = ()
+    """Errors that all samples of an instrument share, one array for every recording, empty where
+    it has none; nothing before they are fitted."""
 
     def twin(self, k: int) -> Twin:
         """Return the twin of recording k."""
@@ -160,15 +131,9 @@ def _moved(frame: Array, step: Array, *, left: bool) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
-    """
-    Where the frames are believed to be.
-
-    Attributes
-    ----------
-    bases : tuple of array, shape (4, 4)
-    tool : array, shape (4, 4)
-
-    """
+    """Where the frames are believed to be."""
 
     bases: tuple[Array, ...]
+    """Shape (4, 4)."""
     tool: Array
+    """Shape (4, 4)."""

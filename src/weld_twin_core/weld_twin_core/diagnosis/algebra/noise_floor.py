@@ -26,20 +26,12 @@ show by itself, in repeats or differences, or be told with the data: a misfit lo
 
 
 class NoiseFloor(NamedTuple):
-    """
-    What the instrument's noise alone would leave.
-
-    Attributes
-    ----------
-    sigma : float
-        Standard deviation of one measured coordinate, [m].
-    independent : bool
-        Whether repeats or differences in time showed it, not what a model left.
-
-    """
+    """What the instrument's noise alone would leave."""
 
     sigma: float
+    """Standard deviation of one measured coordinate, [m]."""
     independent: bool
+    """Whether repeats or differences in time showed it, not what a model left."""
 
     @property
     def rms_m(self) -> float:
@@ -51,12 +43,9 @@ def noise_floor(problem: Problem, residuals: list[Array]) -> NoiseFloor:
     """
     Return the noise of one measured coordinate, and whether it is independent of any model.
 
-    Parameters
-    ----------
-    residuals : list of array, shape (c, M)
-        Of the best model at hand. What it leaves bounds the floor from above; repeated stations
-        and third differences in time, where the data have them, are not touched by its faults.
-
+    residuals: of the best model at hand, shape (c, M). What it leaves bounds the floor from above;
+    repeated stations and third differences in time, where the data have them, are not touched by
+    its faults.
     """
     estimates = []
     independent = True

@@ -68,15 +68,9 @@ def frame_offset(now: Array, was: Array, *, left: bool) -> Array:
     """
     Return the step (xyz, rotvec) that leads from one frame to another, as `Model.moved` does.
 
-    Parameters
-    ----------
-    now : array, shape (4, 4) [m]
-        The frame that the step leads to.
-    was : array, shape (4, 4) [m]
-        The frame that it starts from.
-    left : bool
-        The turn is about the axes outside (a base), else about its own (a tool).
-
+    now: the frame that the step leads to, shape (4, 4) [m].
+    was: the frame that it starts from, shape (4, 4) [m].
+    left: the turn is about the axes outside (a base), else about its own (a tool).
     """
     one, other = now[:3, :3], was[:3, :3]
     turn = one @ other.T if left else other.T @ one

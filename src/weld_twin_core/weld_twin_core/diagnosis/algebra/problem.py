@@ -47,18 +47,10 @@ def frames_named(align: str | Iterable[str], what: str = 'align') -> frozenset[s
     """
     Return the frames to fit along, from one text or from several names.
 
-    Parameters
-    ----------
-    align : str or iterable of str
-        'base', 'tool', 'base,tool', or the names as a list or a set; nothing for neither.
-    what : str
-        How the message names the argument.
+    align: 'base', 'tool', 'base,tool', or the names as a list or a set; nothing for neither.
+    what: how the message names the argument.
 
-    Raises
-    ------
-    ModelError
-        A name is neither 'base' nor 'tool'.
-
+    Raises ModelError: a name is neither 'base' nor 'tool'.
     """
     parts = align.split(',') if isinstance(align, str) else align
     frames = frozenset(name for part in parts if (name := str(part).strip()))
@@ -69,41 +61,27 @@ def frames_named(align: str | Iterable[str], what: str = 'align') -> frozenset[s
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """
-    Recordings to explain.
-
-    Attributes
-    ----------
-    recordings : tuple of Recording
-        Each with measurements inside its joint stream; see `usable`.
-    align : frozenset
-        Frames fitted as nuisance in every hypothesis: 'base' (one per recording), 'tool'.
-    anchor : Anchor, optional
-        Where those frames are believed to be; see `prior`.
-    dated : tuple of Effect
-        What may have set in at an instant that was found: hypotheses beside the library's.
-    changes : tuple of Change
-        What may differ between the recordings: fitted along in every hypothesis, as frames are.
-    touched : tuple of Unknowns or None
-        Where recordings are contacts, one each: what they see of the tool point, and their
-        unknown places; see `touching`. None for a recording that an instrument measured, empty
-        where it measured all.
-    given : tuple of int
-        Of which of the recordings given each is a part, where places of contacts are parts; empty
-        where each was given by itself.
-    loose : tuple of float
-        Noise of every recording in that of the surest; empty where all are alike.
-
-    """
+    """Recordings to explain."""
 
     recordings: tuple[Recording, ...]
+    """Each with measurements inside its joint stream; see `usable`."""
     align: frozenset[str] = field(default_factory=frozenset)
+    """Frames fitted as nuisance in every hypothesis: 'base' (one per recording), 'tool'."""
     anchor: Anchor | None = None
+    """Where those frames are believed to be; see `prior`."""
     dated: tuple[Effect, ...] = ()
+    """What may have set in at an instant that was found: hypotheses beside the library's."""
     changes: tuple[Change, ...] = ()
+    """What may differ between the recordings: fitted along in every hypothesis, as frames are."""
     touched: tuple[Unknowns | None, ...] = ()
+    """Where recordings are contacts, one each: what they see of the tool point, and their unknown
+    places; see `touching`. None for a recording that an instrument measured, empty where it
+    measured all."""
     given: tuple[int, ...] = ()
+    """Of which of the recordings given each is a part, where places of contacts are parts; empty
+    where each was given by itself."""
     loose: tuple[float, ...] = ()
+    """Noise of every recording in that of the surest; empty where all are alike."""
     _taken: WeakKeyDictionary[Scale, list[tuple[Array, Array] | None]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
@@ -215,12 +193,8 @@ class Problem:
         """
         Return what recording k shows of changes of its poses, shape (..., c, M).
 
-        Parameters
-        ----------
-        k : int
-            Which recording, counted from 0.
-        block : array, shape (..., 6, M) [m, rad]
-
+        k: which recording, counted from 0.
+        block: shape (..., 6, M) [m, rad].
         """
         own = self.contact(k)
         if own is not None:
@@ -416,11 +390,7 @@ class Problem:
         """
         Return an effect's columns, one (P, c, M) array per recording.
 
-        Parameters
-        ----------
-        atoms : bool
-            Its linear features; else the derivatives by its fit coordinates.
-
+        atoms: its linear features; else the derivatives by its fit coordinates.
         """
         return [self.seen(k, maker.columns(effect, atoms)) for k, maker in enumerate(features)]
 
@@ -482,11 +452,7 @@ def usable(recording: Recording) -> Recording:
 
     Its side signals are straight between samples, whatever a running twin makes of them.
 
-    Raises
-    ------
-    DataError
-        Nothing was measured, or no measurement falls inside the joint stream.
-
+    Raises DataError: nothing was measured, or no measurement falls inside the joint stream.
     """
     measured, joints = recording.measured, recording.joints
     if measured is None or measured.t.size == 0:

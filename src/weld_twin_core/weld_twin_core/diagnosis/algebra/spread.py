@@ -34,19 +34,11 @@ def covariance(
     """
     Return the covariance of all columns' coefficients, shape (P, P).
 
-    Parameters
-    ----------
-    columns : Columns
-        P whitened columns.
-    ridge : array, shape (P,)
-        Prior precision.
-    residual : array, shape (rows,)
-        What the fit leaves, whitened.
-    labels : array of int, shape (rows,)
-        Stretch of every row, some `BLOCKS` in all.
-    share : float
-        Of the rows that count as independent.
-
+    columns: p whitened columns.
+    ridge: prior precision, shape (P,).
+    residual: what the fit leaves, whitened, shape (rows,).
+    labels: stretch of every row, some `BLOCKS` in all, shape (rows,).
+    share: of the rows that count as independent.
     """
     inverse, size = unit_inverse(columns, ridge)
     stretches = rows_of(np.unique(labels, return_inverse=True)[1].astype(float))
@@ -63,11 +55,7 @@ def unit_inverse(columns: Columns, ridge: Array) -> tuple[Array, Array]:
     """
     Return the inverse of the normal matrix with ones on its diagonal, and the norms of its columns.
 
-    Parameters
-    ----------
-    ridge : array, shape (P,)
-        Prior precision.
-
+    ridge: prior precision, shape (P,).
     """
     normal = columns.normal()
     normal[np.diag_indices_from(normal)] += ridge

@@ -66,21 +66,12 @@ def answer(
     """
     Return the diagnosis.
 
-    Parameters
-    ----------
-    examined : Examined
-        Whether the data are sound, and what was mended.
-    posterior : Posterior
-        The models that the recordings allow.
-    before : Stated
-        The table of answers, and what is said of the names.
-    alternative : Curved or None
-        What explains the gap without a formula.
-    placing : FreeForm or None
-        What tells place and dependence of an unknown gap.
-    limits : Limits or None
-        What the next experiment may cost, and where it has to stay; None plans none.
-
+    examined: whether the data are sound, and what was mended.
+    posterior: the models that the recordings allow.
+    before: the table of answers, and what is said of the names.
+    alternative: what explains the gap without a formula.
+    placing: what tells place and dependence of an unknown gap.
+    limits: what the next experiment may cost, and where it has to stay; None plans none.
     """
     forms = alternative, evidence.floor, result.work.beliefs, placing
     reported, shares = causes(result, unseen, before.table, verdict, *forms)
@@ -184,13 +175,8 @@ def gap(result: Search, floor: float) -> Gap:
     """
     Return the size of the gap over trusted samples.
 
-    Parameters
-    ----------
-    result : Search
-        Its baseline holds frames and known effects only.
-    floor : float
-        RMS of the noise alone, [m].
-
+    result: its baseline holds frames and known effects only.
+    floor: RMS of the noise alone, [m].
     """
     parts = result.problem.residuals(result.baseline.model)
     good = trusted(result.scale.weights)
@@ -255,13 +241,8 @@ def unexplained(
     """
     Return what remains after the verdict, and what that or the gap itself depends on.
 
-    Parameters
-    ----------
-    shrink : Shrink
-        Of the model that is carried.
-    placing : FreeForm or None
-        What tells the places of an unknown gap, so that this says what the causes say.
-
+    shrink: of the model that is carried.
+    placing: what tells the places of an unknown gap, so that this says what the causes say.
     """
     case = Left(evidence, beliefs)
     names = evidence.structure.depends_on if case.structured else ()
@@ -274,11 +255,7 @@ def refusal(examined: Examined) -> Diagnosis:
     """
     Return the diagnosis that there is none: status 'unsound', every figure not a number.
 
-    Parameters
-    ----------
-    examined : Examined
-        With the mistakes found.
-
+    examined: with the mistakes found.
     """
     robot = examined.given.robot
     return Diagnosis(

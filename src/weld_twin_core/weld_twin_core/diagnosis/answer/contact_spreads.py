@@ -25,11 +25,7 @@ def contact_spreads(result: Search, unseen: Unseen) -> ContactResult | None:
     """
     Return how far tool points are from their contacts, or None where an instrument measured.
 
-    Parameters
-    ----------
-    unseen : Unseen
-        Of the final model; each place is left out in turn where there are enough.
-
+    unseen: of the final model; each place is left out in turn where there are enough.
     """
     problem = result.problem
     if not problem.touched:

@@ -48,12 +48,8 @@ def named_effects(
     """
     Return the effects told, those that move the tool most first.
 
-    Parameters
-    ----------
-    unseen : Unseen
-        Of the final model; tells how far each effect moves the tool.
-    posterior : Posterior
-        The models that the recordings allow.
+    unseen: of the final model; tells how far each effect moves the tool.
+    posterior: the models that the recordings allow.
 
     Returns
     -------
@@ -111,19 +107,12 @@ def standard_errors(
 
     Parameters that are not fitted, that rest on a bound or that the data do not show have none.
 
-    Parameters
-    ----------
-    problem, model, scale
-        A model fitted to all measurements.
-    precision : array, shape (K,)
-        Of the prior of all fit coordinates, about zero.
-    share : float
-        Of the rows that count as independent.
-    posterior : Posterior, optional
-        The models that the recordings allow; without, the one that was fitted alone counts.
-    sets : sequence of tuple of Site
-        Effects of which one is at work or another: an error holds for the case that it is this one.
-
+    problem, model, scale: a model fitted to all measurements.
+    precision: of the prior of all fit coordinates, about zero, shape (K,).
+    share: of the rows that count as independent.
+    posterior: the models that the recordings allow; without, the one that was fitted alone counts.
+    sets: effects of which one is at work or another: an error holds for the case that it is this
+    one.
     """
     if not model.found:
         return []
@@ -154,11 +143,7 @@ def covariance(
     """
     Return the covariance of all fit coordinates, shape (K, K); NaN for those that have none.
 
-    Parameters
-    ----------
-    problem, model, scale, precision, share
-        As `standard_errors` takes them.
-
+    problem, model, scale, precision, share: as `standard_errors` takes them.
     """
     columns = designed(problem, model, scale)
     count = coordinates(model).size

@@ -46,11 +46,7 @@ def with_intervals(
     Where curves or many small errors stand for the causes, intervals are those that stretches
     tell.
 
-    Parameters
-    ----------
-    floor : float
-        RMS of the noise alone [m].
-
+    floor: RMS of the noise alone [m].
     """
     curved = len(result.slots) != len(unseen.parts)
     if verdict.status == 'unknown' or curved or not any(result.slots) or not unseen.parts:
@@ -88,12 +84,8 @@ def _coordinates(rng: np.random.Generator, result: Search, missed: float) -> Arr
     """
     Return how far the coordinates of all effects may be off, (DRAWS, K).
 
-    Parameters
-    ----------
-    missed : float
-        Share of what is left that is no noise. It spreads over a number of directions, as what
-        formulas are believed to miss does.
-
+    missed: share of what is left that is no noise. It spreads over a number of directions, as what
+    formulas are believed to miss does.
     """
     rows = result.small.residual.size
     doubt = (

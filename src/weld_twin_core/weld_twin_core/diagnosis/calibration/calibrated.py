@@ -37,48 +37,30 @@ and 31 dependences: 51 of 74, and 61 of 72. Too few to learn more than a constan
 
 @dataclass(frozen=True)
 class Statement:
-    """
-    One statement of a diagnosis: what it says, on what evidence, and how probable that makes it.
-
-    Attributes
-    ----------
-    kind : str
-        One of `features.KINDS`.
-    cause : int or None
-        Which of the causes it is about; of a name before causes are put together, which effect
-        found; None of the answer as a whole.
-    probability : float
-        Of what `features.KINDS` says.
-
-    """
+    """One statement of a diagnosis: what it says, on what evidence, and how probable that makes it."""
 
     kind: str
+    """One of `features.KINDS`."""
     cause: int | None
+    """Which of the causes it is about; of a name before causes are put together, which effect
+    found; None of the answer as a whole."""
     features: Features
     probability: float
+    """Of what `features.KINDS` says."""
 
 
 @dataclass(frozen=True)
 class Stated:
-    """
-    What is said of the names before a verdict is drawn, and what all statements share.
-
-    Attributes
-    ----------
-    names : tuple of Statement
-        Of every effect found; of many small errors one for all that are named.
-    nameless : Statement or None
-        That a cause without a name is at work; None of many small errors, and where nothing was
-        found.
-    situation : mapping from str to float
-        Features of the diagnosis as a whole.
-
-    """
+    """What is said of the names before a verdict is drawn, and what all statements share."""
 
     table: tuple[Row, ...]
     names: tuple[Statement, ...]
+    """Of every effect found; of many small errors one for all that are named."""
     nameless: Statement | None
+    """That a cause without a name is at work; None of many small errors, and where nothing was
+    found."""
     situation: Features
+    """Features of the diagnosis as a whole."""
 
     def put_to(self, evidence: Evidence) -> Evidence:
         """Return evidence with what is believed of the names, and that a cause has none."""
@@ -114,15 +96,9 @@ def calibrated(
     """
     Return a verdict and its causes with probabilities, and the statements that these come from.
 
-    Parameters
-    ----------
-    causes : sequence of Cause
-        With the weights of the table of answers.
-    before : Stated
-        What was said of the names.
-    placing : FreeForm or None
-        What places what has no name.
-
+    causes: with the weights of the table of answers.
+    before: what was said of the names.
+    placing: what places what has no name.
     """
     learned = usual_calibration()
     reported, said = list[Cause](), list[Statement]()

@@ -72,16 +72,10 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
     """
     Return the features of the name of an effect found, from its row of the table of answers.
 
-    Parameters
-    ----------
-    size : float
-        How far the effect moves the tool, RMS in units of noise.
-    wandered : float
-        How far its values move from stretch to stretch, over what noise makes them: a formula that
-        stands in for another wants other values on every stretch.
-    left_at : sequence of str
-        What the most of what is left depends on, in words.
-
+    size: how far the effect moves the tool, RMS in units of noise.
+    wandered: how far its values move from stretch to stretch, over what noise makes them: a
+    formula that stands in for another wants other values on every stretch.
+    left_at: what the most of what is left depends on, in words.
     """
     on = dependence_of(row.leader)
     return plain(
@@ -118,13 +112,8 @@ def of_rest(cause: Cause, level: str) -> Numbers:
     """
     Return the features of the place, or of the dependence, of what has no name.
 
-    Parameters
-    ----------
-    cause : Cause
-        With the weights of the groups that found it.
-    level : str
-        'place' or 'dependence'.
-
+    cause: with the weights of the groups that found it.
+    level: 'place' or 'dependence'.
     """
     listed = [p for _, p in (cause.place if level == 'place' else cause.dependence)]
     first, second, *_ = (*listed, 0.0, 0.0)
@@ -141,13 +130,8 @@ def of_whole(probabilities: Sequence[float], names: Sequence[Mapping[str, float]
     """
     Return the features of an answer as a whole, from what is told of its names.
 
-    Parameters
-    ----------
-    probabilities : sequence of float
-        Of every name told.
-    names : sequence of mapping from str to float
-        Features of the same names.
-
+    probabilities: of every name told.
+    names: features of the same names.
     """
     alone = {
         key: 1.0

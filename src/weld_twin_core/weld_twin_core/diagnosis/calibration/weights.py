@@ -25,21 +25,14 @@ Features = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Term:
-    """
-    What one feature adds to the log odds.
-
-    Attributes
-    ----------
-    weight : float
-        Nats for each unit of the feature.
-    low, high : float
-        Range that was learned from; beyond it nothing is known, and the feature counts as its end.
-
-    """
+    """What one feature adds to the log odds."""
 
     weight: float
+    """Nats for each unit of the feature."""
     low: float
     high: float
+    """Range that was learned from; beyond it nothing is known, and the feature counts as its
+    end."""
 
     def nats(self, value: float) -> float:
         """Return what it adds to the log odds."""
@@ -48,30 +41,18 @@ class Term:
 
 @dataclass(frozen=True)
 class Logistic:
-    """
-    How often one kind of statement is right, as a function of its features.
-
-    Attributes
-    ----------
-    constant : float
-        Log odds where every feature is zero.
-    terms : mapping from str to Term
-        By the name of the feature.
-
-    """
+    """How often one kind of statement is right, as a function of its features."""
 
     constant: float
+    """Log odds where every feature is zero."""
     terms: Mapping[str, Term]
+    """By the name of the feature."""
 
     def probability(self, features: Features) -> float:
         """
         Return the probability of being right.
 
-        Parameters
-        ----------
-        features : mapping from str to float
-            One that is missing counts as zero, such as a family that is not named.
-
+        features: one that is missing counts as zero, such as a family that is not named.
         """
         total = self.constant
         total += sum(term.nats(features.get(name, 0.0)) for name, term in self.terms.items())
@@ -80,24 +61,15 @@ class Logistic:
 
 @dataclass(frozen=True)
 class Calibration:
-    """
-    All that was learned.
-
-    Attributes
-    ----------
-    statements : mapping from str to Logistic
-        By the kind of statement; `features.KINDS` lists them.
-    sure_from : mapping from str to float
-        Probability from which on an 'answer' as a whole, or a 'cause', keeps the promise of being
-        wrong hardly ever.
-    card : mapping
-        Cases, seeds, engines, mix and bounds, to read.
-
-    """
+    """All that was learned."""
 
     statements: Mapping[str, Logistic]
+    """By the kind of statement; `features.KINDS` lists them."""
     sure_from: Mapping[str, float]
+    """Probability from which on an 'answer' as a whole, or a 'cause', keeps the promise of being
+    wrong hardly ever."""
     card: Mapping[str, Any]
+    """Cases, seeds, engines, mix and bounds, to read."""
 
     def probability(self, kind: str, features: Features) -> float:
         """Return how often such statements were right."""
@@ -107,11 +79,7 @@ class Calibration:
         """
         Return whether a statement of this probability keeps the promise.
 
-        Parameters
-        ----------
-        what : str
-            'answer' or 'cause'.
-
+        what: 'answer' or 'cause'.
         """
         return probability >= self.sure_from[what]
 
@@ -120,11 +88,7 @@ def calibration_from(content: Mapping[str, Any]) -> Calibration:
     """
     Return what was learned, from the content of a file.
 
-    Parameters
-    ----------
-    content : mapping
-        As ``weld-twin lab belief`` writes it.
-
+    content: as ``weld-twin lab belief`` writes it.
     """
     statements = {
         kind: Logistic(

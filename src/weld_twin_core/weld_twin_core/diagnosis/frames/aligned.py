@@ -37,22 +37,12 @@ def aligned(
     """
     Return the recordings as a problem, and the model that a search starts from.
 
-    Parameters
-    ----------
-    robot : Robot
-        The nominal model.
-    align : str or iterable of str
-        Frames fitted as nuisance in every hypothesis: 'base', 'tool', 'base,tool'.
-    known : sequence of Effect
-        Put into the twin first.
+    robot: the nominal model.
+    align: frames fitted as nuisance in every hypothesis: 'base', 'tool', 'base,tool'.
+    known: put into the twin first.
 
-    Raises
-    ------
-    DataError
-        Nothing was measured, or no measurement falls inside a joint stream.
-    ModelError
-        ``align`` names something else than base and tool.
-
+    Raises DataError: nothing was measured, or no measurement falls inside a joint stream. Raises
+    ModelError: ``align`` names something else than base and tool.
     """
     recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     if any(recording.contacts is not None for recording in recordings):
@@ -67,18 +57,10 @@ def frames_only(recording: Recording, robot: Robot, align: frozenset[str]) -> Mo
     """
     Return the robot with the frames that best agree with a recording.
 
-    Parameters
-    ----------
-    recording : Recording
-        With measurements.
-    align : frozenset of str
-        Which frames are fitted: 'base', 'tool' or both.
+    recording: with measurements.
+    align: which frames are fitted: 'base', 'tool' or both.
 
-    Raises
-    ------
-    DataError
-        Nothing was measured, or the clocks of joints and measurements do not meet.
-
+    Raises DataError: nothing was measured, or the clocks of joints and measurements do not meet.
     """
     problem = Problem((usable(recording),), align)
     start = initial_frames(problem, Model(robot, (robot.T_world_base,)))
@@ -109,25 +91,14 @@ def posed(
     """
     Return contacts as a problem, and the model that a search starts from.
 
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        With contacts; what an instrument measured comes first in the problem.
-    robot : Robot
-        The nominal model.
-    align : frozenset of str
-        'tool' where the tool point is not known; 'base' where it is not known where the base stands,
-        which says nothing where all places are unknown too.
-    known : sequence of Effect
-        Put into the twin first.
-    given : sequence of int
-        Of which of the recordings given each is a part; each by itself when left out.
+    recordings: with contacts; what an instrument measured comes first in the problem.
+    robot: the nominal model.
+    align: 'tool' where the tool point is not known; 'base' where it is not known where the base
+    stands, which says nothing where all places are unknown too.
+    known: put into the twin first.
+    given: of which of the recordings given each is a part; each by itself when left out.
 
-    Raises
-    ------
-    DataError
-        Contacts are too few, or a recording holds neither contacts nor measurements.
-
+    Raises DataError: contacts are too few, or a recording holds neither contacts nor measurements.
     """
     pairs = list(zip(given or range(len(recordings)), recordings, strict=True))
     tracked = [(k, usable(r)) for k, r in pairs if r.contacts is None]

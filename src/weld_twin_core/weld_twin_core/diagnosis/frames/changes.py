@@ -63,18 +63,10 @@ def families_named(given: str | Iterable[str], what: str = 'may_change') -> tupl
     """
     Return the families that may differ between recordings.
 
-    Parameters
-    ----------
-    given : str or iterable of str
-        Names with commas between, or several names; nothing for none.
-    what : str
-        How the message names the argument.
+    given: names with commas between, or several names; nothing for none.
+    what: how the message names the argument.
 
-    Raises
-    ------
-    ModelError
-        A name is no effect, or one that is not constant.
-
+    Raises ModelError: a name is no effect, or one that is not constant.
     """
     parts = given.split(',') if isinstance(given, str) else given
     names = tuple(dict.fromkeys(name for part in parts if (name := str(part).strip())))
@@ -102,17 +94,11 @@ def with_changes(
     """
     Return problem and model with what differs between the recordings, fitted.
 
-    Parameters
-    ----------
-    problem : Problem
-        Several recordings; with fewer nothing changes.
-    model : Model
-        What is believed so far; its effects are fitted along.
-    families : sequence of str
-        What may differ; see `families_named`.
-    precision : array, shape (K,), optional
-        Prior precision of the effects of ``model``; that of machines at large when left out.
-
+    problem: several recordings; with fewer nothing changes.
+    model: what is believed so far; its effects are fitted along.
+    families: what may differ; see `families_named`.
+    precision: prior precision of the effects of ``model``, shape (K,); that of machines at large
+    when left out.
     """
     candidates = _candidates(problem, model.robot, families)
     if not candidates:
@@ -270,15 +256,9 @@ def told(
     """
     Return what differs between the recordings, with covariances; what noise may do is left out.
 
-    Parameters
-    ----------
-    problem, model, scale
-        A model fitted to all measurements.
-    precision : array, shape (K,)
-        Prior precision of the coordinates of the found effects.
-    families : sequence of str
-        What may differ. Frames that were fitted for each recording are compared here.
-
+    problem, model, scale: a model fitted to all measurements.
+    precision: prior precision of the coordinates of the found effects, shape (K,).
+    families: what may differ. Frames that were fitted for each recording are compared here.
     """
     whole = _covariance(problem, model, scale, precision)
     parts = _places(problem, model)

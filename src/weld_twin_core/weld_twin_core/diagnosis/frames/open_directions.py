@@ -58,10 +58,7 @@ def shown(
     """
     Return how well the data show each direction of the aligned frames, the least first.
 
-    Parameters
-    ----------
-    moving : bool
-        Leave out frame columns that move nothing at all.
+    moving: leave out frame columns that move nothing at all.
 
     Returns
     -------

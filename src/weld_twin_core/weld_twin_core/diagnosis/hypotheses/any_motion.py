@@ -48,11 +48,7 @@ def same_error(robot: Robot, one: Effect, other: Effect) -> bool:
     """
     Return whether one of two constant errors can always do what the other does.
 
-    Parameters
-    ----------
-    one, other : Effect
-        Their families and joints count, not their values.
-
+    one, other: their families and joints count, not their values.
     """
     a, b = columns(robot, one), columns(robot, other)
     return inside(a, b) or inside(b, a)
@@ -64,13 +60,8 @@ def never_parted(
     """
     Return which sites are one error on any motion, what a person can set first.
 
-    Parameters
-    ----------
-    align : frozenset of str
-        Frames that are fitted, 'base' and 'tool'.
-    sets : sequence of sequence of Site
-        What the data cannot tell apart.
-
+    align: frames that are fitted, 'base' and 'tool'.
+    sets: what the data cannot tell apart.
     """
     out = []
     for group in sets:
@@ -93,13 +84,8 @@ def always(robot: Robot, one: Effect, other: Effect, align: frozenset[str]) -> b
     """
     Return whether two constant errors do the same on any motion, each all that the other does.
 
-    Parameters
-    ----------
-    one, other : Effect
-        Their families and joints count, not their values.
-    align : frozenset of str
-        Frames that are fitted, 'base' and 'tool': what these take up tells nobody apart.
-
+    one, other: their families and joints count, not their values.
+    align: frames that are fitted, 'base' and 'tool': what these take up tells nobody apart.
     """
     a, b = columns(robot, one), columns(robot, other)
     frames = [frame_columns(robot, name) for name in sorted(align)]
@@ -119,13 +105,8 @@ def set_instead(robot: Robot, align: frozenset[str], exclude: frozenset[str]) ->
     The tilt of an axis may be the zero of its joint whatever the motion: no measurement can decide,
     mending one mends both, and the zero is what a controller takes.
 
-    Parameters
-    ----------
-    align : frozenset of str
-        Frames that are fitted, 'base' and 'tool'.
-    exclude : frozenset of str
-        Families taken out of the library: nothing is set by them.
-
+    align: frames that are fitted, 'base' and 'tool'.
+    exclude: families taken out of the library: nothing is set by them.
     """
     frames = [frame_columns(robot, name) for name in sorted(align)]
     span = span_of(np.concatenate(frames)) if frames else np.zeros((0, 6 * POSTURES))

@@ -29,24 +29,15 @@ one does, as all stand still."""
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """
-    Columns of every unit.
-
-    Attributes
-    ----------
-    columns : Columns
-        All of them, in the order of their numbers.
-    systems : SeedSystems
-        The normal matrix of every seed.
-    absent : dict
-        Why a family is not considered, by name.
-
-    """
+    """Columns of every unit."""
 
     columns: Columns
+    """All of them, in the order of their numbers."""
     systems: SeedSystems
+    """The normal matrix of every seed."""
     units: tuple[Unit, ...]
     absent: dict[str, str]
+    """Why a family is not considered, by name."""
 
 
 def candidate_kinds(exclude: Sequence[str], align: frozenset[str]) -> list[type[Effect]]:
@@ -181,13 +172,8 @@ def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
     """
     Return causes in joints and links that depend on nothing but some quantities, at zero.
 
-    Parameters
-    ----------
-    view : View
-        The samples that reach them.
-    on : collection of str
-        What they may depend on: 'constant', 'load'.
-
+    view: the samples that reach them.
+    on: what they may depend on: 'constant', 'load'.
     """
     out: dict[tuple[str, ...], Effect] = {}
     for kind in REGISTRY.values():

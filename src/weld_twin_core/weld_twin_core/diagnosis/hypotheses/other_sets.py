@@ -37,22 +37,14 @@ ROUNDS = 4
 
 
 class Other(NamedTuple):
-    """
-    A set of effects that does without one that was found.
-
-    Attributes
-    ----------
-    instead_of : tuple of str and (str or None)
-        Family and joint of what it does without.
-    fit : Fit
-    ahead : float
-        By how much evidence [nats] it is ahead of what was found; less than nothing where behind.
-
-    """
+    """A set of effects that does without one that was found."""
 
     instead_of: Place
+    """Family and joint of what it does without."""
     fit: Fit
     ahead: float
+    """By how much evidence [nats] it is ahead of what was found; less than nothing where
+    behind."""
 
     def newcomers(self, now: Fit) -> list[Place]:
         """Return what it has that was not found, what entered first before the others."""
@@ -62,31 +54,19 @@ class Other(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Sets:
-    """
-    Sets of a library's units, to first order, with the frames taken out of all that is compared.
-
-    Attributes
-    ----------
-    library : Library
-    systems : SeedSystems
-        The normal equations of all seeds.
-    frames : array, shape (K, P)
-        Products of the library's columns with what spans the frames.
-    right : array, shape (K,)
-        Products of its columns with the residual.
-    enter_nats : float
-        Evidence [nats] that a unit must be worth.
-    count : float
-        Number of independent rows.
-
-    """
+    """Sets of a library's units, to first order, with the frames taken out of all that is compared."""
 
     library: Library
     systems: SeedSystems
+    """The normal equations of all seeds."""
     frames: Array
+    """Products of the library's columns with what spans the frames, shape (K, P)."""
     right: Array
+    """Products of its columns with the residual, shape (K,)."""
     enter_nats: float
+    """Evidence [nats] that a unit must be worth."""
     count: float = 1.0
+    """Number of independent rows."""
     _cross: dict[int, Array] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -181,13 +161,8 @@ def reconsidered(work: Workspace, now: Fit, sets: Sets) -> tuple[Fit, list[Other
     """
     Return the best set that doing without one effect at a time leads to, and others near it.
 
-    Parameters
-    ----------
-    now : Fit
-        What the search found.
-    sets : Sets
-        Of the workspace's library.
-
+    now: what the search found.
+    sets: of the workspace's library.
     """
     for _ in range(ROUNDS):
         others = _others(work, now, replace(sets, count=work.effective(now)))
@@ -227,11 +202,7 @@ def ahead(work: Workspace, own: Fit, now: Fit) -> float:
 
     An effect more costs what it costs to enter: that two errors happen to be one is seldom.
 
-    Parameters
-    ----------
-    own, now : Fit
-        The one and the other, on the workspace's problem and scale.
-
+    own, now: the one and the other, on the workspace's problem and scale.
     """
     trials = {unit.site: float(np.log(unit.trials)) for unit in work.library.units}
 

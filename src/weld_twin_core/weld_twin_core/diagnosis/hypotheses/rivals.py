@@ -35,45 +35,28 @@ SHORTLIST, BESIDE = 7, 3
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """
-    A unit in the place of a found effect: its evidence, and the fit with it.
-
-    Attributes
-    ----------
-    site : Site
-    nats : float
-    fit : Fit
-    probability : float
-        Its share of the evidence in this place.
-    behind : float
-        By how much a family that was taken out is ahead in this place [nats]; 0 of none.
-    role : Role
-        Whether it may be in the model.
-    ahead : float
-        By how much evidence it is ahead of all that may be in the model, where it may not [nats].
-
-    """
+    """A unit in the place of a found effect: its evidence, and the fit with it."""
 
     site: Site
     nats: float
     fit: Fit
     probability: float = 0.0
+    """Its share of the evidence in this place."""
     behind: float = 0.0
+    """By how much a family that was taken out is ahead in this place [nats]; 0 of none."""
     role: Role = Role.FOUND
+    """Whether it may be in the model."""
     ahead: float = 0.0
+    """By how much evidence it is ahead of all that may be in the model, where it may not
+    [nats]."""
 
 
 def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> tuple[Rival, ...]:
     """
     Return found effect k and those that could take its place, most probable first.
 
-    Parameters
-    ----------
-    now : Fit
-        The final fit, on the workspace's problem and scale.
-    others : sequence of Other
-        Sets that do without something found: what takes its place may need company.
-
+    now: the final fit, on the workspace's problem and scale.
+    others: sets that do without something found: what takes its place may need company.
     """
     effect = now.model.found[k]
     rest = work.without(now, k).fit
@@ -133,24 +116,15 @@ def _weighed(every: Sequence[Rival], temperature: float) -> tuple[Rival, ...]:
 
 @dataclass(frozen=True, eq=False)
 class _Seat:
-    """
-    The place of an effect found, in which all that may stand there are weighed by one rule.
-
-    Attributes
-    ----------
-    family : str
-        Of the effect found.
-    rest : Fit
-        The fit without it.
-    count : float
-        Number of independent rows.
-
-    """
+    """The place of an effect found, in which all that may stand there are weighed by one rule."""
 
     work: Workspace
     family: str
+    """Of the effect found."""
     rest: Fit
+    """The fit without it."""
     count: float
+    """Number of independent rows."""
 
     def nats(self, full: Fit, choice: Choice | None) -> float:
         """Return the evidence of a fit with a choice in this place, whose number of trials counts."""

@@ -33,46 +33,30 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """
-    What a search found.
-
-    Attributes
-    ----------
-    problem, scale : Problem, Scale
-        All measurements, with the final noise and weights.
-    baseline : Fit
-        Frames and known effects only.
-    precision : array, shape (K,)
-        Prior precision of the final fit's coordinates.
-    work : Workspace
-        The library that rivals are drawn from.
-    small : Fit
-        The final fit on the workspace's measurements.
-    slots : tuple of tuple of Rival
-        For every found effect itself and its rivals; empty when many were fitted together.
-    crowded : bool
-        Whether so many units came one by one that the selection among them was not finished.
-    dense : bool
-        Whether many small errors were fitted together.
-    refused : tuple of Effect
-        What would explain the rest best, but no machine has.
-    many : Search or None
-        All kinds fitted together, where that predicts about as well as the few do.
-
-    """
+    """What a search found."""
 
     problem: Problem
     scale: Scale
+    """All measurements, with the final noise and weights."""
     baseline: Fit
+    """Frames and known effects only."""
     final: Fit
     precision: Array
+    """Prior precision of the final fit's coordinates, shape (K,)."""
     work: Workspace
+    """The library that rivals are drawn from."""
     small: Fit
+    """The final fit on the workspace's measurements."""
     slots: tuple[tuple[Rival, ...], ...]
+    """For every found effect itself and its rivals; empty when many were fitted together."""
     crowded: bool = False
+    """Whether so many units came one by one that the selection among them was not finished."""
     dense: bool = False
+    """Whether many small errors were fitted together."""
     refused: tuple[Effect, ...] = ()
+    """What would explain the rest best, but no machine has."""
     many: Search | None = None
+    """All kinds fitted together, where that predicts about as well as the few do."""
 
     @property
     def library(self) -> Library:
@@ -90,11 +74,7 @@ def search(
     """
     Return the effects that earn their place, fitted on all measurements.
 
-    Parameters
-    ----------
-    start : Model
-        The nominal robot with frames to start from, and the effects known.
-
+    start: the nominal robot with frames to start from, and the effects known.
     """
     full = problem.thinned(FIT_ROWS)
     # Position and orientation weigh as the gap itself spreads, so that neither pays for the other.
@@ -133,11 +113,7 @@ def refitted(result: Search, small: Fit) -> Search:
     """
     Return what was found with another choice of effects, fitted on all measurements.
 
-    Parameters
-    ----------
-    small : Fit
-        The choice, fitted on the workspace's measurements.
-
+    small: the choice, fitted on the workspace's measurements.
     """
     final, scale = _fitted(result.problem, small.model)
     precision = effect_precision(final.model)
@@ -178,11 +154,7 @@ def possible(work: Workspace, now: Fit, refused: list[Effect]) -> Fit:
     """
     Return the fit without what no machine has; that is added to those refused.
 
-    Parameters
-    ----------
-    refused : list of Effect
-        Those refused so far; more are added to it.
-
+    refused: those refused so far; more are added to it.
     """
     while absurd := implausible(now.model):
         refused += absurd

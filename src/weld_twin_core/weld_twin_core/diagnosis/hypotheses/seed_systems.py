@@ -40,26 +40,16 @@ class Role(Enum):
 
 @dataclass(frozen=True, eq=False)
 class Unit:
-    """
-    One family on one joint: the smallest thing a verdict can name.
-
-    Attributes
-    ----------
-    joint : str or None
-    seeds : tuple of Effect
-        Instances that span it; more than one where a parameter bends the response.
-    columns : tuple of array of int
-        Column numbers of every seed.
-    trials : float
-        Among how many instances the seeds were chosen.
-
-    """
+    """One family on one joint: the smallest thing a verdict can name."""
 
     family: str
     joint: str | None
     seeds: tuple[Effect, ...]
+    """Instances that span it; more than one where a parameter bends the response."""
     columns: tuple[Index, ...]
+    """Column numbers of every seed."""
     trials: float
+    """Among how many instances the seeds were chosen."""
     role: Role = Role.FOUND
 
     @property
@@ -73,26 +63,18 @@ class Unit:
 
 
 class Alike(NamedTuple):
-    """
-    Systems of seeds with the same number of columns.
-
-    Attributes
-    ----------
-    seeds : array of int, shape (S,)
-        Which, counted over the units in order.
-    columns : array of int, shape (S, K)
-    normal : array, shape (S, K, K)
-    right : array, shape (S, K)
-    size : array, shape (S, K)
-        Squared norm of every column before anything was projected out.
-
-    """
+    """Systems of seeds with the same number of columns."""
 
     seeds: Index
+    """Which, counted over the units in order, shape (S,)."""
     columns: Index
+    """Shape (S, K)."""
     normal: Array
+    """Shape (S, K, K)."""
     right: Array
+    """Shape (S, K)."""
     size: Array
+    """Squared norm of every column before anything was projected out, shape (S, K)."""
 
 
 class Grown(NamedTuple):
@@ -104,33 +86,20 @@ class Grown(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SeedSystems:
-    """
-    Normal equations of all seeds.
-
-    Attributes
-    ----------
-    alike : tuple of Alike
-        One entry for every number of columns.
-    rss : float
-        Sum of squares of the residual.
-
-    """
+    """Normal equations of all seeds."""
 
     alike: tuple[Alike, ...]
+    """One entry for every number of columns."""
     rss: float = 0.0
+    """Sum of squares of the residual."""
 
     @classmethod
     def of(cls, columns: Sequence[Index], normals: Sequence[Array]) -> SeedSystems:
         """
         Sort seeds by their number of columns.
 
-        Parameters
-        ----------
-        columns : sequence of array of int, shape (K,)
-            Column numbers of every seed.
-        normals : sequence of array, shape (K, K)
-            Products of its columns with each other.
-
+        columns: column numbers of every seed, shape (K,).
+        normals: products of its columns with each other, shape (K, K).
         """
         out = []
         for size in sorted({index.size for index in columns}):
@@ -145,14 +114,10 @@ class SeedSystems:
         """
         Return the systems for a residual, with the columns of a model projected out.
 
-        Parameters
-        ----------
-        own : array, shape (P, rows)
-            The model's columns.
-        residual : array, shape (rows,)
-        products : array, shape (all columns, P + 1)
-            Products of all columns with the model's, and with the residual.
-
+        own: the model's columns, shape (P, rows).
+        residual: shape (rows,).
+        products: products of all columns with the model's, and with the residual, shape (all
+        columns, P + 1).
         """
         return self.given(own @ own.T, own @ residual, float(residual @ residual), products)
 
@@ -160,17 +125,11 @@ class SeedSystems:
         """
         Return the systems with columns projected out of which the products are known.
 
-        Parameters
-        ----------
-        normal : array, shape (P, P)
-            Products of the columns.
-        pull : array, shape (P,)
-            Their products with the residual.
-        rss : float
-            Sum of squares of the residual.
-        products : array, shape (all columns, P + 1)
-            Products of all columns with them, and with the residual.
-
+        normal: products of the columns, shape (P, P).
+        pull: their products with the residual, shape (P,).
+        rss: sum of squares of the residual.
+        products: products of all columns with them, and with the residual, shape (all columns, P +
+        1).
         """
         live = np.flatnonzero(normal.diagonal() > EMPTY)
         scaled, size = unit_diagonal(normal[np.ix_(live, live)], 1e-12)
@@ -191,11 +150,7 @@ class SeedSystems:
         Columns enter one at a time, the one that explains most first, as long as the evidence
         grows; all together where that is worth more.
 
-        Parameters
-        ----------
-        effective : float
-            Number of independent rows.
-
+        effective: number of independent rows.
         """
         return [_grown(each, self.rss, effective) for each in self.alike]
 
@@ -288,17 +243,10 @@ def evidences(rss: float, gain: Array, freedom: Array | float, effective: float)
     """
     Return the `evidence` of many falls at once.
 
-    Parameters
-    ----------
-    rss : float
-        Sum of squares before.
-    gain : array, shape (S,)
-        By how much it falls.
-    freedom : float, or array, shape (S,)
-        Coordinates that each fall took.
-    effective : float
-        Number of independent rows.
-
+    rss: sum of squares before.
+    gain: by how much it falls, shape (S,).
+    freedom: coordinates that each fall took, shape (S,).
+    effective: number of independent rows.
     """
     # Where nothing was left before, nothing can fall.
     remaining = np.maximum(rss - gain, PERFECT * rss) / rss if rss > 0.0 else np.ones_like(gain)
@@ -308,28 +256,18 @@ def evidences(rss: float, gain: Array, freedom: Array | float, effective: float)
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """
-    A unit with the seed and columns that serve it best.
-
-    Attributes
-    ----------
-    nats : float
-        Log of the evidence ratio against leaving the unit out (Schwarz's approximation).
-    alike : Alike
-        The systems that the seed's is among.
-    row : int
-        Which of them.
-    chosen : array of int
-        Of the seed's columns, those that earn their place.
-
-    """
+    """A unit with the seed and columns that serve it best."""
 
     unit: Unit
     seed: int
     nats: float
+    """Log of the evidence ratio against leaving the unit out (Schwarz's approximation)."""
     alike: Alike
+    """The systems that the seed's is among."""
     row: int
+    """Which of them."""
     chosen: Index
+    """Of the seed's columns, those that earn their place."""
 
     @property
     def columns(self) -> Index:
@@ -356,19 +294,11 @@ def ranking(
     """
     Return every unit's best choice, most evidence first.
 
-    Parameters
-    ----------
-    systems : SeedSystems
-        Normal equations of all seeds, with the model projected out.
-    units : sequence of Unit
-        What may enter, each as a whole.
-    effective : float
-        Number of independent rows.
-    least : float
-        Evidence [nats] that a choice must exceed.
-    roles : collection of Role
-        Which units are asked.
-
+    systems: normal equations of all seeds, with the model projected out.
+    units: what may enter, each as a whole.
+    effective: number of independent rows.
+    least: evidence [nats] that a choice must exceed.
+    roles: which units are asked.
     """
     grown = systems.grown(effective)
     first = np.cumsum([0, *(len(unit.seeds) for unit in units)])

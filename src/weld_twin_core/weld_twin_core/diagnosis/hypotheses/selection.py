@@ -31,19 +31,11 @@ Place = tuple[str, str | None]
 
 
 class Less(NamedTuple):
-    """
-    A fit without one of the effects found.
-
-    Attributes
-    ----------
-    fit : Fit
-    size : float
-        RMS change of the residual [noise] as the effect goes, before anything is fitted anew.
-
-    """
+    """A fit without one of the effects found."""
 
     fit: Fit
     size: float
+    """RMS change of the residual [noise] as the effect goes, before anything is fitted anew."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,14 +44,6 @@ class Workspace:
     What selection works on: the problem, its noise, the shared library, and beliefs.
 
     The library's own products are computed once; residuals change, columns do not.
-
-    Attributes
-    ----------
-    bare_rss : float
-        Whitened sum of squares before any effect was found.
-    errors : UsualErrors or None
-        What every arm is off by a little, once it is known how much that is.
-
     """
 
     problem: Problem
@@ -67,7 +51,9 @@ class Workspace:
     library: Library
     beliefs: Beliefs
     bare_rss: float
+    """Whitened sum of squares before any effect was found."""
     errors: UsualErrors | None = None
+    """What every arm is off by a little, once it is known how much that is."""
     _left: WeakKeyDictionary[Fit, float] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
@@ -84,12 +70,8 @@ class Workspace:
         leaves about ``beliefs.misfit``^2 E of misfit in some ``beliefs.misfit_directions`` directions,
         and any further column may pick that up by chance.
 
-        Parameters
-        ----------
-        trust : float
-            Exponent between 0 and 1 by which autocorrelation is believed: while causes are still
-            missing from the model, it is theirs.
-
+        trust: exponent between 0 and 1 by which autocorrelation is believed: while causes are
+        still missing from the model, it is theirs.
         """
         problem, beliefs, found = self.problem, self.beliefs, result.model.found
         share = effective_share(result.residual, problem.rows, problem.samples) ** trust
@@ -117,11 +99,7 @@ class Workspace:
 
         Beside the errors that every arm has a little of, unless the families are such themselves.
 
-        Parameters
-        ----------
-        about : iterable of str
-            The families.
-
+        about: the families.
         """
         errors = self._errors(about)
         if errors is None:

@@ -49,11 +49,7 @@ def profile(problem: Problem, model: Model, scale: Scale, k: int) -> Tried | Non
 
     In whitened squares; None where the effect's kind has no need of a search.
 
-    Parameters
-    ----------
-    k : int
-        Which of the found effects, counted from 0.
-
+    k: which of the found effects, counted from 0.
     """
     effect = model.found[k]
     if not effect.fit.searched:
@@ -80,21 +76,13 @@ def _prior(effects: list[Effect]) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Looker:
-    """
-    What every look at a joint shares: the residual, and what must be fitted along.
-
-    Attributes
-    ----------
-    residual : array, shape (rows,)
-        With frames and effects in the model fitted.
-    span : array, shape (P, rows)
-        Orthonormal rows that span those.
-
-    """
+    """What every look at a joint shares: the residual, and what must be fitted along."""
 
     maker: Maker
     residual: Array
+    """With frames and effects in the model fitted, shape (rows,)."""
     span: Array
+    """Orthonormal rows that span those, shape (P, rows)."""
 
     @classmethod
     def of(cls, problem: Problem, model: Model, scale: Scale) -> _Looker:

@@ -57,13 +57,8 @@ def moved_most(features: Sequence[Features], joint: str | None) -> int:
     still shows none of them. Between stations nothing is seen: beside a motion hardly any of the way
     to each counts, or a dozen would seem to show more of a joint than a path does.
 
-    Parameters
-    ----------
-    features : sequence of Features
-        One for each recording.
-    joint : str or None
-        None for all joints.
-
+    features: one for each recording.
+    joint: none for all joints.
     """
     if len(features) == 1:
         return 0

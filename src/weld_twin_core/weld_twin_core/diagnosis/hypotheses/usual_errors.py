@@ -35,22 +35,14 @@ ON = ('constant', 'angle', 'load')
 
 @dataclass(frozen=True, eq=False)
 class UsualErrors:
-    """
-    Small errors everywhere, as far as one fit shows how large they are.
-
-    Attributes
-    ----------
-    columns : array, shape (P, rows)
-        Whitened, each as large as it usually is on this arm.
-    count : float
-        Number of rows that are independent beside them.
-
-    """
+    """Small errors everywhere, as far as one fit shows how large they are."""
 
     problem: Problem
     scale: Scale
     columns: Array
+    """Whitened, each as large as it usually is on this arm, shape (P, rows)."""
     count: float
+    """Number of rows that are independent beside them."""
 
     @classmethod
     def beside(
@@ -59,14 +51,8 @@ class UsualErrors:
         """
         Return those that a fit leaves room for, beside its frames and effects.
 
-        Parameters
-        ----------
-        problem, scale : Problem, Scale
-            That the fit is of.
-        now : Fit
-        effective : callable
-            Number of independent rows of a fit.
-
+        problem, scale: that the fit is of.
+        effective: number of independent rows of a fit.
         """
         features = problem.features(now.model)
         every = [problem.effect_columns(features, e, atoms=False) for e in _small(features, now)]

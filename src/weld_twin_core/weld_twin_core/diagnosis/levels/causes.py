@@ -72,15 +72,9 @@ def causes(
     """
     Return the causes, largest share first, and what of the squared gap is left and is noise.
 
-    Parameters
-    ----------
-    alternative : Curved or None
-        The free-form explanation; it is the model itself where ``unseen`` is its own.
-    floor : float
-        RMS of the noise alone [m].
-    placing : FreeForm or None
-        What tells the places of an unknown gap.
-
+    alternative: the free-form explanation; it is the model itself where ``unseen`` is its own.
+    floor: RMS of the noise alone [m].
+    placing: what tells the places of an unknown gap.
     """
     reported = _told_claims(result, table, verdict)
     curved = alternative if alternative is not None and alternative.unseen is unseen else None
@@ -357,11 +351,7 @@ def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | No
     their part of it. What the fits of fewer effects make of each other is a small rest; it is
     shared out by size, so that all adds up.
 
-    Parameters
-    ----------
-    unseen : Unseen
-        Of the model that the causes stand for.
-
+    unseen: of the model that the causes stand for.
     """
     if not any(cause.members for cause in causes):
         return None

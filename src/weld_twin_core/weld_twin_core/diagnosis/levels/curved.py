@@ -28,24 +28,15 @@ ROWS = 6000
 
 @dataclass(frozen=True, eq=False)
 class Curved:
-    """
-    A free-form explanation, and the model that carries it.
-
-    Attributes
-    ----------
-    kept : tuple of Effect
-        Effects that stayed beside it: those named beyond doubt, and the set-up's own motion.
-    found : Search
-        With the curves in its final fit.
-    unseen : Unseen
-        Of that fit.
-
-    """
+    """A free-form explanation, and the model that carries it."""
 
     form: FreeForm
     kept: tuple[Effect, ...]
+    """Effects that stayed beside it: those named beyond doubt, and the set-up's own motion."""
     found: Search
+    """With the curves in its final fit."""
     unseen: Unseen
+    """Of that fit."""
 
 
 def curved(result: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
@@ -54,13 +45,8 @@ def curved(result: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
 
     What carries to no other posture may still be told from neighbours in time.
 
-    Parameters
-    ----------
-    result : Search
-        The set-up's own motion that it holds stays beside the curves.
-    verdict : Verdict
-        Of one that names something nothing is left.
-
+    result: the set-up's own motion that it holds stays beside the curves.
+    verdict: of one that names something nothing is left.
     """
     if verdict.status in NAMING or result.dense:
         return None
@@ -115,14 +101,10 @@ def carried(
     """
     Return the model to carry on with, its predictions on unseen stretches, its shrink, the verdict.
 
-    Parameters
-    ----------
-    found, unseen, shrink
-        Of the effects found.
-    alternative : Curved or None
-        The free-form explanation; carried where the verdict is 'unknown' and it predicts as well.
-        What makes unseen data worse than the nominal robot does is not carried at all, nor told.
-
+    found, unseen, shrink: of the effects found.
+    alternative: the free-form explanation; carried where the verdict is 'unknown' and it predicts
+    as well. What makes unseen data worse than the nominal robot does is not carried at all, nor
+    told.
     """
     if verdict.status != 'unknown':
         return result, unseen, shrink, verdict

@@ -31,45 +31,27 @@ FIELD = 'instrument'
 
 
 class Beside(NamedTuple):
-    """
-    What a free form predicts that the names do not.
-
-    Attributes
-    ----------
-    at, on : str
-        Place and dependence of the free form.
-    gain : float
-        Share of the squared error that it takes off on unseen data, by the way of leaving out,
-        stretches of time or regions of posture, that shows less.
-    steady : float
-        The same in standard errors between the parts left out.
-    share : float
-        RMS of what it takes off over that of the largest effect named at this place.
-
-    """
+    """What a free form predicts that the names do not."""
 
     at: str
     on: str
+    """Place and dependence of the free form."""
     gain: float
+    """Share of the squared error that it takes off on unseen data, by the way of leaving out,
+    stretches of time or regions of posture, that shows less."""
     steady: float
+    """The same in standard errors between the parts left out."""
     share: float
+    """RMS of what it takes off over that of the largest effect named at this place."""
 
 
 class Missed(NamedTuple):
-    """
-    What the formulas of the names miss.
-
-    Attributes
-    ----------
-    scattered : tuple of Scatter
-        Joints that noise comes from beyond doubt, largest first.
-    forms : tuple of Beside
-        Free forms that predict beyond doubt what a name should.
-
-    """
+    """What the formulas of the names miss."""
 
     scattered: tuple[Scatter, ...] = ()
+    """Joints that noise comes from beyond doubt, largest first."""
     forms: tuple[Beside, ...] = ()
+    """Free forms that predict beyond doubt what a name should."""
 
     @property
     def in_words(self) -> tuple[tuple[str, str], ...]:
@@ -107,13 +89,8 @@ def no_noise(
     """
     Return 'unknown' in the place of 'none' where what looks like noise follows something.
 
-    Parameters
-    ----------
-    verdict : Verdict
-        Of any other status, nothing changes.
-    alternative : Curved or None
-        The free-form explanation, whether or not it can be carried to another motion.
-
+    verdict: of any other status, nothing changes.
+    alternative: the free-form explanation, whether or not it can be carried to another motion.
     """
     if verdict.status != 'none':
         return verdict

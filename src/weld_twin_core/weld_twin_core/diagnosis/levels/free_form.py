@@ -37,22 +37,14 @@ TRACE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """
-    One group that helps to explain the gap.
-
-    Attributes
-    ----------
-    rivals : tuple of (Group, float)
-        Each group that could stand in its place and its weight, itself included.
-    share : float
-        Of the squared error that is lost without it on unseen folds.
-
-    """
+    """One group that helps to explain the gap."""
 
     group: Group
     ridge: float
     rivals: tuple[tuple[Group, float], ...]
+    """Each group that could stand in its place and its weight, itself included."""
     share: float = 0.0
+    """Of the squared error that is lost without it on unseen folds."""
 
     def weight_of(self, kind: str) -> dict[str, float]:
         """Return the weight of every place ('at') or dependence ('on'), largest first."""
@@ -73,23 +65,14 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class FreeForm:
-    """
-    The free-form explanation.
-
-    Attributes
-    ----------
-    parts : tuple of Part
-        In the order in which they were found.
-    gain : float
-        Share of the squared error that they take away on unseen folds, together.
-    steady : float
-        The same in standard errors between folds.
-
-    """
+    """The free-form explanation."""
 
     parts: tuple[Part, ...]
+    """In the order in which they were found."""
     gain: float = 0.0
+    """Share of the squared error that they take away on unseen folds, together."""
     steady: float = 0.0
+    """The same in standard errors between folds."""
 
     @property
     def curves(self) -> tuple[Effect, ...]:
@@ -121,14 +104,9 @@ def free_form(
     """
     Return the few groups that explain what a fit leaves, each with its rivals.
 
-    Parameters
-    ----------
-    bare : Fit
-        Frames and the effects that are named beyond doubt.
-    wandering : bool
-        Look for what changes as the recording goes on, and ask no more of it than to predict
-        short stretches from their neighbours.
-
+    bare: frames and the effects that are named beyond doubt.
+    wandering: look for what changes as the recording goes on, and ask no more of it than to
+    predict short stretches from their neighbours.
     """
     groups = list(all_groups(problem, bare.model, scale, wandering=wandering))
     labels = ways_to_divide(problem, STRETCHES)
@@ -154,19 +132,11 @@ class Member(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Choosing:
-    """
-    What a choice of groups is made on.
-
-    Attributes
-    ----------
-    groups : sequence of Group
-    ways : sequence of Unseen
-        What is always fitted, with stretches of time left out in turn, and regions of posture.
-
-    """
+    """What a choice of groups is made on."""
 
     groups: Sequence[Group]
     ways: Sequence[Unseen]
+    """What is always fitted, with stretches of time left out in turn, and regions of posture."""
 
     def beside(self, members: Sequence[Member]) -> list[Base]:
         """Return what is always fitted with some members, for each way to divide."""
@@ -263,23 +233,14 @@ def _pruned(work: Choosing, members: list[Member], beliefs: Beliefs) -> list[Mem
 
 
 class Worth(NamedTuple):
-    """
-    What the groups chosen take off the squared error on unseen folds.
-
-    Attributes
-    ----------
-    shares : tuple of float
-        Of each, what is lost without it; together they make up ``gain``.
-    gain : float
-        Share that all of them take away, by the way of dividing that shows least.
-    steady : float
-        That fall in its standard errors between folds.
-
-    """
+    """What the groups chosen take off the squared error on unseen folds."""
 
     shares: tuple[float, ...]
+    """Of each, what is lost without it; together they make up ``gain``."""
     gain: float
+    """Share that all of them take away, by the way of dividing that shows least."""
     steady: float
+    """That fall in its standard errors between folds."""
 
 
 def worth(work: Choosing, members: list[Member]) -> Worth:
@@ -304,15 +265,9 @@ def rival_weights(
     error weighs r to the power of -rows / 4: the likelihood of so many independent rows, softened
     by two because real physics is a little richer than any group.
 
-    Parameters
-    ----------
-    work : Choosing
-        Groups and their folds.
-    members : list of Member
-        The groups chosen.
-    k : int
-        Which of them is held against the others.
-
+    work: groups and their folds.
+    members: the groups chosen.
+    k: which of them is held against the others.
     """
     rest = members[:k] + members[k + 1 :]
     own = (members[k], work.errors(members))

@@ -55,16 +55,10 @@ def placed(
 
     They explain what is left beside everything that is told.
 
-    Parameters
-    ----------
-    result : Search
-        The effects found, before curves take their place.
-    alternative : Curved or None
-        The free-form explanation beside what is told.
-    missed : Missed
-        What the formulas miss. Joints that noise comes from are places, too, where no group finds
-        any.
-
+    result: the effects found, before curves take their place.
+    alternative: the free-form explanation beside what is told.
+    missed: what the formulas miss. Joints that noise comes from are places, too, where no group
+    finds any.
     """
     if verdict.status != 'unknown':
         return None

@@ -47,24 +47,15 @@ TINY = 1e-9
 
 
 class Scatter(NamedTuple):
-    """
-    Scatter along one joint.
-
-    Attributes
-    ----------
-    share : float
-        Of the squared noise.
-    size : float
-        RMS in units of noise.
-    steady : float
-        The share in its standard errors between stretches.
-
-    """
+    """Scatter along one joint."""
 
     joint: str
     share: float
+    """Of the squared noise."""
     size: float
+    """RMS in units of noise."""
     steady: float
+    """The share in its standard errors between stretches."""
 
 
 def scatter(result: Search, unseen: Unseen) -> list[Scatter]:
@@ -132,11 +123,8 @@ def _products(remaining: Array, ways: Array) -> tuple[Array, Array, Array]:
     """
     Return the normal equations of the variances, for every stretch.
 
-    Parameters
-    ----------
-    remaining : array, shape (M, c)
-        Differences in units of noise.
-    ways : array, shape (K, c, M)
+    remaining: differences in units of noise, shape (M, c).
+    ways: shape (K, c, M).
 
     Returns
     -------

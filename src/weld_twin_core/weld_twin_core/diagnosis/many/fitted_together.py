@@ -54,11 +54,7 @@ def fitted_together(
     """
     Return what was found, or all families fitted together where that explains stations better.
 
-    Parameters
-    ----------
-    result : Search
-        The effects found one by one.
-
+    result: the effects found one by one.
     """
     stations = sum(result.problem.samples)
     if not result.problem.at_rest or stations < BEAR[0]:

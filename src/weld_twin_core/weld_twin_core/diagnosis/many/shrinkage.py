@@ -84,24 +84,15 @@ def _learned(
 
 @dataclass(frozen=True, eq=False)
 class Sizes:
-    """
-    What is known of the sizes of a model's coordinates before they are learned, shapes (K,).
-
-    Attributes
-    ----------
-    now : array
-        The coordinates.
-    labels, scales : array
-        As `groups` returns them.
-    believed : array
-        Prior precision; see `believed`.
-
-    """
+    """What is known of the sizes of a model's coordinates before they are learned, shapes (K,)."""
 
     now: Array
+    """The coordinates."""
     labels: Array
     scales: Array
+    """As `groups` returns them."""
     believed: Array
+    """Prior precision; see `believed`."""
 
     @classmethod
     def of(cls, model: Model, beliefs: Beliefs) -> Sizes:

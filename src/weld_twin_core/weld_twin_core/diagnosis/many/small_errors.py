@@ -168,28 +168,18 @@ def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """
-    Waves of one joint that may be lines of its ripple.
-
-    Attributes
-    ----------
-    orders : array, shape (K,) [1/rev]
-    free : array of bool, shape (K,)
-        Which of them are far enough from every order that is in the ripple.
-    piece : Piece
-        Sine and cosine of every order.
-    normal : array, shape (K, 2, 2)
-        Their products with each other.
-    apart : float
-        Half the resolution in orders that the range of motion allows.
-
-    """
+    """Waves of one joint that may be lines of its ripple."""
 
     orders: Array
+    """Shape (K,) [1/rev]."""
     free: NDArray[np.bool_]
+    """Which of them are far enough from every order that is in the ripple, shape (K,)."""
     piece: Piece
+    """Sine and cosine of every order."""
     normal: Array
+    """Their products with each other, shape (K, 2, 2)."""
     apart: float
+    """Half the resolution in orders that the range of motion allows."""
 
     @classmethod
     def of(cls, maker: Maker, ripple: Effect, orders: Array) -> Lines:
@@ -234,11 +224,7 @@ def lines_of(maker: Maker, effect: Effect, least: float) -> Lines | None:
     """
     Return the waves above the dense ones of an effect of waves; None where none can be told.
 
-    Parameters
-    ----------
-    least : float [rad]
-        Travel below which nothing is looked for.
-
+    least: travel below which nothing is looked for [rad].
     """
     waves = effect.traits.waves
     low, high = _ends(maker, effect) if waves is not None else (0.0, 0.0)

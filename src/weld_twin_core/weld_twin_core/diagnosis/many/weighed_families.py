@@ -37,11 +37,7 @@ def weighed_families(result: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[
     """
     Return what every kind of the final model accounts for on unseen data.
 
-    Parameters
-    ----------
-    result : Search
-        Of all kinds fitted together.
-
+    result: of all kinds fitted together.
     """
     effects = result.final.model.found
     members: dict[str, list[int]] = {}

@@ -26,20 +26,12 @@ Slot = tuple[Rival, ...]
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """
-    One effect found, with what could stand in its place.
-
-    Attributes
-    ----------
-    slot : tuple of Rival
-        Most probable first; their weights add up to one.
-    listed : tuple of Site
-        Those named together: the leader alone where it has nearly all of the weight.
-
-    """
+    """One effect found, with what could stand in its place."""
 
     slot: Slot
+    """Most probable first; their weights add up to one."""
     listed: tuple[Site, ...]
+    """Those named together: the leader alone where it has nearly all of the weight."""
 
     @property
     def leader(self) -> Rival:
@@ -79,11 +71,7 @@ def table_of(slots: Sequence[Slot], beliefs: Beliefs) -> tuple[Row, ...]:
     """
     Return the table of answers, a row for every effect found.
 
-    Parameters
-    ----------
-    slots : sequence of tuple of Rival
-        For every effect found, itself and its rivals, most probable first.
-
+    slots: for every effect found, itself and its rivals, most probable first.
     """
     return tuple(
         Row(candidate_set, named_together(candidate_set, beliefs)) for candidate_set in slots

@@ -58,15 +58,10 @@ def allowed(
     """
     Return the models that the recordings allow.
 
-    Parameters
-    ----------
-    problem, model, scale
-        A model fitted to all measurements.
-    precision : array, shape (K,)
-        Prior precision of the found effects' coordinates in that fit; may be empty.
-    floor : NoiseFloor
-        What the recordings themselves say of the instrument's noise.
-
+    problem, model, scale: a model fitted to all measurements.
+    precision: prior precision of the found effects' coordinates in that fit, shape (K,); may be
+    empty.
+    floor: what the recordings themselves say of the instrument's noise.
     """
     recordings = problem.recordings
     problem, scale = _thinned(problem, _noisy(scale))
@@ -209,17 +204,10 @@ class Conditioning:
     """
     The coordinates given rows, all of them or all but some.
 
-    Parameters
-    ----------
-    rows : Rows
-        What was measured, as linear equations.
-    prior : Prior
-        What is known of the coordinates before.
-    width : array, shape (P,)
-        Prior standard deviation of every coordinate.
-    noise : float
-        Variance of a row.
-
+    rows: what was measured, as linear equations.
+    prior: what is known of the coordinates before.
+    width: prior standard deviation of every coordinate, shape (P,).
+    noise: variance of a row.
     """
 
     def __init__(self, rows: Rows, prior: Prior, width: Array, noise: float) -> None:
@@ -233,11 +221,7 @@ class Conditioning:
         """
         Return mean, shape (P,), and covariance, shape (P, P), of the coordinates.
 
-        Parameters
-        ----------
-        but : array of bool, shape (rows,), optional
-            Rows left out.
-
+        but: rows left out, shape (rows,).
         """
         system, right, width = self._system, self._right, self._width
         if but is not None:

@@ -44,15 +44,10 @@ def alone(problem: Problem, model: Model, shrink: Shrink, *, many: bool = False)
     """
     Return what is left with the constants of a model alone, and how they are best changed for that.
 
-    Parameters
-    ----------
-    model : Model
-        The whole model, fitted.
-    shrink : Shrink
-        What the whole model leaves on data that were not fitted.
-    many : bool
-        Whether many small errors were fitted together, of which none is certain by itself. Else
-        constants that were found mean the arm, and stay: frames and other zeros give way.
+    model: the whole model, fitted.
+    shrink: what the whole model leaves on data that were not fitted.
+    many: whether many small errors were fitted together, of which none is certain by itself. Else
+    constants that were found mean the arm, and stay: frames and other zeros give way.
 
     Returns
     -------

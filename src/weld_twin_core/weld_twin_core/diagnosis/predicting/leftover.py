@@ -72,46 +72,30 @@ class Foretold:
     Every sample as the other regions of posture foretell it.
 
     Shifts [m] first, then turns [rad]. Rows that a sample does not have are zero.
-
-    Attributes
-    ----------
-    error : array, shape (N, 6)
-        What was measured less what was foretold.
-    ways : array, shape (R, N, 6)
-        In which what was foretold may be off, each of one standard deviation.
-    levers : array, shape (n, N, 6)
-        d pose / d joint.
-    seen : array of bool, shape (N, 6)
-        Rows that a sample has.
-    region : array, shape (N,)
-        Which region of posture it lies in.
-    good : array of bool, shape (N,)
-        Samples that are no outliers.
-    middle : float
-        How far to go from the fitted model to the middle of those allowed to foretell best.
-
     """
 
     error: Array
+    """What was measured less what was foretold, shape (N, 6)."""
     ways: Array
+    """In which what was foretold may be off, each of one standard deviation, shape (R, N, 6)."""
     levers: Array
+    """d pose / d joint, shape (n, N, 6)."""
     seen: NDArray[np.bool_]
+    """Rows that a sample has, shape (N, 6)."""
     region: NDArray[np.int_]
+    """Which region of posture it lies in, shape (N,)."""
     good: NDArray[np.bool_]
+    """Samples that are no outliers, shape (N,)."""
     middle: float
+    """How far to go from the fitted model to the middle of those allowed to foretell best."""
 
     @classmethod
     def of(cls, unseen: Unseen, columns: Array, levers: Array, given: Given) -> Foretold:
         """
         Return what a model foretells of samples that it was not fitted to.
 
-        Parameters
-        ----------
-        unseen : Unseen
-            Of the fitted model, with regions of posture left out in turn.
-        columns, levers : array, shapes (P, rows) and (n, rows)
-            Whitened, of the coordinates that are uncertain and of all joints.
-
+        unseen: of the fitted model, with regions of posture left out in turn.
+        columns, levers: whitened, of the coordinates that are uncertain and of all joints.
         """
         labels, error = unseen.labels, unseen.whole
         ways = np.empty((len(columns) + 1, labels.size))
@@ -182,19 +166,11 @@ def leftover(
     """
     Return the standard deviations of what is left over.
 
-    Parameters
-    ----------
-    foretold : Foretold
-        Of the samples of the problem.
-    turning : array of bool, shape (n,)
-        Joints that turn; what slides has no gear.
-    noise : float or None
-        Of a measured coordinate [m], told with the data or seen in them.
-    rough : float
-        Share of the arm's small errors that are of a usual size.
-    lost : array, shape (n,) [rad or m]
-        How much motion was found to be lost in every joint.
-
+    foretold: of the samples of the problem.
+    turning: joints that turn, shape (n,); what slides has no gear.
+    noise: of a measured coordinate [m], told with the data or seen in them.
+    rough: share of the arm's small errors that are of a usual size.
+    lost: how much motion was found to be lost in every joint, shape (n,) [rad or m].
     """
     if foretold.seen[:, :3].all(axis=1).any():
         spread = _shared(*foretold.axes(slice(0, 3)), turning)
@@ -264,17 +240,10 @@ def _of_the_arm(
     """
     Return the part of what is left over that is the arm's, as a factor of its size.
 
-    Parameters
-    ----------
-    remaining : float
-        Variance of what is left [m^2].
-    common : float
-        The share of it that neighbours have in common.
-    noise : float or None
-        Standard deviation of the instrument [m]; None where nothing tells it.
-    at_rest : bool
-        Whether stations were measured, which lie apart.
-
+    remaining: variance of what is left [m^2].
+    common: the share of it that neighbours have in common.
+    noise: standard deviation of the instrument [m]; None where nothing tells it.
+    at_rest: whether stations were measured, which lie apart.
     """
     alone = 1.0 - common
     if noise is None:
@@ -303,11 +272,7 @@ def _shared(errors: Array, moments: Array, levers: Array, turning: NDArray[np.bo
     Of all gears alike, or of one alone. An instrument is less sure along some directions than along
     others, and these stay where they are; levers turn with the arm.
 
-    Parameters
-    ----------
-    errors, moments, levers : array, shapes (K, 3), (K, 3, 3) and (K, 3, n)
-    turning : array of bool, shape (n,)
-
+    turning: shape (n,).
     """
     few = np.unique(np.linspace(0, len(errors) - 1, min(len(errors), MOST)).round().astype(int))
     errors, moments, levers = errors[few], moments[few], levers[few]

@@ -70,24 +70,15 @@ class Wanted(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class MeasurementPlan:
-    """
-    Stations to measure, and how sure the model will be after each.
-
-    Attributes
-    ----------
-    q : array, shape (N, n) [rad, m]
-        In the order in which they say most.
-    sigma : array, shape (N + 1,) [m]
-        Standard deviation of the tool in its worst direction, in the middle of the region's
-        postures, after that many stations.
-    within : array, shape (N + 1,)
-        Probability that the tool is within the tolerance at such a posture.
-
-    """
+    """Stations to measure, and how sure the model will be after each."""
 
     q: Array
+    """In the order in which they say most, shape (N, n) [rad, m]."""
     sigma: Array
+    """Standard deviation of the tool in its worst direction, in the middle of the region's
+    postures, after that many stations, shape (N + 1,) [m]."""
     within: Array
+    """Probability that the tool is within the tolerance at such a posture, shape (N + 1,)."""
 
 
 def plan_stations(
@@ -96,20 +87,12 @@ def plan_stations(
     """
     Return the stations that make a fitted model surest, with base and tool frame not known.
 
-    Parameters
-    ----------
-    tolerance : float [m]
-        Of the tool's position, in any direction.
-    noise : float [m]
-        Standard deviation of a measured coordinate, of instrument and arm together.
-    spread : float [rad]
-        Half the range of every joint about the posture of a usual seam.
+    tolerance: of the tool's position, in any direction [m].
+    noise: standard deviation of a measured coordinate, of instrument and arm together [m].
+    spread: half the range of every joint about the posture of a usual seam [rad].
 
-    Raises
-    ------
-    DataError
-        A number means nothing, or hardly any posture of the region is clear of the floor.
-
+    Raises DataError: a number means nothing, or hardly any posture of the region is clear of the
+    floor.
     """
     if not (0.0 < tolerance < 1.0 and 0.0 < noise < 0.1 and count >= 1 and 0.0 < spread < 4.0):
         raise DataError('a plan needs stations, a tolerance, a noise and a spread above zero')
@@ -143,20 +126,11 @@ def plan_more(
     Before the first of them it is as sure there as `twin.posterior.usual_sigma` says: the promise
     of a plan is the warning of the diagnosis. New stations count in the set-up that was recorded.
 
-    Parameters
-    ----------
-    twin : Twin
-        The fitted model.
-    region : (array, array), shapes (K, n) and (C, n)
-        Postures at which it is judged how sure the model is, and those that may be measured.
-    count : int
-        Stations; at most as many as may be measured.
+    twin: the fitted model.
+    region: postures at which it is judged how sure the model is, and those that may be measured.
+    count: stations; at most as many as may be measured.
 
-    Raises
-    ------
-    DataError
-        A number means nothing.
-
+    Raises DataError: a number means nothing.
     """
     offered = len(region[1])
     if not (0.0 < given.tolerance < 1.0 and 0.0 < given.noise < 0.1 and 0 <= count <= offered):
@@ -218,11 +192,7 @@ def clear_postures(robot: Robot, spread: float) -> Array:
     """
     Return postures about that of a usual seam, clear of floor and column, shape (K, n).
 
-    Parameters
-    ----------
-    spread : float [rad]
-        Half the range of every joint.
-
+    spread: half the range of every joint [rad].
     """
     middle = plan(robot, default_seam(robot, 'line'), 'smooth', rate_hz=10.0).motion.q
     centre = middle[len(middle) // 2]

@@ -148,16 +148,10 @@ def discrepancy(robot: Robot, rest: Rest, fine: Array, result: Sequence[Effect])
     """
     Return what no parameter explains, with gears as uneven where they were not seen.
 
-    Parameters
-    ----------
-    rest : Rest
-        What is left over where it was recorded.
-    fine : array, shape (n,)
-        Height of every joint's fine curve.
-    result : sequence of Effect
-        A curve without a formula among them says nothing beyond its ends, so that the joint may
-        be off by as much as that there.
-
+    rest: what is left over where it was recorded.
+    fine: height of every joint's fine curve, shape (n,).
+    result: a curve without a formula among them says nothing beyond its ends, so that the joint
+    may be off by as much as that there.
     """
     fine = np.array(fine)
     for effect in result:

@@ -51,24 +51,16 @@ NOISE_TRUST = 8.0
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """
-    Where coordinates lie before the data.
-
-    Attributes
-    ----------
-    middle, width : array, shape (P,)
-        Counted from the fit; standard deviation of a usual one.
-    group : array of int, shape (P,)
-        Family, -1 for frames, which are as wide as they are.
-    gears : array of bool, shape (G,)
-        Families that are a gear's. How even gears are says nothing of an arm's geometry.
-
-    """
+    """Where coordinates lie before the data."""
 
     middle: Array
     width: Array
+    """Counted from the fit, shape (P,); standard deviation of a usual one."""
     group: NDArray[np.int_]
+    """Family, -1 for frames, which are as wide as they are, shape (P,)."""
     gears: NDArray[np.bool_]
+    """Families that are a gear's, shape (G,). How even gears are says nothing of an arm's
+    geometry."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,45 +81,30 @@ class Rows:
 
 
 class Weighed(NamedTuple):
-    """
-    All models together.
-
-    Attributes
-    ----------
-    mean : array, shape (P,)
-    covariance : array, shape (P, P)
-    shown, open : array, shape (P,)
-        Width of the one prior that stands for all sizes: by precision, as it counts where data show
-        a coordinate, and by variance, as it counts where they do not.
-    noise : float
-        Variance of a row.
-    rough : float
-        Share of the small errors that are of a usual size, among those of the geometry or those of
-        the gears, whichever are rougher.
-
-    """
+    """All models together."""
 
     mean: Array
+    """Shape (P,)."""
     covariance: Array
+    """Shape (P, P)."""
     shown: Array
     open: Array
+    """Width of the one prior that stands for all sizes: by precision, as it counts where data show
+    a coordinate, and by variance, as it counts where they do not, shape (P,)."""
     noise: float
+    """Variance of a row."""
     rough: float
+    """Share of the small errors that are of a usual size, among those of the geometry or those of
+    the gears, whichever are rougher."""
 
 
 def weighed(rows: Rows, prior: Prior, expected: float) -> Weighed:
     """
     Return the coordinates given rows, over all models.
 
-    Parameters
-    ----------
-    rows : Rows
-        What was measured, as linear equations.
-    prior : Prior
-        What is known of the coordinates before.
-    expected : float
-        Variance of a row before anything is known.
-
+    rows: what was measured, as linear equations.
+    prior: what is known of the coordinates before.
+    expected: variance of a row before anything is known.
     """
     chain = _Chain(rows, prior, expected)
     for sweep in range(SWEEPS):
@@ -158,11 +135,7 @@ def hidden(rows: Rows, frames: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """
     Return which coordinates no data like these could show, shape (P,).
 
-    Parameters
-    ----------
-    frames : array of bool, shape (P,)
-        Coordinates of fitted frames.
-
+    frames: coordinates of fitted frames, shape (P,).
     """
     columns = rows.columns
     basis = np.linalg.svd(columns[frames], full_matrices=False)[2]

@@ -43,29 +43,19 @@ CONSTANTS = np.geomspace(0.05, 0.7, 13)
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """
-    What frames and arm leave of every sample, and what may have changed while it was measured.
-
-    Attributes
-    ----------
-    residual : array, shape (M, c) in units of noise
-    basis : array, shape (P, M c)
-        Orthonormal: what frames and arm can explain.
-    things : dict of (array, array), shapes (M, c, k) and (M, 3, k)
-        What 'base', 'tool' and 'joints' do to every sample, whitened, and to its position [m].
-    rows, samples : tuple of int
-        Components and samples of every recording.
-    noise : float
-        Unit of the positions [m].
-
-    """
+    """What frames and arm leave of every sample, and what may have changed while it was measured."""
 
     residual: Array
+    """Shape (M, c) in units of noise."""
     basis: Array
+    """Orthonormal: what frames and arm can explain, shape (P, M c)."""
     things: Mapping[str, tuple[Array, Array]]
+    """What 'base', 'tool' and 'joints' do to every sample, whitened, and to its position [m]."""
     rows: tuple[int, ...]
     samples: tuple[int, ...]
+    """Components and samples of every recording."""
     noise: float
+    """Unit of the positions [m]."""
 
     def left(self, k: int) -> float:
         """Return the RMS distance [m] that is left of recording k, as a lag counts it."""

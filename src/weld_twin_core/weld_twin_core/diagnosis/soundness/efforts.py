@@ -61,12 +61,8 @@ def with_sign(recordings: Sequence[Recording], robot: Robot) -> tuple[Recording,
     """
     Return recordings whose efforts are known to hold the load, or to be it.
 
-    Raises
-    ------
-    DataError
-        Some recordings have efforts and others none, or none ever changes, or they are in another
-        unit than N m.
-
+    Raises DataError: some recordings have efforts and others none, or none ever changes, or they
+    are in another unit than N m.
     """
     reported = [recording.effort is not None for recording in recordings]
     if not any(reported):

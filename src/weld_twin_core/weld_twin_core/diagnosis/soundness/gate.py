@@ -62,31 +62,19 @@ CHECKS: dict[str, tuple[Checker, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """
-    What the gate found.
-
-    Attributes
-    ----------
-    given : Given
-        As it came, or mended where mistakes were undone.
-    posed : Problem and Model, or None
-        To be diagnosed; None where something is wrong that was not undone.
-    checks : tuple of Check
-    unsound : tuple of Unsound
-    mistakes : tuple of Finding
-        Those that were undone.
-    slips : tuple of Slip
-        What seems to have given way at an instant. Of one recording these are causes that ``posed``
-        offers the search; of several see `torn`.
-
-    """
+    """What the gate found."""
 
     given: Given
+    """As it came, or mended where mistakes were undone."""
     posed: tuple[Problem, Model] | None
+    """To be diagnosed; None where something is wrong that was not undone."""
     checks: tuple[Check, ...]
     unsound: tuple[Unsound, ...]
     mistakes: tuple[Finding, ...]
+    """Those that were undone."""
     slips: tuple[Slip, ...] = ()
+    """What seems to have given way at an instant. Of one recording these are causes that ``posed``
+    offers the search; of several see `torn`."""
 
     def told(self, result: Sequence[Effect]) -> tuple[Unsound, ...]:
         """Return the mistakes, and the slips that a fit has among what it found."""
@@ -139,20 +127,11 @@ def examine(
     """
     Return what is wrong with data and set-up.
 
-    Parameters
-    ----------
-    known : sequence of Effect
-        In the twin from the start.
-    apply : bool
-        Go on with mended data where every mistake can be undone.
-    beliefs : Beliefs, optional
-        What a difference between recordings must be worth.
+    known: in the twin from the start.
+    apply: go on with mended data where every mistake can be undone.
+    beliefs: what a difference between recordings must be worth.
 
-    Raises
-    ------
-    DataError
-        There is nothing to work on.
-
+    Raises DataError: there is nothing to work on.
     """
     trial, mistakes, look = given, list[Finding](), _Look()
     for _ in range(MOST + 1):  # what is undone shows what it hid

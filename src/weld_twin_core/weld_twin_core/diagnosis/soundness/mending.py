@@ -31,24 +31,14 @@ Sampled = TypeVar('Sampled', Signal, JointSignal)
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """
-    What a diagnosis is given.
-
-    Attributes
-    ----------
-    recordings : tuple of Recording
-    robot : Robot
-    align : frozenset of str
-        Frames to be fitted: 'base', 'tool'.
-    may_change : tuple of str
-        Families that may differ between the recordings.
-
-    """
+    """What a diagnosis is given."""
 
     recordings: tuple[Recording, ...]
     robot: Robot
     align: frozenset[str] = frozenset()
+    """Frames to be fitted: 'base', 'tool'."""
     may_change: tuple[str, ...] = ()
+    """Families that may differ between the recordings."""
 
 
 Mend = Callable[[Given], Given]
@@ -174,15 +164,9 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
 
     The measurements keep their stamps, so that whatever is told of an instant is told in theirs.
 
-    Parameters
-    ----------
-    late : float [s]
-        How late its measurements are in the middle.
-    rate : float [s/s]
-        How much later they get with every second of theirs.
-    middle : float [s]
-        The instant that ``late`` belongs to, on the clock of the measurements.
-
+    late: how late its measurements are in the middle [s].
+    rate: how much later they get with every second of theirs [s/s].
+    middle: the instant that ``late`` belongs to, on the clock of the measurements [s].
     """
     own = given.recordings[k]
 
@@ -214,16 +198,10 @@ def stamped_evenly(
     """
     Return what was given with measurements of recording k stamped by an even clock.
 
-    Parameters
-    ----------
-    first, step : float [s]
-        The first stamp, and the time from one to the next.
-    lost : array of int
-        Samples before which one is missing.
-    count : int
-        How many measurements had these stamps; of as many in the same time as there are now, each
-        takes its share.
-
+    first, step: the first stamp, and the time from one to the next [s].
+    lost: samples before which one is missing.
+    count: how many measurements had these stamps; of as many in the same time as there are now,
+    each takes its share.
     """
 
     def stamped(seen: Measurements) -> Measurements:
@@ -285,20 +263,11 @@ def replayed(entries: Sequence[Mapping[str, Any]], given: Given, which: int = 0)
     """
     Return what is given after the corrections of a diagnosis.
 
-    Parameters
-    ----------
-    entries : sequence of mapping
-        In the order in which they were made.
-    given : Given
-        One recording of the same source, or none for the robot alone.
-    which : int
-        Which recording of that diagnosis it is: some corrections are of one alone.
+    entries: in the order in which they were made.
+    given: one recording of the same source, or none for the robot alone.
+    which: which recording of that diagnosis it is: some corrections are of one alone.
 
-    Raises
-    ------
-    ModelError
-        A correction does not fit what is given.
-
+    Raises ModelError: a correction does not fit what is given.
     """
     for entry in entries:
         own = dict(entry)

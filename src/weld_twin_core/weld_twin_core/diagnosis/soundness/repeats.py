@@ -22,11 +22,7 @@ def refuse_reused(recordings: Sequence[Recording], holdout: Sequence[Recording])
     """
     Refuse to judge on measurements that are fitted as well.
 
-    Raises
-    ------
-    DataError
-        A held-out recording holds measurements of another, whatever its name.
-
+    Raises DataError: a held-out recording holds measurements of another, whatever its name.
     """
     for held in holdout:
         for recording in recordings:

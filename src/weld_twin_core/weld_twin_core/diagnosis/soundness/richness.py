@@ -94,11 +94,7 @@ def quantity(case: Case) -> Sequence[Finding]:
     """
     Return a note when there are few stations.
 
-    Raises
-    ------
-    DataError
-        There are fewer numbers than a frame has, or nothing moves.
-
+    Raises DataError: there are fewer numbers than a frame has, or nothing moves.
     """
     problem = case.problem
     frames = 6 * (len(case.recordings) if 'base' in problem.align else 0)

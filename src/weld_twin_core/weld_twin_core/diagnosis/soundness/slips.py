@@ -121,13 +121,8 @@ def changes(
     A settling is named only where a steady drift does not do as well; what is neither is taken out
     before the next is looked for.
 
-    Parameters
-    ----------
-    problem : Problem
-        The measurements that ``rest`` is of.
-    largest : float [m]
-        How far the largest gaps are; nothing moved twice as far.
-
+    problem: the measurements that ``rest`` is of.
+    largest: how far the largest gaps are [m]; nothing moved twice as far.
     """
     out: list[Slip | Settling] = []
     taken: list[tuple[int, int]] = []

@@ -40,29 +40,19 @@ SEED = 3
 
 
 class Candidates(NamedTuple):
-    """
-    What could have been found.
-
-    Attributes
-    ----------
-    fixed : array, shape (P, rows)
-        Whitened columns that are always fitted.
-    precision : array, shape (P,)
-        Their prior precision.
-    groups : iterable of array, shape (E, rows)
-        One group is found at a time.
-    ridges : sequence of float
-        Prior precisions at which it is tried.
-    ways : sequence of array of int, shape (rows,)
-        Ways to divide the rows into parts that are left out in turn; the one that shows least counts.
-
-    """
+    """What could have been found."""
 
     fixed: Array
+    """Whitened columns that are always fitted, shape (P, rows)."""
     precision: Array
+    """Their prior precision, shape (P,)."""
     groups: Iterable[Array]
+    """One group is found at a time, shape (E, rows)."""
     ridges: Sequence[float]
+    """Prior precisions at which it is tried."""
     ways: Sequence[Array]
+    """Ways to divide the rows into parts that are left out in turn, shape (rows,); the one that
+    shows least counts."""
 
 
 def noise(rows: int) -> Array:
@@ -79,13 +69,8 @@ def chance_gain(candidates: Candidates, steady: float, *, pooled: bool = False) 
     """
     Return the share of noise that the best of all candidates hardly ever predicts.
 
-    Parameters
-    ----------
-    steady : float
-        Standard errors that a gain must have to count.
-    pooled : bool
-        Whether all ways to divide count together, and not the one that shows least.
-
+    steady: standard errors that a gain must have to count.
+    pooled: whether all ways to divide count together, and not the one that shows least.
     """
     rest, remaining = _noise_left(candidates.fixed, candidates.precision)
     ways = [_parts(rest, remaining, labels) for labels in candidates.ways]
@@ -161,15 +146,10 @@ def chance_ratio(columns: Array, precision: Array, ways: Sequence[Array], *, kno
     A fit of few stations takes up part of the noise, so that it leaves too little where it was fitted
     and too much elsewhere. One where there are many rows.
 
-    Parameters
-    ----------
-    columns : array, shape (P, rows)
-        All that is fitted.
-    precision : array, shape (P,)
-    ways : sequence of array of int, shape (rows,)
-    known : bool
-        Whether the floor is known apart from what the fit leaves.
-
+    columns: all that is fitted, shape (P, rows).
+    precision: shape (P,).
+    ways: shape (rows,).
+    known: whether the floor is known apart from what the fit leaves.
     """
     rows = columns.shape[1]
     if rows > FEW:

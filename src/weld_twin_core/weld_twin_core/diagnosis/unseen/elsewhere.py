@@ -32,11 +32,7 @@ def borne_out(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) ->
     An effect gives its place to its like where that alone carries over. Then rivals that leave more
     than the effect in the model are none.
 
-    Parameters
-    ----------
-    holdout : sequence of Recording
-        Never fitted; without any nothing changes.
-
+    holdout: never fitted; without any nothing changes.
     """
     if not holdout:
         return result

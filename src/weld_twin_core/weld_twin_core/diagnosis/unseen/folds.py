@@ -31,11 +31,7 @@ def ways_to_divide(problem: Problem, stretches: int = STRETCHES) -> list[Array]:
     Stretches of time, then regions of posture; these not where places of contacts are the parts, as
     a place would lie on both sides.
 
-    Parameters
-    ----------
-    stretches : int
-        How many, about.
-
+    stretches: how many, about.
     """
     by_time = problem.block_labels(stretches)
     if problem.untracked and problem.places >= PLACES:
@@ -52,11 +48,7 @@ def posture_regions(problem: Problem, halvings: int = 3) -> Array:
     recordings have bases of their own, one that lies in one region for the most part is dealt out
     over all of them: its base could not be told from the other regions.
 
-    Parameters
-    ----------
-    halvings : int
-        2 to this power is the number of regions.
-
+    halvings: 2 to this power is the number of regions.
     """
     postures = np.concatenate(
         [r.joints.at(r.measured.t)[0] for r in problem.recordings if r.measured is not None]
@@ -95,40 +87,25 @@ def _keeping_bases(labels: Array, samples: Sequence[int]) -> Array:
 
 
 class Gain(NamedTuple):
-    """
-    What one model takes off the squared error of another on unseen parts.
-
-    Attributes
-    ----------
-    share : float
-        Share of it.
-    steady : float
-        The same in standard errors between parts.
-    fall : float [m^2]
-    rms_m : float
-        What is left, RMS [m].
-
-    """
+    """What one model takes off the squared error of another on unseen parts."""
 
     share: float
+    """Share of it."""
     steady: float
+    """The same in standard errors between parts."""
     fall: float
+    """[m^2]"""
     rms_m: float
+    """What is left, RMS [m]."""
 
 
 def gain(before: Array, after: Array, labels: Array, after_labels: Array | None = None) -> Gain:
     """
     Return what is gained.
 
-    Parameters
-    ----------
-    before, after : array, shape (samples,) [m^2]
-        Squared errors.
-    labels : array of int, shape (samples,)
-        Part of every sample.
-    after_labels : array of int, optional
-        The same of those after, where other samples are trusted.
-
+    before, after: squared errors, shape (samples,) [m^2].
+    labels: part of every sample, shape (samples,).
+    after_labels: the same of those after, where other samples are trusted.
     """
     others = labels if after_labels is None else after_labels
     names = np.intersect1d(labels, others)
@@ -161,10 +138,7 @@ def jackknife(tries: Array) -> Array:
     """
     Return the variance of a figure from what it is with each part left out in turn.
 
-    Parameters
-    ----------
-    tries : array, shape (parts, ...)
-
+    tries: shape (parts, ...).
     """
     count = len(tries)
     return np.asarray((count - 1) / count * ((tries - tries.mean(axis=0)) ** 2).sum(axis=0))

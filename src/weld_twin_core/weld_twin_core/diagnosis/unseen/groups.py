@@ -67,30 +67,19 @@ NEAR = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """
-    One place with one dependence.
-
-    Attributes
-    ----------
-    at, on : str
-        Place and dependence.
-    curves : tuple of Effect
-        What spans it, all values zero; empty where it is spanned by plain columns.
-    columns : array, shape (E, rows)
-        Whitened, together of unit mean square.
-    scales : array, shape (E,)
-        What the columns were divided by, noise per unit of a curve's value.
-    carriers : tuple of Effect
-        Curves that do on any motion what plain columns do on this one.
-
-    """
+    """One place with one dependence."""
 
     at: str
     on: str
+    """Place and dependence."""
     curves: tuple[Effect, ...]
+    """What spans it, all values zero; empty where it is spanned by plain columns."""
     columns: Array
+    """Whitened, together of unit mean square, shape (E, rows)."""
     scales: Array
+    """What the columns were divided by, noise per unit of a curve's value, shape (E,)."""
     carriers: tuple[Effect, ...] = ()
+    """Curves that do on any motion what plain columns do on this one."""
 
     @property
     def carried(self) -> tuple[Effect, ...]:
@@ -115,11 +104,7 @@ def all_groups(
     """
     Yield the groups that these data can show at all.
 
-    Parameters
-    ----------
-    wandering : bool
-        Whether what a joint loses by its direction may be more and less as time goes on.
-
+    wandering: whether what a joint loses by its direction may be more and less as time goes on.
     """
     features = problem.features(model)
     for at, on, curves in _curved(features, model):

@@ -37,11 +37,7 @@ def held_out_shrink(
     """
     Return the gap before and after, on the held-out bags or on stretches taking their turn.
 
-    Parameters
-    ----------
-    result : Search
-        The fitted effects and the noise they leave.
-
+    result: the fitted effects and the noise they leave.
     """
     model = result.final.model
     steps, alone = _waterfall(unseen, model)
@@ -74,11 +70,7 @@ def left_on(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> f
     """
     Return what the model leaves on held-out recordings, RMS over trusted samples [m].
 
-    Parameters
-    ----------
-    result : Search
-        Its final model is judged.
-
+    result: its final model is judged.
     """
     return float(np.sqrt(_on_bags(result, holdout, beliefs.other_setup)[1].mean()))
 
@@ -239,16 +231,10 @@ def ratio_interval(
     fitted, each stretch unseen, is one draw of that spread, and its square is added to the
     variance.
 
-    Parameters
-    ----------
-    before, after : array, shape (samples,)
-        Squared errors on unseen data.
-    labels : array of int, shape (samples,)
-    elsewhere : float, optional
-        The same ratio on other recordings.
-    farthest : float
-        Logarithm of a ratio between the two beyond which it widens the interval no further.
-
+    before, after: squared errors on unseen data, shape (samples,).
+    labels: shape (samples,).
+    elsewhere: the same ratio on other recordings.
+    farthest: logarithm of a ratio between the two beyond which it widens the interval no further.
     """
     ratio = float(np.sqrt(after.mean() / max(before.mean(), 1e-300)))
     if np.unique(labels).size < FEWEST:

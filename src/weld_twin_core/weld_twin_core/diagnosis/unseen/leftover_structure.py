@@ -29,43 +29,27 @@ TOLD = 3
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """
-    What groups of columns without a formula find.
-
-    Attributes
-    ----------
-    rms_m : float
-        RMS error on unseen stretches with the best of them beside the model, [m].
-    gain : float
-        Share of the squared error on unseen stretches that it takes away.
-    sure : float
-        The gain over its standard error between stretches.
-    chance : float
-        Share that the best of them hardly ever takes off noise alone; 0 where rows are many.
-    of_gap : mapping from (str, str) to float
-        By joint and dependence: share of the squared gap, no effect fitted, that one takes off.
-
-    """
+    """What groups of columns without a formula find."""
 
     rms_m: float
+    """RMS error on unseen stretches with the best of them beside the model, [m]."""
     gain: float
+    """Share of the squared error on unseen stretches that it takes away."""
     sure: float
+    """The gain over its standard error between stretches."""
     depends_on: tuple[str, ...]
     chance: float = 0.0
+    """Share that the best of them hardly ever takes off noise alone; 0 where rows are many."""
     of_gap: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    """By joint and dependence: share of the squared gap, no effect fitted, that one takes off."""
 
 
 def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> Structure:
     """
     Return what groups without a formula add on stretches not used for fitting.
 
-    Parameters
-    ----------
-    unseen : Unseen
-        Of the model.
-    baseline : Fit
-        Of the model without any effect that was found.
-
+    unseen: of the model.
+    baseline: of the model without any effect that was found.
     """
     problem = unseen.problem
     bare = Unseen.of(problem, unseen.scale, baseline, np.zeros(0))

@@ -51,47 +51,32 @@ TETHER = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Unseen:
-    """
-    Predictions of the final model and its parts on unseen stretches.
-
-    Attributes
-    ----------
-    labels : array, shape (rows,)
-        Stretch of every row.
-    columns : Columns
-        P columns: frames, then the coordinates of every found effect.
-    parts : tuple of slice
-        Columns of every effect.
-    residual : array, shape (rows,)
-        The final residual.
-    taken : callable
-        Returns what each effect takes off the residual, exactly, shape (K, rows): a run of the
-        twin for each, which a model of all effects does not need.
-    precision, pull : array, shape (P,)
-        Prior precision of every column, and how hard it pulls from where the fit is now.
-
-    """
+    """Predictions of the final model and its parts on unseen stretches."""
 
     problem: Problem
     scale: Scale
     labels: Array
+    """Stretch of every row, shape (rows,)."""
     columns: Columns
+    """P columns: frames, then the coordinates of every found effect."""
     parts: tuple[slice, ...]
+    """Columns of every effect."""
     residual: Array
+    """The final residual, shape (rows,)."""
     taken: Callable[[], Array]
+    """Returns what each effect takes off the residual, exactly, shape (K, rows): a run of the twin
+    for each, which a model of all effects does not need."""
     precision: Array
     pull: Array
+    """Prior precision of every column, and how hard it pulls from where the fit is now, shape
+    (P,)."""
 
     @classmethod
     def of(cls, problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
         """
         Prepare the parts of a fitted model, once.
 
-        Parameters
-        ----------
-        precision : array, shape (K,)
-            Prior precision of the fit coordinates, one over variance.
-
+        precision: prior precision of the fit coordinates, one over variance, shape (K,).
         """
         made: Unseen
         for given, made in fit.prepared:
@@ -113,11 +98,7 @@ class Unseen:
         """
         Return the same with something fitted along that was found at zero.
 
-        Parameters
-        ----------
-        columns : array, shape (E, rows)
-            Whitened, each as large as it is believed to be.
-
+        columns: whitened, each as large as it is believed to be, shape (E, rows).
         """
         count, more = self.columns.count, len(columns)
 
@@ -137,13 +118,8 @@ class Unseen:
         """
         Return the same under another prior about zero.
 
-        Parameters
-        ----------
-        precision : array, shape (K,)
-            Of every coordinate, one over variance.
-        coordinates : array, shape (K,)
-            Where the fit is.
-
+        precision: of every coordinate, one over variance, shape (K,).
+        coordinates: where the fit is, shape (K,).
         """
         frames = self.frames
         return replace(
@@ -400,11 +376,7 @@ class Base:
         """
         Return what further columns take off at the best of a few ridges.
 
-        Parameters
-        ----------
-        extra : array, shape (E, rows)
-            Of unit mean square.
-
+        extra: of unit mean square, shape (E, rows).
         """
         labels, before = self._known
         tried = self.extended(extra, RIDGES)
@@ -423,12 +395,8 @@ class Base:
         """
         Return the unseen residual with further columns, one array (rows,) for every ridge.
 
-        Parameters
-        ----------
-        extra : array, shape (E, rows)
-        ridges : sequence of float
-            Prior precision of the further columns.
-
+        extra: shape (E, rows).
+        ridges: prior precision of the further columns.
         """
         spans = self.unseen._spans
         both = np.concatenate([extra, self.target[None]])

@@ -44,16 +44,10 @@ def locate(result: Search, found: Structure, causes: Sequence[Cause] = ()) -> Wh
     """
     Return where the gap lies.
 
-    Parameters
-    ----------
-    result : Search
-        Its baseline is the model before any effect was found.
-    found : Structure
-        What groups without a formula take off the whole gap.
-    causes : sequence of Cause
-        Of the answer, if there are any: joints and regimes are then theirs, so that they say what
-        the answer says, also where a cause sits at no joint or its place is not certain.
-
+    result: its baseline is the model before any effect was found.
+    found: what groups without a formula take off the whole gap.
+    causes: of the answer, if there are any: joints and regimes are then theirs, so that they say
+    what the answer says, also where a cause sits at no joint or its place is not certain.
     """
     problem, start = result.problem, result.baseline.model
     names = start.robot.joint_names

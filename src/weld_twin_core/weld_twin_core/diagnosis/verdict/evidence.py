@@ -23,56 +23,38 @@ from ..unseen.unseen_stretches import Unseen
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """
-    What the verdict is drawn from.
-
-    Attributes
-    ----------
-    slots : tuple of tuple of Rival
-        For every found effect, itself and its rivals, most probable first.
-    structure : Structure
-        What generic columns still find.
-    gap, after, floor : float
-        RMS on unseen data before and after, and of the noise, [m].
-    independent : bool
-        Whether the floor was measured apart from any model.
-    parts : tuple of float
-        Squared contribution of every effect over the square of their sum.
-    refused : tuple of str
-        What would explain the rest best but no machine has, in words.
-    lacking : tuple of str
-        What was taken out of the library and fits clearly better than what was found, in words.
-    families : tuple of Family, optional
-        Where many small errors were fitted together: what each kind accounts for.
-    leverage : float
-        Ratio of ``after`` to ``floor`` that noise alone hardly ever exceeds: few stations are taken
-        up in part by the fit.
-    believed : tuple of float
-        How probable it is of every effect found that its name is right, as the calibration has it;
-        of many small errors, of all that are named.
-    nameless : float
-        How probable it is that a cause is at work that has no name in the library, as the
-        calibration has it.
-    missed : tuple of (str, str)
-        Places at which something free predicts beyond doubt what the formula of a name should, and
-        that in words; at 'instrument' it speaks against every name.
-
-    """
+    """What the verdict is drawn from."""
 
     slots: tuple[tuple[Rival, ...], ...]
+    """For every found effect, itself and its rivals, most probable first."""
     structure: Structure
+    """What generic columns still find."""
     gap: float
     after: float
     floor: float
+    """RMS on unseen data before and after, and of the noise, [m]."""
     independent: bool
+    """Whether the floor was measured apart from any model."""
     parts: tuple[float, ...]
+    """Squared contribution of every effect over the square of their sum."""
     refused: tuple[str, ...] = ()
+    """What would explain the rest best but no machine has, in words."""
     lacking: tuple[str, ...] = ()
+    """What was taken out of the library and fits clearly better than what was found, in words."""
     families: tuple[Family, ...] | None = None
+    """Where many small errors were fitted together: what each kind accounts for."""
     leverage: float = 1.0
+    """Ratio of ``after`` to ``floor`` that noise alone hardly ever exceeds: few stations are taken
+    up in part by the fit."""
     believed: tuple[float, ...] = ()
+    """How probable it is of every effect found that its name is right, as the calibration has it;
+    of many small errors, of all that are named."""
     nameless: float = 0.0
+    """How probable it is that a cause is at work that has no name in the library, as the
+    calibration has it."""
     missed: tuple[tuple[str, str], ...] = ()
+    """Places at which something free predicts beyond doubt what the formula of a name should, and
+    that in words; at 'instrument' it speaks against every name."""
 
 
 def gathered(
@@ -86,15 +68,9 @@ def gathered(
     """
     Return the evidence for a verdict.
 
-    Parameters
-    ----------
-    found, unseen
-        The search, and unseen stretches under its final model.
-    leftover : Structure
-        What generic columns still find beside it.
-    shrink : Shrink
-        On held-out recordings or on stretches taking their turn.
-
+    found, unseen: the search, and unseen stretches under its final model.
+    leftover: what generic columns still find beside it.
+    shrink: on held-out recordings or on stretches taking their turn.
     """
     robot = result.final.model.robot
     return Evidence(

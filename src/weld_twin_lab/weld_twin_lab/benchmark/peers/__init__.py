@@ -25,30 +25,19 @@ PACKAGES = {'pinocchio': 'pin', 'mujoco': 'mujoco'}
 
 @dataclass(frozen=True)
 class Peer:
-    """
-    One arm in one package.
-
-    Attributes
-    ----------
-    poses : callable
-        Joint positions (N, n) to poses (N, 4, 4).
-    screws : callable or None
-        Joint positions to poses and Jacobians (N, 6, n).
-    dh : callable or None
-        Joint positions to poses and derivatives by the DH values, (N, 6, 4 n), of each row
-        by theta, d, a, alpha.
-    single : callable or None
-        One joint position (n,) to a pose (4, 4).
-    loops : bool
-        A Python loop, so that the time per pose does not depend on how many there are.
-
-    """
+    """One arm in one package."""
 
     poses: Callable[[Array], Array]
+    """Joint positions (N, n) to poses (N, 4, 4)."""
     screws: Callable[[Array], tuple[Array, Array]] | None = None
+    """Joint positions to poses and Jacobians (N, 6, n)."""
     dh: Callable[[Array], tuple[Array, Array]] | None = None
+    """Joint positions to poses and derivatives by the DH values, (N, 6, 4 n), of each row by
+    theta, d, a, alpha."""
     single: Callable[[Array], Array] | None = None
+    """One joint position (n,) to a pose (4, 4)."""
     loops: bool = True
+    """A Python loop, so that the time per pose does not depend on how many there are."""
 
 
 def find_peers(robot: Robot) -> tuple[dict[str, Peer], dict[str, str]]:

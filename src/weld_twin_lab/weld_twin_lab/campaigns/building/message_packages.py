@@ -112,11 +112,7 @@ def folder_of_messages() -> Path | None:
     """
     Return a folder for ``PYTHONPATH`` that has the packages; None where they are installed.
 
-    Raises
-    ------
-    TwinError
-        They cannot be built here; the message says why.
-
+    Raises TwinError: they cannot be built here; the message says why.
     """
     absent = [package for package in DEFINITIONS if not _installed(package)]
     if not absent:

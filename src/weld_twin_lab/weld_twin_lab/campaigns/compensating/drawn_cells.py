@@ -56,21 +56,13 @@ TRIES = 200
 
 
 class Arm(NamedTuple):
-    """
-    An arm that goals are drawn for.
-
-    Attributes
-    ----------
-    seed : int
-        Decides what it is off by, what is learned of it, and its goals.
-    changed : bool
-        Whether its cell is changed after the goals.
-
-    """
+    """An arm that goals are drawn for."""
 
     name: str
     seed: int
+    """Decides what it is off by, what is learned of it, and its goals."""
     changed: bool
+    """Whether its cell is changed after the goals."""
 
     def of(self, rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
         """Return the rows of this arm."""
@@ -85,20 +77,12 @@ class DrawnGoal(NamedTuple):
 
 
 class Learned(NamedTuple):
-    """
-    What a diagnosis learned of an arm.
-
-    Attributes
-    ----------
-    text : str
-        The diagnosis.json.
-    noise : float [m]
-        Standard deviation of a coordinate of the instrument that it was learned with.
-
-    """
+    """What a diagnosis learned of an arm."""
 
     text: str
+    """The diagnosis.json."""
     noise: float
+    """Standard deviation of a coordinate of the instrument that it was learned with [m]."""
 
 
 def drawn_causes(robot: Robot, rng: np.random.Generator) -> list[dict[str, Any]]:
@@ -182,11 +166,7 @@ def drawn_goal(robot: Robot, rng: np.random.Generator) -> DrawnGoal:
     """
     Return a straight or bent seam, there or there and back, as points of a goal.
 
-    Raises
-    ------
-    DataError
-        None of those drawn can be travelled.
-
+    Raises DataError: none of those drawn can be travelled.
     """
     home, inside = np.array(HOMES[robot.name]), bool(rng.random() >= FAR)
     bare = robot.with_frames(base=np.eye(4))

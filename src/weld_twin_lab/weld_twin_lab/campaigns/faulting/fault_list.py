@@ -33,21 +33,13 @@ HOUR = 3600 * S
 
 @dataclass(frozen=True)
 class Fault:
-    """
-    One fault.
-
-    Attributes
-    ----------
-    run : callable
-        Does it, and leaves the cell in order.
-    tell : sequence of str
-        Nodes whose health must not be ok meanwhile.
-
-    """
+    """One fault."""
 
     name: str
     run: Callable[[Bench], None]
+    """Does it, and leaves the cell in order."""
     tell: Sequence[str] = TAKE_JOINTS
+    """Nodes whose health must not be ok meanwhile."""
 
 
 def _third(spoil: Callable[[Any], None]) -> Callable[[Bench], None]:

@@ -52,24 +52,15 @@ Told = tuple[str, str, float, 'float | None', str]
 
 
 class Scene(NamedTuple):
-    """
-    One fault.
-
-    Attributes
-    ----------
-    run : callable
-        Does it on a stand whose nodes run; yields what was told.
-    nodes : dict
-        Nodes that run, with their parameters.
-    mended : sequence of str
-        Nodes that must be well again at the end.
-
-    """
+    """One fault."""
 
     name: str
     run: Callable[[Stand], Iterator[Told]]
+    """Does it on a stand whose nodes run; yields what was told."""
     nodes: dict[str, dict[str, Any]]
+    """Nodes that run, with their parameters."""
     mended: tuple[str, ...] = ()
+    """Nodes that must be well again at the end."""
 
 
 def _turned(x: float, angle: float) -> Array:

@@ -137,12 +137,8 @@ class Stand:
         """
         Return after how long [s] a node's health tells something, and the whole sentence.
 
-        Parameters
-        ----------
-        node : str
-            Its full name.
-        within : float [s]
-
+        node: its full name.
+        within: [s]
         """
         self.health.clear()
         begun, found = time.monotonic(), ['']

@@ -41,21 +41,13 @@ class Hang(BaseException):
 
 @dataclass
 class Finding:
-    """
-    What a file did that it should not.
-
-    Attributes
-    ----------
-    case : int
-        With the seed of the campaign it makes the same file again.
-    what : str
-        Exception and the place in this project's code where it came from.
-
-    """
+    """What a file did that it should not."""
 
     target: str
     case: int
+    """With the seed of the campaign it makes the same file again."""
     what: str
+    """Exception and the place in this project's code where it came from."""
     times: int = 1
 
 

@@ -80,11 +80,7 @@ def mutate(rng: Random, seed: bytes, kind: str) -> bytes:
     """
     Return a seed with a few things wrong.
 
-    Parameters
-    ----------
-    kind : str
-        'yaml' and 'json' are also changed as trees, 'binary' never as text.
-
+    kind: 'yaml' and 'json' are also changed as trees, 'binary' never as text.
     """
     if kind in ('yaml', 'json') and rng.random() < 0.5:
         return _tree(rng, seed, kind)

@@ -32,51 +32,33 @@ ERRORS = ('none', 'offset', 'huge', 'jumbled')
 
 @dataclass(frozen=True)
 class Draw:
-    """
-    What a degenerate recording is made of.
-
-    Attributes
-    ----------
-    robot : str
-        One of `ROBOTS`.
-    stations : bool
-        At rest, else in motion.
-    count : int
-        Measurements.
-    turned : bool
-        Whether orientations were measured.
-    still : int
-        Joints that do not move, counted from the last.
-    travel : float
-        Half the range that the others move over [rad or m].
-    grid : float
-        Step that positions are rounded to [degrees]; none at 0.
-    repeats : int
-        How often every posture comes.
-    noise : float
-        Of the instrument, [m].
-    flat : int
-        Coordinates that were not measured and are zero throughout.
-    error : str
-        One of `ERRORS`.
-    warm : bool
-        Whether a temperature was recorded, ever the same.
-
-    """
+    """What a degenerate recording is made of."""
 
     robot: str = 'ur5'
+    """One of `ROBOTS`."""
     stations: bool = True
+    """At rest, else in motion."""
     count: int = 20
+    """Measurements."""
     turned: bool = False
+    """Whether orientations were measured."""
     align: str = ''
     still: int = 0
+    """Joints that do not move, counted from the last."""
     travel: float = 0.5
+    """Half the range that the others move over [rad or m]."""
     grid: float = 0.0
+    """Step that positions are rounded to [degrees]; none at 0."""
     repeats: int = 1
+    """How often every posture comes."""
     noise: float = 2e-5
+    """Of the instrument, [m]."""
     flat: int = 0
+    """Coordinates that were not measured and are zero throughout."""
     error: str = 'none'
+    """One of `ERRORS`."""
     warm: bool = False
+    """Whether a temperature was recorded, ever the same."""
     seed: int = 0
 
 
@@ -185,13 +167,8 @@ def worst_of(count: int, first: int, tell: Callable[[str], None]) -> dict[str, A
     """
     Return how many draws ended how, and those that went wrong.
 
-    Parameters
-    ----------
-    count, first : int
-        So many draws, from this one on.
-    tell : callable
-        Told every draw that went wrong.
-
+    count, first: so many draws, from this one on.
+    tell: told every draw that went wrong.
     """
     statuses: Counter[str] = Counter()
     bad = []

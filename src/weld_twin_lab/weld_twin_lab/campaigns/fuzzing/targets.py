@@ -63,22 +63,14 @@ PATHS = (
 
 @dataclass(frozen=True)
 class Target:
-    """
-    A kind of file.
-
-    Attributes
-    ----------
-    suffix, kind : str
-        Of the file's name, and how it may be changed.
-    read : callable
-        Reads the file of a path.
-
-    """
+    """A kind of file."""
 
     suffix: str
     kind: str
+    """Of the file's name, and how it may be changed."""
     seeds: tuple[bytes, ...]
     read: Callable[[Path], Any]
+    """Reads the file of a path."""
 
 
 @cache

@@ -24,11 +24,7 @@ def write_result(
     """
     Write what came of a campaign, beside where and with what it ran.
 
-    Raises
-    ------
-    DataError
-        The file is something else's, or cannot be written.
-
+    Raises DataError: the file is something else's, or cannot be written.
     """
     refuse_foreign(path, campaign)
     head = {
@@ -50,11 +46,7 @@ def refuse_foreign(path: Path | str, campaign: str) -> None:
     """
     Refuse to replace anything but an older result of the same campaign.
 
-    Raises
-    ------
-    DataError
-        Something else is there.
-
+    Raises DataError: something else is there.
     """
     target = Path(path)
     if not target.exists():

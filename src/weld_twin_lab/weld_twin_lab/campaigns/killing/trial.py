@@ -38,25 +38,16 @@ JOINTS = tuple(f'joint_{k}' for k in range(1, 7))
 
 @dataclass(frozen=True)
 class Trial:
-    """
-    When and how a recorder is killed.
-
-    Attributes
-    ----------
-    moment : float [s]
-        After the first message; then it is killed, or told to end if ``closing``.
-    split_mb : float [MB]
-        Size of a file of the bag; 0 is without limit.
-    wait : float [s]
-        From being told to end until the kill.
-
-    """
+    """When and how a recorder is killed."""
 
     storage: str
     moment: float
+    """After the first message [s]; then it is killed, or told to end if ``closing``."""
     closing: bool
     split_mb: float
+    """Size of a file of the bag [MB]; 0 is without limit."""
     wait: float
+    """From being told to end until the kill [s]."""
 
 
 @dataclass

@@ -25,20 +25,11 @@ def keystore(folder: Path, policy: Path, enclaves: Iterable[str]) -> Path:
     """
     Return a new keystore for the domain of the environment.
 
-    Parameters
-    ----------
-    folder : Path
-        Where to make it.
-    policy : Path
-        What each enclave may do.
-    enclaves : iterable of str
-        All of them stand in the policy.
+    folder: where to make it.
+    policy: what each enclave may do.
+    enclaves: all of them stand in the policy.
 
-    Raises
-    ------
-    TwinError
-        sros2 is not here, or fails.
-
+    Raises TwinError: sros2 is not here, or fails.
     """
     command = [sys.executable, '-m', __name__, str(folder), str(policy), *enclaves]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -54,18 +54,11 @@ def secured_middleware(source: Path, work: Path) -> Iterator[None]:
     """
     Build a source and let this process and its children run on it, for a while.
 
-    Parameters
-    ----------
-    source : Path
-        Folder with checkouts.
-    work : Path
-        Folder to build in; what was built there before is used again.
+    source: folder with checkouts.
+    work: folder to build in; what was built there before is used again.
 
-    Raises
-    ------
-    TwinError
-        Source, compiler, headers or the wheels of the build tools are missing, or it does not build.
-
+    Raises TwinError: source, compiler, headers or the wheels of the build tools are missing, or it
+    does not build.
     """
     install = work / 'install'
     if next(install.rglob(LIBRARY), None) is None:

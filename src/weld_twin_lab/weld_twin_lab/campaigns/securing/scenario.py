@@ -66,11 +66,7 @@ def locks(folder: Path) -> list[dict[str, str]]:
     """
     Return what each of the parties has in its environment, the nodes' own first.
 
-    Raises
-    ------
-    TwinError
-        No keys can be made.
-
+    Raises TwinError: no keys can be made.
     """
     file = folder / 'policy.xml'
     file.write_text(HEAD + PARTY + policy().removeprefix(HEAD).removesuffix(TAIL) + TAIL)
@@ -98,16 +94,9 @@ def played(folder: Path, locked: list[dict[str, str]]) -> dict[str, Any]:
     """
     Return what each party heard, what was recorded of each, and what the nodes made of it.
 
-    Parameters
-    ----------
-    locked : list of dict
-        Environments of the parties, the first one that of the nodes too; empty without keys.
+    locked: environments of the parties, the first one that of the nodes too; empty without keys.
 
-    Raises
-    ------
-    TwinError
-        A node does not run; the message has what it said.
-
+    Raises TwinError: a node does not run; the message has what it said.
     """
     bag = folder / 'bag'
     words = {**WORDS, 'recorder': ['-p', f'out:={bag}']}

@@ -29,24 +29,15 @@ ALL = ('a', 'alpha', 'd', 'theta')
 
 @dataclass(frozen=True)
 class Fitted:
-    """
-    What came of a fit.
-
-    Attributes
-    ----------
-    names : tuple of (str, int)
-        DH value and row, or frame and -1.
-    values, errors : array, shape (P,)
-        Corrections, and their standard errors.
-    effect : array, shape (P,) [m]
-        How far each moves the tool, RMS.
-
-    """
+    """What came of a fit."""
 
     names: tuple[tuple[str, int], ...]
+    """DH value and row, or frame and -1."""
     values: Array
     errors: Array
+    """Corrections, and their standard errors, shape (P,)."""
     effect: Array
+    """How far each moves the tool, RMS, shape (P,) [m]."""
     robot: Robot
 
 

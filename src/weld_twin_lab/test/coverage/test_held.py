@@ -106,3 +106,7 @@ def test_promises_of_a_sealed_cell_hold_where_the_tool_really_is_and_are_sharp()
     (low, high), true = shrink['ci90'], shrink['true']
     assert low <= true <= high
     assert 'parameters' in promise_table([told])
+    # As a program: what is off before is known better than it is large, and less is off after.
+    ((before,), (after,)) = (told['promises'][f'path {when}'] for when in ('before', 'after'))
+    assert np.ptp(before['ci90']) < before['true']
+    assert after['true'] < before['true'] and after['ci90'][1] < before['ci90'][0]

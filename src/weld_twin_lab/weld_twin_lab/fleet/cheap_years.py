@@ -12,6 +12,7 @@ years that are diagnosed in full.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,8 +45,6 @@ def cheap_year(seed: int, number: int, bases: Sequence[Mapping[str, Any]]) -> di
 
 def _common(entries: Sequence[Entry]) -> list[Entry]:
     """Return entries with only the coordinates that all have, in the same order."""
-    from dataclasses import replace
-
     names = [n for n in entries[0].names if all(n in each.names for each in entries)]
     out = []
     for each in entries:
@@ -66,17 +65,18 @@ def drawn(
     checks: Sequence[Entry], lived: Year, truth: Mapping[str, float], rng: np.random.Generator
 ) -> list[Observation]:
     """Return the observations of a year: the arm as it is each week, seen through a check."""
-    shown = [each.information()[0] for each in observations(checks)]
+    seen = observations(checks)
+    shown = [each.information()[0] for each in seen]
     roots = [_root(each) for each in shown]
     out = []
     for week, set_up in zip(lived.weeks, lived.set_ups, strict=True):
         k = set_up % len(checks)
-        check = checks[k]
+        check = seen[k]
         off = moved(lived.events, week)
         theta = np.array([truth[name] + off.get(name, 0.0) for name in check.names])
         told = shown[k] @ theta + roots[k] @ rng.normal(size=theta.size)
         value = check.covariance @ told
-        out.append(Observation(WEEK * week, check.names, value, check.covariance, check.prior_std))
+        out.append(replace(check, day=WEEK * week, value=value))
     return out
 
 

@@ -6,13 +6,13 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from weld_twin_core.history import Observation
 from weld_twin_report.history import Entry, observations
 from weld_twin_report.history.tracking import likely, named
 
@@ -79,10 +79,7 @@ def scored(
     """Return what the weekly looks at a year of diagnoses came to."""
     entries = [Entry.of_plain(each) for each in kept]
     start = FIRST.timestamp() / 86_400.0
-    seen = [
-        Observation(o.day - start, o.names, o.value, o.covariance, o.prior_std)
-        for o in observations(entries)
-    ]
+    seen = [replace(o, day=o.day - start) for o in observations(entries)]
     yearly = draw(seed, number)
     truth = {
         f'{each["effect"]} {each["joint"]} 0': float(

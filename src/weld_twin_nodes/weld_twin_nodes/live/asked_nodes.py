@@ -51,6 +51,7 @@ class AskedNodes:
 
     def close(self) -> None:
         """Ask and listen no more."""
+        self._unasked.clear()  # a look may be waiting in the executor already
         self._node.destroy_timer(self._asking)
         self._node.destroy_subscription(self._events)
         for client in self._clients:
@@ -76,7 +77,7 @@ class AskedNodes:
                 question = GetParameters.Request(names=asked)
                 client.call_async(question).add_done_callback(partial(self._told, name))
         if not self._unasked:
-            self._asking.cancel()
+            self._node.destroy_timer(self._asking)
 
     def _told(self, name: str, answer: Future) -> None:
         self._take(name, answer.result().values)

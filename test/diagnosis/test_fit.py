@@ -19,6 +19,7 @@ from weld_twin_core.diagnosis.algebra.fit import (
     stepped,
 )
 from weld_twin_core.diagnosis.algebra.problem import Problem
+from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 
 CASES = {
     'geometry': (
@@ -217,3 +218,12 @@ def test_few_stations_are_not_outweighed_by_what_is_believed_of_machines(ratio):
     start = bare.model.with_found((effect('gear_ratio', joint=joint, scale=0.0),))
     (found,) = fit(problem, start, scale).model.found
     assert float(found.scale) == pytest.approx(ratio, abs=3e-4)
+
+
+def test_what_a_fit_leaves_is_foretold_without_the_effects_that_were_taken_out_of_it():
+    problem, scale, model, _ = case('geometry')
+    found = fit(problem, model, scale)
+    bare = replace(found, model=found.model.with_found(()))
+    unseen = Unseen.of(problem, scale, bare, np.zeros(bare.coordinates.size))
+    assert unseen.parts == ()
+    assert unseen.whole.shape == found.residual.shape

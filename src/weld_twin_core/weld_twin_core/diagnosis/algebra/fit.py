@@ -59,8 +59,6 @@ class Fit:
     model: Model
     residual: Array
     """Whitened residual at the solution, shape (rows,)."""
-    coordinates: Array
-    """Fit coordinates of all found effects, shape (K,)."""
     prepared: list[Any] = field(default_factory=list, init=False, repr=False)
     """What was last prepared of it for unseen stretches, as several steps ask for the same. It
     lies here, and goes with the fit: it holds the fit itself."""
@@ -69,6 +67,11 @@ class Fit:
     def rss(self) -> float:
         """Return the whitened sum of squares."""
         return float(self.residual @ self.residual)
+
+    @cached_property
+    def coordinates(self) -> Array:
+        """Return the fit coordinates of all found effects, shape (K,)."""
+        return coordinates(self.model)
 
 
 def design(problem: Problem, model: Model, scale: Scale) -> Array:
@@ -141,7 +144,7 @@ def fit(
         share = (LEAST_NOISE / scale.position) ** 2
         start = _Point.at(problem, model, scale, prior, share)
         here = min(here, _descended(start, iterations, tolerance), key=lambda one: one.surprise)
-    return Fit(here.model, here.residual, coordinates(here.model))
+    return Fit(here.model, here.residual)
 
 
 def _descended(start: _Point, iterations: int, tolerance: float) -> _Point:

@@ -24,7 +24,7 @@ from ...twin.posterior import Directions, Posterior, postures_within_limits, usu
 from ...twin.reversals import is_play, lost_motion
 from ...twin.twin import Twin
 from ..algebra.definite import inverted
-from ..algebra.fit import LEAST_TURN, Fit, coordinates
+from ..algebra.fit import LEAST_TURN, Fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Model, Problem, Scale
@@ -69,7 +69,7 @@ def allowed(
     rows, prior = _rows(problem, model, scale, what), _prior(what, model)
     models = weighed(rows, prior, _expected(problem, scale))
     system = Conditioning(rows, prior, models.shown, models.noise)
-    fit = Fit(model, rows.residual, coordinates(model))
+    fit = Fit(model, rows.residual)
     regions = Unseen.of(problem, scale, fit, precision).by(posture_regions(problem))
     levers = _levers(problem, model, scale)
     foretold = Foretold.of(regions, rows.columns, levers, system.given)

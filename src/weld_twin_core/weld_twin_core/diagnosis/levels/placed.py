@@ -64,8 +64,7 @@ def placed(
         return None
     if result.dense:
         # Beside many small errors it is what they leave that has no place yet.
-        model = result.final.model.with_found(())
-        bare = replace(result.final, model=model, coordinates=np.zeros(0))
+        bare = replace(result.final, model=result.final.model.with_found(()))
         form = free_form(result.problem, result.scale, bare, beliefs)
     else:
         form = FreeForm(()) if alternative is None else alternative.form

@@ -54,7 +54,7 @@ class ToleranceStack:
     runs: int
     seed: int
     percentiles: dict[str, Array]
-    """For d_norm, max_m, across_m and stickout_m: value and 95 % interval at `PERCENTILES`, shape
+    """Value and 95 % interval at `PERCENTILES` of d_norm, max_m, across_m and stickout_m, shape
     (K, 3)."""
     inside_across: Probability
     inside_stickout: Probability

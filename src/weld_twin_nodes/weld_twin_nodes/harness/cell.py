@@ -105,7 +105,7 @@ class Cell:
         Start a node in a process of its own.
 
         node: a node of this package, or a whole command.
-        **parameters: its ROS parameters.
+        parameters: its ROS parameters.
         """
         assert self._folder is not None
         folder = self._folder / f'{self._started:02d}'
@@ -128,7 +128,7 @@ class Cell:
         does.
         args: its other arguments.
         cli_args: such as remappings.
-        **parameters: its ROS parameters.
+        parameters: its ROS parameters.
         """
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         node = make(*args, context=self._context, parameter_overrides=overrides, cli_args=cli_args)

@@ -17,15 +17,18 @@ as they are there, so that one that was stopped goes on.
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import wraps
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+import weld_twin_core
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.whole_files import write_text
@@ -37,6 +40,12 @@ from weld_twin_nodes.offline.owned_files import LIST
 if TYPE_CHECKING:
     from weld_twin_nodes.offline.task_pool import Runner, Task
 
+_COPYRIGHT = (
+    b'# Copyright 2026 weld_twin contributors\n',
+    b'# SPDX-FileCopyrightText: weld_twin contributors\n',
+)
+"""The line of copyright is no part of the engine: its older form stands in digests of earlier
+studies, so that they hold for the same engine."""
 MISSED = 1
 """Exit code where a goal was not met."""
 DONE = 'done'
@@ -190,6 +199,26 @@ class Study:
         out, ours = self.out, (*ours, LIST)
         if out.exists() and not (out.is_dir() and all(p.name in ours for p in out.iterdir())):
             raise DataError(f"'{out}' holds something else already; choose another place")
+
+
+def engine_digest() -> str:
+    """Return the SHA-256 over the source of the core: another engine, another digest."""
+    place = Path(weld_twin_core.__file__).parent
+    files = [file.read_bytes() for file in sorted(place.rglob('*.py'))]
+    whole = [hashlib.sha256(text.replace(*_COPYRIGHT, 1)).hexdigest() for text in files]
+    return hashlib.sha256('\n'.join(whole).encode()).hexdigest()
+
+
+def require_simulator() -> None:
+    """
+    Refuse to make cases without the simulator.
+
+    Raises DataError: it is not installed.
+    """
+    if find_spec('mujoco') is None:
+        raise DataError(
+            "cases are simulated with MuJoCo; install it with: pip install 'weld-twin[bench]'"
+        )
 
 
 def head(schema: str, **more: Any) -> dict[str, Any]:

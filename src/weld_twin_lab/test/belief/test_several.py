@@ -9,8 +9,8 @@ import pytest
 
 from weld_twin_lab.belief.baseline import page, scored
 from weld_twin_lab.belief.judged import kept
-from weld_twin_lab.belief.several import CROWDED, MOST, lot_of, several
-from weld_twin_lab.belief.trial import SEVERAL, tried
+from weld_twin_lab.belief.mix import CROWDED, MOST, SEVERAL, drawn, lot_of
+from weld_twin_lab.belief.trial import tried
 from weld_twin_lab.belief.visible import shown
 from weld_twin_lab.belief.whole import VISIBLE, whole
 
@@ -36,7 +36,7 @@ def test_every_number_of_causes_comes_equally_often_and_a_fifth_is_withheld():
 
 def test_what_the_frames_take_up_does_not_show_and_a_twisted_link_does():
     number = next(k for k in range(0, 60, MOST) if lot(k).motion == 'stations')
-    case, _ = several(5, number)
+    case = drawn(5, number, SEVERAL).case
     robot = case.cell.robot
     first, link = robot.joint_names[0], robot.joint_names[2]
     zero = {'effect': 'joint_offset', 'joint': first, 'offset': 1e-3}

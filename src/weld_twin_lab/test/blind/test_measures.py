@@ -13,8 +13,7 @@ from weld_twin_lab.blind.measures import (
     calibration_measures,
     verdict_measures,
 )
-from weld_twin_lab.blind.score_page import page
-from weld_twin_lab.blind.scoring import Score
+from weld_twin_lab.blind.scoring import Score, page
 
 A, B, C = ('joint_offset', 'a'), ('joint_offset', 'b'), ('gear_ratio', 'a')
 

@@ -13,6 +13,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_lab.contest.arms import page as told_page
 from weld_twin_lab.contest.course import commands, run_all
 from weld_twin_lab.contest.entrants import bootstrap, geometry, never_knows, zero_offset
 from weld_twin_lab.contest.open_form import (
@@ -23,7 +24,6 @@ from weld_twin_lab.contest.open_form import (
     write_case,
 )
 from weld_twin_lab.contest.scores import Sealed, page, point
-from weld_twin_lab.contest.told import page as told_page
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 
 SIZE = 4e-4

@@ -17,8 +17,8 @@ from ..blind.ambiguous import Site
 from ..blind.judging import CONFIDENT, is_sure
 from ..blind.statistics import Estimate, bootstrap, calibration_error, share
 from .levels_of_truth import Levels, alike_by_structure, levels_of
+from .mix import MOST as CAUSES
 from .rows import rounded
-from .several import MOST as CAUSES
 from .whole import WIDEST, whole
 
 MOST = 2 * CAUSES

@@ -22,8 +22,7 @@ from ..blind.blind_cell import take
 from ..blind.making import MOTIONS_OF, truth_of
 from ..blind.statistics import share
 from .levels_of_truth import alike_by_structure
-from .mix import SPANS
-from .several import several
+from .mix import SEVERAL, SPANS, drawn
 from .trial import diagnosed, recordings_of, said
 
 MOST = 4
@@ -38,11 +37,11 @@ def grown(seed: int, number: int) -> dict[str, Any]:
     """
     Return what is said of a cell with one recording, two, ..., and with all in reverse.
 
-    seed, number: of the cell, as `several.several` takes them.
+    seed, number: of the cell, as `mix.drawn` takes them.
     """
     name = f'{seed}/{number}'
     try:
-        case, _ = several(seed, number)
+        case = drawn(seed, number, SEVERAL).case
     except Exception as error:
         return {'name': name, 'error': f'not drawn: {error}'}
     rng = np.random.default_rng([seed, 7000 + number])

@@ -1,44 +1,84 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The mix of cases that belief is learned from, and that its bounds hold for.
+The mixes of cases that belief is learned from, and that its bounds hold for.
 
-Robots, kinds of causes, their sizes and the kinds of motion are those of the blind check, with a
-quarter of the cases outside the library or withheld from it; a third of the motions is poor.
+In the usual one robots, kinds of causes, their sizes and the kinds of motion are those of the blind
+check, with a quarter of the cases outside the library or withheld from it; a third of the motions is
+poor. The other has cells with one to six causes at once, as real cells have them: every number is
+equally often, and in a fifth of the cases the family of one cause is taken out of the library. The
+plant's statics are true: a spring settles where it balances the load.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ..blind.ambiguous import CONSTRUCTIONS
-from ..blind.deck import KINDS, Deck, Lot, lots
+from ..blind.cause_sizes import FAMILIES, MOVING
+from ..blind.deck import KINDS, ROBOTS, Deck, Lot, lots
 from ..blind.making import SealedCase, draw_case
-from ..blind.poor_motion import WAYS
+from ..blind.poor_motion import WAYS, poorer
 
+USUAL, SEVERAL = 'usual', 'several'
+"""Mixes of cases."""
 SHARES = {**KINDS, 'outside': 6, 'withheld': 6}
-"""Of 44 cases, how many are of each kind."""
+"""Of 44 usual cases, how many are of each kind."""
 POOR = ('', '', '', '', '', '', '', '', *WAYS)
-"""How motions are made poor: one in three; 'few' changes stations alone."""
+"""How their motions are made poor: one in three; 'few' changes stations alone."""
 SPANS = (15.0, 45.0)
 """Length [s] of a recording, drawn between these."""
+MOST = 6
+"""Causes of one of several at the most."""
+COMMON = (
+    'joint_offset',
+    'link_length',
+    'link_offset',
+    'link_twist',
+    'axis_parallelism',
+    'backlash',
+    'joint_compliance',
+    'gear_ratio',
+    'transmission_ripple',
+)
+"""Families that most arms have something of; each comes `OFTEN` times as often as any other."""
+OFTEN = 5
+"""Cards of a common family in the deck for one of any other. A judgement: most cells have some."""
+MOTIONS = ('stations', 'stations', 'seams', 'both')
+CROWDED = ('stations', 'both')
+"""Motions of cases with five and six causes: stations, 40 at least, that could tell them."""
+STRATA = (1, 1, 2, 2, 2, 3)
+"""Numbers of the strata of `blind.deck`, dealt like cards: 1 to 40 times the noise."""
+ALIGN = (('base', 'tool'), ('base', 'tool'), ('base', 'tool'), ('base',), ())
+"""Frames to be fitted: both in most cells, as nobody knows them."""
+NOISE = (2e-5, 8e-5)
+"""RMS length of the noise [m], drawn between these with even logarithms."""
+WITHHELD = 5
+"""One case of so many has a family taken out."""
+HELD_OUT = 3
+"""One case of so many brings a held-out recording; of stations it has few."""
 
 
 class Drawn(NamedTuple):
-    """A case, and how its motion was made poor."""
+    """A case, how its motion was made poor, and whether its held-out recording is given."""
 
     case: SealedCase
-    poor: str
+    poor: str = ''
+    held_out: bool = True
 
 
-def drawn(seed: int, number: int) -> Drawn:
+def drawn(seed: int, number: int, mix: str = USUAL) -> Drawn:
     """
-    Return case ``number`` of a seed; it depends on nothing else.
+    Return case ``number`` of a seed and a mix; it depends on nothing else.
 
     Raises DataError: no cell and motion show such causes.
     """
+    if mix == SEVERAL:
+        return _of_several(seed, number)
     lot = mixed(seed, number + 1)[number]
     ways = Deck(POOR, seed, 60)
     poor = [ways.next() for _ in range(number + 1)][number]
@@ -49,5 +89,54 @@ def drawn(seed: int, number: int) -> Drawn:
 
 
 def mixed(seed: int, count: int) -> list[Lot]:
-    """Return what the first cases of a seed are to be, in the shares of the mix."""
+    """Return what the first usual cases of a seed are to be, in the shares of the mix."""
     return lots(seed, count, constructions=tuple(CONSTRUCTIONS), shares=SHARES)
+
+
+def _of_several(seed: int, number: int) -> Drawn:
+    rng = np.random.default_rng([seed, 3000 + number])
+    lot = lot_of(seed, number, rng)
+    case = draw_case(lot, rng, SPANS)
+    holdout = poorer(case.holdout, 'few', rng)
+    if lot.kind == 'withheld':
+        case = replace(case, excluded=(str(rng.choice(lot.families)),))
+    given = number % HELD_OUT == HELD_OUT - 1 and not case.also
+    return Drawn(replace(case, holdout=holdout), held_out=given)
+
+
+def lot_of(seed: int, number: int, rng: np.random.Generator) -> Lot:
+    """
+    Return what a case of the mix of several is to be.
+
+    rng: of the case.
+    """
+    count = 1 + number % MOST
+    crowded = count >= MOST - 1
+    motion = str(rng.choice(CROWDED if crowded else MOTIONS))
+    align = ALIGN[int(rng.integers(len(ALIGN)))]
+    fitted = {f'{frame}_pose' for frame in align}
+    still = MOVING if motion in CROWDED else frozenset()
+    cards = [name for name in (*COMMON * (OFTEN - 1), *FAMILIES) if name not in still | fitted]
+    families = _families(cards, count, rng)
+    withheld = (number // MOST) % WITHHELD == WITHHELD - 1
+    robots = Deck(ROBOTS, seed, 71)
+    robot = [robots.next() for _ in range(number + 1)][number]
+    return Lot(
+        'withheld' if withheld else 'several',
+        robot,
+        motion,
+        families,
+        tuple(int(rng.choice(STRATA)) for _ in range(count)),
+        align,
+        float(np.exp(rng.uniform(*np.log(NOISE)))),
+    )
+
+
+def _families(cards: Sequence[str], count: int, rng: np.random.Generator) -> tuple[str, ...]:
+    """Return families; a common one may come twice, at two joints."""
+    out: list[str] = []
+    while len(out) < count:
+        card = str(rng.choice(cards))
+        if card in COMMON or card not in out:
+            out.append(card)
+    return tuple(out)

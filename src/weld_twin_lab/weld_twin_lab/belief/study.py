@@ -25,9 +25,10 @@ from .bound import upper_limit
 from .goals import goal_measures
 from .judged import Example, examples_of, kept
 from .logistic import log_loss
+from .mix import USUAL
 from .rows import seeds_of
 from .table import page
-from .trial import USUAL, tried
+from .trial import tried
 
 RESULT, PAGE = 'results.json', 'belief.md'
 COVERAGE = 0.7

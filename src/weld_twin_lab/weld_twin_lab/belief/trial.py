@@ -19,16 +19,12 @@ from weld_twin_core.recording import Recording
 from ..blind import layout
 from ..blind.achieved import aligned_on, counted, gap_on
 from ..blind.blind_cell import Take, as_recording, record
-from ..blind.diagnosing import engine_digest
 from ..blind.displacement import rms
 from ..blind.making import SealedCase, truth_of
-from .mix import drawn
-from .several import several
+from ..study import engine_digest
+from .mix import SEVERAL, USUAL, drawn
 from .visible import shown
 from .whole import FEW
-
-USUAL, SEVERAL = 'usual', 'several'
-"""Mixes of cases."""
 
 
 def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
@@ -36,25 +32,17 @@ def tried(seed: int, number: int, mix: str = USUAL) -> dict[str, Any]:
     Return the row of one case: its truth, what was said of it, and on what evidence.
 
     seed, number: of the case, as the mix takes them.
-    mix: `USUAL` for `mix.drawn`; `SEVERAL` for `several.several`.
+    mix: `USUAL` or `SEVERAL`.
     """
     name = f'{seed}/{number}'
     try:
-        case, poor, held_out = _drawn(seed, number, mix)
+        case, poor, held_out = drawn(seed, number, mix)
     except Exception as error:
         return {'name': name, 'error': f'not drawn: {error}'}
     row = {'poor': poor, **row_of(name, case, held_out=held_out)}
     if mix == SEVERAL or row['truth']['kind'] in FEW:
         row['truth']['shown'] = shown(case)
     return row
-
-
-def _drawn(seed: int, number: int, mix: str) -> tuple[SealedCase, str, bool]:
-    """Return a case, how its motion was made poor, and whether it has a held-out recording."""
-    if mix == SEVERAL:
-        case, held_out = several(seed, number)
-        return case, '', held_out
-    return (*drawn(seed, number), True)
 
 
 def row_of(name: str, case: SealedCase, *, held_out: bool = True) -> dict[str, Any]:

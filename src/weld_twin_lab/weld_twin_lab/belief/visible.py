@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Which causes of a case show at all, by the plant alone.
+Which causes of a case show at all, and what share of the gap each has, by the plant alone.
 
 A cause is taken out of the truth; all others and the frames may then change so that the
 recordings look as they did. What still differs, there and on another motion, shows. On the
@@ -18,7 +18,7 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 
-from ..blind.blind_cell import BlindCell, Take, deviation, exact, record
+from ..blind.blind_cell import BlindCell, Take, deviation, exact, floor, record
 from ..blind.cause_sizes import SIZES, Cause
 from ..blind.making import SealedCase
 
@@ -105,3 +105,23 @@ def _changed(causes: Sequence[Cause], k: int) -> Iterator[list[Cause]]:
             other = value.copy()
             other[at] += step
             yield [*causes[:k], {**own, key: other.tolist()}, *causes[k + 1 :]]
+
+
+def true_shares(case: SealedCase) -> list[float]:
+    """
+    Return the true share of every cause of a case.
+
+    As a diagnosis tells it: of the squared gap with its noise, what is no noise is parted by how
+    far each cause moves the tool along with all of them together. One that works against the
+    others takes nothing off the gap beside them, and has a share of zero. The noise is all that
+    is not the causes': the instrument's, and that of stamps that jitter.
+    """
+    whole = deviation(case.cell, case.causes, case.train)
+    noise, _ = floor(case.cell, case.causes, case.train)
+    square = float((whole**2).sum(axis=-1).mean())
+    along = [
+        max(float((deviation(case.cell, [cause], case.train) * whole).sum(axis=-1).mean()), 0.0)
+        for cause in case.causes
+    ]
+    explained = square / (square + noise**2) / max(sum(along), 1e-300)
+    return [explained * part for part in along]

@@ -19,7 +19,7 @@ import numpy as np
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.markdown import table
 
-from ..blind.diagnosing import engine_digest
+from ..study import engine_digest
 from . import waiting_data as data
 from .costs import Cost, cost_of
 
@@ -47,6 +47,7 @@ _CLI = ('-m', 'weld_twin_nodes')
 _READ = """
 import sys
 from weld_twin_core.arm.catalog import load
+
 try:
     from weld_twin_msgs_py.bags import read_recording
 except ImportError:  # where it was in earlier versions

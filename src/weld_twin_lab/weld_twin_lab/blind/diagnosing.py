@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import resource
 import sys
@@ -12,7 +11,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-import weld_twin_core
 from weld_twin_core import __version__
 from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.errors import DataError
@@ -23,16 +21,11 @@ from weld_twin_nodes.offline.task_pool import Runner, Task
 from weld_twin_nodes.offline.told_twin import build_twin
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
+from ..study import engine_digest
 from . import layout, seal
 
 _KIB = 1024 if sys.platform != 'darwin' else 1
 """What getrusage counts memory in [bytes]."""
-_COPYRIGHT = (
-    b'# Copyright 2026 weld_twin contributors\n',
-    b'# SPDX-FileCopyrightText: weld_twin contributors\n',
-)
-"""The line of copyright is no part of the engine: its older form stands in digests of earlier
-studies, so that they hold for the same engine."""
 
 
 def diagnose_cases(
@@ -100,14 +93,6 @@ def _truths_readable(cases: Path, allowed: bool) -> bool:
             'them away, or say --allow-readable'
         )
     return truths is not None
-
-
-def engine_digest() -> str:
-    """Return the SHA-256 over the source of the core: another engine, another digest."""
-    place = Path(weld_twin_core.__file__).parent
-    files = [file.read_bytes() for file in sorted(place.rglob('*.py'))]
-    whole = [hashlib.sha256(text.replace(*_COPYRIGHT, 1)).hexdigest() for text in files]
-    return seal.text_digest('\n'.join(whole))
 
 
 def diagnose_case(place: str, digest: str, engine: str, with_holdout: bool) -> dict[str, Any]:

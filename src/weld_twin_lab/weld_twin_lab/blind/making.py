@@ -14,6 +14,9 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.features import Features
+from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import write_recording
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
@@ -21,6 +24,7 @@ from weld_twin_msgs_py.robots import write_robot_yaml
 from weld_twin_nodes.offline.output_directory import new_directory
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
+from ..plant.outside_causes import FLANK_TORQUE
 from . import layout, seal
 from .ambiguous import CONSTRUCTIONS, construct
 from .blind_cell import (
@@ -48,6 +52,8 @@ Cells and motions drawn for a case before it is given up; causes that cannot sho
 """
 MOTIONS_OF = {'both': ('stations', 'seams')}
 """Motions of the recordings of a case, where there are several."""
+NO_LOAD = 1e-6
+"""Load [N m, N] below which it is that of rounding."""
 DECOY = 0.1
 """Share of cases with their causes in the library from which another family is taken out."""
 
@@ -219,6 +225,29 @@ def _excluded(lot: Lot, rng: np.random.Generator) -> tuple[str, ...]:
     if lot.kind in ('single', 'double', 'none') and rng.random() < DECOY:
         return (str(rng.choice(others)),)
     return ()
+
+
+def one_arm(case: SealedCase) -> SealedCase:
+    """
+    Return the case with what friction holds in a gear the same in every recording.
+
+    The plant has it as a share of a recording's largest load where it is not given. Where there is no
+    load at all, rounding would decide on which flank the gear lies.
+
+    Raises DataError: a joint with such play carries nothing.
+    """
+    robot, command = case.cell.robot, case.train.command
+    moved = Recording('first', JointMotion(command.t, command.q, static=command.static))
+    shift = Features(Twin(robot), moved, command.t).view.shift
+    causes = []
+    for cause in case.causes:
+        if cause['effect'] == 'loaded_play':
+            most = float(np.abs(shift['tau', robot.index(str(cause['joint']))]).max())
+            if most < NO_LOAD:
+                raise DataError(f'{cause["joint"]} carries nothing, so no load moves its play')
+            cause = {**cause, 'torque': FLANK_TORQUE * most}
+        causes.append(cause)
+    return replace(case, causes=causes)
 
 
 def write_case(place: Path, name: str, case: SealedCase) -> None:

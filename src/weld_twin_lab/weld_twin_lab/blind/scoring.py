@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Open the seals, check the commitments, hold verdicts against truths."""
+"""Open the seals, check the commitments, hold verdicts against truths; the score as a page."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
 
 from . import layout, seal
@@ -22,9 +23,11 @@ from .measures import (
     Measure,
     alias_measure,
     calibration_measures,
+    measure_table,
     verdict_measures,
 )
 
+MISSED = ('case', 'kind', 'truth (RMS over noise)', 'verdict', 'confidence', 'why there is none')
 MIB = 1 << 20
 """Bytes."""
 
@@ -120,3 +123,32 @@ def _costs(verdicts: list[dict[str, Any]]) -> dict[str, float]:
         'median_memory_mib': float(np.median(memory)),
         'most_memory_mib': float(np.max(memory)),
     }
+
+
+def page(score: Score) -> str:
+    """Return measures, cases that were missed, and what a diagnosis costs."""
+    made, costs = score.made, score.costs
+    seen = 'could be read' if made['truths_readable'] else 'could not be read'
+    missed = [
+        (
+            case.name,
+            f'{case.kind}, {case.robot}, {case.motion}',
+            f'{case.truth} ({case.stratum:.1f})',
+            f'{case.status}: {case.said or "-"}',
+            f'{case.confidence:.2f}',
+            score.errors.get(case.name, ''),
+        )
+        for case in score.cases
+        if not case.right
+    ]
+    return '\n'.join(
+        [
+            f'# {len(score.cases) - len(missed)} of {len(score.cases)} cases answered rightly\n',
+            f'Seed {made["seed"]}, seal {made["seal"]}, engine {made["engine"][:16]} of version '
+            f'{made["version"]}. Truths {seen} from where the cases were diagnosed.\n',
+            measure_table([measure.as_dict() for measure in score.measures]),
+            f'A diagnosis took {costs["median_seconds"]:.1f} s in the median, '
+            f'{costs["most_seconds"]:.1f} s at most, and {costs["most_memory_mib"]:.0f} MiB.\n',
+            *([markdown.table(MISSED, *missed)] if missed else []),
+        ]
+    )

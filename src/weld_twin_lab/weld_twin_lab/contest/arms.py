@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Cases from two measured arms: from few stations or a small region to half of all."""
+"""Cases from two measured arms, from few stations or a small region to half of all; and the page."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from weld_twin_msgs_py.files.markdown import table
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 
-from ..transfer.plain import plain_fit
 from ..transfer.splits import Split, all_splits
+from ..transfer.unseen import ALIGN, plain_fit
 from .course import Run
 from .open_form import write_case
 
@@ -29,7 +29,6 @@ KINDS = ('n30', 'wrist_10deg', 'octant_0', 'odd')
 of all."""
 MEASURED = 'measured.json'
 """Where the tool was at the times asked for, beside the cases and not in them."""
-ALIGN = frozenset({'base', 'tool'})
 Errors = dict[str, dict[str, float]]
 """Mean errors [m] by method and case."""
 
@@ -110,3 +109,27 @@ def _millimetres(error: float | None, best: float) -> str:
     if error is None:
         return '-'
     return f'**{1e3 * error:.3f}**' if error == best else f'{1e3 * error:.3f}'
+
+
+def page(table: str, errors: Errors, measured: Mapping[str, Array]) -> str:
+    """
+    Return the page in Markdown.
+
+    table: all methods on the sealed cases, as `scores.page` gives it.
+    errors: on the measured arms, as `arms.lefts` gives them; empty where these were not asked.
+    measured: what was measured there, shape (M, 3) [m].
+    """
+    parts = [f'## On sealed cases\n\n{table}']
+    if errors:
+        parts.append(_on_arms(errors, measured))
+    return '\n'.join(parts)
+
+
+def _on_arms(errors: Errors, measured: Mapping[str, Array]) -> str:
+    asked = ', '.join(f'{name} {len(rows)}' for name, rows in measured.items())
+    return (
+        '## On two measured arms\n\nMean error [mm] on the stations asked for; the least on every '
+        'split is bold. `n30` is thirty stations, `wrist_10deg` and `octant_0` are narrow regions '
+        f'asked about outside of them, `odd` is every second station.\n\n'
+        f'{arm_table(errors, list(measured))}\nStations asked for: {asked}.\n'
+    )

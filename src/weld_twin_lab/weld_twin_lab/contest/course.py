@@ -12,15 +12,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import NamedTuple
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots import load_robot
 
+from ..benchmark.costs import cost_of
 from ..blind import layout
 from .open_form import ContestAnswer, read_answer, write_case
-from .processes import Ended, ended
 
 ENTRANTS = (
     'weld_twin',
@@ -34,6 +35,10 @@ ENTRANTS = (
     'never_knows',
 )
 """Methods of the repository, a file each in `entrants`."""
+SAID = 'said.txt'
+"""What a method printed while it worked."""
+LIMIT = 300.0
+"""Seconds an answer may take; a fit that has not ended by then has lost its way."""
 RUN = 'run.json'
 """What a run took, beside its answer: a contest that was stopped goes on from there."""
 
@@ -149,3 +154,33 @@ def _kept(place: Path, count: int) -> Run:
         return Run(read_answer(place, count), *used)
     except DataError as error:
         return Run(None, *used, str(error))
+
+
+class Ended(NamedTuple):
+    """How a run ended."""
+
+    seconds: float
+    """Of processor time, the start of the interpreter and its imports included [s]."""
+    memory_bytes: int
+    trouble: str = ''
+    """The last that it said where it failed; empty where it did not."""
+
+
+def ended(words: Sequence[str], case: Path, place: Path) -> Ended:
+    """
+    Have the answer to a case written to a place.
+
+    words: the command of a method, with {case} and {out} in it.
+    """
+    filled = [word.replace('{case}', str(case)).replace('{out}', str(place)) for word in words]
+    with (place / SAID).open('w', encoding='utf-8') as said:
+        code, cost = cost_of(filled, said=said, limit=LIMIT)
+    return Ended(cost.cpu, int(cost.peak), _trouble(place, code))
+
+
+def _trouble(place: Path, code: int) -> str:
+    """Return the last line that a program said before it failed; nothing where it did not."""
+    if code == 0:
+        return ''
+    lines = (place / SAID).read_text(encoding='utf-8').strip().splitlines()
+    return lines[-1] if lines else f'exit code {code}'

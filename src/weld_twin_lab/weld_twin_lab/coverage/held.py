@@ -18,7 +18,7 @@ from weld_twin_core.recording import Measurements, Recording
 from weld_twin_core.twin.posterior import largest_sigma, pose_covariances
 from weld_twin_core.twin.twin import Twin
 
-from ..transfer.flags import flagged
+from ..transfer.unseen import flagged
 
 HOLD = 0.9
 """Share of the errors that a region promises to hold."""

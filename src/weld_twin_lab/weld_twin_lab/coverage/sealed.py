@@ -29,14 +29,13 @@ from weld_twin_core.twin.twin import Twin
 
 from ..belief.mix import drawn
 from ..belief.trial import diagnosed, recordings_of
-from ..belief.true_shares import true_shares
+from ..belief.visible import true_shares
 from ..blind.achieved import NORMAL_90, TO_90, aligned_on, gap_on
 from ..blind.blind_cell import GROSS, as_recording, exact, record
 from ..blind.cause_sizes import Cause, site
 from ..blind.displacement import rms
-from ..blind.making import SealedCase
-from ..blind.one_arm import one_arm
-from ..transfer.flags import flagged
+from ..blind.making import SealedCase, one_arm
+from ..transfer.unseen import flagged
 from .held import held, twin_for, within
 from .oracle import oracle_sigma
 from .planned import small_errors
@@ -59,7 +58,7 @@ def of_case(seed: int, number: int) -> dict[str, Any] | None:
     seed, number: as `mix.drawn` takes them.
     """
     try:
-        case, poor = drawn(seed, number)
+        case, poor, _ = drawn(seed, number)
         case = one_arm(case)
     except DataError:
         return None

@@ -17,12 +17,10 @@ from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
 
-from ..blind.simulator import require_simulator
 from ..programs.cells import CELLS
-from ..study import Parts
-from ..transfer.plain import plain_fit
+from ..study import Parts, require_simulator
 from ..transfer.splits import TUNED_ON, Split, all_splits
-from ..transfer.unseen_stations import ALIGN, residual
+from ..transfer.unseen import ALIGN, plain_fit, residual
 from .held import held
 from .others import of_seam, of_touches, of_years
 from .planned import carried_out

@@ -30,8 +30,7 @@ from ..blind.blind_cell import as_recording, of_motion, record
 from ..blind.cause_sizes import site
 from ..blind.deck import Lot
 from ..blind.judging import Judged, judge
-from ..blind.making import SealedCase, draw_case
-from ..blind.one_arm import one_arm
+from ..blind.making import SealedCase, draw_case, one_arm
 from ..blind.poor_motion import WAYS
 from ..blind.recorded_motion import RATE, Motion
 from ..blind.seal import text_digest

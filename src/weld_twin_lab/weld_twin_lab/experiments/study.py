@@ -12,8 +12,7 @@ from weld_twin_core.errors import TwinError
 from weld_twin_nodes.offline.task_pool import Runner, Task
 
 from ..blind.deck import lots
-from ..blind.diagnosing import engine_digest
-from ..study import Tell, head
+from ..study import Tell, engine_digest, head, require_simulator
 from .goals import summary
 
 PARTS = 'parts'
@@ -70,8 +69,6 @@ def investigated_cell(seed: int, number: int, engine: str) -> dict[str, Any]:
     seed, number: decide the cell.
     engine: only tells the results of one version of the core from those of another.
     """
-    from ..blind.simulator import require_simulator
-
     require_simulator()
     from .sealed_cell import SealedCell
     from .trial import looped, poor_at_first

@@ -20,8 +20,7 @@ from weld_twin_nodes.offline.exporting import Speeds, export
 
 from ..blind.blind_cell import BlindCell, as_recording, record
 from ..blind.deck import Lot, lots
-from ..blind.making import SealedCase, draw_case
-from ..blind.one_arm import one_arm
+from ..blind.making import SealedCase, draw_case, one_arm
 from ..blind.recorded_motion import RATE
 from ..blind.seams import drawn_seam
 from ..plant.plant import run

@@ -17,8 +17,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, JointSignal, Recording
 from weld_twin_msgs_py.files import markdown
 
-from ..transfer.plain import PLAIN, plain_fit
-from ..transfer.unseen_stations import ALIGN, residual
+from ..transfer.unseen import ALIGN, PLAIN, plain_fit, residual
 
 WAYS = ('frames', 'geometry', 'statics', 'efforts')
 """Plain fits of the frames and of the geometry; diagnoses with springs by statics and by efforts."""

@@ -24,9 +24,8 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
 from ..contacts.data import places_of, robot_of, touches
-from ..transfer.arm_tables import stations
 from ..transfer.servo_axis import axis_recording, axis_robot
-from ..transfer.splits import HOME, alone
+from ..transfer.splits import HOME, alone, stations
 
 HALF_PI = float(np.pi / 2.0)
 """A right angle [rad]."""

@@ -13,14 +13,12 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.contacts import spreads
-from weld_twin_core.diagnosis import Diagnosis, diagnose
+from weld_twin_core.diagnosis import Diagnosis
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.recording import Recording
 
-from ..transfer.crash import traceback_told
-from ..transfer.plain import PLAIN, plain_fit
-from ..transfer.unseen_stations import residual
+from ..transfer.unseen import PLAIN, plain_fit, residual, tried
 from .borne_out import Borne, borne_out
 from .rows import ArmRow, halves, plans, row, size
 
@@ -40,7 +38,8 @@ def judged(data: str, name: str) -> dict[str, Any]:
     plan = next(each for each in plans() if each.name == name)
     one = row(Path(data), plan)
     start = perf_counter()
-    found, error = _tried(one.fitted, one)
+    options = {'align': one.align, 'experiment': False}
+    found, error = tried(one.fitted, one.robot, **options)
     out: dict[str, Any] = {
         'name': name,
         'stations': size(one.fitted),
@@ -61,7 +60,7 @@ def judged(data: str, name: str) -> dict[str, Any]:
     out['unseen_m'] = _unseen(one, found)
     pair = halves(one.fitted) if plan.halved else None
     if pair is not None:
-        both = [_tried(half, one)[0] for half in pair]
+        both = [tried(half, one.robot, **options)[0] for half in pair]
         out['halves'] = [_said(half) if half is not None else None for half in both]
     return out
 
@@ -199,13 +198,6 @@ def _accused(entry: Mapping[str, Any]) -> bool:
         for cause in entry['causes']
         for place, p in cause['place'][:1]
     )
-
-
-def _tried(recording: Recording, one: ArmRow) -> tuple[Diagnosis | None, str | None]:
-    try:
-        return diagnose([recording], one.robot, align=one.align, experiment=False), None
-    except Exception:  # what is counted here is exactly what nobody expected
-        return None, traceback_told()
 
 
 def _said(found: Diagnosis) -> dict[str, Any]:

@@ -11,16 +11,13 @@ import numpy as np
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis import Diagnosis, diagnose
+from weld_twin_core.diagnosis import Diagnosis
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.recording import Recording
 
-from .crash import traceback_told
-from .flags import flagged
-from .plain import PLAIN, plain_fit
 from .splits import Split, halves
-from .unseen_stations import ALIGN, residual
+from .unseen import ALIGN, PLAIN, flagged, plain_fit, residual, tried
 
 PRODUCT, FRAMES = 'product', 'frames'
 HALVES = 60
@@ -42,7 +39,7 @@ def judge(split: Split) -> dict[str, Any]:
         name: plain_fit(split.train, robot, families, ALIGN) for name, families in PLAIN.items()
     }
     start = perf_counter()
-    diagnosis, error = tried(split.train, split.robot)
+    diagnosis, error = tried(split.train, robot, align=ALIGN)
     out['seconds'] = round(perf_counter() - start, 2)
     out['traceback'] = error
     if diagnosis is None:
@@ -55,17 +52,9 @@ def judge(split: Split) -> dict[str, Any]:
         if stations is not None and _count(stations):
             out[region] = _region(models, split.train, stations, diagnosis)
     if _count(split.train) >= HALVES:
-        pair = [tried(half, split.robot) for half in halves(split.train)]
+        pair = [tried(half, robot, align=ALIGN) for half in halves(split.train)]
         out['halves'] = [said(half) if half else {'traceback': text} for half, text in pair]
     return out
-
-
-def tried(train: Recording, robot: str) -> tuple[Diagnosis | None, str | None]:
-    """Return the diagnosis, or the traceback that came instead."""
-    try:
-        return diagnose([train], catalog.load(robot), align=ALIGN), None
-    except Exception:  # what is counted here is exactly what nobody expected
-        return None, traceback_told()
 
 
 def said(diagnosis: Diagnosis) -> dict[str, Any]:

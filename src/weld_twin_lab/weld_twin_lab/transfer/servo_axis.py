@@ -13,14 +13,12 @@ from scipy.io import loadmat
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
-from .crash import traceback_told
 from .judging import said
 from .splits import Rows
-from .unseen_stations import residual
+from .unseen import residual, tried
 
 FILE = 'DATA_EMPS.mat'
 JOINT = 'axis'
@@ -68,12 +66,10 @@ def judge_axis(directory: Path) -> dict[str, Any]:
     out: dict[str, Any] = {'name': 'servo_axis', 'kind': 'servo_axis', 'robot': robot.name}
     out['rms_m'] = plain_axis(recording, cut)
     start = perf_counter()
-    try:
-        diagnosis = diagnose([train], robot)
-    except Exception:
-        return out | {'traceback': traceback_told()}
-    out['seconds'] = round(perf_counter() - start, 2)
-    out['traceback'] = None
+    diagnosis, error = tried(train, robot)
+    out |= {'seconds': round(perf_counter() - start, 2), 'traceback': error}
+    if diagnosis is None:
+        return out
     out |= said(diagnosis)
     out['found'] = [found.as_dict() for found in diagnosis.effects]
     if diagnosis.status != 'unsound':

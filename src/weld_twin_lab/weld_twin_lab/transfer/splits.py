@@ -13,14 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import JointMotion, Recording
-
-from .arm_tables import stations
+from weld_twin_msgs_py.tables import read_table
 
 Rows = NDArray[Any]
 """Row numbers."""
 
+TABLES = {'ur5': 'grid.csv', 'ur10': 'series_c_random_poses.csv'}
+"""What the stations of each arm are in."""
 COUNTS = (15, 30, 60, 120, 240)
 """Stations that are fitted on, at random: from hardly enough to plenty."""
 LEAST = 15
@@ -69,6 +71,15 @@ def all_splits(ur5: Path, ur10: Path) -> Iterator[Split]:
     """
     for robot, directory in (('ur5', ur5), ('ur10', ur10)):
         yield from splits(robot, stations(robot, directory), HOME[robot])
+
+
+def stations(robot: str, directory: Path) -> Recording:
+    """
+    Return the stations of one of the two arms, in the order they were measured.
+
+    Raises DataError: the table is missing or cannot be read.
+    """
+    return read_table(directory / TABLES[robot], catalog.load(robot)).recording
 
 
 def splits(robot: str, table: Recording, first: int = 0) -> Iterator[Split]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...study import DONE, Study, option, options, study
+from ...study import DONE, Study, engine_digest, option, options, require_simulator, study
 
 TABLE, GROWING = 'answers.jsonl', 'growing'
 
@@ -70,10 +70,8 @@ def _answers(study: Study) -> list[dict[str, Any]]:
     from weld_twin_nodes.offline.task_pool import Task
 
     from ...belief.baseline import brief
+    from ...belief.mix import SEVERAL
     from ...belief.switches import tried_without, without
-    from ...belief.trial import SEVERAL
-    from ...blind.diagnosing import engine_digest
-    from ...blind.simulator import require_simulator
 
     require_simulator()
     args, out_of_it = study.args, tuple(sorted(study.args.without))
@@ -93,8 +91,6 @@ def _growing(study: Study) -> None:
 
     from ...belief.growing import grown, page
     from ...belief.rows import write_rows
-    from ...blind.diagnosing import engine_digest
-    from ...blind.simulator import require_simulator
 
     args = study.args
     if not args.cases or args.beside:

@@ -15,7 +15,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...belief.terms import RISK
-from ...study import Study, option, options, study
+from ...study import Study, option, options, require_simulator, study
 
 LEARNED, JUDGED = 'cases.jsonl.gz', 'held_out.jsonl.gz'
 
@@ -48,7 +48,6 @@ def run(study: Study) -> None:
 
     from ...belief.rows import read_rows, write_rows
     from ...belief.study import fit, rows_of, write
-    from ...blind.simulator import require_simulator
 
     args = study.args
     if args.cases or args.held_out:

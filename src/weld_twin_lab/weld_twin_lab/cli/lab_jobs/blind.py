@@ -14,7 +14,7 @@ from pathlib import Path
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.options import add_command
 
-from ...study import DONE, REQUIRED, Study, job, listed, option, options, study
+from ...study import DONE, REQUIRED, Study, job, listed, option, options, require_simulator, study
 from ..retired import BLIND, add_retired
 
 DRAW = (
@@ -157,8 +157,6 @@ JOBS = {
 
 def _made(study: Study, cases: Path, truths: Path) -> None:
     """Make the cases that the options ask for, and print their seal."""
-    from ...blind.simulator import require_simulator
-
     require_simulator()
     from ...blind.making import make
 
@@ -172,8 +170,7 @@ def _made(study: Study, cases: Path, truths: Path) -> None:
 
 def _scored(study: Study, cases: Path, truths: Path, results: Path, seal: str = '') -> None:
     """Score, write, and print the measures."""
-    from ...blind.score_page import page
-    from ...blind.scoring import score
+    from ...blind.scoring import page, score
 
     result = score(cases, truths, results, seal_given=seal)
     study.write('score', result.as_dict(), page(result))

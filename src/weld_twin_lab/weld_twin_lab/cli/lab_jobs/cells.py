@@ -9,7 +9,7 @@ tracker. Writes cells.json and cells.md; a run that was interrupted goes on wher
 
 from __future__ import annotations
 
-from ...study import Study, option, options, study
+from ...study import Study, engine_digest, option, options, require_simulator, study
 
 add_arguments = options(
     option('--cells', 14, 'N', 'sealed cells of every kind (default: 14)'),
@@ -25,8 +25,6 @@ def run(study: Study) -> bool:
     """Run what is not done yet, write the result, print the table."""
     from weld_twin_nodes.offline.task_pool import Task
 
-    from ...blind.diagnosing import engine_digest
-    from ...blind.simulator import require_simulator
     from ...cells.case import beside_a_camera, sealed
     from ...cells.drawn import KINDS
     from ...cells.real_pixels import PARTS, part

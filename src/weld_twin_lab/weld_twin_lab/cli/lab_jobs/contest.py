@@ -34,14 +34,14 @@ add_arguments = options(
 @study
 def run(study: Study) -> None:
     """Run the contest and print the tables."""
-    from ...contest import course, told
+    from ...contest import arms, course
 
     args = study.args
     methods = course.commands(listed(args.entrants) or list(course.ENTRANTS), args.enter)
     content, table = _sealed(study, methods)
     errors, measured = _arms(study, methods) if args.ur5 and args.ur10 else ({}, {})
     content['arms_mean_m'] = errors
-    text = told.page(table, errors, measured)
+    text = arms.page(table, errors, measured)
     study.write('contest', content, text)
 
 

@@ -9,7 +9,7 @@ A run that was interrupted goes on where it stopped.
 
 from __future__ import annotations
 
-from ...study import Study, listed, option, options, study
+from ...study import Study, engine_digest, listed, option, options, require_simulator, study
 
 add_arguments = options(
     option('--seed', 20, 'S', 'decides what is drawn (default: 20)'),
@@ -27,8 +27,6 @@ def run(study: Study) -> bool:
     """Run what is not done yet, write the result, print the table."""
     from weld_twin_core.errors import DataError
 
-    from ...blind.diagnosing import engine_digest
-    from ...blind.simulator import require_simulator
     from ...gate.mistakes import KINDS
     from ...gate.table import page, result
     from ...gate.tasks import drawn

@@ -9,7 +9,7 @@ where it stopped.
 
 from __future__ import annotations
 
-from ...study import Study, head, option, options, study
+from ...study import Study, engine_digest, head, option, options, require_simulator, study
 
 add_arguments = options(
     option('--seams', 1, 'N', 'sealed seams a language (default: 1)'),
@@ -22,9 +22,6 @@ add_arguments = options(
 def run(study: Study) -> None:
     """Correct and drive what is not done yet, and print the table."""
     from weld_twin_nodes.offline.task_pool import Task
-
-    from ...blind.diagnosing import engine_digest
-    from ...blind.simulator import require_simulator
 
     require_simulator()
     from ...programs.cells import CELLS

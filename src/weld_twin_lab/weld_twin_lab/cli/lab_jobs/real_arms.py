@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...study import DONE, REQUIRED, Study, option, options, study
+from ...study import DONE, REQUIRED, Study, engine_digest, option, options, study
 
 add_arguments = options(
     option('--data', REQUIRED, 'DIR', 'holds ur5_laser_tracker, emps, mukca, ...'),
@@ -26,7 +26,6 @@ def run(study: Study) -> None:
     from weld_twin_core.errors import DataError
     from weld_twin_nodes.offline.task_pool import Task
 
-    from ...blind.diagnosing import engine_digest
     from ...real_arms.rows import plans
     from ...real_arms.study import judged, summary, table
 

@@ -9,6 +9,7 @@ on where it stopped. Remove the directory to begin anew. Exits with 1 when a goa
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from ...study import REQUIRED, Study, option, options, study
@@ -25,16 +26,20 @@ add_arguments = options(
 def run(study: Study) -> bool:
     """Judge what is not judged yet, and print the goals."""
     from ...study import head
-    from ...transfer.goals import measures
-    from ...transfer.study import NAME, PARTS, entries_of
-    from ...transfer.tables import goal_table, page
+    from ...transfer.goals import goal_table, measures, page
+    from ...transfer.judging import judge
+    from ...transfer.servo_axis import judge_axis
+    from ...transfer.splits import all_splits
 
-    args = study.args
-    study.refuse_foreign(f'{NAME}.json', f'{NAME}.md', PARTS)
-    ur5, ur10, emps = (Path(place) for place in (args.ur5, args.ur10, args.emps))
-    entries = entries_of(ur5, ur10, emps, args.only, study.parts(PARTS))
+    args, parts = study.args, 'splits'
+    study.refuse_foreign('transfer.json', 'transfer.md', parts)
+    part = study.parts(parts)
+    chosen = [s for s in all_splits(Path(args.ur5), Path(args.ur10)) if args.only in s.name]
+    entries = [part(split.name, partial(judge, split)) for split in chosen]
+    if args.only in 'servo_axis':
+        entries.append(part('servo_axis', partial(judge_axis, Path(args.emps))))
     found = measures(entries)
     result = head('transfer/1', measures=[m._asdict() for m in found], splits=entries)
-    study.write(NAME, result, page(entries, found), say=False)
+    study.write('transfer', result, page(entries, found), say=False)
     print(goal_table(found))
     return all(m.reached is not False for m in found)

@@ -8,7 +8,7 @@ and diagnosed in full. A run that was interrupted goes on where it stopped.
 
 from __future__ import annotations
 
-from ...study import Study, option, options, study
+from ...study import Study, engine_digest, option, options, require_simulator, study
 
 add_arguments = options(
     option('--seed', 26, 'S', 'decides the cells and the years (default: 26)'),
@@ -24,8 +24,6 @@ add_arguments = options(
 @study
 def run(study: Study) -> bool:
     """Run what is not done yet, write the results, print the table."""
-    from ...blind.diagnosing import engine_digest
-    from ...blind.simulator import require_simulator
     from ...fleet.years import GOALS, run_years
     from ...fleet.years_page import page
 

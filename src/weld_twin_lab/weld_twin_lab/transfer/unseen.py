@@ -1,20 +1,34 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What anybody would do: fit the frames, the geometry, or geometry and gravity, all at once."""
+"""
+What a diagnosis, and what anybody would do, predict on stations that they have not seen.
+
+Plain fits are of the frames, of the geometry, or of geometry and gravity, all at once.
+"""
 
 from __future__ import annotations
 
+import re
+import traceback
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis import Diagnosis, diagnose
 from weld_twin_core.diagnosis.algebra.fit import fit, robust_scale
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, usable
 from weld_twin_core.diagnosis.frames.alignment import initial_frames
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.plausible import spreads
+from weld_twin_core.effects.setup_motion import seen_from
 from weld_twin_core.recording import Recording
+from weld_twin_core.twin.posterior import Posterior
 
+ALIGN = frozenset({'base', 'tool'})
 GEOMETRY = ('joint_offset', 'link_length', 'link_offset', 'link_twist', 'axis_parallelism')
 PLAIN: dict[str, tuple[str, ...]] = {
     'frames': (),
@@ -61,3 +75,49 @@ def _members(robot: Robot, families: tuple[str, ...]) -> tuple[Effect, ...]:
         if family != 'joint_compliance' or robot.mass is not None
         for joint in robot.joint_names
     )
+
+
+def residual(model: Model, train: Recording, other: Recording) -> Array:
+    """
+    Return measured minus predicted, shape (3 or 6, M) [m, rad]; nothing is fitted.
+
+    model: fitted on ``train``.
+    """
+    found = seen_from(model.found, train.epoch_ns, train.span_ns, other)
+    placed = Model(model.robot, model.bases[:1], model.known, found)
+    return Problem((usable(other),), ALIGN).residuals(placed)[0]
+
+
+def flagged(posterior: Posterior, other: Recording, t: Array) -> NDArray[np.bool_]:
+    """Return which poses a prediction flags as outside what was recorded, shape (M,)."""
+    q, qd = other.joints.at(t)
+    warm, load = other.temperature, other.wrench
+    found = posterior.domain.outside(
+        q,
+        None if other.joints.static else qd,
+        None if load is None else load.at(t),
+        None if warm is None else warm.at(t),
+    )
+    out = np.zeros(t.size, dtype=bool)
+    for first, last, _ in found:
+        out[first : last + 1] = True
+    return out
+
+
+def tried(
+    recording: Recording, robot: Robot, **options: Any
+) -> tuple[Diagnosis | None, str | None]:
+    """Return the diagnosis, or the traceback that came instead."""
+    try:
+        return diagnose([recording], robot, **options), None
+    except Exception:  # what is counted here is exactly what nobody expected
+        return None, traceback_told()
+
+
+_BEFORE = re.compile(r'(?<=File ").*?(?=(?:weld_twin_\w+|site-packages)/)')
+"""What stands before a package in the path of its file: of this machine alone."""
+
+
+def traceback_told() -> str:
+    """Return the traceback of the exception being handled, files as from their package on."""
+    return _BEFORE.sub('', traceback.format_exc())

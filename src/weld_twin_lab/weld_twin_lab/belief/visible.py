@@ -39,7 +39,7 @@ def shown(case: SealedCase) -> list[float]:
     whole = _moved(cell, case.causes, takes)
     frames = _frames(cell, takes, case.cell.align)
     columns = [
-        [(_moved(cell, changed, takes) - whole) / STEP for changed in _changed(case.causes, k)]
+        [(_moved(cell, changed, takes) - whole) / STEP for changed in changed(case.causes, k)]
         for k in range(len(case.causes))
     ]
     unseen = np.arange(whole.size) >= whole.size - 3 * _samples(cell, case.test)
@@ -78,11 +78,11 @@ def _frames(cell: BlindCell, takes: Sequence[Take], align: Sequence[str]) -> lis
             out.append(np.concatenate([np.cross(axis, own.position).ravel() for own in seen]))
             out.append(np.concatenate([np.tile(axis, len(own.position)) for own in seen]))
         if 'tool' in align:
-            out.append(np.concatenate([(_turned(own.quaternion) @ axis).ravel() for own in seen]))
+            out.append(np.concatenate([(turned(own.quaternion) @ axis).ravel() for own in seen]))
     return out
 
 
-def _turned(quaternion: Any) -> Array:
+def turned(quaternion: Any) -> Array:
     """Return rotations, shape (M, 3, 3), of quaternions x y z w."""
     x, y, z, w = np.asarray(quaternion, dtype=float).T
     rows = [
@@ -93,7 +93,7 @@ def _turned(quaternion: Any) -> Array:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
-def _changed(causes: Sequence[Cause], k: int) -> Iterator[list[Cause]]:
+def changed(causes: Sequence[Cause], k: int) -> Iterator[list[Cause]]:
     """Yield all causes with each number of one changed a little."""
     own = causes[k]
     for key in (*SIZES[own['effect']], *TURNING.get(own['effect'], ())):

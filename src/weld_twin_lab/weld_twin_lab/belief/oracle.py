@@ -1,0 +1,274 @@
+# Copyright 2026 weld_twin contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What somebody could be sure of who knows the plant: a bound on how often an answer can be right and sure.
+
+The oracle draws other causes as the cases are drawn, moves the plant with them, and weighs each against
+the cause at work on the same recordings: importance sampling, with Laplace's weight about each draw. It
+knows how large causes are, which families there are, the noise, how many causes are at work and all of
+them but one. So it is surer than anybody can be who has to find these out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from math import lgamma, log, pi
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+from scipy.special import logsumexp
+
+from weld_twin_core.arrays import Array
+
+from ..blind.blind_cell import BlindCell, Take, deviation, exact, record
+from ..blind.cause_sizes import CAUSES, FAMILIES, MOVING, SIZES, Cause, plausible, scaled, site
+from ..blind.cause_sizes import draw as drawn_cause
+from ..blind.deck import STRATA
+from ..blind.displacement import rms
+from ..blind.making import SealedCase
+from .levels_of_truth import alike_by_structure
+from .mix import drawn
+from .several import COMMON, OFTEN, several
+from .visible import STEP, TURNING, changed, turned
+
+DRAWS = 2
+"""Causes drawn of each family at each joint: phases and instants differ; sizes are fitted."""
+PATIENCE = 12
+"""Draws for each joint until all joints are thought to have theirs."""
+HOPELESS = 400.0
+"""Chi-square above that of the truth from which a cause with one number is not looked at further."""
+NEAR = 60.0
+"""Chi-square above that of the truth from which a cause has no weight: exp(-30)."""
+AS_WELL = 0.32
+"""RMS [noise] by which an answer may differ on the sealed motion: it leaves 1.05 noise instead of 1."""
+WIDE = 1.15
+"""Factor by which a size may leave the strata that sizes are drawn from."""
+FLAT = log(STRATA[-1][1] / STRATA[0][0])
+"""Width of the even prior over the logarithm of a size."""
+
+
+class _Bench(NamedTuple):
+    """The recordings of a case as the oracle looks at them; rows are over their noise."""
+
+    cell: BlindCell
+    """Nothing is aligned in it: frames are columns here."""
+    takes: tuple[Take, ...]
+    """The recordings diagnosed, and then the sealed one."""
+    seen: int
+    """Rows of those diagnosed."""
+    sealed: slice
+    """Rows of the sealed positions."""
+    y: Array
+    """What was measured, (rows,); on the sealed motion the truth without noise."""
+    beside: list[Cause]
+    """All causes but the one that is asked for."""
+    nuisance: Array
+    """Columns of frames and of the other causes, (rows, p)."""
+
+
+class _Weighed(NamedTuple):
+    """A cause held against what was measured."""
+
+    chi2: float
+    log_weight: float
+    predicted: Array
+    """On all rows."""
+
+
+def certainty(seed: int, number: int, mix: str) -> float | None:
+    """
+    Return how sure the oracle is of all causes of a case; None where it is not asked.
+
+    It is asked of cases with one and two causes in the library. A cause that no motion tells from
+    the one at work, or that predicts the sealed motion as well, counts as right.
+
+    seed, number, mix: of the case, as `trial.tried` takes them.
+    """
+    case = several(seed, number)[0] if mix == 'several' else drawn(seed, number).case
+    kinds = ('single', 'double', 'several')
+    if case.lot.kind not in kinds or not 1 <= len(case.causes) <= 2:
+        return None
+    rng = np.random.default_rng([seed, 5000 + number])
+    return float(np.prod([_of_one(case, k, mix, rng) for k in range(len(case.causes))]))
+
+
+def _of_one(case: SealedCase, k: int, mix: str, rng: np.random.Generator) -> float:
+    """Return the posterior probability of one cause, the others known."""
+    bench, own = _bench(case, k, rng), case.causes[k]
+    wanted = rms(deviation(case.cell, [own], case.train)) / case.cell.noise
+    true = _weighed(bench, own, wanted)
+    if true is None:
+        return 0.0
+    alike = alike_by_structure(case.lot.robot, site(own))
+    right, wrong = [true.log_weight + _log_prior(case, own['effect'], mix)], []
+    for cause, log_prior in _others(case, mix, site(own), rng):
+        # Some causes need a wrench or a temperature that this cell has not, or cannot be simulated.
+        with suppress(ValueError, FloatingPointError):
+            size = rms(deviation(case.cell, [cause], case.train)) / case.cell.noise
+            factor = wanted / max(size, 1e-9)
+            factor = factor if plausible(case.cell.robot, cause, factor) else 1.0
+            other = _weighed(bench, scaled(cause, factor), size * factor, true.chi2)
+            if other is not None:
+                off = (other.predicted - true.predicted)[bench.sealed].reshape(-1, 3)
+                as_good = site(cause) in alike or rms(off) / np.sqrt(3.0) < AS_WELL
+                (right if as_good else wrong).append(other.log_weight + log_prior)
+    return float(np.exp(logsumexp(right) - logsumexp([*right, *wrong])))
+
+
+def _bench(case: SealedCase, k: int, rng: np.random.Generator) -> _Bench:
+    cell = replace(case.cell, align=())
+    takes = (case.train, *case.also, case.test)
+    beside = [*case.causes[:k], *case.causes[k + 1 :]]
+    whole = _moved(cell, [*beside, case.causes[k]], takes)
+    seen = whole.size - _moved(cell, (), takes[-1:]).size
+    columns = [
+        (_moved(cell, new, takes) - whole) / STEP
+        for j in range(len(beside))
+        for new in changed([*beside, case.causes[k]], j)
+    ]
+    columns += _frames(cell, takes, case.cell.align)
+    y = whole.copy()
+    y[:seen] += rng.standard_normal(seen)
+    nuisance = np.array(columns).T if columns else np.zeros((whole.size, 0))
+    count = 3 * len(record(cell, (), case.test, exact(cell.tracker)).position)
+    return _Bench(cell, takes, seen, slice(seen, seen + count), y, beside, nuisance)
+
+
+def _weighed(bench: _Bench, cause: Cause, ratio: float, best: float = np.inf) -> _Weighed | None:
+    """
+    Return the weight of a cause, its numbers fitted; None where it has none.
+
+    ratio: of its deviation to the noise, as it is given.
+    best: chi-square of the cause at work.
+    """
+    whole = _moved(bench.cell, [*bench.beside, cause], bench.takes)
+    if np.isfinite(best) and _one_number(cause):
+        without = _moved(bench.cell, bench.beside, bench.takes)
+        if _fitted(bench, without, (whole - without)[:, None])[0] > best + HOPELESS:
+            return None
+    causes = [*bench.beside, cause]
+    changes = changed(causes, len(bench.beside))
+    columns = [(_moved(bench.cell, new, bench.takes) - whole) / STEP for new in changes]
+    chi2, moved, predicted, volume = _fitted(bench, whole, np.array(columns).T)
+    sizes = np.concatenate([_scaled(cause, key) for key in SIZES[cause['effect']] if key in cause])
+    grown = sizes + moved[: sizes.size]
+    growth = float(np.linalg.norm(grown) / np.linalg.norm(sizes))
+    sensible = STRATA[0][0] / WIDE < ratio * growth < STRATA[-1][1] * WIDE
+    signed = CAUSES[cause['effect']].signed or sizes.size > 1
+    if (chi2 > best + NEAR or not sensible or (not signed and grown[0] < 0.0)) and np.isfinite(
+        best
+    ):
+        return None
+    sphere = log(2.0) + 0.5 * sizes.size * log(pi) - lgamma(0.5 * sizes.size)
+    sphere = sphere if signed else 0.0
+    turns = (moved.size - sizes.size) * log(2.0 * pi)
+    density = -log(FLAT) - sphere - sizes.size * log(max(np.linalg.norm(grown), 1e-9)) - turns
+    return _Weighed(chi2, density + volume - 0.5 * chi2, predicted)
+
+
+def _one_number(cause: Cause) -> bool:
+    sizes = SIZES[cause['effect']]
+    return cause['effect'] not in TURNING and len(sizes) == 1 and np.ndim(cause[sizes[0]]) == 0
+
+
+def _scaled(cause: Cause, key: str) -> Array:
+    """Return a size in the unit of the columns: its largest number."""
+    value = np.atleast_1d(np.asarray(cause[key], dtype=float))
+    return np.asarray(value / np.abs(value).max())
+
+
+def _fitted(bench: _Bench, whole: Array, columns: Array) -> tuple[float, Array, Array, float]:
+    """
+    Return chi-square, coefficients of the columns, the prediction, and the log volume of the posterior.
+
+    whole: what the causes move, (rows,); columns: their derivatives, (rows, k).
+    """
+    seen, design = slice(bench.seen), np.concatenate([columns, bench.nuisance], axis=1)
+    scale = np.maximum(np.linalg.norm(design[seen], axis=0), 1e-12)
+    gap = bench.y - whole
+    fitted = np.linalg.lstsq(design[seen] / scale, gap[seen], rcond=1e-9)[0] / scale
+    left = gap - design @ fitted
+    basis = np.linalg.qr(bench.nuisance[seen])[0]
+    bare = columns[seen] - basis @ (basis.T @ columns[seen])
+    sizes = np.maximum(np.linalg.svd(bare, compute_uv=False), 1e-3)
+    volume = float(0.5 * sizes.size * log(2.0 * pi) - np.log(sizes).sum())
+    return float((left[seen] ** 2).sum()), fitted[: columns.shape[1]], bench.y - left, volume
+
+
+def _moved(cell: BlindCell, causes: Sequence[Cause], takes: Sequence[Take]) -> Array:
+    """
+    Return how far causes move what is measured, over its noise, (rows,).
+
+    Of each recording the positions, and then the turns where they are measured.
+    """
+    out = []
+    for taken in takes:
+        out.append(deviation(cell, causes, taken).ravel() / cell.tracker.sigma)
+        if cell.tracker.orientation:
+            moved, ideal = (record(cell, c, taken, exact(cell.tracker)) for c in (causes, ()))
+            there = Rotation.from_quat(ideal.quaternion)
+            if not ideal.static:
+                t = np.clip(moved.t_measured, ideal.t_measured[0], ideal.t_measured[-1])
+                there = Slerp(ideal.t_measured, there)(t)
+            turn = (Rotation.from_quat(moved.quaternion) * there.inv()).as_rotvec()
+            out.append(turn.ravel() / cell.tracker.sigma_orientation)
+    return np.concatenate(out)
+
+
+def _frames(cell: BlindCell, takes: Sequence[Take], align: Sequence[str]) -> list[Array]:
+    """Return columns of the frames that are fitted, in the rows of `_moved`."""
+    seen = [record(cell, (), taken, exact(cell.tracker)) for taken in takes]
+    out = []
+    for axis in np.eye(3):
+        for shift, turn in ((axis, np.zeros(3)), (np.zeros(3), axis)):
+            for frame in align:
+                parts = []
+                for own in seen:
+                    rotation = turned(own.quaternion)
+                    arm = own.position if frame == 'base' else np.zeros_like(own.position)
+                    along, about = (
+                        (
+                            np.broadcast_to(v, own.position.shape)
+                            if frame == 'base'
+                            else rotation @ v
+                        )
+                        for v in (shift, turn)
+                    )
+                    parts.append((along + np.cross(about, arm)).ravel() / cell.tracker.sigma)
+                    if cell.tracker.orientation:
+                        parts.append(about.ravel() / cell.tracker.sigma_orientation)
+                out.append(np.concatenate(parts))
+    return [column for column in out if np.abs(column).max() > 0.0]
+
+
+def _log_prior(case: SealedCase, family: str, mix: str) -> float:
+    """Return the log prior of a family at one of its joints, up to what is the same for all."""
+    often = OFTEN if mix == 'several' and family in COMMON else 1
+    return log(often) - (log(case.cell.robot.n) if 'joint' in _any(case, family) else 0.0)
+
+
+def _any(case: SealedCase, family: str) -> Cause:
+    return drawn_cause(family, case.cell.robot, 1.0, np.random.default_rng(0))
+
+
+def _others(
+    case: SealedCase, mix: str, own: tuple[str, str | None], rng: np.random.Generator
+) -> Iterator[tuple[Cause, float]]:
+    """Yield causes drawn at every other place, with the log prior of each."""
+    robot, t = case.cell.robot, case.train.command.t
+    fitted = {f'{frame}_pose' for frame in case.cell.align}
+    still = MOVING if all(taken.command.static for taken in (case.train, *case.also)) else ()
+    for family in FAMILIES:
+        if family in fitted or family in still:
+            continue
+        found: dict[str | None, list[Cause]] = {}
+        for _ in range(PATIENCE * robot.n if 'joint' in _any(case, family) else DRAWS):
+            cause = drawn_cause(family, robot, float(t[-1] - t[0]), rng)
+            kept = found.setdefault(cause.get('joint'), [])
+            if len(kept) < DRAWS and site(cause) != own:
+                kept.append(cause)
+        share = _log_prior(case, family, mix) - log(DRAWS)
+        yield from ((cause, share) for kept in found.values() for cause in kept)

@@ -16,6 +16,8 @@ from ..blind.statistics import Estimate, bootstrap, share
 Kept = Mapping[str, Any]
 SEEN, PLAIN = 1.0, 3.0
 """Effect RMS over noise from which a cause can be seen, and from which it is plain."""
+ORACLE = 0.99
+"""Probability from which the oracle is sure."""
 
 
 def goal_measures(rows: Sequence[Kept]) -> list[Measure]:
@@ -44,6 +46,13 @@ def _of_causes(rows: Sequence[Kept]) -> list[Measure]:
             0.70,
         ),
         _measure('single_right', 'the same: right', lone, lambda r: r['right']),
+        _measure(
+            'oracle_sure',
+            'one or two causes of which an oracle is sure: right and sure',
+            [r for r in known if (r.get('oracle') or 0.0) >= ORACLE],
+            lambda r: r['right'] and r['sure'],
+            0.95,
+        ),
         _measure('double_named', 'two causes, each 3 noise: both named', *_several(rows, 2, 0.90)),
         _measure(
             'triple_named', 'three causes, each 3 noise: all named', *_several(rows, 3, 0.85)

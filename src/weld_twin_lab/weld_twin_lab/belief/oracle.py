@@ -30,8 +30,7 @@ from ..blind.deck import STRATA
 from ..blind.displacement import rms
 from ..blind.making import SealedCase
 from .levels_of_truth import alike_by_structure
-from .mix import drawn
-from .several import COMMON, OFTEN, several
+from .mix import COMMON, OFTEN, SEVERAL, drawn
 from .visible import STEP, TURNING, changed, turned
 
 DRAWS = 2
@@ -87,15 +86,15 @@ def certainty(seed: int, number: int, mix: str) -> float | None:
 
     seed, number, mix: of the case, as `trial.tried` takes them.
     """
-    case = several(seed, number)[0] if mix == 'several' else drawn(seed, number).case
+    case = drawn(seed, number, mix).case
     kinds = ('single', 'double', 'several')
     if case.lot.kind not in kinds or not 1 <= len(case.causes) <= 2:
         return None
     rng = np.random.default_rng([seed, 5000 + number])
-    return float(np.prod([_of_one(case, k, mix, rng) for k in range(len(case.causes))]))
+    return float(np.prod([of_one(case, k, mix, rng) for k in range(len(case.causes))]))
 
 
-def _of_one(case: SealedCase, k: int, mix: str, rng: np.random.Generator) -> float:
+def of_one(case: SealedCase, k: int, mix: str, rng: np.random.Generator) -> float:
     """Return the posterior probability of one cause, the others known."""
     bench, own = _bench(case, k, rng), case.causes[k]
     wanted = rms(deviation(case.cell, [own], case.train)) / case.cell.noise
@@ -103,7 +102,8 @@ def _of_one(case: SealedCase, k: int, mix: str, rng: np.random.Generator) -> flo
     if true is None:
         return 0.0
     alike = alike_by_structure(case.lot.robot, site(own))
-    right, wrong = [true.log_weight + _log_prior(case, own['effect'], mix)], []
+    right = [true.log_weight + _log_prior(case, own['effect'], mix)]
+    wrong: list[float] = []
     for cause, log_prior in _others(case, mix, site(own), rng):
         # Some causes need a wrench or a temperature that this cell has not, or cannot be simulated.
         with suppress(ValueError, FloatingPointError):
@@ -165,7 +165,9 @@ def _weighed(bench: _Bench, cause: Cause, ratio: float, best: float = np.inf) ->
     sphere = log(2.0) + 0.5 * sizes.size * log(pi) - lgamma(0.5 * sizes.size)
     sphere = sphere if signed else 0.0
     turns = (moved.size - sizes.size) * log(2.0 * pi)
-    density = -log(FLAT) - sphere - sizes.size * log(max(np.linalg.norm(grown), 1e-9)) - turns
+    density = (
+        -log(FLAT) - sphere - sizes.size * log(max(float(np.linalg.norm(grown)), 1e-9)) - turns
+    )
     return _Weighed(chi2, density + volume - 0.5 * chi2, predicted)
 
 
@@ -246,7 +248,7 @@ def _frames(cell: BlindCell, takes: Sequence[Take], align: Sequence[str]) -> lis
 
 def _log_prior(case: SealedCase, family: str, mix: str) -> float:
     """Return the log prior of a family at one of its joints, up to what is the same for all."""
-    often = OFTEN if mix == 'several' and family in COMMON else 1
+    often = OFTEN if mix == SEVERAL and family in COMMON else 1
     return log(often) - (log(case.cell.robot.n) if 'joint' in _any(case, family) else 0.0)
 
 

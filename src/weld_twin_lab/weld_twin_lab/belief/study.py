@@ -26,6 +26,7 @@ from .goals import goal_measures
 from .judged import Example, examples_of, kept
 from .logistic import log_loss
 from .mix import USUAL
+from .oracle import certainty
 from .rows import seeds_of
 from .table import page
 from .trial import tried
@@ -50,6 +51,17 @@ def rows_of(seed: int, count: int, runner: Runner, mix: str = USUAL) -> list[dic
     """
     tasks = [Task(tried, (seed, number, mix), f'case {number}') for number in range(count)]
     return [{'mix': mix, **kept(row)} for row in runner.run(tasks)]
+
+
+def with_oracle(rows: Sequence[dict[str, Any]], runner: Runner) -> list[dict[str, Any]]:
+    """
+    Return rows with what an oracle is sure of, where it is asked: `oracle.certainty`.
+
+    rows: as `rows_of` gives them.
+    """
+    cases = [(*map(int, str(row['name']).split('/')), str(row['mix'])) for row in rows]
+    tasks = [Task(certainty, case, f'oracle on case {case[1]}') for case in cases]
+    return [{**row, 'oracle': p} for row, p in zip(rows, runner.run(tasks), strict=True)]
 
 
 def fit(rows: Sequence[Mapping[str, Any]], risk: float = terms.RISK) -> dict[str, Any]:

@@ -39,7 +39,7 @@ def shown(case: SealedCase) -> list[float]:
     whole = _moved(cell, case.causes, takes)
     frames = _frames(cell, takes, case.cell.align)
     columns = [
-        [(_moved(cell, changed, takes) - whole) / STEP for changed in changed(case.causes, k)]
+        [(_moved(cell, new, takes) - whole) / STEP for new in changed(case.causes, k)]
         for k in range(len(case.causes))
     ]
     unseen = np.arange(whole.size) >= whole.size - 3 * _samples(cell, case.test)

@@ -34,6 +34,12 @@ add_arguments = options(
     option('--learn-from', [], 'TABLE', 'tables kept from other runs', nargs='*'),
     option('--judge-on', [], 'TABLE', 'tables kept from other runs', nargs='*'),
     option(
+        '--oracle',
+        False,
+        None,
+        'ask of cases with one and two causes what one who knows the plant could be sure of',
+    ),
+    option(
         '--risk', RISK, 'P', f'probability that an answer may be sure and wrong (default: {RISK})'
     ),
     out='where everything goes',
@@ -47,7 +53,7 @@ def run(study: Study) -> None:
     from weld_twin_core.errors import DataError
 
     from ...belief.rows import read_rows, write_rows
-    from ...belief.study import fit, rows_of, write
+    from ...belief.study import fit, rows_of, with_oracle, write
 
     args = study.args
     if args.cases or args.held_out:
@@ -60,7 +66,8 @@ def run(study: Study) -> None:
     tried = [row for table in args.judge_on for row in read_rows(Path(table))]
     with study.runner('diagnosing') as runner:
         taught += rows_of(args.seed, args.cases, runner, args.mix)
-        tried += rows_of(args.held_out_seed, args.held_out, runner, args.mix)
+        asked = rows_of(args.held_out_seed, args.held_out, runner, args.mix)
+        tried += with_oracle(asked, runner) if args.oracle else asked
     _refuse_shared(taught, tried)
     write_rows(study.out / LEARNED, taught)
     if tried:

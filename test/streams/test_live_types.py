@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import time
+from functools import partial
 from importlib import import_module
 
 import numpy as np
@@ -137,101 +138,33 @@ def dynamic(q, names=NAMES):
     return make
 
 
-def shifted():
-    T = forward(ROBOT, Q)
-    T[:3, 3] += OFF
-    return T
-
-
-MEASURED = {
-    'PoseWithCovarianceStamped': (
-        'geometry_msgs/PoseWithCovarianceStamped',
-        lambda: pose(shifted()),
-        {},
-        OFF,
-    ),
-    'TransformStamped': (
-        'geometry_msgs/TransformStamped',
-        lambda: lambda stamp: placed(shifted(), stamp, 'world', 'probe'),
-        {},
-        OFF,
-    ),
-    'TFMessage': (
-        'tf2_msgs/TFMessage',
-        lambda: (
-            lambda stamp: tf(
-                placed(np.eye(4), stamp, 'a', 'b'), placed(shifted(), stamp, 'world', 'probe')
-            )
-        ),
-        {'measured_frame': 'probe'},
-        OFF,
-    ),
-    'JointTrajectoryControllerState': (
-        'control_msgs/JointTrajectoryControllerState',
-        lambda: controller(Q, BEYOND),
-        {},
-        (forward(ROBOT, BEYOND) - forward(ROBOT, Q))[:3, 3],
-    ),
-}
-
-
-@pytest.mark.parametrize('which', MEASURED)
-def test_a_measurement_of_another_type_is_compared(cell, other, which):
-    """UR5 stands in the world as the base does, so both axes are one."""
-    name, make, parameters, expected = MEASURED[which]
-    theirs, make = publisher(cell, other, name, '/tracker'), make()
-    remap = ['--ros-args', '-r', 'measured/tool_pose:=/tracker']
-    cell.add(DeviationAnalyzer, reliable_inputs=True, cli_args=remap, **parameters)
-    deviations, twin = cell.collect('/deviation'), cell.publisher(TWIN_POSE)
-    base, T = cell.publisher(TWIN_BASE), forward(ROBOT, Q)
-    base.publish(cell.messages.pose(S, np.zeros(3), np.eye(3), 'world'))
-    stamp = [S]
-
-    def step():
-        stamp[0] += S // 100
-        twin.publish(cell.messages.pose(stamp[0], T[:3, 3], T[:3, :3], 'world'))
-        theirs.publish(make(stamp[0]))
-        return len(deviations) > 2
-
-    cell.wait(step, 'deviations')
-    np.testing.assert_allclose(from_messages.vector3(deviations.last), expected, atol=EXACT)
-
-
+T = forward(ROBOT, Q)
+SHIFTED = T.copy()
+SHIFTED[:3, 3] += OFF
+MEASURED = (
+    (pose(SHIFTED), OFF),
+    (lambda ns: placed(SHIFTED, ns, 'world', 'probe'), OFF),
+    (lambda ns: tf(placed(np.eye(4), ns, 'a', 'b'), placed(SHIFTED, ns, 'world', 'probe')), OFF),
+    (controller(Q, BEYOND), (forward(ROBOT, BEYOND) - T)[:3, 3]),
+)
+"""What is measured, in messages of four types, and the deviation; UR5 stands in the world as its base
+does, so both axes are one."""
 MIXED = [3, 1, 5, 0, 2, 4]
-JOINTS = {
-    'DynamicJointState in another order': (
-        'control_msgs/DynamicJointState',
-        dynamic,
-        (Q[MIXED], [NAMES[k] for k in MIXED]),
-        {},
-    ),
-    'reference of a controller': (
-        'control_msgs/JointTrajectoryControllerState',
-        controller,
-        (Q, BEYOND),
-        {},
-    ),
-    'feedback of a controller': (
-        'control_msgs/JointTrajectoryControllerState',
-        controller,
-        (BEYOND, Q),
-        {'joint_part': 'feedback'},
-    ),
+AS_TOLD = {
+    'feedback of a controller': (controller(BEYOND, Q), {'joint_part': 'feedback'}),
     'a map of names behind a prefix': (
-        'control_msgs/DynamicJointState',
-        dynamic,
-        (Q, ['left/A1', *(f'left/{name}' for name in NAMES[1:])]),
+        dynamic(Q, ['left/A1', *(f'left/{name}' for name in NAMES[1:])]),
         {'joint_prefix': 'left/', 'joint_map': f'{{{NAMES[0]}: A1}}'},
     ),
 }
 
 
-@pytest.mark.parametrize('which', JOINTS)
-def test_the_twin_takes_joints_of_another_type_and_under_other_names(cell, other, which):
-    name, make, values, parameters = JOINTS[which]
-    theirs, make = publisher(cell, other, name, '/joint_states'), make(*values)
+@pytest.mark.parametrize('which', AS_TOLD)
+def test_the_twin_takes_joints_of_another_type_as_it_is_told(cell, other, which):
+    make, parameters = AS_TOLD[which]
+    theirs, stamp = other.create_publisher(type(make(S)), '/joint_states', 10), [S]
     cell.add(ForwardKinematicsTwin, **parameters)
-    poses, stamp = cell.collect(TWIN_POSE.name), [S]
+    poses = cell.collect(TWIN_POSE.name)
 
     def step():
         stamp[0] += S // 100
@@ -239,9 +172,7 @@ def test_the_twin_takes_joints_of_another_type_and_under_other_names(cell, other
         return len(poses) > 2
 
     cell.wait(step, 'poses')
-    np.testing.assert_allclose(
-        from_messages.pose(poses.last)[0], forward(ROBOT, Q)[:3, 3], atol=1e-12
-    )
+    np.testing.assert_allclose(from_messages.pose(poses.last)[0], T[:3, 3], atol=1e-12)
 
 
 def turned(x, angle):
@@ -273,7 +204,6 @@ class TrackedCell:
             return
         self.due = time.monotonic() + BEAT
         self.stamp += round(BEAT * S)
-        T = forward(ROBOT, Q)
         self.twin.publish(self.cell.messages.pose(self.stamp, T[:3, 3], T[:3, :3], 'world'))
         out = kind('geometry_msgs/PointStamped')()
         out.header.stamp.sec, out.header.stamp.nanosec = divmod(self.stamp, S)
@@ -375,30 +305,29 @@ def test_running_nodes_follow_publishers_of_one_type_after_the_other(cell, other
     deviations, poses = cell.collect('/deviation'), cell.collect(TWIN_POSE.name)
     base, stamp = cell.publisher(TWIN_BASE), [S]
     base.publish(cell.messages.pose(S, np.zeros(3), np.eye(3), 'world'))
-    plain = ('sensor_msgs/JointState', lambda: lambda ns: cell.messages.joint_state(ns, NAMES, Q))
-    joints = [(name, lambda m=make, v=values: m(*v)) for name, make, values, _ in JOINTS.values()]
-    turns = zip([*MEASURED.values()], [*joints[:2], plain, joints[0]], strict=True)
-    for (measured, make, _, expected), (state, make_state) in turns:
+    mixed = dynamic(Q[MIXED], [NAMES[k] for k in MIXED])
+    plain = partial(cell.messages.joint_state, names=NAMES, q=Q)
+    turns = zip(MEASURED, (mixed, controller(Q, BEYOND), plain, mixed), strict=True)
+    for (measured, expected), state in turns:
         theirs = [
-            (other.create_publisher(kind(measured), '/tracker', 10), make()),
-            (other.create_publisher(kind(state), '/joint_states', 10), make_state()),
+            (other.create_publisher(type(make(S)), topic, 10), make)
+            for topic, make in (('/tracker', measured), ('/joint_states', state))
         ]
 
         def step(theirs=theirs, begun=stamp[0]):
             stamp[0] += S // 100
-            for publisher, message in theirs:
-                publisher.publish(message(stamp[0]))
+            for publisher, make in theirs:
+                publisher.publish(make(stamp[0]))
             time.sleep(BEAT)
             new = begun + BEAT * S
             return all(len(tap) and tap.stamps[-1] > new for tap in (deviations, poses))
 
-        cell.wait(step, f'deviations by {measured} and {state}')
-        np.testing.assert_allclose(
-            from_messages.vector3(deviations.last), expected, atol=1e-8, err_msg=measured
-        )
-        np.testing.assert_allclose(
-            from_messages.pose(poses.last)[0], forward(ROBOT, Q)[:3, 3], atol=1e-12, err_msg=state
-        )
+        types = ' and '.join(type(make(S)).__name__ for _, make in theirs)
+        cell.wait(step, f'deviations by {types}')
+        got = from_messages.vector3(deviations.last)
+        np.testing.assert_allclose(got, expected, atol=1e-8, err_msg=types)
+        got = from_messages.pose(poses.last)[0]
+        np.testing.assert_allclose(got, T[:3, 3], atol=1e-12, err_msg=types)
         for publisher, _ in theirs:
             other.destroy_publisher(publisher)
     assert [node.stop() for node in nodes] == [0, 0]
@@ -413,7 +342,7 @@ def test_a_recorder_takes_the_type_of_a_publisher_that_comes_after_it(cell, othe
 
     def step():
         stamp[0] += S // 100
-        theirs.publish(placed(shifted(), stamp[0], 'world', 'probe'))
+        theirs.publish(placed(SHIFTED, stamp[0], 'world', 'probe'))
         return json.loads(cell.trigger('/recorder/counts').message)[topic] > 3
 
     cell.wait(step, 'some to be recorded')

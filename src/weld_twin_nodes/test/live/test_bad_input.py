@@ -128,19 +128,6 @@ def test_a_bad_joint_state_costs_a_sentence_and_nothing_else(twin, robot, what):
     np.testing.assert_allclose(rotation, expected[:3, :3], atol=1e-15)
 
 
-def test_joints_in_another_order_and_more_of_them_are_taken_by_name(twin, robot):
-    message = joint_state(twin, robot)
-    message.name = ['gripper', *reversed(robot.joint_names)]
-    message.position = [9.0, *reversed(Q.tolist())]
-    message.velocity = [0.0] * 7
-    before = len(twin.out)
-    twin.send['/joint_states'](message)
-    twin.cell.wait(lambda: len(twin.out) == before + 1, 'the pose')
-    np.testing.assert_allclose(
-        from_messages.pose(twin.out.last)[0], forward(robot, Q)[:3, 3], atol=1e-15
-    )
-
-
 def test_the_analyzer_pairs_good_poses_around_bad_ones(cell, robot):
     bench = Bench(cell, DeviationAnalyzer, [MEASURED_POSE, TWIN_POSE], '/deviation')
     make, eye = cell.messages, np.eye(3)

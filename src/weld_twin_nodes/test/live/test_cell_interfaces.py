@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from scipy.interpolate import CubicHermiteSpline
 
 from weld_twin_core.arm.catalog import load
@@ -67,26 +66,6 @@ def until_heard(cell, publisher, message_of, tap, what):
     cell.wait(told, what)
 
 
-def test_the_robot_description_is_the_model_of_the_twin(shared, run, robot, tmp_path):
-    write_urdf(tmp_path / 'arm.urdf', robot)
-    row = ROBOT_DESCRIPTION
-    latched = shared.node.create_publisher(row.message_class(), row.name, row.offered.to_rclpy())
-    latched.publish(row.message_class()(data=(tmp_path / 'arm.urdf').read_text()))
-    node = run(ForwardKinematicsTwin, robot='topic')
-    assert node.robot.joint_names == robot.joint_names
-    poses = shared.collect(TWIN_POSE.name)
-    until_heard(
-        shared,
-        shared.publisher(),
-        lambda k: shared.messages.joint_state(k * S, robot.joint_names, Q),
-        poses,
-        'a pose',
-    )
-    np.testing.assert_allclose(
-        from_messages.pose(poses.last)[0], forward(robot, Q)[:3, 3], rtol=0.0, atol=1e-12
-    )
-
-
 def test_another_robot_told_while_the_twin_runs_is_not_taken_and_told(shared, run, tmp_path):
     texts = {}
     for name in ('ur5', 'ur10'):
@@ -105,45 +84,6 @@ def test_another_robot_told_while_the_twin_runs_is_not_taken_and_told(shared, ru
     assert node.robot is before
     latched.publish(texts['ur5'])
     shared.wait(lambda: health.told[own][-1:] == [('ok', 'running')], 'the first robot again')
-
-
-def test_joints_of_two_publishers_make_one_pose(shared, run, robot):
-    run(ForwardKinematicsTwin)
-    poses, make = shared.collect(TWIN_POSE.name), shared.messages
-    first, second = shared.publisher(), shared.publisher()
-
-    def told():
-        told.count += 1
-        for publisher, part in ((first, slice(0, 2)), (second, slice(2, 6))):
-            publisher.publish(
-                make.joint_state(
-                    told.count * S, robot.joint_names[part], Q[part], np.zeros(6)[part]
-                )
-            )
-        return len(poses) > 0
-
-    told.count = 0
-    shared.wait(told, 'a pose')
-    np.testing.assert_allclose(
-        from_messages.pose(poses.last)[0], forward(robot, Q)[:3, 3], rtol=0.0, atol=1e-15
-    )
-
-
-def test_a_publisher_that_offers_too_little_is_told_of(shared, run):
-    node = run(ForwardKinematicsTwin)
-    health = HealthListener(shared.node)
-    hasty = shared.node.create_publisher(
-        JOINT_STATES.message_class(),
-        JOINT_STATES.name,
-        QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT),
-    )
-
-    def said():
-        return [text for _, text in health.of(node.get_name()) if 'reliability' in text]
-
-    shared.wait(lambda: said() != [], 'the mismatch to be told')
-    assert '/joint_states' in said()[0]
-    shared.node.destroy_publisher(hasty)
 
 
 def trajectory(robot):

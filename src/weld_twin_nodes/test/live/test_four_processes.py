@@ -157,29 +157,3 @@ def test_the_recorded_bag_says_how_it_came_about(live_and_offline):
         assert made['completeness'][topic] == whole
     assert made['completeness']['/deviation']['missing'] == 0
     assert bag_info(live).incomplete == ()
-
-
-def test_another_tool_opens_the_recorded_bag(live_and_offline):
-    make_reader = pytest.importorskip('mcap.reader').make_reader
-    decoder = pytest.importorskip('mcap_ros2.decoder').DecoderFactory()
-    live = live_and_offline[0]
-    stamp, values = content(live)['/twin/tool_pose']
-    with next(live.glob('*.mcap')).open('rb') as file:
-        reader = make_reader(file, decoder_factories=[decoder])
-        found = [
-            (m.header.stamp.sec * 10**9 + m.header.stamp.nanosec, m.pose.position)
-            for _, _, _, m in reader.iter_decoded_messages(topics=['/twin/tool_pose'])
-        ]
-    np.testing.assert_array_equal([s for s, _ in found], stamp)
-    np.testing.assert_array_equal([(p.x, p.y, p.z) for _, p in found], values[:, :3])
-
-
-def test_without_errors_the_deviation_is_zero_to_float_precision(tmp_path):
-    robot = catalog.load('ur5')
-    plan = plan_motion(robot, 'line', 'aggressive', RATE)
-    sound = build_twin(robot), build_twin(robot)
-    times = stamps(plan.motion.t, START)
-    write_simulation(tmp_path / 'bag', Simulation(*sound, plan.motion, times, 7, plan.length))
-    values = content(tmp_path / 'bag')['/deviation'][1]
-    assert len(values) == plan.motion.t.size
-    assert np.abs(values).max() <= np.finfo(float).eps

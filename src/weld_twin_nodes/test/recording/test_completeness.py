@@ -282,23 +282,6 @@ def test_a_type_that_is_not_installed_is_named_with_its_package():
         message_class('their_msgs/msg/Arc')
 
 
-def test_a_recorder_in_a_namespace_records_its_own_cell(cell, tmp_path):
-    left = cell.node.create_publisher(JOINT_STATES.message_class(), '/left/joint_states', 10)
-    names = ['--ros-args', '-r', '__ns:=/left', '-r', 'measured/tool_pose:=/tracker/pose']
-    from weld_twin_nodes.live.recorder import Recorder
-
-    node = cell.add(Recorder, cli_args=names, out=str(tmp_path / 'bag'))
-    cell.wait(lambda: left.get_subscription_count() > 0, 'the recorder')
-    listened(cell, '/tracker/pose')
-    for k in range(3):
-        left.publish(cell.messages.joint_state(FIRST + k, ROBOT.joint_names, np.zeros(6)))
-    counts = '/left/recorder/counts'
-    cell.wait(lambda: '"/left/joint_states": 3' in cell.trigger(counts).message, 'three')
-    cell.remove(node)
-    with BagReader(tmp_path / 'bag') as reader:
-        assert reader.topics['/left/joint_states'][1] == 3
-
-
 def test_a_played_bag_is_recorded_whole_and_counted(cell, tmp_path):
     process = recorder(cell, tmp_path)
     bag = Path(__file__).parents[4] / 'bags/elbow_play'

@@ -63,6 +63,11 @@ def test_the_whole_answer_has_the_least_of_its_names():
     assert (told['least size'], told['widest set']) == (0.5, 3.0)
     assert told['only drift'] == 1.0 and 'only wear' not in told
     assert of_whole([], [])['names'] == 0.0
+    # What was found and is not reported has to be wrong.
+    beside = of_whole([0.9], [own], [0.4])
+    assert beside['names'] == pytest.approx(np.log(0.9 * 0.6))
+    assert beside['least name'] == pytest.approx(np.log(0.6 / 0.4))
+    assert beside['told'] == 1
 
 
 def test_log_odds_end_at_a_thousand_to_one():

@@ -108,7 +108,13 @@ def calibrated(
         said += levels
     slots = [cause for cause in reported if cause.slot is not None]
     names = [before.names[cause.slot].features for cause in slots if cause.slot is not None]
-    whole = of_whole([cause.probability for cause in slots], names)
+    reported_slots = {cause.slot for cause in slots}
+    unnamed = [
+        one.probability
+        for k, one in enumerate(before.names)
+        if verdict.status in NAMING and not verdict.families and k not in reported_slots
+    ]
+    whole = of_whole([cause.probability for cause in slots], names, unnamed)
     whole = {**before.situation, **whole, **of_form(placing)}
     verdict, more = _of_answer(verdict, whole, learned)
     if verdict.sure and verdict.status in NAMING:

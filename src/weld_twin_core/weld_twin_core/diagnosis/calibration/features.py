@@ -126,13 +126,20 @@ def of_rest(cause: Cause, level: str) -> Numbers:
     )
 
 
-def of_whole(probabilities: Sequence[float], names: Sequence[Mapping[str, float]]) -> Numbers:
+def of_whole(
+    probabilities: Sequence[float],
+    names: Sequence[Mapping[str, float]],
+    unnamed: Sequence[float] = (),
+) -> Numbers:
     """
-    Return the features of an answer as a whole, from what is told of its names.
+    Return the features of an answer as a whole, from what is reported of its names.
 
-    probabilities: of every name told.
+    probabilities: of every name reported.
     names: features of the same names.
+    unnamed: probabilities of names that are not reported though an effect was found: the answer is
+    right only if they are wrong.
     """
+    held = [*probabilities, *(1.0 - p for p in unnamed)]
     alone = {
         key: 1.0
         for own in names
@@ -141,8 +148,8 @@ def of_whole(probabilities: Sequence[float], names: Sequence[Mapping[str, float]
     }
     return plain(
         {
-            'names': float(np.log(max(float(np.prod(probabilities)), 1.0 / FAR))),
-            'least name': odds(min(probabilities, default=0.5)),
+            'names': float(np.log(max(float(np.prod(held)), 1.0 / FAR))),
+            'least name': odds(min(held, default=0.5)),
             'told': len(names),
             'least size': min((own['size'] for own in names), default=0.0),
             'widest set': max((own['members'] for own in names), default=0.0),

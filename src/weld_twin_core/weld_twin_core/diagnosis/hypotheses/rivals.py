@@ -62,11 +62,13 @@ def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> t
     rest = work.without(now, k).fit
     ranked = work.ranked(rest, work.effective(now), roles=Role)
     own = next((c for c in ranked if c.unit.site == (effect.name, effect.site)), None)
+    # Started from what the others are beside the found effect: without it they may have gone far off.
+    start = now.model.without(k)
     tried = [
         (choice, other)
         for role in Role
         for choice in _near(work, ranked, role, sites(now))
-        if not implausible((other := work.fitted_with(rest.model, choice.effect())).model)
+        if not implausible((other := work.fitted_with(start, choice.effect())).model)
     ]
     count = work.independent([now, *(f for _, f in tried)], [effect.name])
     seat = _Seat(work, effect.name, rest, count)

@@ -7,7 +7,7 @@ from diagnosis_cells import effect, tiny
 
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses import search
-from weld_twin_core.diagnosis.hypotheses.rivals import Rival
+from weld_twin_core.diagnosis.hypotheses.rivals import Rival, rivals
 from weld_twin_core.diagnosis.result import Site
 
 TRUE = (
@@ -23,7 +23,7 @@ def test_a_rival_that_earns_no_place_takes_none_from_what_was_found(monkeypatch)
     problem, model = tiny(TRUE)
     work, now = search.workspace(problem, model.with_found(TRUE), (), Beliefs())
 
-    def rivals(work, now, k, others):
+    def chosen(work, now, k, others):
         own = Rival(Site(now.model.found[k].name, now.model.found[k].site), 6.2, now, 0.4)
         if k == 0:
             return (own,)
@@ -31,10 +31,26 @@ def test_a_rival_that_earns_no_place_takes_none_from_what_was_found(monkeypatch)
         assert [e.name for e in idle.model.found] == ['joint_offset', 'gear_ratio']
         return Rival(Site(IDLE.name, IDLE.site), 7.7, idle, 0.6), own
 
-    monkeypatch.setattr(search, 'rivals', rivals)
+    monkeypatch.setattr(search, 'rivals', chosen)
     kept, slots = search.settled(work, now, str)
     assert [e.name for e in kept.model.found] == ['joint_offset', 'link_length']
     assert len(slots) == 2
+
+
+def test_alternatives_are_fitted_from_what_the_others_are_beside_what_was_found(monkeypatch):
+    # Without the zero the length goes far off to make up for it; an alternative to the zero need not.
+    problem, model = tiny(TRUE)
+    work, now = search.workspace(problem, model.with_found(TRUE), (), Beliefs())
+    beside = now.model.found[1]
+    alone = work.without(now, 0).fit.model.found[0]
+    assert abs(alone.number('da') - beside.number('da')) > 1e-5
+    starts = []
+    monkeypatch.setattr(
+        type(work), 'fitted_with', lambda self, start, effect: starts.append(start) or now
+    )
+    rivals(work, now, 0)
+    assert starts
+    assert all(start.found[0].number('da') == beside.number('da') for start in starts)
 
 
 def test_what_stands_for_several_gives_way_to_them():
@@ -53,7 +69,7 @@ def test_the_model_holds_the_likeliest_of_twins_and_not_the_one_that_came_first(
     first = effect('gear_ratio', joint='elbow_joint')
     work, now = search.workspace(problem, model.with_found((first, TRUE[1])), (), Beliefs())
 
-    def rivals(work, now, k, others):
+    def chosen(work, now, k, others):
         own, other = (
             now.model.found[k],
             TRUE[0] if now.model.found[k].name == first.name else first,
@@ -66,7 +82,7 @@ def test_the_model_holds_the_likeliest_of_twins_and_not_the_one_that_came_first(
         order = Rival(sites[1], 9.0, instead, 0.55), Rival(sites[0], 9.0 - ahead, now, 0.45)
         return order if ahead else order[::-1]
 
-    monkeypatch.setattr(search, 'rivals', rivals)
+    monkeypatch.setattr(search, 'rivals', chosen)
     monkeypatch.setattr(search, 'reconsidered', lambda work, now, sets: (now, ()))
     kept, _ = search.settled(work, now, str)
     assert {(e.name, e.site) for e in kept.model.found} == {(e.name, e.site) for e in TRUE}

@@ -10,6 +10,7 @@ from scipy.stats import norm
 
 from weld_twin_core.diagnosis.algebra.independent_rows import effective_share
 from weld_twin_core.diagnosis.hypotheses.seed_systems import SeedSystems, Unit, evidence, ranking
+from weld_twin_core.diagnosis.result import Site
 
 
 def wandering(rho, samples, components, seed=0):
@@ -74,10 +75,9 @@ def best(columns, y, effective, trials=1.0):
     """Return the best choice of a base that may move, its components given as columns."""
     seed = effect('base_pose', xyz=[0, 0, 0], rotvec=[0, 0, 0])
     index = np.arange(len(columns))
-    unit = Unit('base_pose', None, (seed,), (index,), trials)
-    nothing = np.zeros((0, y.size))
-    products = columns @ np.concatenate([nothing, y[None]]).T
-    systems = SeedSystems.of([index], [columns @ columns.T]).beside(nothing, y, products)
+    unit = Unit(Site('base_pose', None), (seed,), (index,), trials)
+    systems = SeedSystems.of([index], [columns @ columns.T])
+    systems = systems.given(np.zeros((0, 0)), np.zeros(0), y @ y, (columns @ y)[:, None])
     return ranking(systems, [unit], effective)[0]
 
 
@@ -116,12 +116,12 @@ def test_what_the_model_has_is_not_counted_again():
     columns[1] = own[0] - 3.0 * own[1]
     y = 2.0 * own[0] + 0.7 * columns[0] + rng.normal(size=700)
     seed = effect('joint_offset', joint='elbow_joint', offset=0.0)
-    units = [Unit(str(k), None, (seed,), (np.array([k]),), 1.0) for k in range(2)]
+    units = [Unit(Site(str(k), None), (seed,), (np.array([k]),), 1.0) for k in range(2)]
     squares = [columns[k : k + 1] @ columns[k : k + 1].T for k in range(2)]
     products = columns @ np.concatenate([own, y[None]]).T
     systems = SeedSystems.of([unit.columns[0] for unit in units], squares)
-    found = ranking(systems.beside(own, y, products), units, 700.0)
-    assert [choice.unit.family for choice in found] == ['0']
+    found = ranking(systems.given(own @ own.T, own @ y, y @ y, products), units, 700.0)
+    assert [choice.unit.site.effect for choice in found] == ['0']
     basis = np.vstack([own, columns[:1]]).T
     expected = np.linalg.lstsq(basis, y, rcond=None)[0][2]
     assert found[0].effect().offset == pytest.approx(expected, rel=1e-9)

@@ -11,7 +11,7 @@ from diagnosis_cells import tiny
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.diagnosis.algebra.problem import Problem
-from weld_twin_core.diagnosis.frames.in_turn import chord
+from weld_twin_core.diagnosis.frames.alignment import chord
 from weld_twin_core.diagnosis.frames.open_directions import shown
 from weld_twin_core.diagnosis.levels.placed import _tilt
 from weld_twin_core.diagnosis.predicting.leftover import _middle, _shared

@@ -48,10 +48,10 @@ def library(problem, model, exclude=()):
 def test_families_taken_out_only_stand_beside_and_are_said_to_be_absent():
     problem, model = tiny()
     found = library(problem, model, ('joint_offset',))
-    roles = {unit.role for unit in found.units if unit.family == 'joint_offset'}
+    roles = {unit.role for unit in found.units if unit.site.effect == 'joint_offset'}
     assert roles == {Role.TAKEN_OUT}
     assert found.absent['joint_offset'] == 'excluded by the user'
-    assert any(unit.family == 'joint_offset' for unit in library(problem, model).units)
+    assert any(unit.site.effect == 'joint_offset' for unit in library(problem, model).units)
 
 
 def test_what_the_data_cannot_show_is_absent_with_its_reason():
@@ -71,7 +71,7 @@ def test_what_the_data_cannot_show_is_absent_with_its_reason():
 )
 def test_frames_fitted_as_nuisance_are_no_cause(align, gone):
     found = library(*tiny(align=align))
-    names = {unit.family for unit in found.units}
+    names = {unit.site.effect for unit in found.units}
     assert {'base_pose', 'tool_pose'} - names == gone
 
 

@@ -11,8 +11,8 @@ import weld_twin_core as wt
 from weld_twin_core.diagnosis.calibration.features import KINDS, odds, of_whole
 from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
-from weld_twin_core.diagnosis.posterior.table import table_of
 from weld_twin_core.diagnosis.result import Site
+from weld_twin_core.diagnosis.verdict.table import Row
 
 PLAY = Site('backlash', 'elbow_joint')
 
@@ -91,16 +91,16 @@ def test_marginals_of_a_row_are_sums_over_who_shares_it():
         Rival(PLAY, 5.0, _Fit(3.0, 3.0), 0.18),
         Rival(Site('drift', None), 2.0, _Fit(5.0, 5.0), 0.02),
     )
-    (row,) = table_of((slot,), wt.diagnosis.Beliefs())
+    row = Row.of(slot, wt.diagnosis.Beliefs())
     assert row.listed == (zero, gear, PLAY)
     assert row.mass == pytest.approx(0.98)
     assert row.places()['wrist'] == pytest.approx(0.8)
     assert row.dependences() == pytest.approx(
         {'constant': 0.5, 'angle': 0.3, 'direction': 0.18, 'time': 0.02}
     )
-    assert row.gap == 9.0
+    assert row.leader.nats == 9.0
     sure = (replace(slot[0], probability=0.9), *(replace(r, probability=0.03) for r in slot[1:]))
-    (row,) = table_of((sure,), wt.diagnosis.Beliefs())
+    row = Row.of(sure, wt.diagnosis.Beliefs())
     assert row.listed == (zero,)
 
 

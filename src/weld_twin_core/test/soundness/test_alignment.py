@@ -8,8 +8,7 @@ from measured_cells import anywhere, asked, moving, recorded, remeasured, statio
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.rotation import rotation_matrix
-from weld_twin_core.diagnosis.frames.alignment import initial_frames
-from weld_twin_core.diagnosis.frames.in_turn import nearest_rotation
+from weld_twin_core.diagnosis.frames.alignment import initial_frames, nearest_rotation
 
 
 def worst_median(problem, model):

@@ -4,34 +4,7 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
-from typing import Any
-
-
-def _search(value: Any) -> Any:
-    """Return a field that decides which effects are found, and which rivals they have."""
-    return field(default=value, metadata={'step': 'search'})
-
-
-def _many(value: Any) -> Any:
-    """Return a field that decides whether and how many small errors are fitted together."""
-    return field(default=value, metadata={'step': 'many'})
-
-
-def _unseen(value: Any, most: float = math.inf) -> Any:
-    """Return a field that judges unseen data before the verdict is drawn."""
-    return field(default=value, metadata={'step': 'unseen', 'most': most})
-
-
-def _verdict(value: Any, most: float = math.inf) -> Any:
-    """Return a field that only the verdict reads: it can be drawn anew from the same evidence."""
-    return field(default=value, metadata={'step': 'verdict', 'most': most})
-
-
-def _levels(value: Any) -> Any:
-    """Return a field that holds names against curves, or says what is believed of each level."""
-    return field(default=value, metadata={'step': 'levels'})
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -54,146 +27,146 @@ class Beliefs:
 
     # Which effects are found -----------------------------------------------------------------
 
-    enter_nats: float = _search(6.0)
+    enter_nats: float = 6.0
     """Evidence [nats] that an effect must be worth to enter and to stay: odds of about 400 to 1,
     for a hundred or so candidates of which any may enter by chance."""
 
-    close_nats: float = _search(8.0)
+    close_nats: float = 8.0
     """Evidence [nats] below the best within which a candidate is fitted as well: the linear
     ranking is a quadratic expansion, and misjudges a response that bends by a few nats."""
 
-    close_share: float = _search(0.15)
+    close_share: float = 0.15
     """The same as a share of the best: what the ranking misjudges grows with the effect."""
 
-    invisible: float = _search(0.12)
+    invisible: float = 0.12
     """RMS change of the residual [noise] below which a lone effect is not worth a name, however
     many rows vouch for it. A judgement."""
 
-    negligible: float = _search(0.25)
+    negligible: float = 0.25
     """RMS change of the residual [noise] below which an effect beside a larger one is not told
     from that one's misfit. A judgement."""
 
-    misfit_share: float = _levels(0.06)
+    misfit_share: float = 0.06
     """RMS that a free form takes off, as a share of the largest effect named at its place, from which
     on it is more than what formulas miss. On 12 development cases (seed 960001) with an effect too
     many, such took 0.015 to 0.09; of 15 whose small cause was real one took less than 0.03."""
 
-    hope: float = _search(0.3)
+    hope: float = 0.3
     """Exponent by which autocorrelation is believed while causes are still missing, 0 to 1: the
     residual is then the causes' own, and looks far more correlated than the noise is."""
 
-    misfit: float = _search(0.012)
+    misfit: float = 0.012
     """Share of an effect's amplitude by which its formula errs on a real arm: edges are soft,
     springs harden, lags have a second pole. A judgement."""
 
-    misfit_directions: float = _search(30.0)
+    misfit_directions: float = 30.0
     """Number of directions among all columns that such a misfit spreads over. A judgement."""
 
-    rival_nats: float = _search(15.0)
+    rival_nats: float = 15.0
     """Evidence [nats] below the best within which another effect is fitted as a rival."""
 
-    rival_share: float = _search(0.35)
+    rival_share: float = 0.35
     """The same as a share of the best."""
 
-    temperature: float = _search(2.0)
+    temperature: float = 2.0
     """Evidence between rivals is divided by this: real physics is a little richer than any model
     compared, so a nat is worth half of what it counts. A judgement."""
 
     # Many small errors at once ---------------------------------------------------------------
 
-    many: int = _many(8)
+    many: int = 8
     """Effects found one by one on stations from which on they are many small ones acting together.
     A judgement."""
 
-    several: int = _many(4)
+    several: int = 4
     """Effects found on stations from which on the many are tried as well, and taken if they
     predict unseen stations better. A judgement."""
 
-    better: float = _many(0.95)
+    better: float = 0.95
     """RMS on unseen stations, as a share of that of the few, that the many must stay below. A
     judgement."""
 
-    tied_from: int = _many(3)
+    tied_from: int = 3
     """Coordinates of one kind from which on they share a learned size: a variance learned from
     two numbers says nothing."""
 
-    wave_range: float = _many(1.0)
+    wave_range: float = 1.0
     """Travel [rad] of a joint from which on its waves are told from their neighbours' orders: over
     less than a sixth of a turn, orders that differ by six look alike."""
 
-    line_chi2: float = _many(25.0)
+    line_chi2: float = 25.0
     """Chi-square of two degrees of freedom that a single line must reach: chance reaches it once
     in 270000 looks, and some 2000 are taken."""
 
-    setup_chi2: float = _many(60.0)
+    setup_chi2: float = 60.0
     """Chi-square of six degrees of freedom that a motion of the set-up must reach over some 40
     looks. Chance reaches 25 once in 3000 looks; the rest is a judgement, as what no model of the
     arm has looks like a motion of the set-up too."""
 
-    family_worth: float = _verdict(0.1)
+    family_worth: float = 0.1
     """Share by which the RMS error on unseen data grows without a kind, in the median part left out,
     from which on the kind is named; a tenth is what a calibration is worth doing for."""
 
-    joint_worth: float = _verdict(0.1)
+    joint_worth: float = 0.1
     """Share of a kind from which on a joint of it is told, and how nearly as well as the kind another
     must do to be told beside it. A judgement."""
 
-    member_least_m: float = _verdict(1e-6)
+    member_least_m: float = 1e-6
     """RMS at the tool [m] below which a member is not listed: no instrument sees it."""
 
     # What unseen data say --------------------------------------------------------------------
 
-    dependence_gain: float = _unseen(0.02)
+    dependence_gain: float = 0.02
     """Share of the squared unseen error from which what a generic column explains is told."""
 
-    dependence_sure: float = _unseen(2.0)
+    dependence_sure: float = 2.0
     """The same in standard errors between stretches."""
 
-    other_setup: float = _unseen(5.0)
+    other_setup: float = 5.0
     """Times by which a held-out recording must fit better with a frame of its own to stem from
     another set-up. A judgement."""
 
-    parted: float = _unseen(0.05)
+    parted: float = 0.05
     """Share by which a rival may leave more on held-out recordings than the effect in the model and
     still count as its like. Two errors told apart by less are the same to who uses the model."""
 
-    farthest: float = _unseen(1.0)
+    farthest: float = 1.0
     """Logarithm of a ratio between two motions from which on it says no more about the interval:
     a model that leaves e times as much elsewhere fits neither."""
 
     # The verdict -----------------------------------------------------------------------------
 
-    sure: float = _verdict(0.85, most=1.0)
+    sure: float = 0.85
     """Probability from which on a leader is named alone."""
 
-    listed: float = _verdict(0.03)
+    listed: float = 0.03
     """Probability from which on a rival is named beside a leader that is not sure."""
 
-    unexplained: float = _verdict(0.05)
+    unexplained: float = 0.05
     """Share of the squared gap that may stay unexplained before it is told as something left, and
     before the answer is 'unknown' where nothing was found."""
 
-    least_excess: float = _verdict(0.05)
+    least_excess: float = 0.05
     """Share of the squared floor that a gap counts as standing above it at the least; keeps
     the share unexplained from a division by next to nothing."""
 
-    above: float = _verdict(1.3)
+    above: float = 1.3
     """What remains must exceed an independently measured floor by this factor to count; the
     floor itself is known to a tenth or so, and noise has tails."""
 
-    structure_gain: float = _verdict(0.03)
+    structure_gain: float = 0.03
     """Share of the squared unseen error that a structure must take away to be one,"""
 
-    structure_sure: float = _verdict(3.0)
+    structure_sure: float = 3.0
     """and the same in its standard errors between stretches."""
 
-    blatant_gain: float = _verdict(0.15)
+    blatant_gain: float = 0.15
     """The same for a structure so large that a few stretches may hold all of it,"""
 
-    blatant_sure: float = _verdict(1.5)
+    blatant_sure: float = 1.5
     """and its standard errors, which are then large as well."""
 
-    far_above: float = _verdict(1.7)
+    far_above: float = 1.7
     """What remains over the floor, RMS, from which the answer is 'unknown' where nothing was found
     and nothing shows the noise by itself. A Gaussian gives 1, one with trimmed outliers up to
     about 1.3; two causes outside the library (seed 515001) gave 1.9 and 2.6 and were called no gap
@@ -201,40 +174,40 @@ class Beliefs:
 
     # Place, dependence and name --------------------------------------------------------------
 
-    group_share: float = _levels(0.05)
+    group_share: float = 0.05
     """Share of the squared error so far that a free-form group must take away on unseen folds to
     be one of the few. On 8 development cases (seed 424202) with causes outside the library 0.02
     to 0.05 of the error at the start found the same places; below, a large gap lost its second."""
 
-    group_steady: float = _levels(2.0)
+    group_steady: float = 2.0
     """The same fall over its standard error between folds: one chance in forty for each group."""
 
-    group_rows: float = _levels(200.0)
+    group_rows: float = 200.0
     """Independent rows that two groups are told apart by, however many there are: beyond some
     hundreds the difference of real physics from every group decides, no longer the noise."""
 
-    beaten_share: float = _levels(0.15)
+    beaten_share: float = 0.15
     """Share of the squared error left by the effects named that a free form must take away on
     unseen stretches for the names to be doubted. A cause named rightly leaves noise, of which no
     curve predicts any; the share leaves room for what real gears are beyond their formulas."""
 
-    beaten_steady: float = _levels(2.0)
+    beaten_steady: float = 2.0
     """The same in standard errors between stretches."""
 
-    field_misses: float = _levels(0.03)
+    field_misses: float = 0.03
     """RMS that a smooth field over the workspace takes off on unseen stretches, as a share of the
     largest effect named, from which on the names do not hold. Geometry and instruments have exact
     formulas: on 78 development cases (seed 990001) named rightly it took off nothing that was
     steady, on 6 with a cause of another formula 0.04 to 0.1."""
 
-    scatter_sure: float = _levels(5.0)
+    scatter_sure: float = 5.0
     """Standard errors from which on noise is said to come from a joint. Chance reaches 3 of a
     handful of stretches now and then; of those cases the rightly named stay below 4, four with a
     link that jumps or an encoder that rounds reach 6 to 25."""
 
-    curve_room: float = _levels(1.05)
+    curve_room: float = 1.05
     """Curves are carried although effects that imitate the cause leave this much less on unseen
     stretches: they carry no parameter of an effect that is not there."""
 
-    level_shared: float = _levels(0.7)
+    level_shared: float = 0.7
     """Belief that what several joints do alike has one cause, and not one each. A judgement."""

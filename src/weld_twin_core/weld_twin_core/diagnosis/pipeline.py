@@ -25,10 +25,10 @@ from .levels.curved import carried, curved
 from .levels.formulas import missed, no_noise
 from .levels.placed import placed
 from .many.fitted_together import fitted_together
-from .posterior.table import table_of
+from .many.weighed_families import weighed_families
 from .predicting.allowed import allowed
 from .predicting.alone import alone
-from .result import Diagnosis, Shrink
+from .result import Diagnosis
 from .soundness.efforts import with_sign
 from .soundness.gate import Examined, examine
 from .soundness.mending import Given
@@ -39,6 +39,7 @@ from .unseen.leftover_structure import structure
 from .unseen.unseen_stretches import Unseen
 from .verdict.decision import LIKELIER, decide
 from .verdict.evidence import gathered
+from .verdict.table import Row
 
 Progress = Callable[[str], None]
 
@@ -153,9 +154,14 @@ def _explained(
     Where a few effects leave the cause unknown, and that is rather wrong than right, and all kinds
     together predict as well, kinds that unseen data need are told in their place.
     """
-    result = _searched(examined, exclude, beliefs, progress)
+    assert examined.posed is not None
+    result = search(*examined.posed, exclude, beliefs, progress)
+    result = fitted_together(result, exclude, beliefs, progress)
+    result = settled_between(result, examined.given.may_change, beliefs)
     out = _told(result, examined, holdout, beliefs, limits, progress)
-    if result.many is None or out.status != 'unknown' or _named(out) or _nameless(out):
+    # Or is it likelier than not that no name is right?
+    nameless = max(out.confidence, getattr(out.evidence, 'nameless', 0.0)) > LIKELIER
+    if result.many is None or out.status != 'unknown' or _named(out) or nameless:
         return out
     progress('a few effects leave the cause unknown: all kinds together')
     many = _told(result.many, examined, holdout, beliefs, limits, progress)
@@ -165,11 +171,6 @@ def _explained(
 def _named(out: Diagnosis) -> bool:
     """Return whether a cause is named that is likelier right than wrong."""
     return any(cause.effect is not None and cause.probability > LIKELIER for cause in out.causes)
-
-
-def _nameless(out: Diagnosis) -> bool:
-    """Return whether it is likelier than not that no name is right."""
-    return max(out.confidence, getattr(out.evidence, 'nameless', 0.0)) > LIKELIER
 
 
 def _told(
@@ -191,9 +192,10 @@ def _told(
     progress('looked for what is left')
     floor = noise_floor(result.problem, result.problem.residuals(result.final.model))
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
-    evidence = gathered(result, unseen, leftover, shrink, floor, beliefs)
+    families = weighed_families(result, unseen, beliefs) if result.dense else None
+    evidence = gathered(result, unseen, leftover, shrink, floor, families)
     remaining = missed(result, unseen, beliefs)
-    table = table_of(result.slots, beliefs)
+    table = tuple(Row.of(slot, beliefs) for slot in result.slots)
     statements = stated(result, unseen, evidence, table)
     evidence = statements.put_to(replace(evidence, missed=remaining.in_words))
     verdict = decide(evidence, beliefs)
@@ -204,28 +206,14 @@ def _told(
     progress('held against curves without a formula')
     which = verdict, alternative, holdout, beliefs
     result, unseen, shrink, verdict = carried(result, unseen, shrink, *which)
-    result = _by_itself(_held(result, examined.given.robot), shrink)
+    result = _held(result, examined.given.robot)
+    model = result.final.model
+    own = replace(model, alone=alone(result.problem, model, shrink, many=result.dense))
+    result = replace(result, final=replace(result.final, model=own))
     posterior = allowed(result.problem, result.final.model, result.scale, result.precision, floor)
     progress('weighed what the data leave open')
     reported = (statements, alternative, places, limits)
     return answer(result, unseen, evidence, verdict, shrink, examined, posterior, *reported)
-
-
-def _by_itself(result: Search, shrink: Shrink) -> Search:
-    """Return what was found with what a robot file of it does by itself."""
-    model = result.final.model
-    own = replace(model, alone=alone(result.problem, model, shrink, many=result.dense))
-    return replace(result, final=replace(result.final, model=own))
-
-
-def _searched(
-    examined: Examined, exclude: Sequence[str], beliefs: Beliefs, progress: Progress
-) -> Search:
-    """Return what was found, few effects or many, each with what could take its place."""
-    assert examined.posed is not None
-    result = search(*examined.posed, exclude, beliefs, progress)
-    result = fitted_together(result, exclude, beliefs, progress)
-    return settled_between(result, examined.given.may_change, beliefs)
 
 
 def _held(result: Search, robot: Robot) -> Search:

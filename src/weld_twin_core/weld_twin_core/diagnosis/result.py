@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -151,12 +151,16 @@ class Changed:
         }
 
 
-@dataclass(frozen=True)
-class Site:
+class Site(NamedTuple):
     """A family on a joint (None: the robot as a whole)."""
 
     effect: str
     joint: str | None
+
+    @classmethod
+    def of(cls, effect: Effect) -> Site:
+        """Return where an effect is at work."""
+        return cls(effect.name, effect.site)
 
     def __str__(self) -> str:
         """Return it as people read it."""
@@ -164,7 +168,7 @@ class Site:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain values in the public schema."""
-        return asdict(self)
+        return self._asdict()
 
 
 @dataclass(frozen=True)

@@ -154,8 +154,14 @@ class Columns:
     @classmethod
     def joined(cls, pieces: Sequence[Piece]) -> Columns:
         """Return columns in few pieces, in the same order, so that products are few and large."""
-        runs = (list(run) for _, run in groupby(pieces, key=lambda piece: id(piece.joint)))
-        return cls(tuple(_one(run) for run in runs))
+        out = []
+        for _, alike in groupby(pieces, key=lambda piece: id(piece.joint)):
+            first, *more = alike
+            each = (
+                np.concatenate([first.each, *(one.each for one in more)]) if more else first.each
+            )
+            out.append(Piece(each, first.joint))
+        return cls(tuple(out))
 
     @cached_property
     def places(self) -> tuple[slice, ...]:
@@ -214,13 +220,6 @@ class Columns:
         return Columns(tuple(piece.within(rows) for piece in self.pieces))
 
 
-def _one(run: Sequence[Piece]) -> Piece:
-    """Return pieces that are kept alike as one."""
-    if len(run) == 1:
-        return run[0]
-    return Piece(np.concatenate([piece.each for piece in run]), run[0].joint)
-
-
 class Maker:
     """
     Makes the columns of effects at a model.
@@ -238,7 +237,13 @@ class Maker:
         shifts = [maker.shifts(effect, atoms) for maker in self.features]
         joint = None if self.problem.touched else moved_joint(shifts)
         if joint is not None and (atoms or len(shifts[0]) >= MANY):
-            return Piece(_amounts(shifts, joint, self.problem.samples), self.moved(joint))
+            # By how much every feature moves the joint, over all recordings.
+            each = [
+                np.stack([np.broadcast_to(shift.get(('q', joint), 0.0), (m,)) for shift in part])
+                for part, m in zip(shifts, self.problem.samples, strict=True)
+            ]
+            amounts = each[0] if len(each) == 1 else np.concatenate(each, axis=1)
+            return Piece(amounts, self.moved(joint))
         changes = [m.changes(own) for m, own in zip(self.features, shifts, strict=True)]
         parts = [self.problem.seen(k, change) for k, change in enumerate(changes)]
         return Piece(self.problem.whitened(parts, self.scale))
@@ -265,15 +270,6 @@ def moved_joint(shifts: Sequence[Sequence[Shift]]) -> int | None:
         return None
     name, joint = channels.pop()
     return joint if name == 'q' else None
-
-
-def _amounts(shifts: Sequence[Sequence[Shift]], joint: int, samples: Sequence[int]) -> Array:
-    """Return by how much every feature moves a joint, over all recordings, shape (K, samples)."""
-    parts = [
-        np.stack([np.broadcast_to(shift.get(('q', joint), 0.0), (m,)) for shift in part])
-        for part, m in zip(shifts, samples, strict=True)
-    ]
-    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
 
 
 def designed(problem: Problem, model: Model, scale: Scale) -> Columns:

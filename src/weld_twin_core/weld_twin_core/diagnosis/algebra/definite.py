@@ -98,17 +98,12 @@ def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
 
 def unit_diagonal(normal: Array, damping: float = 0.0) -> tuple[Array, Array]:
     """
-    Return a normal matrix with ones on its diagonal, and the norms of its columns.
+    Return a normal matrix with ones on its diagonal, (P, P), and the norms of its columns, (P,).
+
+    Solve ``normal / outer(size, size)`` for ``right / size`` and divide by ``size``.
 
     normal: shape (P, P).
     damping: added to the diagonal of ones, so that columns that repeat others do no harm.
-
-    Returns
-    -------
-    scaled : array, shape (P, P)
-        ``normal / outer(size, size)``; solve it for ``right / size`` and divide by ``size``.
-    size : array, shape (P,)
-
     """
     size = np.sqrt(np.maximum(normal.diagonal(), EMPTY))
     scaled = normal / (size[:, None] * size)

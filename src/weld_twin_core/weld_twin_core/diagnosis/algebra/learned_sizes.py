@@ -56,7 +56,10 @@ def learned_precision(
     normal = normal * np.outer(scales, scales)
     right = right * scales
     tied = labels >= 0
-    usual = _usual(scales, believed)
+    usual = np.full(scales.size, np.inf)  # variance of machines at large in typical sizes
+    if believed is not None:
+        known = believed > 0.0
+        usual[known] = 1.0 / (believed[known] * scales[known] ** 2)
     variance, most = _first_variances(labels, usual)
     members, count = labels[tied], variance.size
     learned_of = np.bincount(members, minlength=count) > 0
@@ -74,15 +77,6 @@ def learned_precision(
     precision = _precision(tied, variance, labels, usual) / scales**2
     # The fit works in whitened rows, so a prior counts against the noise actually there.
     return precision * noise, float(determined.sum())
-
-
-def _usual(scales: Array, believed: Array | None) -> Array:
-    """Return the variance of machines at large in typical sizes, shape (K,); inf if unknown."""
-    usual = np.full(scales.size, np.inf)
-    if believed is not None:
-        known = believed > 0.0
-        usual[known] = 1.0 / (believed[known] * scales[known] ** 2)
-    return usual
 
 
 def _first_variances(labels: Array, usual: Array) -> tuple[Array, Array]:

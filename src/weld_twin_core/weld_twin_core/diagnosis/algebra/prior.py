@@ -38,7 +38,18 @@ def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
     Errors that samples share come in standard deviations. What may differ between recordings is
     believed to be as large as in a machine.
     """
-    precision, off = _anchored(problem, model)
+    anchor, frames = problem.anchor, list[Array]()
+    precision = np.zeros(problem.frame_count)
+    if anchor is not None:
+        # Nothing is believed of frames without an anchor.
+        sizes = np.repeat([FRAME_SHIFT, FRAME_TURN], 3)
+        precision = np.tile(sizes**-2.0, problem.frame_count // 6)
+        first = [group[0] for group in problem.stands] if 'base' in problem.align else []
+        frames = [frame_offset(model.bases[k], anchor.bases[k], left=True) for k in first]
+        if 'tool' in problem.align:
+            tool = model.robot.T_flange_tool
+            frames.append(frame_offset(tool, anchor.tool, left=False))
+    off = np.concatenate(frames) if frames else np.zeros(problem.frame_count)
     beside = [model.shared(k, own.mean.size) - own.mean for k, own in problem.common]
     precision = np.concatenate([precision, *(np.ones(part.size) for part in beside)])
     off = np.concatenate([off, *beside])
@@ -46,22 +57,6 @@ def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
     now = [change.effect.fit.coordinates() for change in model.changes]
     own = np.concatenate([np.zeros(0), *spread]) ** -2.0 if spread else np.zeros(0)
     return np.concatenate([precision, own]), np.concatenate([off, *now])
-
-
-def _anchored(problem: Problem, model: Model) -> tuple[Array, Array]:
-    """Return the prior precision of base and tool, and how far they are from the anchor."""
-    pairs: list[tuple[Array, Array, bool]] = []
-    anchor = problem.anchor
-    if anchor is None:
-        return np.zeros(problem.frame_count), np.zeros(problem.frame_count)
-    if 'base' in problem.align:
-        first = [group[0] for group in problem.stands]
-        pairs += [(model.bases[k], anchor.bases[k], True) for k in first]
-    if 'tool' in problem.align:
-        pairs.append((model.robot.T_flange_tool, anchor.tool, False))
-    sizes = np.repeat([FRAME_SHIFT, FRAME_TURN], 3)
-    off = [frame_offset(now, was, left=remaining) for now, was, remaining in pairs]
-    return np.tile(sizes**-2.0, len(pairs)), np.concatenate([np.zeros(0), *off])
 
 
 def frame_offset(now: Array, was: Array, *, left: bool) -> Array:

@@ -18,7 +18,7 @@ from ...contacts import Unknowns, places, unknowns
 from ...effects.effect import Effect
 from ...errors import DataError, ModelError
 from ...pose_noise import Common
-from ...recording import Measurements, Recording
+from ...recording import Recording
 from ...twin.features import Features, Remembered
 from .independent_rows import by_sample
 from .model import Anchor, Change, Model, Scale
@@ -91,7 +91,7 @@ class Problem:
         """Return the scalar rows per sample of each recording: 6 for poses, 3 for points."""
         seen = (self.contact(k) for k in range(len(self.recordings)))
         return tuple(
-            (3 if _measured(r).rotation is None else 6) if own is None else own.seen.shape[1]
+            (3 if r.seen.rotation is None else 6) if own is None else own.seen.shape[1]
             for r, own in zip(self.recordings, seen, strict=True)
         )
 
@@ -157,7 +157,7 @@ class Problem:
     @cached_property
     def common(self) -> list[tuple[int, Common]]:
         """Return the recordings whose samples share errors of their instrument, and these."""
-        each = enumerate(_measured(r).common for r in self.recordings)
+        each = enumerate(r.seen.common for r in self.recordings)
         return [(k, common) for k, common in each if common is not None]
 
     def of_frames(self) -> Problem:
@@ -168,14 +168,14 @@ class Problem:
         """Return the problem without errors that samples of an instrument share."""
         if not self.common:
             return self
-        pairs = ((r, _measured(r)) for r in self.recordings)
+        pairs = ((r, r.seen) for r in self.recordings)
         bare = tuple(r.with_measured(replace(m, common=None)) for r, m in pairs)
         return replace(self, recordings=bare)
 
     @cached_property
     def roots(self) -> list[Array | None]:
         """Return what makes independent rows of each recording's poses; None of those not told."""
-        reported = (_measured(r).noise for r in self.recordings)
+        reported = (r.seen.noise for r in self.recordings)
         return [None if noise is None else noise.root for noise in reported]
 
     def touching(self, model: Model) -> Problem:
@@ -185,7 +185,7 @@ class Problem:
             if recording.contacts is None:
                 each.append(None)
                 continue
-            poses = model.twin(k).poses(recording, _measured(recording).t)
+            poses = model.twin(k).poses(recording, recording.seen.t)
             each.append(unknowns(recording.contacts, poses.position))
         return replace(self, touched=tuple(each) if any(each) else ())
 
@@ -218,7 +218,7 @@ class Problem:
     @cached_property
     def samples(self) -> tuple[int, ...]:
         """Return the number of measurements of each recording."""
-        return tuple(_measured(r).t.size for r in self.recordings)
+        return tuple(r.seen.t.size for r in self.recordings)
 
     @cached_property
     def told_weights(self) -> list[Array]:
@@ -250,7 +250,7 @@ class Problem:
         """
         out = []
         for maker, recording in zip(self.features(model), self.recordings, strict=True):
-            measured, poses = _measured(recording), maker.run.poses
+            measured, poses = recording.seen, maker.run.poses
             if recording.contacts is not None:
                 where = places(recording.contacts, poses.position)
                 out.append(where.rows(poses.position)[0].T)
@@ -275,7 +275,7 @@ class Problem:
             if other is model:
                 return makers
         makers = [
-            Features(model.twin(k), r, _measured(r).t, self._remembered[k])
+            Features(model.twin(k), r, r.seen.t, self._remembered[k])
             for k, r in enumerate(self.recordings)
         ]
         self._lately[1:] = self._lately[:1]
@@ -348,41 +348,31 @@ class Problem:
 
     def frame_columns(self, features: list[Features]) -> tuple[list[Array], list[str]]:
         """Return nuisance columns, one (P, c, M) array per recording, and their names."""
-        names: list[str] = []
-        if 'base' in self.align:
-            names += [f'base {group[0]}.{j}' for group in self.stands for j in range(6)]
-        if 'tool' in self.align:
-            names += [f'tool.{j}' for j in range(6)]
+        groups = [(f'base {g[0]}', 'base', g) for g in self.stands if 'base' in self.align]
+        groups += [('tool', 'tool', tuple(range(len(features))))] * ('tool' in self.align)
+        sizes = [change.effect.fit.coordinates().size for change in self.changes]
+        names = [f'{name}.{j}' for name, _, _ in groups for j in range(6)]
         names += [f'common {k}.{j}' for k, own in self.common for j in range(own.mean.size)]
+        names += [f'change {i}.{j}' for i, size in enumerate(sizes) for j in range(size)]
         parts = []
-        groups = [('base', group) for group in self.stands if 'base' in self.align]
-        groups += [('tool', tuple(range(len(features))))] * ('tool' in self.align)
-        rows, samples = self.rows, self.samples
         for k, maker in enumerate(features):
-            block = np.zeros((len(names), rows[k], samples[k]))
-            for p, (kind, group) in enumerate(groups):
+            block = np.zeros((len(names), self.rows[k], self.samples[k]))
+            at, given = 0, self.given[k] if self.given else k
+            for _, kind, group in groups:
                 for j in range(6 if k in group else 0):
-                    block[6 * p + j] = self.seen(k, maker.column((kind, j)))
-            at = self.frame_count
+                    block[at + j] = self.seen(k, maker.column((kind, j)))
+                at += 6
             for other, own in self.common:
                 if other == k:
                     block[at : at + own.mean.size] = own.change.transpose(2, 1, 0)
                 at += own.mean.size
-            parts.append(np.concatenate([block, *self._change_columns(k, maker)]))
-        sizes = [change.effect.fit.coordinates().size for change in self.changes]
-        names += [f'change {i}.{j}' for i, size in enumerate(sizes) for j in range(size)]
+            for change, size in zip(self.changes, sizes, strict=True):
+                if change.recording == given:
+                    columns = maker.columns(change.effect, atoms=False)
+                    block[at : at + size] = self.seen(k, columns)
+                at += size
+            parts.append(block)
         return parts, names
-
-    def _change_columns(self, k: int, maker: Features) -> list[Array]:
-        """Return the columns of every change in recording k, zero for those of the others."""
-        out, own = [], self.given[k] if self.given else k
-        for change in self.changes:
-            if change.recording == own:
-                out.append(self.seen(k, maker.columns(change.effect, atoms=False)))
-            else:
-                size = change.effect.fit.coordinates().size
-                out.append(np.zeros((size, self.rows[k], self.samples[k])))
-        return out
 
     def effect_columns(
         self, features: list[Features], effect: Effect, *, atoms: bool = True
@@ -409,7 +399,9 @@ class Problem:
         whole = self.places >= PLACES
         total = max(sum(self.samples), 1)
         out, start = [np.empty(0, int) for _ in self.recordings], 0
-        for k in self._by_content:
+        # In an order that does not hang on which was given first.
+        keys = [(r.epoch_ns, r.seen.position.tobytes()) for r in self.recordings]
+        for k in sorted(range(len(keys)), key=keys.__getitem__):
             c, m = self.rows[k], self.samples[k]
             count = max(1, round(blocks * m / total))
             if whole and self.contact(k) is not None:
@@ -419,12 +411,6 @@ class Problem:
             start += count
         return np.concatenate(out)
 
-    @property
-    def _by_content(self) -> list[int]:
-        """Return the recordings in an order that does not hang on which was given first."""
-        keys = [(r.epoch_ns, _measured(r).position.tobytes()) for r in self.recordings]
-        return sorted(range(len(keys)), key=keys.__getitem__)
-
     def thinned(self, most_rows: int) -> Problem:
         """Return the problem with evenly fewer measurements when it has too many rows."""
         factor = self.size / most_rows
@@ -432,7 +418,7 @@ class Problem:
             return self
         out = []
         for recording in self.recordings:
-            measured = _measured(recording)
+            measured = recording.seen
             if recording.contacts is not None:
                 out.append(recording)
                 continue
@@ -467,9 +453,3 @@ def usable(recording: Recording) -> Recording:
             f'{measured.t[-1]:.3f} s); the two clocks differ'
         )
     return recording.looking_back().with_measured(measured.take(inside))
-
-
-def _measured(recording: Recording) -> Measurements:
-    if recording.measured is None:
-        raise DataError(f'{recording.name} holds no measured poses or points')
-    return recording.measured

@@ -84,7 +84,7 @@ def _told(
     """Return which effects of the model are told, each with the number of its set."""
     if not dense:
         return [(c.members[0], c.effect) for c in causes if c.effect is not None]
-    sites = [Site(effect.name, effect.site) for effect in model]
+    sites = [Site.of(effect) for effect in model]
     return [
         (sites.index(site), k)
         for k, group in enumerate(verdict.sets)
@@ -132,7 +132,7 @@ def standard_errors(
 
 def _instead(effect: Effect, sets: Sequence[tuple[Site, ...]]) -> set[tuple[str, str]]:
     """Return names and joints of those that may be at work in an effect's place."""
-    mine = Site(effect.name, effect.site)
+    mine = Site.of(effect)
     named = {site for group in sets if mine in group for site in group} - {mine}
     return {(site.effect, site.joint or '') for site in named}
 

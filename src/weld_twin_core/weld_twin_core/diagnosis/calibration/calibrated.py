@@ -10,11 +10,11 @@ from typing import TypeVar
 
 from ..hypotheses.search import Search
 from ..levels.free_form import FreeForm
-from ..posterior.table import Row
 from ..result import NAMING, Cause
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
+from ..verdict.table import Row
 from .features import (
     TOLD_AS,
     Numbers,

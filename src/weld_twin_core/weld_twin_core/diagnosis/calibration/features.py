@@ -16,10 +16,10 @@ import numpy as np
 
 from ..hypotheses.search import Search
 from ..levels.free_form import FreeForm
-from ..posterior.table import Row, dependence_of
 from ..result import Cause
 from ..verdict.decision import Left
 from ..verdict.evidence import Evidence
+from ..verdict.table import Row
 
 Numbers = dict[str, float]
 FAR = 1e3
@@ -77,11 +77,11 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
     formula that stands in for another wants other values on every stretch.
     left_at: what the most of what is left depends on, in words.
     """
-    on = dependence_of(row.leader)
+    on = row.leader.dependence
     return plain(
         {
             'weight': odds(row.mass),
-            'evidence': log1(row.gap),
+            'evidence': log1(row.leader.nats),
             'behind': log1(row.leader.behind),
             'size': log(size),
             'wander': log(wandered),

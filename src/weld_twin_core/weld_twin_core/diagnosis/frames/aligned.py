@@ -27,46 +27,6 @@ from ..algebra.fit import fit
 from ..algebra.problem import Anchor, Model, Problem, frames_named, usable
 from .alignment import initial_frames
 
-
-def aligned(
-    recordings: Recording | Sequence[Recording],
-    robot: Robot,
-    align: str | Iterable[str],
-    known: Sequence[Effect],
-) -> tuple[Problem, Model]:
-    """
-    Return the recordings as a problem, and the model that a search starts from.
-
-    robot: the nominal model.
-    align: frames fitted as nuisance in every hypothesis: 'base', 'tool', 'base,tool'.
-    known: put into the twin first.
-
-    Raises DataError: nothing was measured, or no measurement falls inside a joint stream. Raises
-    ModelError: ``align`` names something else than base and tool.
-    """
-    recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
-    if any(recording.contacts is not None for recording in recordings):
-        return posed(recordings, robot, frames_named(align), known)
-    problem = Problem(tuple(usable(r) for r in recordings), frames_named(align))
-    model = Model(robot, tuple(robot.T_world_base for _ in recordings), tuple(known))
-    model = initial_frames(problem, model)
-    return replace(problem, anchor=Anchor(model.bases, model.robot.T_flange_tool)), model
-
-
-def frames_only(recording: Recording, robot: Robot, align: frozenset[str]) -> Model:
-    """
-    Return the robot with the frames that best agree with a recording.
-
-    recording: with measurements.
-    align: which frames are fitted: 'base', 'tool' or both.
-
-    Raises DataError: nothing was measured, or the clocks of joints and measurements do not meet.
-    """
-    problem = Problem((usable(recording),), align)
-    start = initial_frames(problem, Model(robot, (robot.T_world_base,)))
-    return fit(problem, start, problem.unit_scale()).model
-
-
 NEAR = 0.02
 """Median distance [m] of the tool point from its contacts from which a fit finds its own way."""
 ROUNDS = 20
@@ -81,29 +41,33 @@ FEWEST = 2
 """Postures that one contact needs at the least: of a single one its unknown place takes everything."""
 
 
-def posed(
-    recordings: Sequence[Recording],
+def aligned(
+    recordings: Recording | Sequence[Recording],
     robot: Robot,
-    align: frozenset[str],
+    align: str | Iterable[str],
     known: Sequence[Effect],
     given: Sequence[int] = (),
 ) -> tuple[Problem, Model]:
     """
-    Return contacts as a problem, and the model that a search starts from.
+    Return the recordings as a problem, and the model that a search starts from.
 
-    recordings: with contacts; what an instrument measured comes first in the problem.
+    recordings: with measurements or contacts; what an instrument measured comes first in the problem.
     robot: the nominal model.
-    align: 'tool' where the tool point is not known; 'base' where it is not known where the base
-    stands, which says nothing where all places are unknown too.
+    align: frames fitted as nuisance in every hypothesis: 'base', 'tool', 'base,tool'. Of contacts
+    'tool' where the tool point is not known; 'base' where it is not known where the base stands,
+    which says nothing where all places are unknown too.
     known: put into the twin first.
     given: of which of the recordings given each is a part; each by itself when left out.
 
-    Raises DataError: contacts are too few, or a recording holds neither contacts nor measurements.
+    Raises DataError: nothing was measured, no measurement falls inside a joint stream, or contacts
+    are too few. Raises ModelError: ``align`` names something else than base and tool.
     """
+    recordings = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    align = frames_named(align)
     pairs = list(zip(given or range(len(recordings)), recordings, strict=True))
     tracked = [(k, usable(r)) for k, r in pairs if r.contacts is None]
     touched = [(k, part) for k, r in pairs if r.contacts is not None for part in _by_place(r)]
-    parts = tuple(k for k, _ in (*tracked, *touched))
+    parts = tuple(k for k, _ in (*tracked, *touched)) if touched else ()
     model = _started([r for _, r in tracked], [r for _, r in touched], robot, align, known)
     model = replace(model, given=parts)
     filled = [_filled(r, model, k) for k, (_, r) in enumerate(touched, len(tracked))]
@@ -113,6 +77,20 @@ def posed(
     if problem.untracked and not problem.placed:
         problem = replace(problem, align=align & {'tool'})
     return problem, model
+
+
+def frames_only(recording: Recording, robot: Robot, align: frozenset[str]) -> Model:
+    """
+    Return the robot with the frames that best agree with a recording.
+
+    recording: with measurements.
+    align: which frames are fitted: 'base', 'tool' or both.
+
+    Raises DataError: nothing was measured, or the clocks of joints and measurements do not meet.
+    """
+    problem = Problem((usable(recording),), align)
+    start = initial_frames(problem, Model(robot, (robot.T_world_base,)))
+    return fit(problem, start, problem.unit_scale()).model
 
 
 def _started(

@@ -260,7 +260,10 @@ def told(
     precision: prior precision of the coordinates of the found effects, shape (K,).
     families: what may differ. Frames that were fitted for each recording are compared here.
     """
-    whole = _covariance(problem, model, scale, precision)
+    columns, ridge = _columns(problem, model, scale, precision)
+    residual = problem.whitened(problem.residuals(model), scale)
+    share = effective_share(residual, problem.rows, problem.samples)
+    whole = covariance(columns, ridge, residual, problem.block_labels(BLOCKS), share)
     parts = _places(problem, model)
     out = [
         Told(change, whole[np.ix_(part, part)])
@@ -285,14 +288,6 @@ def _bases(kind: type[Effect], problem: Problem, model: Model, whole: Array) -> 
         own = problem.given[k] if problem.given else k
         out.append(Told(Change(own, effect), mix @ whole @ mix.T))
     return out
-
-
-def _covariance(problem: Problem, model: Model, scale: Scale, precision: Array) -> Array:
-    """Return the covariance of all columns, shape (P, P)."""
-    columns, ridge = _columns(problem, model, scale, precision)
-    residual = problem.whitened(problem.residuals(model), scale)
-    share = effective_share(residual, problem.rows, problem.samples)
-    return covariance(columns, ridge, residual, problem.block_labels(BLOCKS), share)
 
 
 def _columns(

@@ -94,7 +94,8 @@ def held(result: Fit, problem: Problem, scale: Scale, precision: Array, given: R
         return result
     off, weight = _off(problem, result.model, given)
     back = np.linalg.lstsq(weight[:, None] * free.vectors, -weight * off, rcond=1e-9)[0]
-    count = problem.shared_count + _between(result.model) + result.coordinates.size
+    changed = sum(change.effect.fit.coordinates().size for change in result.model.changes)
+    count = problem.shared_count + changed + result.coordinates.size
     step = np.concatenate([free.vectors @ back, np.zeros(count)])
     model = stepped(problem, result.model, step)
     for _ in range(ROUNDS):
@@ -105,11 +106,6 @@ def held(result: Fit, problem: Problem, scale: Scale, precision: Array, given: R
     if residual @ residual > result.rss + most:
         return result
     return fit(problem, model, scale, precision if precision.size else None, iterations=0)
-
-
-def _between(model: Model) -> int:
-    """Return the number of coordinates of what differs between the recordings."""
-    return sum(change.effect.fit.coordinates().size for change in model.changes)
 
 
 def _off(problem: Problem, model: Model, given: Robot) -> tuple[Array, Array]:

@@ -44,14 +44,32 @@ def of_no_size(site: Site) -> Effect:
     return REGISTRY[site.effect](**({'joint': site.joint} if site.joint is not None else {}))
 
 
-def same_error(robot: Robot, one: Effect, other: Effect) -> bool:
+def same_error(
+    robot: Robot,
+    one: Effect,
+    other: Effect,
+    align: frozenset[str] = frozenset(),
+    *,
+    both: bool = False,
+) -> bool:
     """
     Return whether one of two constant errors can always do what the other does.
 
     one, other: their families and joints count, not their values.
+    align: frames that are fitted, 'base' and 'tool': what these take up tells nobody apart.
+    both: ask that each can do what the other does.
     """
     a, b = columns(robot, one), columns(robot, other)
-    return inside(a, b) or inside(b, a)
+    if align:
+        span = _frames(robot, align)
+        if min(share_outside(rows, span).min() for rows in (a, b)) < SAME:
+            return False  # A frame is what they are.
+        a, b = (outside(rows, span) for rows in (a, b))
+    within = (
+        rows.any(axis=1).all() and (share_outside(rows, span_of(others)) < SAME).all()
+        for rows, others in ((a, b), (b, a))
+    )
+    return bool(all(within) if both else any(within))
 
 
 def never_parted(
@@ -70,31 +88,13 @@ def never_parted(
         remaining.sort(key=lambda site: not REGISTRY[site.effect].traits.set_at_controller)
         while len(remaining) > 1:
             first = of_no_size(remaining[0])
-            same = [
-                remaining[0],
-                *(s for s in remaining[1:] if always(robot, first, of_no_size(s), align)),
-            ]
+            others = ((s, of_no_size(s)) for s in remaining[1:])
+            same = [s for s, own in others if same_error(robot, first, own, align, both=True)]
+            same = [remaining[0], *same]
             remaining = [site for site in remaining if site not in same]
             if len(same) > 1:
                 out.append(tuple(same))
     return tuple(out)
-
-
-def always(robot: Robot, one: Effect, other: Effect, align: frozenset[str]) -> bool:
-    """
-    Return whether two constant errors do the same on any motion, each all that the other does.
-
-    one, other: their families and joints count, not their values.
-    align: frames that are fitted, 'base' and 'tool': what these take up tells nobody apart.
-    """
-    a, b = columns(robot, one), columns(robot, other)
-    frames = [frame_columns(robot, name) for name in sorted(align)]
-    if frames:
-        span = span_of(np.concatenate(frames))
-        if min(share_outside(rows, span).min() for rows in (a, b)) < SAME:
-            return False  # A frame is what they are.
-        a, b = (outside(rows, span) for rows in (a, b))
-    return inside(a, b) and inside(b, a)
 
 
 @lru_cache(maxsize=4)
@@ -108,8 +108,7 @@ def set_instead(robot: Robot, align: frozenset[str], exclude: frozenset[str]) ->
     align: frames that are fitted, 'base' and 'tool'.
     exclude: families taken out of the library: nothing is set by them.
     """
-    frames = [frame_columns(robot, name) for name in sorted(align)]
-    span = span_of(np.concatenate(frames)) if frames else np.zeros((0, 6 * POSTURES))
+    span = _frames(robot, align)
     singles = [e for e in _constants(robot) if e.fit.coordinates().size == 1]
     singles = [e for e in singles if e.traits.set_at_controller <= (e.name not in exclude)]
     rows = np.concatenate([np.zeros((0, span.shape[1])), *(columns(robot, e) for e in singles)])
@@ -119,7 +118,7 @@ def set_instead(robot: Robot, align: frozenset[str], exclude: frozenset[str]) ->
     same = np.outer(shown, shown) & (np.abs(unit @ unit.T) > 1.0 - SAME**2)
     can_be_set = np.array([e.traits.set_at_controller for e in singles], dtype=bool)
     found = same[:, can_be_set].any(axis=1) & ~can_be_set
-    return frozenset(Site(singles[k].name, singles[k].site) for k in np.flatnonzero(found))
+    return frozenset(Site.of(singles[k]) for k in np.flatnonzero(found))
 
 
 def _constants(robot: Robot) -> Iterator[Effect]:
@@ -136,10 +135,12 @@ def columns(robot: Robot, effect: Effect) -> Array:
     return _levered(anywhere(robot).columns(effect))
 
 
-def frame_columns(robot: Robot, name: str) -> Array:
-    """Return what a frame does to the tool in many postures, shape (6, rows)."""
-    maker = anywhere(robot)
-    return _levered(np.stack([maker.column((name, k)) for k in range(6)]))
+def _frames(robot: Robot, align: frozenset[str]) -> Array:
+    """Return what spans the motions of frames in many postures, shape (P, rows)."""
+    maker, rows = anywhere(robot), [np.zeros((0, 6 * POSTURES))]
+    for name in sorted(align):
+        rows.append(_levered(np.stack([maker.column((name, k)) for k in range(6)])))
+    return span_of(np.concatenate(rows))
 
 
 @lru_cache(maxsize=2)
@@ -156,8 +157,3 @@ def _levered(columns: Array) -> Array:
     out = np.array(columns)
     out[:, 3:] *= LEVER
     return out.reshape(out.shape[0], -1)
-
-
-def inside(rows: Array, span: Array, share: float = SAME) -> bool:
-    """Return whether every row lies in the span of others, but for a share of it."""
-    return bool(rows.any(axis=1).all() and (share_outside(rows, span_of(span)) < share).all())

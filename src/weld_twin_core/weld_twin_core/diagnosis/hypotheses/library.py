@@ -66,7 +66,7 @@ def build(problem: Problem, model: Model, scale: Scale, exclude: Sequence[str] =
             shelf.add(kind, joint)
     for sudden in problem.dated:
         if sudden.name not in exclude:
-            shelf.place(sudden.name, sudden.site, [sudden], float(sum(problem.samples)))
+            shelf.place(Site.of(sudden), [sudden], float(sum(problem.samples)))
     index = [own for unit in shelf.units for own in unit.columns]
     systems = SeedSystems.of(index, [piece.normal() for piece in shelf.pieces])
     columns = Columns.joined(shelf.pieces or [Piece(np.zeros((0, problem.size)))])
@@ -98,14 +98,15 @@ class _Shelf:
             return
         result, trials = self._seeds(kind, joint)
         seeds = [seed for seed in result if not hardly_moves(self.features, seed)]
-        role = Role.ALIKE if Site(kind.name, joint) in self.alike else Role.FOUND
+        site = Site(kind.name, joint)
+        role = Role.ALIKE if site in self.alike else Role.FOUND
         if kind.name in self.excluded:
             role = Role.TAKEN_OUT
         elif len(seeds) < len(result):
             self._leave_out(kind.name, str(joint))
-        self.place(kind.name, joint, seeds, trials, role)
+        self.place(site, seeds, trials, role)
         if not seeds:
-            self.place(kind.name, joint, self._constants(kind, joint), 1.0, Role.ALIKE)
+            self.place(site, self._constants(kind, joint), 1.0, Role.ALIKE)
 
     def _seeds(self, kind: type[Effect], joint: str | None) -> tuple[list[Effect], float]:
         """Return the instances that are looked for, and among how many they were chosen."""
@@ -140,12 +141,7 @@ class _Shelf:
         self.absent[family] = f'{REASON} ({", ".join(dict.fromkeys(joints))})'
 
     def place(
-        self,
-        family: str,
-        joint: str | None,
-        seeds: Sequence[Effect],
-        trials: float,
-        role: Role = Role.FOUND,
+        self, site: Site, seeds: Sequence[Effect], trials: float, role: Role = Role.FOUND
     ) -> None:
         """Add the unit of those seeds that the data show."""
         every = ((seed, self._maker.piece(seed)) for seed in seeds)
@@ -158,7 +154,7 @@ class _Shelf:
             columns.append(np.arange(self._count, self._count + piece.count))
             self._count += piece.count
         kept = tuple(seed for seed, _ in shown)
-        self.units.append(Unit(family, joint, kept, tuple(columns), trials, role))
+        self.units.append(Unit(site, kept, tuple(columns), trials, role))
 
 
 def _shown(seed: Effect, piece: Piece) -> bool:

@@ -20,9 +20,10 @@ import numpy as np
 from ...arrays import Array
 from ..algebra.alias import outside, span_of
 from ..algebra.fit import Fit, design, solve_scaled
+from ..result import Site
 from .library import Library
 from .seed_systems import SINGULAR, Choice, SeedSystems, evidence, ranking
-from .selection import Place, Workspace, backward, implausible, merged, sites
+from .selection import Workspace, backward, implausible, merged, sites
 
 BEGUN = 6
 """Effects that a set is begun with, in turn; bounds the time."""
@@ -39,17 +40,12 @@ ROUNDS = 4
 class Other(NamedTuple):
     """A set of effects that does without one that was found."""
 
-    instead_of: Place
-    """Family and joint of what it does without."""
+    instead_of: Site
+    """What it does without."""
     fit: Fit
     ahead: float
     """By how much evidence [nats] it is ahead of what was found; less than nothing where
     behind."""
-
-    def newcomers(self, now: Fit) -> list[Place]:
-        """Return what it has that was not found, what entered first before the others."""
-        had = sites(now)
-        return [site for site in sites(self.fit) if site not in had]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +110,7 @@ class Sets:
             rows -= self.frames @ self.frames[new].T
             self._cross.update(zip(new, rows.T.copy(), strict=True))
 
-    def of(self, wanted: Sequence[Place]) -> list[Choice]:
+    def of(self, wanted: Sequence[Site]) -> list[Choice]:
         """Return some units as a set, each with the seed that serves it best beside the others."""
         chosen: list[Choice] = []
         remaining = set(wanted)
@@ -123,7 +119,7 @@ class Sets:
             remaining.remove(best.unit.site)
         return chosen
 
-    def without(self, start: list[Choice], never: Place) -> list[Choice]:
+    def without(self, start: list[Choice], never: Site) -> list[Choice]:
         """Return the best set that begins with another and lacks a unit."""
         entering = self._entering(start, never)[:BEGUN]
         self._know(_columns(entering))
@@ -132,12 +128,12 @@ class Sets:
         best = sorted(more.values(), key=self.worth)[-COMPLETED:]
         return max((self._grown(one, never, LONGEST) for one in best), key=self.worth, default=[])
 
-    def _entering(self, chosen: Sequence[Choice], never: Place) -> list[Choice]:
+    def _entering(self, chosen: Sequence[Choice], never: Site) -> list[Choice]:
         """Return what earns a place beside a set, most evidence first."""
         taken = {never, *_names(chosen)}
         return [c for c in self.beside(chosen, self.enter_nats) if c.unit.site not in taken]
 
-    def _grown(self, chosen: list[Choice], never: Place, most: int) -> list[Choice]:
+    def _grown(self, chosen: list[Choice], never: Site, most: int) -> list[Choice]:
         """Return a set with what else earns a place, one unit after the other."""
         for _ in range(most):
             entering = self._entering(chosen, never)
@@ -188,7 +184,7 @@ def _others(work: Workspace, now: Fit, sets: Sets) -> list[Other]:
 
 def _fitted(work: Workspace, now: Fit, chosen: Sequence[Choice]) -> Fit:
     """Return the fit of a set; what was found before starts at its values."""
-    known = {(effect.name, effect.site): effect for effect in now.model.found}
+    known = {Site.of(effect): effect for effect in now.model.found}
     result = tuple(known[place] for place in _names(chosen) if place in known)
     for choice in chosen:
         if choice.unit.site not in known:
@@ -220,5 +216,5 @@ def _columns(chosen: Sequence[Choice]) -> list[int]:
     return [int(column) for choice in chosen for column in choice.columns]
 
 
-def _names(chosen: Sequence[Choice]) -> tuple[Place, ...]:
+def _names(chosen: Sequence[Choice]) -> tuple[Site, ...]:
     return tuple(sorted((c.unit.site for c in chosen), key=str))

@@ -22,12 +22,13 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
+from ...effects.registry import REGISTRY
 from ..algebra.fit import Fit
 from ..result import Site
 from .any_motion import constant, of_no_size, same_error
 from .other_sets import Other, ahead
 from .seed_systems import Choice, Role, evidence
-from .selection import Place, Workspace, backward, implausible, sites
+from .selection import Workspace, backward, implausible, sites
 
 SHORTLIST, BESIDE = 7, 3
 """Rivals that may be in the model, and others of each role, fitted at the most; bounds the time."""
@@ -50,6 +51,22 @@ class Rival:
     """By how much evidence it is ahead of all that may be in the model, where it may not
     [nats]."""
 
+    @property
+    def place(self) -> str:
+        """Return where it is at work."""
+        effect = self._fitted
+        return str(self.site.joint) if effect is None else effect.at
+
+    @property
+    def dependence(self) -> str:
+        """Return what it depends on."""
+        effect = self._fitted
+        return REGISTRY[self.site.effect].traits.depends_on if effect is None else effect.on
+
+    @property
+    def _fitted(self) -> Effect | None:
+        return next((e for e in self.fit.model.found if Site.of(e) == self.site), None)
+
 
 def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> tuple[Rival, ...]:
     """
@@ -58,10 +75,10 @@ def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> t
     now: the final fit, on the workspace's problem and scale.
     others: sets that do without something found: what takes its place may need company.
     """
-    effect = now.model.found[k]
+    place = Site.of(now.model.found[k])
     rest = work.without(now, k).fit
     ranked = work.ranked(rest, work.effective(now), roles=Role)
-    own = next((c for c in ranked if c.unit.site == (effect.name, effect.site)), None)
+    own = next((c for c in ranked if c.unit.site == place), None)
     # Started from what the others are beside the found effect: without it they may have gone far off.
     start = now.model.without(k)
     tried = [
@@ -70,23 +87,33 @@ def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> t
         for choice in _near(work, ranked, role, sites(now))
         if not implausible((other := work.fitted_with(start, choice.effect())).model)
     ]
-    count = work.independent([now, *(f for _, f in tried)], [effect.name])
-    seat = _Seat(work, effect.name, rest, count)
-    out = [Rival(Site(effect.name, effect.site), seat.nats(now, own), now)]
+    about = [place.effect]
+    count = work.independent([now, *(f for _, f in tried)], about)
+
+    def nats(full: Fit, choice: Choice | None) -> float:
+        freedom, trials = float(full.coordinates.size - rest.coordinates.size), 1.0
+        if choice is not None:
+            # Unused components of a vector effect buy nothing and cost nothing.
+            freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
+            trials = max(choice.unit.trials, 1.0)
+        before, after = work.left(rest, about), work.left(full, about)
+        return evidence(before, before - after, freedom, count) - float(np.log(trials))
+
+    out = [Rival(place, nats(now, own), now)]
     for choice, other in tried:
-        site, nats = Site(*choice.unit.site), seat.nats(other, choice)
-        out.append(Rival(site, nats, other, role=choice.unit.role))
+        out.append(Rival(choice.unit.site, nats(other, choice), other, role=choice.unit.role))
     for other_set in others:
-        if other_set.instead_of == (effect.name, effect.site):
-            known = {(one.site.effect, one.site.joint) for one in out}
-            first = next((s for s in other_set.newcomers(now) if s not in known), None)
+        if other_set.instead_of == place:
+            # What it has that was not found, what entered first before the others.
+            known = {*sites(now), *(one.site for one in out)}
+            first = next((site for site in sites(other_set.fit) if site not in known), None)
             if first is not None:
-                out.append(Rival(Site(*first), out[0].nats + other_set.ahead, other_set.fit))
+                out.append(Rival(first, out[0].nats + other_set.ahead, other_set.fit))
     return _weighed(out, work.beliefs.temperature)
 
 
 def _near(
-    work: Workspace, ranked: Sequence[Choice], role: Role, taken: Sequence[Place]
+    work: Workspace, ranked: Sequence[Choice], role: Role, taken: Sequence[Site]
 ) -> list[Choice]:
     """
     Return the choices of a role that the model does not have, near the best of them.
@@ -114,30 +141,6 @@ def _weighed(every: Sequence[Rival], temperature: float) -> tuple[Rival, ...]:
     weights /= weights.sum()
     told = [replace(r, probability=float(w)) for r, w in zip(out.values(), weights, strict=True)]
     return tuple(sorted(told, key=lambda r: -r.probability))
-
-
-@dataclass(frozen=True, eq=False)
-class _Seat:
-    """The place of an effect found, in which all that may stand there are weighed by one rule."""
-
-    work: Workspace
-    family: str
-    """Of the effect found."""
-    rest: Fit
-    """The fit without it."""
-    count: float
-    """Number of independent rows."""
-
-    def nats(self, full: Fit, choice: Choice | None) -> float:
-        """Return the evidence of a fit with a choice in this place, whose number of trials counts."""
-        freedom = float(full.coordinates.size - self.rest.coordinates.size)
-        trials = 1.0
-        if choice is not None:
-            # Unused components of a vector effect buy nothing and cost nothing.
-            freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
-            trials = max(choice.unit.trials, 1.0)
-        before, after = (self.work.left(one, [self.family]) for one in (self.rest, full))
-        return evidence(before, before - after, freedom, self.count) - float(np.log(trials))
 
 
 def with_leads(
@@ -178,7 +181,7 @@ def _lead(work: Workspace, now: Fit, other: Rival) -> Array | None:
     """
     own = backward(work, other.fit)
     kept = sites(own)
-    if (other.site.effect, other.site.joint) not in kept:
+    if other.site not in kept:
         return None
     nats = ahead(work, own, now)
     if nats <= work.beliefs.enter_nats:

@@ -18,7 +18,7 @@ from ..result import Site
 from .library import Library, build
 from .other_sets import AHEAD, Sets, reconsidered
 from .rivals import Rival, rivals, with_leads
-from .selection import Workspace, backward, forward, implausible, possible_part
+from .selection import Workspace, backward, forward, implausible, possible_part, sites
 
 SEARCH_ROWS = 9000
 """Rows a search works on: what is found there is fitted again on all."""
@@ -175,14 +175,14 @@ def settled(
         slots = []
         for k, effect in enumerate(now.model.found):
             slots.append(rivals(work, now, k, others))
-            progress(f'rivals of {Site(effect.name, effect.site)} weighed')
+            progress(f'rivals of {Site.of(effect)} weighed')
             leader, own = slots[-1][0], next(r for r in slots[-1] if r.fit is now)
             # What was had before comes back only where that is more than rounding.
             most = own.nats + AHEAD * (names(leader.fit.model) in had)
             if leader.nats > most and attempt < SWAPS:
                 swapped = backward(work, leader.fit)
                 # A rival that does not earn a place itself takes none from what did.
-                if leader.site in [Site(e.name, e.site) for e in swapped.model.found]:
+                if leader.site in sites(swapped):
                     now = swapped
                     had.append(names(now.model))
                     break
@@ -194,7 +194,7 @@ def settled(
 def names(model: Model) -> list[tuple[str, str | None, int]]:
     """Return what tells one set of found effects from another."""
     return sorted(
-        ((e.name, e.site, e.fit.coordinates().size) for e in model.found),
+        ((*Site.of(e), e.fit.coordinates().size) for e in model.found),
         key=lambda item: (item[0], item[1] or '', item[2]),
     )
 

@@ -10,7 +10,7 @@ together. So each seed has a small system of its own, and those of one size are 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...effects.effect import Effect
 from ..algebra.definite import EMPTY, FLAT, Index, unit_diagonal
+from ..result import Site
 
 SINGULAR = 1e-11
 """Added to the diagonal of ones, so that columns that repeat others do no harm; far above
@@ -42,8 +43,7 @@ class Role(Enum):
 class Unit:
     """One family on one joint: the smallest thing a verdict can name."""
 
-    family: str
-    joint: str | None
+    site: Site
     seeds: tuple[Effect, ...]
     """Instances that span it; more than one where a parameter bends the response."""
     columns: tuple[Index, ...]
@@ -51,15 +51,6 @@ class Unit:
     trials: float
     """Among how many instances the seeds were chosen."""
     role: Role = Role.FOUND
-
-    @property
-    def site(self) -> tuple[str, str | None]:
-        """Return family and joint."""
-        return self.family, self.joint
-
-    def __str__(self) -> str:
-        """Return family and joint as people read them."""
-        return f'{self.family} of {self.joint}' if self.joint else self.family
 
 
 class Alike(NamedTuple):
@@ -110,26 +101,14 @@ class SeedSystems:
             out.append(Alike(seeds, index, normal, np.zeros(each.shape), each))
         return cls(tuple(out))
 
-    def beside(self, own: Array, residual: Array, products: Array) -> SeedSystems:
+    def given(self, normal: Array, pull: Array, rss: float, products: Array) -> SeedSystems:
         """
         Return the systems for a residual, with the columns of a model projected out.
 
-        own: the model's columns, shape (P, rows).
-        residual: shape (rows,).
-        products: products of all columns with the model's, and with the residual, shape (all
-        columns, P + 1).
-        """
-        return self.given(own @ own.T, own @ residual, float(residual @ residual), products)
-
-    def given(self, normal: Array, pull: Array, rss: float, products: Array) -> SeedSystems:
-        """
-        Return the systems with columns projected out of which the products are known.
-
-        normal: products of the columns, shape (P, P).
+        normal: products of the model's columns, shape (P, P).
         pull: their products with the residual, shape (P,).
         rss: sum of squares of the residual.
-        products: products of all columns with them, and with the residual, shape (all columns, P +
-        1).
+        products: of all columns with the model's, and with the residual, shape (all columns, P + 1).
         """
         live = np.flatnonzero(normal.diagonal() > EMPTY)
         scaled, size = unit_diagonal(normal[np.ix_(live, live)], 1e-12)
@@ -138,68 +117,51 @@ class SeedSystems:
         solved = np.linalg.solve(scaled, wanted) if live.size else wanted
         right = products[:, -1] - cross @ solved[:, -1]
         rss = max(rss - float(pull[live] / size @ solved[:, -1]), EMPTY)
-        taken = solved[:, :-1].T
-        return replace(
-            self, rss=rss, alike=tuple(_less(a, cross, taken, right) for a in self.alike)
-        )
-
-    def grown(self, effective: float) -> list[Grown]:
-        """
-        Return which columns of every seed are worth it, for every size of seed.
-
-        Columns enter one at a time, the one that explains most first, as long as the evidence
-        grows; all together where that is worth more.
-
-        effective: number of independent rows.
-        """
-        return [_grown(each, self.rss, effective) for each in self.alike]
+        taken, alike = solved[:, :-1].T, []
+        for each in self.alike:
+            both = cross[each.columns] @ np.swapaxes(taken[each.columns], 1, 2)
+            alike.append(each._replace(normal=each.normal - both, right=right[each.columns]))
+        return SeedSystems(tuple(alike), rss)
 
 
-def _less(alike: Alike, cross: Array, taken: Array, right: Array) -> Alike:
-    both = cross[alike.columns] @ np.swapaxes(taken[alike.columns], 1, 2)
-    return alike._replace(normal=alike.normal - both, right=right[alike.columns])
+def grown(alike: Alike, rss: float, effective: float) -> Grown:
+    """
+    Return which columns of every seed are worth it.
 
+    Columns enter one at a time, the one that explains most first, as long as the evidence
+    grows; all together where that is worth more.
 
-def _grown(alike: Alike, rss: float, effective: float) -> Grown:
-    each = np.arange(alike.seeds.size)
-    live = np.einsum('sii->si', alike.normal) > FLAT * alike.size
-    remaining, pull = _scaled(alike, live)
-    whole = _together(remaining, pull, live.sum(axis=1, dtype=np.float64), rss, effective)
-    rest, chosen = live.copy(), np.zeros(live.shape, bool)
-    log_bayes_factor, gain = np.full(each.size, -np.inf), np.zeros(each.size)
+    rss: sum of squares of the residual.
+    effective: number of independent rows.
+    """
+    diagonal, eye = np.einsum('sii->si', alike.normal), np.eye(alike.right.shape[1])
+    live = diagonal > FLAT * alike.size
+    # Ones on the diagonal; what is not live stands by itself.
+    unit, both = np.sqrt(np.where(live, diagonal, 1.0)), live[:, :, None] & live[:, None]
+    remaining = np.where(both, alike.normal / (unit[:, :, None] * unit[:, None]), eye)
+    remaining, pull = remaining + SINGULAR * eye, np.where(live, alike.right / unit, 0.0)
+    count, together = live.sum(axis=1, dtype=np.float64), np.full(len(live), -np.inf)
+    if (several := count > 1).any():
+        all_at_once = np.linalg.solve(remaining[several], pull[several, :, None])[..., 0]
+        gains = (pull[several] * all_at_once).sum(axis=1)
+        together[several] = evidences(rss, gains, count[several], effective)
+    rest, chosen, growing = live.copy(), np.zeros(live.shape, bool), np.arange(len(live))
+    worth, gain = np.full(len(live), -np.inf), np.zeros(len(live))
     for step in range(live.shape[1]):
-        falls = np.where(rest, pull**2 / np.einsum('sii->si', remaining), -1.0)
+        falls = np.where(rest[growing], pull**2 / np.einsum('sii->si', remaining), -1.0)
         k = falls.argmax(axis=1)
-        more = falls[each, k]
-        worth = evidences(rss, gain + more, step + 1.0, effective)
-        better = (more >= 0.0) & (worth > log_bayes_factor)
-        if not better.any():
+        more = falls[np.arange(k.size), k]
+        now = evidences(rss, gain[growing] + more, step + 1.0, effective)
+        better = (more >= 0.0) & (now > worth[growing])
+        growing, k = growing[better], k[better]
+        if not growing.size:
             break
-        chosen[each[better], k[better]] = True
-        rest[each, k] = False
-        rest[~better] = False
-        log_bayes_factor, gain = (
-            np.where(better, worth, log_bayes_factor),
-            np.where(better, gain + more, gain),
-        )
-        remaining, pull = _projected(remaining, pull, k)
-    all_of_them = whole > log_bayes_factor
-    return Grown(np.where(all_of_them[:, None], live, chosen), np.maximum(whole, log_bayes_factor))
-
-
-def _scaled(alike: Alike, live: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return systems with ones on the diagonal; what is not live stands by itself."""
-    unit = np.sqrt(np.where(live, np.einsum('sii->si', alike.normal), 1.0))
-    both = live[:, :, None] & live[:, None]
-    eye = np.eye(live.shape[1])
-    scaled = np.where(both, alike.normal / (unit[:, :, None] * unit[:, None]), eye)
-    return scaled + SINGULAR * eye, np.where(live, alike.right / unit, 0.0)
-
-
-def _together(scaled: Array, pull: Array, count: Array, rss: float, effective: float) -> Array:
-    """Return the evidence of all live columns of every seed at once, where there are several."""
-    gain = (pull * np.linalg.solve(scaled, pull[..., None])[..., 0]).sum(axis=1)
-    return np.where(count > 1, evidences(rss, gain, count, effective), -np.inf)
+        chosen[growing, k], rest[growing, k] = True, False
+        worth[growing] = now[better]
+        gain[growing] += more[better]
+        remaining, pull = _projected(remaining[better], pull[better], k)
+    all_of_them = together > worth
+    return Grown(np.where(all_of_them[:, None], live, chosen), np.maximum(together, worth))
 
 
 def _projected(remaining: Array, pull: Array, k: Index) -> tuple[Array, Array]:
@@ -216,20 +178,13 @@ def _projected(remaining: Array, pull: Array, k: Index) -> tuple[Array, Array]:
 
 def evidence(rss: float, gain: float, freedom: float, effective: float) -> float:
     r"""
-    Return the nats that a fall of the sum of squares is worth, noise level unknown.
+    Return the log Bayes factor of a fall of the sum of squares, noise level unknown.
 
     .. math:: \tfrac{n}{2} \log\frac{RSS}{RSS - gain} - \tfrac{p}{2} \log n
 
-    Parameters
-    ----------
-    rss : float
-        Sum of squares before.
-    gain : float
-        By how much it falls.
-    freedom : float
-        Coordinates that the fall took.
-    effective : float
-        Number of independent rows [1]_: autocorrelated residuals carry less than their count.
+    rss, gain: sum of squares before, and by how much it falls.
+    freedom: coordinates that the fall took.
+    effective: number of independent rows [1]_: autocorrelated residuals carry less than their count.
 
     References
     ----------
@@ -240,14 +195,7 @@ def evidence(rss: float, gain: float, freedom: float, effective: float) -> float
 
 
 def evidences(rss: float, gain: Array, freedom: Array | float, effective: float) -> Array:
-    """
-    Return the `evidence` of many falls at once.
-
-    rss: sum of squares before.
-    gain: by how much it falls, shape (S,).
-    freedom: coordinates that each fall took, shape (S,).
-    effective: number of independent rows.
-    """
+    """Return the `evidence` of many falls at once, ``gain`` and ``freedom`` of shape (S,)."""
     # Where nothing was left before, nothing can fall.
     remaining = np.maximum(rss - gain, PERFECT * rss) / rss if rss > 0.0 else np.ones_like(gain)
     count = max(effective, FEWEST)
@@ -300,15 +248,12 @@ def ranking(
     least: evidence [nats] that a choice must exceed.
     roles: which units are asked.
     """
-    grown = systems.grown(effective)
+    each = [grown(alike, systems.rss, effective) for alike in systems.alike]
     first = np.cumsum([0, *(len(unit.seeds) for unit in units)])
-    log_bayes_factor, group, row = (
-        np.full(first[-1], -np.inf),
-        np.zeros(first[-1], int),
-        np.zeros(first[-1], int),
-    )
-    for k, (alike, each) in enumerate(zip(systems.alike, grown, strict=True)):
-        log_bayes_factor[alike.seeds], group[alike.seeds] = each.nats, k
+    log_bayes_factor, group = np.full(first[-1], -np.inf), np.zeros(first[-1], int)
+    row = np.zeros(first[-1], int)
+    for k, (alike, own) in enumerate(zip(systems.alike, each, strict=True)):
+        log_bayes_factor[alike.seeds], group[alike.seeds] = own.nats, k
         row[alike.seeds] = np.arange(alike.seeds.size)
     worth = np.maximum.reduceat(log_bayes_factor, first[:-1]) if units else log_bayes_factor
     worth = worth - np.log([unit.trials for unit in units])
@@ -317,6 +262,6 @@ def ranking(
     for u in np.flatnonzero(asked & (worth > least)).tolist():
         seed = int(np.argmax(log_bayes_factor[first[u] : first[u + 1]]))
         k, r = group[first[u] + seed], row[first[u] + seed]
-        chosen = np.flatnonzero(grown[k].chosen[r])
+        chosen = np.flatnonzero(each[k].chosen[r])
         result.append(Choice(units[u], seed, float(worth[u]), systems.alike[k], int(r), chosen))
     return sorted(result, key=lambda choice: -choice.nats)

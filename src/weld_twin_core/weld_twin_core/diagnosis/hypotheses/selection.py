@@ -19,6 +19,7 @@ from ..algebra.fit import Fit, design, fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
+from ..result import Site
 from .library import Library
 from .seed_systems import Choice, Role, SeedSystems, evidence, ranking
 from .starts import started
@@ -26,8 +27,6 @@ from .usual_errors import UsualErrors, usual
 
 SHORTLIST = 4
 """Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
-Place = tuple[str, str | None]
-"""Family and joint."""
 
 
 class Less(NamedTuple):
@@ -141,7 +140,7 @@ class Workspace:
         """Return the normal equations of all seeds given a fit: its frames and effects fitted."""
         own = design(self.problem, now.model, self.scale)
         products = self.library.columns.products(np.concatenate([own, now.residual[None]]))
-        return self.library.systems.beside(own, now.residual, products)
+        return self.library.systems.given(own @ own.T, own @ now.residual, now.rss, products)
 
     def ranked(
         self, now: Fit, count: float, least: float = -np.inf, roles: Iterable[Role] = (Role.FOUND,)
@@ -159,15 +158,9 @@ def forward(
     """
     Return the fit of a forward selection, and what no machine has and would have explained the rest.
 
-    Parameters
-    ----------
-    now : Fit
-        With what the model has already.
-    most : int
-        Stop after this many units.
-    tick : callable
-        Told what was found, for progress.
-
+    now: with what the model has already.
+    most: stop after this many units.
+    tick: told what was found, for progress.
     """
     for _ in range(most):
         # Until the cause is in the model the residual is all signal and looks autocorrelated;
@@ -212,7 +205,7 @@ def _with_best(
         impossible += absurd
         if possible:
             nats, best, unit = max(possible, key=lambda item: item[0])
-            return best, f'{unit} (+{nats:.0f} nats)', impossible
+            return best, f'{unit.site} (+{nats:.0f} nats)', impossible
         if not absurd or not all(_misshapen(now.model.robot, effect) for effect in absurd):
             break
         ranked = [choice for choice in ranked if choice not in close]
@@ -226,9 +219,9 @@ def _misshapen(robot: Robot, effect: Effect) -> bool:
     return all(name in bent for name, _, _ in beyond(robot, effect))
 
 
-def sites(result: Fit) -> list[Place]:
+def sites(result: Fit) -> list[Site]:
     """Return what is in the model of a fit."""
-    return [(effect.name, effect.site) for effect in result.model.found]
+    return [Site.of(effect) for effect in result.model.found]
 
 
 def implausible(model: Model) -> list[Effect]:
@@ -244,7 +237,7 @@ def possible_part(model: Model) -> Model:
 def merged(result: tuple[Effect, ...], effect: Effect) -> tuple[Effect, ...]:
     """Return the effects with one more, in one with its like where their kind can join."""
     for k, other in enumerate(result):
-        if (other.name, other.site) == (effect.name, effect.site):
+        if Site.of(other) == Site.of(effect):
             both = other.search.joined(effect)
             if both is not None:
                 return (*result[:k], both, *result[k + 1 :])

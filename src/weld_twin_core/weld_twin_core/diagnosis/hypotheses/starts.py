@@ -100,10 +100,17 @@ class _Looker:
         if starts is None:
             return None
         effects, joint = starts[0], most.twin.robot.index(str(effect.site))
-        parts = [
-            _picked(maker, effect, starts[1] if maker is most else _moved(effects, maker, joint))
-            for maker in features
-        ]
+        parts = []
+        for maker in features:
+            moved, view = starts[1], _view(maker, effect)
+            if maker is not most:
+                shifts = [
+                    np.broadcast_to(e.displace(view)['q', joint], view.t.shape) for e in effects
+                ]
+                moved = np.stack(shifts)
+            if effect.stage in MEMORY:  # at the stamps of the measurements
+                moved = Picker(maker.recording.joints, maker.run.view.t).pick(moved)
+            parts.append(moved)
         piece = Piece(np.concatenate(parts, axis=1), self.maker.moved(joint))
         assert piece.joint is not None
         pull = piece.products(self.residual[None])[:, 0]
@@ -115,20 +122,6 @@ class _Looker:
 def _view(maker: Features, effect: Effect) -> View:
     """Return what an effect sees of a recording."""
     return maker.joint_view if effect.stage in MEMORY else maker.view
-
-
-def _moved(effects: list[Effect], maker: Features, joint: int) -> Array:
-    """Return what each instance does to the joint, shape (D, N)."""
-    view = _view(maker, effects[0])
-    each = [effect.displace(view)['q', joint] for effect in effects]
-    return np.stack([np.broadcast_to(shift, view.t.shape) for shift in each])
-
-
-def _picked(maker: Features, effect: Effect, moved: Array) -> Array:
-    """Return displacements at the stamps of the measurements, shape (D, M)."""
-    if effect.stage not in MEMORY:
-        return moved
-    return Picker(maker.recording.joints, maker.run.view.t).pick(moved)
 
 
 def _sized(effects: list[Effect], pull: Array, mass: Array) -> Tried:

@@ -13,7 +13,8 @@ sample by sample, too, so that causes can be thought away.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from math import nan
 
 import numpy as np
 
@@ -21,11 +22,11 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..posterior.table import Row
 from ..result import Cause, Contributions, Shares, Site
 from ..unseen.folds import jackknife
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
+from ..verdict.table import Row, marginal
 from .curved import Curved
 from .free_form import FreeForm, Part
 
@@ -41,22 +42,6 @@ noise and the fit. Chosen on 167 causes of sealed cases so that 90 % are covered
 
 
 Members = tuple[int, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class _Claim:
-    """One cause before its share: members of the model, its slot, and what is believed of it."""
-
-    members: tuple[int, ...]
-    place: dict[str, float]
-    dependence: dict[str, float]
-    name: dict[Site, float]
-    taken: float | None = None
-    """Share of the squared gap that groups at this place take off unseen folds; None of a name."""
-    slot: int | None = None
-    group: int | None = None
-    kind: float | None = None
-    """Share of the squared gap that a kind takes off unseen data; None of one effect by itself."""
 
 
 def causes(
@@ -79,20 +64,20 @@ def causes(
     reported = _told_claims(result, table, verdict)
     curved = alternative if alternative is not None and alternative.unseen is unseen else None
     claims, rest = _nameless(result, reported, verdict, curved, placing, beliefs)
-    squares = (
-        unseen.squares(unseen.bare),
-        unseen.squares(unseen.whole),
-    )
+    squares = unseen.squares(unseen.bare), unseen.squares(unseen.whole)
     parts = _contributions(unseen)
     labels = unseen.trusted_labels()
     whole = _shares(squares, parts, claims, np.ones(labels.size, dtype=bool))
     spread = _spread(squares, parts, claims, labels)
-    whole, spread = _as_placed(whole, spread, claims, placing)
-    whole = np.array([s if c.kind is None else c.kind for c, s in zip(claims, whole, strict=True)])
+    given = np.array([claim.share for claim in claims])
+    if result.dense:
+        whole = np.where(np.isnan(given), whole, given)
+    elif placing is not None:
+        whole, spread = _as_placed(whole, spread, given, placing)
     noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
     remaining = max(1.0 - float(whole.sum()) - noise, 0.0)
     out = [
-        _cause(claim, float(share), float(error))
+        _sized(claim, float(share), float(error))
         for claim, share, error in zip(claims, whole, spread, strict=True)
     ]
     out.sort(key=lambda cause: -cause.share)
@@ -100,25 +85,29 @@ def causes(
     much = remaining > beliefs.unexplained and bool(out)
     if rest is not None and (much or (rest.place and not out)):
         error = float(np.sqrt((spread**2).sum()))
-        out.append(replace(_cause(rest, remaining, error), rest=True))
+        out.append(replace(_sized(rest, remaining, error), rest=True))
     return tuple(out), Shares(unexplained=remaining, noise=max(noise, 0.0))
 
 
-def _cause(claim: _Claim, share: float, error: float) -> Cause:
-    """Return a claim with its share."""
-    return Cause(
-        place=_listed(claim.place),
-        dependence=_listed(claim.dependence),
-        name=tuple((s, p) for s, p in claim.name.items() if p >= LISTED),
-        share=share,
-        share_ci90=(
-            float(max(share - STUDENT * error, 0.0)),
-            float(min(share + STUDENT * error, 1.0)),
-        ),
-        members=claim.members,
-        slot=claim.slot,
-        effect=claim.group,
-    )
+def _cause(
+    members: Members,
+    place: Mapping[str, float],
+    dependence: Mapping[str, float],
+    name: Mapping[Site, float],
+    *,
+    share: float = nan,
+    slot: int | None = None,
+    effect: int | None = None,
+) -> Cause:
+    """Return a cause; its share is that of a kind, or of groups, where it is given already."""
+    names = tuple((site, p) for site, p in name.items() if p >= LISTED)
+    levels = _listed(place), _listed(dependence), names
+    return Cause(*levels, share, (nan, nan), members, slot=slot, effect=effect)
+
+
+def _sized(cause: Cause, share: float, error: float) -> Cause:
+    low, high = max(share - STUDENT * error, 0.0), min(share + STUDENT * error, 1.0)
+    return replace(cause, share=share, share_ci90=(float(low), float(high)))
 
 
 def covering(cause: Cause) -> Cause:
@@ -128,7 +117,7 @@ def covering(cause: Cause) -> Cause:
 
 
 def _as_placed(
-    whole: Array, spread: Array, claims: Sequence[_Claim], placing: FreeForm | None
+    whole: Array, spread: Array, given: Array, placing: FreeForm
 ) -> tuple[Array, Array]:
     """
     Return shares and their errors with those of places as the groups take the gap off.
@@ -136,10 +125,9 @@ def _as_placed(
     Curves that are carried stand for a place as well as curves can; what a place is worth its own
     groups say, whether or not a curve carries them.
     """
-    of_groups = np.array([claim.taken is not None for claim in claims])
-    if placing is None or not of_groups.any():
+    of_groups, parts = ~np.isnan(given), np.nan_to_num(given)
+    if not of_groups.any():
         return whole, spread
-    parts = np.array([claim.taken or 0.0 for claim in claims])
     explained = max(float(whole[of_groups].sum()), float(parts.sum()))
     explained = min(explained, max(1.0 - float(whole[~of_groups].sum()), 0.0))
     reported = parts * explained / max(float(parts.sum()), 1e-300)
@@ -152,47 +140,34 @@ def _listed(beliefs: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
     return tuple((name, belief) for name, belief in ordered if belief >= LISTED)
 
 
-def _told_claims(result: Search, table: Sequence[Row], verdict: Verdict) -> list[_Claim]:
+def _told_claims(result: Search, table: Sequence[Row], verdict: Verdict) -> list[Cause]:
     """Return a claim for every effect that is told, or for every group of many small ones."""
     model = result.final.model.found
     if result.dense:
         return _claims_of_many(model, verdict)
-    out: list[_Claim] = []
+    out, sites = list[Cause](), [Site.of(effect) for effect in model]
     for at, group in enumerate(verdict.sets):
         k = next(i for i, row in enumerate(table) if row.leader.site in group)
         taken = {member for claim in out for member in claim.members}
-        member = _member(model, group, table[k], taken)
+        # A member that was taken out of the library may lead its set; the model holds another.
+        among = (group, [one.site for one in table[k].slot])
+        own = (m for some in among for m, s in enumerate(sites) if s in some and m not in taken)
+        member = next(own, None)
         if member is not None:
             names = {site: p for site, p in table[k].names().items() if site in group}
-            levels = table[k].places(), table[k].dependences()
-            out.append(_Claim((member,), *levels, names, slot=k, group=at))
+            levels = table[k].places(), table[k].dependences(), names
+            out.append(_cause((member,), *levels, slot=k, effect=at))
     return out
-
-
-def _member(
-    model: Sequence[Effect], group: Sequence[Site], row: Row, taken: set[int]
-) -> int | None:
-    """
-    Return which effect of the model stands for a set.
-
-    A member that was taken out of the library may lead its set; the model holds another.
-    """
-    sites = [Site(effect.name, effect.site) for effect in model]
-    for among in (group, [alternative.site for alternative in row.slot]):
-        for at, site in enumerate(sites):
-            if site in among and at not in taken:
-                return at
-    return None
 
 
 def _nameless(
     result: Search,
-    reported: list[_Claim],
+    reported: list[Cause],
     verdict: Verdict,
     curved: Curved | None,
     placing: FreeForm | None,
     beliefs: Beliefs,
-) -> tuple[list[_Claim], _Claim | None]:
+) -> tuple[list[Cause], Cause | None]:
     """Return all claims with those of curves that the model holds, and what is left beside."""
     if verdict.status != 'unknown':
         # What was found and does not count as named is left, and nothing else says where it sits.
@@ -204,27 +179,26 @@ def _nameless(
     taken = {at for claim in reported for at in claim.members}
     for k, effect in enumerate(model if curved is not None else ()):
         if k not in taken and not effect.traits.bends:
-            levels = {effect.at: 1.0}, {effect.on: 1.0}
-            claims.append(_Claim((k,), *levels, {Site(effect.name, effect.site): 1.0}))
+            claims.append(_cause((k,), {effect.at: 1.0}, {effect.on: 1.0}, {Site.of(effect): 1.0}))
     for place, own in places.items():
         if not held[place]:
             remaining += own
             continue
-        curves = {Site(model[k].name, model[k].site): 1.0 for k in held[place]}
-        levels = (_place_of(place, own, beliefs), _dependence_of(own))
+        curves = {Site.of(model[k]): 1.0 for k in held[place]}
+        levels = _place_of(place, own, beliefs), _dependence_of(own), curves
         share = float(sum(part.share for part in own))
-        claims.append(_Claim(held[place], *levels, curves, share))
+        claims.append(_cause(held[place], *levels, share=share))
     return claims, _rest(remaining, beliefs)
 
 
-def _rest(remaining: list[Part], beliefs: Beliefs) -> _Claim:
+def _rest(remaining: list[Part], beliefs: Beliefs) -> Cause:
     """Return what is left beside everything told, where the most of it is."""
     if not remaining:
-        return _Claim((), {}, {}, {})
+        return _cause((), {}, {}, {})
     places = _by_place(remaining)
     first = max(places, key=lambda at: sum(part.share for part in places[at]))
     own = places[first]
-    return _Claim((), _place_of(first, own, beliefs), _dependence_of(own), {})
+    return _cause((), _place_of(first, own, beliefs), _dependence_of(own), {})
 
 
 def _carried_by(places: dict[str, list[Part]], alternative: Curved | None) -> dict[str, Members]:
@@ -255,12 +229,12 @@ def _place_of(place: str, parts: list[Part], beliefs: Beliefs) -> dict[str, floa
 def _dependence_of(parts: list[Part]) -> dict[str, float]:
     """Return what is believed of the dependence of some parts, each counted by its share."""
     whole = sum(part.share for part in parts)
-    out: dict[str, float] = {}
-    for part in parts:
-        size = part.share / whole if whole > 0.0 else 1.0 / len(parts)
-        for on, weight in part.weight_of('on').items():
-            out[on] = out.get(on, 0.0) + size * weight
-    return out
+    sizes = [part.share / whole if whole > 0.0 else 1.0 / len(parts) for part in parts]
+    return marginal(
+        (on, size * weight)
+        for part, size in zip(parts, sizes, strict=True)
+        for on, weight in part.weight_of('on').items()
+    )
 
 
 def _by_place(parts: Sequence[Part]) -> dict[str, list[Part]]:
@@ -280,7 +254,7 @@ def _by_place(parts: Sequence[Part]) -> dict[str, list[Part]]:
     return out
 
 
-def _claims_of_many(model: tuple[Effect, ...], verdict: Verdict) -> list[_Claim]:
+def _claims_of_many(model: tuple[Effect, ...], verdict: Verdict) -> list[Cause]:
     """Return a claim for every kind that unseen data need, with its joints and with what is like it."""
     out = []
     for family in verdict.families:
@@ -289,18 +263,13 @@ def _claims_of_many(model: tuple[Effect, ...], verdict: Verdict) -> list[_Claim]
         whole = 1.0 + sum(part for _, part in family.like)
         reported = [(site, share / whole) for site, share in family.needed]
         reported += [(site, part / whole) for site, part in family.like]
-        place: dict[str, float] = {}
-        dependence: dict[str, float] = {}
-        name: dict[Site, float] = {}
-        for site, part in reported:
-            own = next(e for e in model if (e.name, e.site) == (site.effect, site.joint))
-            place[own.at] = place.get(own.at, 0.0) + part
-            dependence[own.on] = dependence.get(own.on, 0.0) + part
-            name[site] = part
+        effects = {Site.of(effect): effect for effect in reversed(model)}
+        place = marginal((effects[site].at, part) for site, part in reported)
+        dependence = marginal((effects[site].on, part) for site, part in reported)
         members = tuple(k for k, effect in enumerate(model) if effect.name == family.effect)
         group = next(k for k, each in enumerate(verdict.sets) if each[0] == family.needed[0][0])
-        claim = _Claim(members, place, dependence, name, group=group, kind=family.share)
-        out.append(claim)
+        levels = place, dependence, dict(reported)
+        out.append(_cause(members, *levels, share=family.share, effect=group))
     return out
 
 
@@ -319,7 +288,7 @@ def _contributions(unseen: Unseen) -> Array:
 def _shares(
     squares: tuple[Array, Array],
     parts: Array,
-    claims: Sequence[_Claim],
+    claims: Sequence[Cause],
     keep: np.ndarray,
 ) -> Array:
     """Return the share of every claim over some of the samples."""
@@ -333,7 +302,7 @@ def _shares(
 
 
 def _spread(
-    squares: tuple[Array, Array], parts: Array, claims: Sequence[_Claim], labels: np.ndarray
+    squares: tuple[Array, Array], parts: Array, claims: Sequence[Cause], labels: np.ndarray
 ) -> Array:
     """Return the standard error of every share, by leaving out one stretch at a time."""
     names = np.unique(labels)
@@ -364,7 +333,8 @@ def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | No
     rest = unseen.bare - remaining - parts.sum(axis=0)
     sizes = (parts**2).mean(axis=1)
     parts += rest * (sizes / max(float(sizes.sum()), 1e-300))[:, None]
-    split = [_metres(unseen, part) for part in (remaining, *parts)]
+    metres = [unseen.problem.measured_rows(part, unseen.scale) for part in (remaining, *parts)]
+    split = [[each[:, :3] for each in own] for own in metres]
     return Contributions(
         left=tuple(split[0]),
         parts=tuple(np.array(each) for each in zip(*split[1:], strict=True)),
@@ -380,8 +350,3 @@ def _fields(unseen: Unseen) -> Array:
     normal = columns @ columns.T + np.diag(unseen.precision[:count])
     step = np.linalg.lstsq(normal, columns @ fields.T, rcond=None)[0]
     return np.asarray(fields - step.T @ columns)
-
-
-def _metres(unseen: Unseen, rows: Array) -> list[Array]:
-    """Return the position part of whitened rows, (M, 3) [m] for every recording."""
-    return [part[:, :3] for part in unseen.problem.measured_rows(rows, unseen.scale)]

@@ -54,7 +54,7 @@ def curved(result: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
     kept = [
         effect
         for effect, candidate_set in zip(result.final.model.found, result.slots, strict=False)
-        if {Site(effect.name, effect.site), candidate_set[0].site} & reported
+        if {Site.of(effect), candidate_set[0].site} & reported
     ]
     kept = [effect for effect in result.final.model.found if not effect.traits.cause] + kept
     found = _beside(result, kept, beliefs)

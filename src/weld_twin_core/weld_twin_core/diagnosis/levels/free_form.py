@@ -21,6 +21,7 @@ from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import steadiness, ways_to_divide
 from ..unseen.groups import Group, all_groups
 from ..unseen.unseen_stretches import Base, Unseen
+from ..verdict.table import marginal
 
 STANDS_OUT, NAMED = 0.5, 3
 """Weight from which one place is named alone, and how many are named where none has it."""
@@ -48,10 +49,7 @@ class Part:
 
     def weight_of(self, kind: str) -> dict[str, float]:
         """Return the weight of every place ('at') or dependence ('on'), largest first."""
-        out: dict[str, float] = {}
-        for group, weight in self.rivals:
-            name = str(getattr(group, kind))
-            out[name] = out.get(name, 0.0) + weight
+        out = marginal((str(getattr(group, kind)), weight) for group, weight in self.rivals)
         return dict(sorted(out.items(), key=lambda item: -item[1]))
 
     @property

@@ -74,19 +74,20 @@ def placed(
 def _with_scatter(form: FreeForm, scattered: Sequence[Scatter]) -> FreeForm:
     """Return a form with a part for every joint that noise comes from and that has none yet."""
     seen = {part.group.at for part in form.parts}
-    more = [_scattering(one) for one in scattered if one.joint not in seen]
+    more = []
+    for one in scattered:
+        if one.joint not in seen:
+            rounded, jumping = (
+                Group(one.joint, on, (), np.zeros((0, 0)), np.zeros(0))
+                for on in ('angle', 'direction')
+            )
+            weights = (rounded, ROUNDED), (jumping, JUMPING)
+            more.append(Part(rounded, 1.0, weights, one.share))
     if not more:
         return form
     gain = form.gain + (1.0 - form.gain) * sum(part.share for part in more)
     steady = form.steady or min(one.steady for one in scattered)
     return replace(form, parts=(*form.parts, *more), gain=gain, steady=steady)
-
-
-def _scattering(one: Scatter) -> Part:
-    rounded, jumping = (
-        Group(one.joint, on, (), np.zeros((0, 0)), np.zeros(0)) for on in ('angle', 'direction')
-    )
-    return Part(rounded, 1.0, ((rounded, ROUNDED), (jumping, JUMPING)), one.share)
 
 
 def arm_first(result: Search, form: FreeForm) -> FreeForm:

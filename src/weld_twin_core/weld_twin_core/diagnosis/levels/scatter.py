@@ -23,7 +23,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
@@ -73,7 +72,8 @@ def scatter(result: Search, unseen: Unseen) -> list[Scatter]:
     for k, part in enumerate(parts):
         ways = problem.seen(k, _ways(features[k])) / noise[: problem.rows[k], None]
         left = np.diff(part, n=3, axis=0) / np.sqrt(THIRD)
-        usual = _usual(left)
+        length = (left**2).sum(axis=1)
+        usual = length < GROSS * np.median(length)
         if usual.sum() < STRETCHES:  # repeats with jumps between
             return []
         sums.append(_products(left[usual], ways[..., 1:-2][..., usual]))
@@ -113,26 +113,14 @@ def _ways(maker: Features) -> Array:
     return np.concatenate([coordinates, sight, velocity[None], np.array(moved)])
 
 
-def _usual(remaining: Array) -> NDArray[np.bool_]:
-    """Return which differences do not stand out, shape (M,)."""
-    length = (remaining**2).sum(axis=1)
-    return np.asarray(length < GROSS * np.median(length))
-
-
 def _products(remaining: Array, ways: Array) -> tuple[Array, Array, Array]:
     """
-    Return the normal equations of the variances, for every stretch.
+    Return the variances' normal equations, (stretches, K, K) and (stretches, K), and sizes, (K + 2,).
+
+    Sizes are the sums of squares of each way and of the differences, and the number of rows.
 
     remaining: differences in units of noise, shape (M, c).
     ways: shape (K, c, M).
-
-    Returns
-    -------
-    normal : array, shape (stretches, K, K)
-    right : array, shape (stretches, K)
-    sizes : array, shape (K + 2,)
-        Sum of squares of each way, then of the differences, then the number of rows.
-
     """
     cross = np.einsum('acm,bcm->abm', ways, ways, optimize=True) ** 2
     along = np.einsum('acm,mc->am', ways, remaining) ** 2

@@ -16,7 +16,6 @@ from dataclasses import fields, replace
 import numpy as np
 
 from ...arm.robot import Robot
-from ...arrays import Array
 from ...effects.effect import Effect, Stage
 from ...effects.plausible import beyond, plausible
 from ...effects.registry import REGISTRY
@@ -97,13 +96,21 @@ def _by_chance(none: Search, many: Search) -> bool:
 
 def _steps(problem: Problem, stations: int) -> list[tuple[str, ...]]:
     """Return the kinds left out of every step, from the least that is fitted to the most."""
-    steps = [_beyond(demand) for demand, least in enumerate(BEAR) if stations >= least]
+    steps = [
+        tuple(name for name, kind in REGISTRY.items() if kind.traits.demand > demand)
+        for demand, least in enumerate(BEAR)
+        if stations >= least
+    ]
     # First without curves: what a handful of stations bears is the geometry under load.
     curves = tuple(name for name, kind in REGISTRY.items() if kind.traits.bends)
     steps = steps[-1:] if stations >= PLENTY else [(*steps[0], *curves), *steps]
     if not problem.untracked:
         return steps
-    steps = [_but_scales(step) for step in steps]
+    # Contacts have few places, and each holds the arm in other angles. Of two arms of three measured
+    # by contacts, wrong scales of the joints made places that were left out better predicted (0.36 to
+    # 0.34 mm and 0.61 to 0.49 mm), of the third neither better nor worse; hundreds of waves told from
+    # few places made them worse.
+    steps = [tuple(name for name in step if not _one_number(REGISTRY[name])) for step in steps]
     # What carries over to another place only a place left out can tell; two are too few.
     return steps[:1] if problem.places < PLACES else steps
 
@@ -151,24 +158,8 @@ def _too_large(robot: Robot, effect: Effect) -> bool:
     return False
 
 
-def _beyond(demand: int) -> tuple[str, ...]:
-    """Return the kinds that demand more of the stations, left out of a step."""
-    return tuple(name for name, kind in REGISTRY.items() if kind.traits.demand > demand)
-
-
-def _but_scales(less: tuple[str, ...]) -> tuple[str, ...]:
-    """
-    Return kinds left out, but for those of a single number per joint and no memory.
-
-    Contacts have few places, and each holds the arm in other angles. Of two arms of three measured
-    by contacts, wrong scales of the joints made places that were left out better predicted (0.36 to
-    0.34 mm and 0.61 to 0.49 mm), of the third neither better nor worse; hundreds of waves told from
-    few places made them worse.
-    """
-    return tuple(name for name in less if not _one_number(REGISTRY[name]))
-
-
 def _one_number(kind: type[Effect]) -> bool:
+    """Return whether a kind has a single number for each joint, and no memory."""
     numbers = [item for item in fields(kind) if item.name != 'joint']
     linear = all(parameter.linear for parameter in kind.parameters)
     return kind.of == 'joint' and kind.stage is Stage.JOINT and len(numbers) == 1 and linear
@@ -176,18 +167,13 @@ def _one_number(kind: type[Effect]) -> bool:
 
 def unseen_rms(result: Search) -> float:
     """Return the RMS [m] on stretches and on regions of posture left out, both together."""
-    unseen = Unseen.of(result.problem, result.scale, result.final, result.precision)
-    ways = [each.rms(_unseen(result, each)) for each in unseen.every_way()]
-    return float(np.sqrt(np.mean(np.square(ways))))
-
-
-def _unseen(result: Search, each: Unseen) -> Array:
-    """Return what is left on parts left out, with the sizes of many learned anew for each."""
-    return (
-        predicted(each, result.final.model, result.work.beliefs)
-        if _relearned(result)
-        else each.whole
-    )
+    ways = Unseen.of(result.problem, result.scale, result.final, result.precision).every_way()
+    if _relearned(result):
+        left = [predicted(each, result.final.model, result.work.beliefs) for each in ways]
+    else:
+        left = [each.whole for each in ways]
+    rms = [each.rms(rows) for each, rows in zip(ways, left, strict=True)]
+    return float(np.sqrt(np.mean(np.square(rms))))
 
 
 def _relearned(result: Search) -> bool:

@@ -22,7 +22,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ..algebra.columns import designed, rows_of
+from ..algebra.columns import designed
 from ..algebra.fit import Fit, coordinates, fit, robust_scale, solve_scaled, stepped
 from ..algebra.learned_sizes import learned_precision, projected
 from ..algebra.prior import effect_precision, frame_prior
@@ -105,11 +105,8 @@ class Sizes:
         """
         Return the prior precision learned, the freedom that it leaves, and the step to where it leads.
 
-        Parameters
-        ----------
-        normal, right, rss, rows
-            Normal equations of the frames, with what is believed of these, and of all coordinates.
-
+        normal, right, rss, rows: normal equations of the frames, with what is believed of these,
+        and of all coordinates.
         """
         frames = len(right) - self.now.size
         precision, freedom = learned_precision(
@@ -132,19 +129,15 @@ def predicted(unseen: Unseen, model: Model, beliefs: Beliefs) -> Array:
     left out, and on a dozen stations dozens of errors predict pure noise.
     """
     frames, residual = unseen.frames, unseen.residual
-    spans = rows_of(unseen.labels)
-    parts = [unseen.columns.within(rows) for rows in spans]
-    normals = [part.normal() for part in parts]
-    rights = [part.times(residual[rows]) for part, rows in zip(parts, spans, strict=True)]
-    whole, force = np.sum(normals, axis=0), np.sum(rights, axis=0)
+    whole = np.sum(unseen.normals, axis=0)
     whole[:frames, :frames] += np.diag(unseen.precision[:frames])
-    force[:frames] -= unseen.pull[:frames]
     sizes, out = Sizes.of(model, beliefs), np.array(residual)
-    for part, rows, normal, right in zip(parts, spans, normals, rights, strict=True):
-        here = residual[rows]
+    for b, rows in enumerate(unseen.spans):
+        right, here = unseen.rights_of_residual[b][:, 0].copy(), residual[rows]
+        right[:frames] -= unseen.pull[:frames]
         rss, count = float(residual @ residual - here @ here), residual.size - here.size
-        *_, step = sizes.learned(whole - normal, force - right, rss, count)
-        out[rows] -= part.mixed(step)
+        *_, step = sizes.learned(whole - unseen.normals[b], right, rss, count)
+        out[rows] -= unseen.stretches[b].mixed(step)
     return out
 
 

@@ -11,7 +11,7 @@ tell waves from each other has a curve over its angle in their place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Array
 from ...effects import REGISTRY
-from ...effects.effect import Effect, Stage, View
+from ...effects.effect import Effect, Stage
 from ...twin.features import Features, joints_of
 from ..algebra.alias import outside, share_outside, span_of
 from ..algebra.columns import Maker, Piece
@@ -82,8 +82,10 @@ def _everything(
             if kind.applicable(view, joint) is not None:
                 continue
             if kind.traits.waves is None:
-                small = _as_found(kind.search.small(view, joint, most), have)
-            elif _travel(view, joint) >= beliefs.wave_range:
+                # Each as the search has found it where it has.
+                each = {seed.key: seed for seed in reversed(kind.search.small(view, joint, most))}
+                small = [have.get(key, seed) for key, seed in reversed(each.items())]
+            elif np.ptp(view.joint(view.robot.index(str(joint)))) >= beliefs.wave_range:
                 reported = orders_told(features, str(joint))
                 small = kind.search.small(view, joint, min(most, reported))
             else:
@@ -129,16 +131,6 @@ def _bends(
             angles = np.concatenate([maker.view.joint(i) for maker in features])
             out += [kind.search.bend(joint, angles) for kind in kinds]
     return [effect for effect in out if effect is not None]
-
-
-def _as_found(small: Sequence[Effect], have: Mapping[tuple[str, ...], Effect]) -> Sequence[Effect]:
-    """Return instances, each as the search has found it where it has."""
-    each = {seed.key: seed for seed in reversed(small)}
-    return [have.get(key, seed) for key, seed in reversed(each.items())]
-
-
-def _travel(view: View, joint: str | None) -> float:
-    return float(np.ptp(view.joint(view.robot.index(str(joint)))))
 
 
 def with_setup(problem: Problem, model: Model, scale: Scale, beliefs: Beliefs) -> Model:

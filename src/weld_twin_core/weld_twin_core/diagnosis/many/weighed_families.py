@@ -12,13 +12,15 @@ What would do as well in its place is told beside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
+from ...effects.effect import Effect
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Family, Site
@@ -30,7 +32,6 @@ TINY = 1e-9
 """Least error [m] divided by: a nanometre, far below any instrument."""
 MOST_LIKE = 2
 """Kinds told beside one at the most; what more than three would explain is no name."""
-Members = Mapping[str, Sequence[int]]
 
 
 def weighed_families(result: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[Family, ...]:
@@ -39,36 +40,19 @@ def weighed_families(result: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[
 
     result: of all kinds fitted together.
     """
-    effects = result.final.model.found
-    members: dict[str, list[int]] = {}
-    for k, effect in enumerate(effects):
-        if effect.traits.cause or effect.traits.bends:
-            members.setdefault(effect.name, []).append(k)
-    always = [
-        k for k, effect in enumerate(effects) if not (effect.traits.cause or effect.traits.bends)
-    ]
-    case = _Case.of(result, unseen, always)
-    chosen = _chosen(case, members, beliefs.family_worth)
-    out = []
-    for name, index in members.items():
-        if not effects[index[0]].traits.cause:
-            continue
-        sizes = [(Site(name, effects[k].site), unseen.rms(unseen.targets[1 + k])) for k in index]
-        sizes.sort(key=lambda item: -item[1])
-        out.append(_weighed(case, members, chosen, name, tuple(sizes), beliefs.family_worth))
-    return _with_shares(out, case, _all(members, chosen))
-
-
-def _with_shares(
-    families: Sequence[Family], case: _Case, chosen: Sequence[int]
-) -> tuple[Family, ...]:
-    """Return the kinds with their shares of what those chosen take off together."""
-    bare, remaining = (float((case.left(kept) ** 2).mean()) for kept in ((), chosen))
+    case, out = _Case.of(result, unseen, beliefs.family_worth), list[Family]()
+    chosen = case.chosen()
+    for name, index in case.members.items():
+        if case.named(name):
+            sizes = [(case.sites[k], unseen.rms(unseen.targets[1 + k])) for k in index]
+            sizes.sort(key=lambda item: -item[1])
+            out.append(case.weighed(name, chosen, tuple(sizes)))
+    # Their shares are of what those chosen take off together.
+    bare, remaining = (case.mean_square(kept) for kept in ((), case.of_kinds(chosen)))
     explained = max(1.0 - remaining / max(bare, TINY**2), 0.0)
-    whole = sum(one.rms_m**2 for one in families if one.chosen)
+    whole = max(sum(one.rms_m**2 for one in out if one.chosen), TINY**2)
     return tuple(
-        replace(one, share=explained * one.rms_m**2 / max(whole, TINY**2)) if one.chosen else one
-        for one in families
+        replace(one, share=explained * one.rms_m**2 / whole) if one.chosen else one for one in out
     )
 
 
@@ -81,42 +65,66 @@ class _Case:
     of every sample, those of all views one after the other.
     """
 
+    effects: tuple[Effect, ...]
     views: tuple[Unseen, ...]
     parts: NDArray[np.intp]
-    always: Sequence[int]
-    sites: tuple[Site, ...]
-    causes: tuple[bool, ...]
-    known: dict[tuple[int, ...], Array]
+    worth: float
+    """Share by which unseen data get worse without a kind that is needed."""
+    _known: dict[tuple[int, ...], Array] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, result: Search, unseen: Unseen, always: Sequence[int]) -> _Case:
+    def of(cls, result: Search, unseen: Unseen, worth: float) -> _Case:
+        """Return the case of all kinds fitted together."""
         model = result.final.model
         usual = believed(model)
         usual = np.where(usual > 0.0, usual, result.precision)
         views = unseen.held(usual, result.final.coordinates).every_way()
         parts, first = [], 0
         for view in views:
-            parts.append(first + _neighbours(view))
+            names, own = np.unique(view.trusted_labels(), return_inverse=True)
+            # Of eight parts two neighbours together tell more steadily.
+            parts.append(first + (own // 2 if names.size >= STRETCHES else own))
             first = int(parts[-1].max()) + 1
-        sites = tuple(Site(effect.name, effect.site) for effect in model.found)
-        causes = tuple(effect.traits.cause for effect in model.found)
-        return cls(tuple(views), np.concatenate(parts), always, sites, causes, {})
+        return cls(model.found, tuple(views), np.concatenate(parts), worth)
 
-    def named(self, effects: Sequence[int]) -> bool:
-        """Return whether some effects may be named as a cause."""
-        return all(self.causes[k] for k in effects)
+    @cached_property
+    def sites(self) -> list[Site]:
+        """Return family and joint of every effect."""
+        return [Site.of(effect) for effect in self.effects]
+
+    @cached_property
+    def members(self) -> dict[str, list[int]]:
+        """Return the effects of every kind; others, as motions of the set-up, are in every model."""
+        out: dict[str, list[int]] = {}
+        for k, effect in enumerate(self.effects):
+            if effect.traits.cause or effect.traits.bends:
+                out.setdefault(effect.name, []).append(k)
+        return out
+
+    def of_kinds(self, names: Iterable[str], but: str | None = None) -> list[int]:
+        """Return the effects of some kinds."""
+        return [k for name in names if name != but for k in self.members[name]]
+
+    def named(self, name: str) -> bool:
+        """Return whether a kind may be named as a cause."""
+        return self.effects[self.members[name][0]].traits.cause
 
     def squares(self, kept: Iterable[int]) -> Array:
         """Return the squared error of every sample, with some effects in the model, [m^2]."""
-        index = tuple(sorted({*kept, *self.always}))
-        if index not in self.known:
+        always = set(range(len(self.effects))).difference(*self.members.values())
+        index = tuple(sorted({*kept, *always}))
+        if index not in self._known:
             each = [view.squares(view.predict(index)) for view in self.views]
-            self.known[index] = np.concatenate(each)
-        return self.known[index]
+            self._known[index] = np.concatenate(each)
+        return self._known[index]
 
     def left(self, kept: Iterable[int]) -> Array:
         """Return the RMS error [m] of every part, shape (parts,)."""
         return np.asarray(np.sqrt(self._mean(self.squares(kept))))
+
+    def mean_square(self, kept: Iterable[int]) -> float:
+        """Return the mean squared error of a part [m^2]."""
+        return float((self.left(kept) ** 2).mean())
 
     def growth(self, kept: Iterable[int], less: Iterable[int]) -> Array:
         """
@@ -134,112 +142,83 @@ class _Case:
     def _mean(self, values: Array) -> Array:
         return np.bincount(self.parts, weights=values) / np.bincount(self.parts)
 
+    def _loss(self, kept: Iterable[int], less: Iterable[int]) -> float:
+        """Return by what share the error grows in the median part."""
+        return float(np.median(self.growth(kept, less)))
 
-def _neighbours(view: Unseen) -> NDArray[np.intp]:
-    """Return the part of every sample; of eight, two neighbours together tell more steadily."""
-    names, parts = np.unique(view.trusted_labels(), return_inverse=True)
-    return np.asarray(parts // 2 if names.size >= STRETCHES else parts, dtype=np.intp)
-
-
-def _chosen(case: _Case, members: Members, worth: float) -> tuple[str, ...]:
-    """Return the kinds that unseen data need together, added one by one, and held to it."""
-    chosen: list[str] = []
-    while len(chosen) < len(members):
-        best = _next(case, members, chosen, worth)
-        if best is None:
-            break
-        chosen.append(best)
-    while chosen:
-        grows = [
-            float(np.median(case.growth(_all(members, chosen), _all(members, chosen, name))))
-            for name in chosen
-        ]
-        if min(grows) >= worth:
-            break
-        del chosen[int(np.argmin(grows))]
-    return tuple(chosen)
-
-
-def _next(case: _Case, members: Members, chosen: Sequence[str], worth: float) -> str | None:
-    """
-    Return the kind that takes most off unseen data beside those chosen; None where none takes enough.
-
-    What makes no part worse comes first: it is no whim of a few stations. Free curves take the place
-    of many kinds; they are chosen where no kind does nearly as much.
-    """
-    now = _all(members, chosen)
-    order = []
-    for name in members:
-        if name not in chosen:
-            fall = case.growth([*now, *members[name]], now)
-            median = float(np.median(fall))
-            if median >= worth:
-                order.append((bool(fall.min() >= 0.0), median, name))
-    if not order:
-        return None
-    first = max(order)[2]
-    causes = [item for item in order if case.named(members[item[2]])]
-    if causes and not case.named(members[first]):
-        other = max(causes)[2]
-        loss = case.growth([*now, *members[first]], [*now, *members[other]])
-        return other if float(np.median(loss)) < worth else first
-    return first
-
-
-def _all(members: Members, names: Iterable[str], without: str | None = None) -> list[int]:
-    """Return the effects of some kinds."""
-    return [k for name in names if name != without for k in members[name]]
-
-
-def _weighed(
-    case: _Case,
-    members: Members,
-    chosen: Sequence[str],
-    name: str,
-    sizes: tuple[tuple[Site, float], ...],
-    worth: float,
-) -> Family:
-    """Return one kind with all that is told of it."""
-    others = _all(members, chosen, name)
-    own = list(members[name])
-    growths = tuple(case.growth([*others, *own], others).tolist())
-    before, after = (float((case.left(kept) ** 2).mean()) for kept in (others, [*others, *own]))
-    fall = max(before - after, 0.0)
-    out = Family(name, growths, name in chosen, sizes, rms_m=float(np.sqrt(fall)))
-    if name not in chosen:
+    def chosen(self) -> list[str]:
+        """Return the kinds that unseen data need together, added one by one, and held to it."""
+        out: list[str] = []
+        while len(out) < len(self.members) and (best := self._next(out)) is not None:
+            out.append(best)
+        while out:
+            every = self.of_kinds(out)
+            losses = [self._loss(every, self.of_kinds(out, but=name)) for name in out]
+            if min(losses) >= self.worth:
+                break
+            del out[int(np.argmin(losses))]
         return out
-    like = []
-    for other in members:
-        if other not in chosen and case.named(members[other]):
-            loss = case.growth([*others, *own], [*others, *members[other]])
-            part = 1.0 - max(float(np.median(loss)), 0.0) / worth
-            if part > 0.0:
-                like.append((part, other))
-    like = sorted(like, key=lambda item: -item[0])[:MOST_LIKE]
-    reported = tuple((_largest(case, others, members[other]), part) for part, other in like)
-    return replace(out, needed=_needed(case, others, own), like=reported)
 
+    def _next(self, chosen: Sequence[str]) -> str | None:
+        """
+        Return the kind that takes most off unseen data beside those chosen, if one takes enough.
 
-def _needed(
-    case: _Case, others: Sequence[int], own: Sequence[int]
-) -> tuple[tuple[Site, float], ...]:
-    """Return the members of a kind that are missed, each with its share, largest first."""
-    if len(own) == 1:
-        return ((case.sites[own[0]], 1.0),)
-    every = [*others, *own]
-    missed = np.array(
-        [np.median(case.growth(every, [k for k in every if k != one])) for one in own]
-    )
-    missed = np.maximum(missed, 0.0)
-    if missed.sum() <= 0.0:
-        # Each takes the place of another: the one that does most by itself stands for them.
-        return ((_largest(case, others, own), 1.0),)
-    shares = missed / missed.sum()
-    ordered = np.argsort(-shares, kind='stable')
-    return tuple((case.sites[own[k]], float(shares[k])) for k in ordered if shares[k] > 0.0)
+        What makes no part worse comes first: it is no whim of a few stations. Free curves take the place
+        of many kinds; they are chosen where no kind does nearly as much.
+        """
+        now, order = self.of_kinds(chosen), []
+        for name in self.members:
+            if name not in chosen:
+                fall = self.growth([*now, *self.members[name]], now)
+                median = float(np.median(fall))
+                if median >= self.worth:
+                    order.append((bool(fall.min() >= 0.0), median, name))
+        if not order:
+            return None
+        first = max(order)[2]
+        causes = [item for item in order if self.named(item[2])]
+        if causes and not self.named(first):
+            other = max(causes)[2]
+            with_first, with_other = ([*now, *self.members[name]] for name in (first, other))
+            return other if self._loss(with_first, with_other) < self.worth else first
+        return first
 
+    def weighed(
+        self, name: str, chosen: Sequence[str], sizes: tuple[tuple[Site, float], ...]
+    ) -> Family:
+        """Return one kind with all that is told of it."""
+        others, own = self.of_kinds(chosen, but=name), self.members[name]
+        every = [*others, *own]
+        growths = tuple(self.growth(every, others).tolist())
+        fall = max(self.mean_square(others) - self.mean_square(every), 0.0)
+        out = Family(name, growths, name in chosen, sizes, rms_m=float(np.sqrt(fall)))
+        if name not in chosen:
+            return out
+        like = []
+        for other, instead in self.members.items():
+            if other not in chosen and self.named(other):
+                loss = max(self._loss(every, [*others, *instead]), 0.0)
+                if (part := 1.0 - loss / self.worth) > 0.0:
+                    like.append((part, instead))
+        like = sorted(like, key=lambda item: -item[0])[:MOST_LIKE]
+        reported = tuple((self._largest(others, instead), part) for part, instead in like)
+        return replace(out, needed=self._needed(others, own), like=reported)
 
-def _largest(case: _Case, others: Sequence[int], own: Sequence[int]) -> Site:
-    """Return the member of a kind that does most by itself."""
-    remaining = [float(np.median(case.left([*others, k]))) for k in own]
-    return case.sites[own[int(np.argmin(remaining))]]
+    def _needed(self, others: Sequence[int], own: Sequence[int]) -> tuple[tuple[Site, float], ...]:
+        """Return the members of a kind that are missed, each with its share, largest first."""
+        if len(own) == 1:
+            return ((self.sites[own[0]], 1.0),)
+        every = [*others, *own]
+        missed = np.array([self._loss(every, [k for k in every if k != one]) for one in own])
+        missed = np.maximum(missed, 0.0)
+        if missed.sum() <= 0.0:
+            # Each takes the place of another: the one that does most by itself stands for them.
+            return ((self._largest(others, own), 1.0),)
+        shares = missed / missed.sum()
+        ordered = np.argsort(-shares, kind='stable')
+        return tuple((self.sites[own[k]], float(shares[k])) for k in ordered if shares[k] > 0.0)
+
+    def _largest(self, others: Sequence[int], own: Sequence[int]) -> Site:
+        """Return the member of a kind that does most by itself."""
+        remaining = [float(np.median(self.left([*others, k]))) for k in own]
+        return self.sites[own[int(np.argmin(remaining))]]

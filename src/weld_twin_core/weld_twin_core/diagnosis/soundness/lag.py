@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ..frames.in_turn import nearest_rotation
+from ..frames.alignment import nearest_rotation
 from .limits import ENOUGH, FEW, STEPS, WORTH
 
 MOST_LAG = 2.0

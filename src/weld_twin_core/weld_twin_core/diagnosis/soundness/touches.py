@@ -24,7 +24,7 @@ from ...recording import Recording
 from ..algebra.fit import robust_fit, robust_scale
 from ..algebra.independent_rows import robust_spread
 from ..algebra.problem import Model, Problem
-from ..frames.aligned import FEWEST, posed
+from ..frames.aligned import FEWEST, aligned
 from ..hypotheses.library import plain_causes
 from ..result import Unsound
 from .evidence import Finding, mistake
@@ -68,7 +68,7 @@ def touches(problem: Problem, model: Model) -> Touched:
         every[k].recording if k in every else recording
         for k, recording in enumerate(problem.recordings)
     ]
-    again, start = posed(mended, model.robot, problem.align, model.known, problem.given)
+    again, start = aligned(mended, model.robot, problem.align, model.known, problem.given)
     loose = dict(zip(problem.given, problem.loose, strict=False))
     again = replace(again, loose=tuple(loose[k] for k in again.given if loose))
     return Touched(again, start, reported)

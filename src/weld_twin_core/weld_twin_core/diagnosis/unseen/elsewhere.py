@@ -10,8 +10,9 @@ choose among two or three, and only where these part plainly.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 
 from ...recording import Recording
 from ..beliefs import Beliefs
@@ -41,17 +42,13 @@ def borne_out(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) ->
         result = _exchanged(result, holdout, beliefs)
     slots = list[Slot]()
     for effect, candidate_set in zip(result.final.model.found, result.slots, strict=False):
-        own = Site(effect.name, effect.site)
+        own = Site.of(effect)
         close = [r for r in candidate_set if r.probability >= beliefs.listed or r.site == own]
         certain = candidate_set[0].site == own and candidate_set[0].probability >= beliefs.sure
         if not certain and len(close) > 1:
             remaining = _left(result, close, holdout, beliefs)
-            candidate_set = _alike(
-                candidate_set,
-                own,
-                dict(zip((r.site for r in close), remaining, strict=True)),
-                beliefs,
-            )
+            by_site = dict(zip((r.site for r in close), remaining, strict=True))
+            candidate_set = _alike(candidate_set, own, by_site, beliefs)
         slots.append(candidate_set)
     return replace(result, slots=tuple(slots))
 
@@ -59,7 +56,14 @@ def borne_out(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) ->
 def _exchanged(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -> Search:
     """Return the search with every effect replaced by its like where that alone carries over."""
     for _ in result.slots:
-        likes = list(_likes(result, beliefs))
+        # Those that could be in the model as well.
+        likes = [
+            one
+            for one in chain.from_iterable(result.slots)
+            if one.probability >= beliefs.listed
+            and one.fit is not result.small
+            and one.role is not Role.TAKEN_OUT
+        ]
         remaining = _left(result, likes, holdout, beliefs)
         least = min(remaining, default=float('inf'))
         if not likes or (1.0 + beliefs.parted) * least > left_on(result, holdout, beliefs):
@@ -75,26 +79,11 @@ def _exchanged(result: Search, holdout: Sequence[Recording], beliefs: Beliefs) -
     return result
 
 
-def _likes(result: Search, beliefs: Beliefs) -> Iterator[Rival]:
-    """Yield the rivals that could be in the model as well."""
-    for candidate_set in result.slots:
-        for alternative in candidate_set:
-            likely = alternative.probability >= beliefs.listed
-            if (
-                likely
-                and alternative.fit is not result.small
-                and alternative.role is not Role.TAKEN_OUT
-            ):
-                yield alternative
-
-
 def _left(
     result: Search, some: Sequence[Rival], holdout: Sequence[Recording], beliefs: Beliefs
 ) -> list[float]:
     """Return what each rival leaves on held-out recordings, RMS [m]."""
-    return [
-        left_on(replace(result, final=alternative.fit), holdout, beliefs) for alternative in some
-    ]
+    return [left_on(replace(result, final=one.fit), holdout, beliefs) for one in some]
 
 
 def _alike(candidate_set: Slot, own: Site, remaining: dict[Site, float], beliefs: Beliefs) -> Slot:
@@ -102,12 +91,6 @@ def _alike(candidate_set: Slot, own: Site, remaining: dict[Site, float], beliefs
     most = (1.0 + beliefs.parted) * min(remaining.values())
     if remaining.get(own, most) > most:
         return candidate_set
-    kept = [
-        alternative
-        for alternative in candidate_set
-        if remaining.get(alternative.site, most) <= most
-    ]
-    whole = sum(alternative.probability for alternative in kept)
-    return tuple(
-        replace(alternative, probability=alternative.probability / whole) for alternative in kept
-    )
+    kept = [one for one in candidate_set if remaining.get(one.site, most) <= most]
+    whole = sum(one.probability for one in kept)
+    return tuple(replace(one, probability=one.probability / whole) for one in kept)

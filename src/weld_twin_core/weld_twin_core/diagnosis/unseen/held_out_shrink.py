@@ -16,7 +16,7 @@ from ...recording import Recording
 from ..algebra.fit import fit, robust_scale, trusted
 from ..algebra.problem import Model, Problem, usable
 from ..beliefs import Beliefs
-from ..frames.aligned import posed
+from ..frames.aligned import aligned
 from ..hypotheses.search import Search
 from ..result import Shrink
 from .folds import jackknife, posture_regions
@@ -42,7 +42,7 @@ def held_out_shrink(
     model = result.final.model
     steps, alone = _waterfall(unseen, model)
     turned = unseen.turn_rms(unseen.bare), unseen.turn_rms(unseen.whole)
-    both = _judged(unseen), by_posture(unseen)
+    both = _judged(unseen), _judged(unseen.by(posture_regions(unseen.problem)))
     if holdout:
         source = ', '.join(r.name for r in holdout)
         pair = _on_bags(result, holdout, beliefs.other_setup)
@@ -106,12 +106,8 @@ def _of_others(judged: Sequence[Judged], among: int) -> tuple[float, float]:
     return min(low for low, _ in ends), max(high for _, high in ends)
 
 
-def by_posture(whole: Unseen) -> Judged:
-    """Return the gap before and after on regions of posture that take their turn."""
-    return _judged(whole.by(posture_regions(whole.problem)))
-
-
 def _judged(unseen: Unseen) -> Judged:
+    """Return the gap before and after on parts that take their turn."""
     before, after = unseen.squares(unseen.bare), unseen.squares(unseen.whole)
     labels = unseen.trusted_labels()
     ratio, interval = ratio_interval(before, after, labels)
@@ -175,7 +171,7 @@ def _on_bags(
 def _on_contacts(result: Search, recording: Recording) -> list[tuple[Array, Array]]:
     """Return squared errors before and after at every place of held-out contacts."""
     model = result.final.model
-    problem, start = posed((recording,), model.robot, frozenset(), model.known)
+    problem, start = aligned((recording,), model.robot, frozenset(), model.known)
     own = [k for k, r in enumerate(result.problem.recordings) if r.contacts is not None]
     sizes = []
     for fitted in (result.baseline.model, model):

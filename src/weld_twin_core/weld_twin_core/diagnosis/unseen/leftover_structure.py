@@ -62,7 +62,9 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
     for group in all_groups(problem, model, unseen.scale):
         if group.at in joints:
             after = first.errors(first.extended(group.columns, RIDGES[1:2])[0]).sum()
-            key = group.at, _dependence(group)
+            # Waves of a gear stand by themselves.
+            waves = group.on == 'angle' and len(group.columns) == FINE
+            key = group.at, 'waves' if waves else group.on
             of_gap[key] = max(of_gap.get(key, 0.0), float(1.0 - after / max(before, 1e-300)))
         if _tells(group, at_joint=group.at in joints) and (elsewhere or group.at in joints):
             found.append((base.gain(group.columns), f'{group.on} at {group.at}'))
@@ -82,11 +84,6 @@ def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> 
         )
         chance = chance_gain(tried, beliefs.blatant_sure)
     return Structure(best.rms_m, best.share, best.steady, tuple(names[:TOLD]), chance, of_gap)
-
-
-def _dependence(group: Group) -> str:
-    """Return what a group depends on; waves of a gear stand by themselves."""
-    return 'waves' if group.on == 'angle' and len(group.columns) == FINE else group.on
 
 
 def _tells(group: Group, *, at_joint: bool) -> bool:

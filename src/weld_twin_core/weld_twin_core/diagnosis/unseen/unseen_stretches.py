@@ -83,7 +83,27 @@ class Unseen:
             same = made.problem is problem and made.scale is scale
             if same and np.array_equal(given, precision):
                 return made
-        made = _prepared(problem, scale, fit, precision)
+        columns = designed(problem, fit.model, scale)
+        frames = columns.count - fit.coordinates.size
+        sizes = (effect.fit.coordinates().size for effect in fit.model.found)
+        ends = np.cumsum([frames, *sizes]).tolist()
+        prior = np.zeros(columns.count)
+        prior[:frames], off = frame_prior(problem, fit.model)
+        if precision.size:
+            prior[frames:] = precision
+        # A learned prior holds a coordinate already; a tether would tell it of unseen stretches.
+        tether = np.concatenate([np.zeros(frames), _tether(fit.model)])
+        made = cls(
+            problem=problem,
+            scale=scale,
+            labels=problem.block_labels(STRETCHES),
+            columns=columns,
+            parts=tuple(slice(a, b) for a, b in pairwise(ends)),
+            residual=fit.residual,
+            taken=cache(partial(_taken, problem, scale, fit)),
+            precision=prior + np.where(prior > 0.0, 0.0, tether),
+            pull=prior * np.concatenate([off, fit.coordinates]),
+        )
         fit.prepared[:] = [(precision, made)]
         return made
 
@@ -175,19 +195,19 @@ class Unseen:
             return self.base(kept).residual
         mix = self._mix(kept)
         residual: Array = np.array(self._explained(mix))
-        for b, rows in enumerate(self._spans):
+        for b, rows in enumerate(self.spans):
             inverse = self._inverses[b]
             step = inverse @ self._right(b, mix)
             if gone.size:
                 step -= inverse[:, gone] @ np.linalg.solve(inverse[np.ix_(gone, gone)], step[gone])
-            residual[rows] -= self._stretches[b].mixed(step)
+            residual[rows] -= self.stretches[b].mixed(step)
         return residual
 
     @cached_property
     def _inverses(self) -> list[Array]:
         """Return the inverse of all normal equations without every stretch."""
         out = []
-        for b in range(len(self._spans)):
+        for b in range(len(self.spans)):
             system, size = unit_diagonal(self._system(b, np.arange(self.columns.count)), DAMPING)
             # A base that only one stretch shows has columns of zeros without it; it stays put.
             unit = np.where(size > ZERO, 1.0 / size, 0.0)
@@ -199,11 +219,11 @@ class Unseen:
         index, mix = self._index(kept), self._mix(kept)
         target = self._explained(mix)
         solvers, residual = list[Solver](), target.copy()
-        for b, rows in enumerate(self._spans if index.size else ()):
+        for b, rows in enumerate(self.spans if index.size else ()):
             solver = self._solver(b, index)
             whole = np.zeros(self.columns.count)
             whole[index] = solver(self._right(b, mix)[index])
-            residual[rows] -= self._stretches[b].mixed(whole)
+            residual[rows] -= self.stretches[b].mixed(whole)
             solvers.append(solver)
         return Base(self, index, target, solvers, residual)
 
@@ -212,7 +232,13 @@ class Unseen:
         if index.size == self.columns.count > MANY:
             return partial(np.matmul, self._inverses[b])
         system, size = unit_diagonal(self._system(b, index), DAMPING)
-        return partial(_solved, factored(system), size)
+        solve = factored(system)
+
+        def solved(right: Array) -> Array:
+            unit = size if right.ndim == 1 else size[:, None]
+            return solve(right / unit) / unit
+
+        return solved
 
     def _mix(self, kept: Sequence[int]) -> Array:
         """Return which targets a model of some effects is to explain, shape (1 + K,)."""
@@ -230,56 +256,43 @@ class Unseen:
         return np.concatenate([np.arange(self.frames), *parts]).astype(int)
 
     @cached_property
-    def _spans(self) -> list[Rows]:
+    def spans(self) -> list[Rows]:
         """Return the rows of every stretch."""
         return rows_of(self.labels)
 
     @cached_property
-    def _stretches(self) -> list[Columns]:
+    def stretches(self) -> list[Columns]:
         """Return the columns of every stretch."""
-        return [self.columns.within(rows) for rows in self._spans]
+        return [self.columns.within(rows) for rows in self.spans]
 
     @cached_property
-    def _normals(self) -> list[Array]:
+    def normals(self) -> list[Array]:
         """Return the normal matrix of every stretch, where there are few columns."""
-        return [part.normal() for part in self._stretches]
-
-    def _normal(self, b: int, index: Index) -> Array:
-        """Return the normal matrix of some columns on one stretch."""
-        if self.columns.count > MANY:
-            return self._stretches[b].chosen(index).normal()
-        normal = self._normals[b]
-        return normal if index.size == self.columns.count else normal[np.ix_(index, index)]
+        return [part.normal() for part in self.stretches]
 
     @cached_property
     def _rights(self) -> list[Array]:
-        """Return the products of the columns with all targets on every stretch, (P, 1 + K)."""
+        """Return the products with all targets on all stretches but each, (P, 1 + K)."""
         return self._products(self.targets)
 
     @cached_property
-    def _rights_of_residual(self) -> list[Array]:
+    def rights_of_residual(self) -> list[Array]:
         """Return the same with the final residual alone, (P, 1)."""
         return self._products(self.residual[None])
 
     def _products(self, targets: Array) -> list[Array]:
-        parts = zip(self._stretches, self._spans, strict=True)
-        return [part.products(targets[:, rows]) for part, rows in parts]
+        parts = zip(self.stretches, self.spans, strict=True)
+        each = [part.products(targets[:, rows]) for part, rows in parts]
+        whole = np.asarray(sum(each))
+        return [whole - own for own in each]
 
     @cached_property
     def _total(self) -> Array:
         """Return the normal matrix of all columns on all stretches, with the priors."""
         few = self.columns.count <= MANY
-        total = np.sum(self._normals, axis=0) if few else self.columns.normal()
+        total = np.sum(self.normals, axis=0) if few else self.columns.normal()
         total[np.diag_indices_from(total)] += self.precision
         return np.asarray(total)
-
-    @cached_property
-    def _right_total(self) -> Array:
-        return np.asarray(sum(self._rights))
-
-    @cached_property
-    def _right_total_of_residual(self) -> Array:
-        return np.asarray(sum(self._rights_of_residual))
 
     def _system(self, b: int, index: Index) -> Array:
         """
@@ -287,19 +300,19 @@ class Unseen:
 
         What a column shows on that stretch alone is nothing but rounding elsewhere; it stays put.
         """
-        total = self._total
+        total, many = self._total, self.columns.count > MANY
+        own = self.stretches[b].chosen(index).normal() if many else self.normals[b]
         if index.size < self.columns.count:
-            total = total[np.ix_(index, index)]
-        remaining = total - self._normal(b, index)
+            some = np.ix_(index, index)
+            total, own = total[some], own if many else own[some]
+        remaining = total - own
         remaining[np.diag_indices_from(remaining)] += ROUNDED * np.diag(total)
         return np.asarray(remaining)
 
     def _right(self, b: int, mix: Array) -> Array:
         """Return the right-hand side of every column on all stretches but one."""
-        if mix[1:].any():
-            return np.asarray((self._right_total - self._rights[b]) @ mix - self.pull)
-        right = self._right_total_of_residual - self._rights_of_residual[b]
-        return np.asarray(right[:, 0] - self.pull)
+        right = self._rights[b] @ mix if mix[1:].any() else self.rights_of_residual[b][:, 0]
+        return np.asarray(right - self.pull)
 
     def wandered(self) -> Array:
         """
@@ -310,8 +323,8 @@ class Unseen:
         """
         every, mix = np.arange(self.columns.count), np.eye(1 + len(self.parts))[0]
         whole = _spread(self._total)
-        ratios = np.zeros((len(self._spans), every.size))
-        for b in range(len(self._spans)):
+        ratios = np.zeros((len(self.spans), every.size))
+        for b in range(len(self.spans)):
             remaining = self._system(b, every)
             system, size = unit_diagonal(remaining.copy(), DAMPING)
             step = factored(system)(self._right(b, mix) / size) / size
@@ -398,7 +411,7 @@ class Base:
         extra: shape (E, rows).
         ridges: prior precision of the further columns.
         """
-        spans = self.unseen._spans
+        spans = self.unseen.spans
         both = np.concatenate([extra, self.target[None]])
         crosses = [own.products(both[:, rows]) for own, rows in zip(self._own, spans, strict=True)]
         squares = [extra[:, rows] @ both[:, rows].T for rows in spans]
@@ -423,33 +436,7 @@ class Base:
     @cached_property
     def _own(self) -> list[Columns]:
         """Return the columns of the model on every stretch."""
-        return [part.chosen(self.index) for part in self.unseen._stretches]
-
-
-def _prepared(problem: Problem, scale: Scale, fit: Fit, precision: Array) -> Unseen:
-    """Return the parts of a fitted model; see `Unseen.of`."""
-    model = fit.model
-    columns = designed(problem, model, scale)
-    frames = columns.count - fit.coordinates.size
-    ends = np.cumsum([frames, *(effect.fit.coordinates().size for effect in model.found)]).tolist()
-    prior = np.zeros(columns.count)
-    prior[:frames], off = frame_prior(problem, model)
-    if precision.size:
-        prior[frames:] = precision
-    x = np.concatenate([off, fit.coordinates])
-    # A learned prior holds a coordinate already; a tether would tell it of unseen stretches.
-    tether = np.where(prior > 0.0, 0.0, np.concatenate([np.zeros(frames), _tether(model)]))
-    return Unseen(
-        problem=problem,
-        scale=scale,
-        labels=problem.block_labels(STRETCHES),
-        columns=columns,
-        parts=tuple(slice(a, b) for a, b in pairwise(ends)),
-        residual=fit.residual,
-        taken=cache(partial(_taken, problem, scale, fit)),
-        precision=prior + tether,
-        pull=prior * x,
-    )
+        return [part.chosen(self.index) for part in self.unseen.stretches]
 
 
 def _taken(problem: Problem, scale: Scale, fit: Fit) -> Array:
@@ -457,12 +444,6 @@ def _taken(problem: Problem, scale: Scale, fit: Fit) -> Array:
     without = (fit.model.without(k) for k in range(len(fit.model.found)))
     remaining = [problem.whitened(problem.residuals(model), scale) for model in without]
     return np.array(remaining).reshape(-1, fit.residual.size) - fit.residual
-
-
-def _solved(solve: Solver, size: Array, right: Array) -> Array:
-    """Return the solution of scaled normal equations, shape as the right-hand side (P, ...)."""
-    unit = size if right.ndim == 1 else size[:, None]
-    return np.asarray(solve(right / unit) / unit)
 
 
 def _spread(normal: Array) -> Array:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...arrays import Array
 from ..algebra.fit import trusted
 from ..algebra.problem import Model, Problem
 from ..hypotheses.search import Search
@@ -58,7 +57,9 @@ def locate(result: Search, found: Structure, causes: Sequence[Cause] = ()) -> Wh
         joints, regimes = _of_causes(causes, names)
     else:
         joints = dict(zip(names, map(float, shares.max(axis=1)), strict=True))
-        regimes = _map_regimes(shares)
+        best = dict(zip(REGRESSORS, map(float, shares.max(axis=0)), strict=True))
+        best['static'] = max(best[name] for name in list(REGRESSORS)[:3])
+        regimes = {name: best[name] for name in REGIMES}
     ordered = sorted(joints.items(), key=lambda item: -item[1])
     good = trusted(result.scale.weights)
     return Where(
@@ -84,12 +85,6 @@ def _of_causes(
         for dependence, p in cause.dependence:
             regimes[REGIME_OF[dependence]] += cause.share * p / on
     return joints, regimes
-
-
-def _map_regimes(shares: Array) -> dict[str, float]:
-    best = {name: float(shares[:, r].max()) for r, name in enumerate(REGRESSORS)}
-    best['static'] = max(best[name] for name in list(REGRESSORS)[:3])
-    return {name: best[name] for name in REGIMES}
 
 
 def _path(

@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..beliefs import Beliefs
-from ..posterior.table import named_together
 from ..result import Family, Site
 from .evidence import Evidence
+from .table import named_together
 
 FIELD = 'instrument'
 """A free field over the workspace speaks against every formula: it is what each of them bends to."""
@@ -129,9 +129,7 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
         return _of_families(remaining)
     if not evidence.slots:
         return _of_nothing(remaining)
-    sets = tuple(
-        named_together(candidate_set, remaining.beliefs) for candidate_set in evidence.slots
-    )
+    sets = tuple(named_together(slot, remaining.beliefs) for slot in evidence.slots)
     likely = [
         p > LIKELIER and _holds(group, evidence)
         for p, group in zip(evidence.believed, sets, strict=True)
@@ -141,7 +139,12 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
     reported = tuple(group for group, holds in zip(sets, likely, strict=True) if holds)
     if named <= more or evidence.nameless > LIKELIER:
         return Verdict('unknown', reported, _why_unknown(remaining, sets, likely))
-    reasons = tuple(_alike(group) for group in reported if len(group) > 1)
+    reasons = tuple(
+        f'{", ".join(map(str, group))} move the tool alike on these data: their fits differ by less '
+        'than the noise'
+        for group in reported
+        if len(group) > 1
+    )
     return Verdict('ambiguous' if reasons else 'identified', reported, reasons)
 
 
@@ -236,9 +239,8 @@ def _of_families(remaining: Left) -> Verdict:
 
 def _sets_of(family: Family) -> list[tuple[Site, ...]]:
     """Return a set for every joint of a kind; what would do as well as the kind is in the first."""
-    sites = [site for site, _ in family.needed]
-    like = tuple(site for site, _ in family.like)
-    return [(sites[0], *like), *((site,) for site in sites[1:])] if sites else []
+    like = [site for site, _ in family.like]
+    return [(site, *(like if k == 0 else ())) for k, (site, _) in enumerate(family.needed)]
 
 
 def _absurd(evidence: Evidence) -> str:
@@ -248,11 +250,6 @@ def _absurd(evidence: Evidence) -> str:
         f'what remains would be explained best by {first}: it imitates a cause that '
         'is not in the library, or the data are not what they seem'
     )
-
-
-def _alike(chosen: tuple[Site, ...]) -> str:
-    names = ', '.join(str(site) for site in chosen)
-    return f'{names} move the tool alike on these data: their fits differ by less than the noise'
 
 
 def _depends(evidence: Evidence) -> str:

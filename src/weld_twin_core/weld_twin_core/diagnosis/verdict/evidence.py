@@ -10,10 +10,8 @@ from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.noise_floor import NoiseFloor
-from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..hypotheses.search import Search
-from ..many.weighed_families import weighed_families
 from ..result import Family, Shrink, Site
 from ..unseen.chance import chance_ratio, may_be_chance
 from ..unseen.folds import ways_to_divide
@@ -63,7 +61,7 @@ def gathered(
     leftover: Structure,
     shrink: Shrink,
     floor: NoiseFloor,
-    beliefs: Beliefs,
+    families: tuple[Family, ...] | None,
 ) -> Evidence:
     """
     Return the evidence for a verdict.
@@ -71,8 +69,11 @@ def gathered(
     found, unseen: the search, and unseen stretches under its final model.
     leftover: what generic columns still find beside it.
     shrink: on held-out recordings or on stretches taking their turn.
+    families: what each kind accounts for, where many small errors were fitted together.
     """
-    robot = result.final.model.robot
+    robot, parts = result.final.model.robot, unseen.targets[1:]
+    total = parts.sum(axis=0)
+    whole = max(float(total @ total), 1e-300)
     return Evidence(
         slots=result.slots,
         structure=leftover,
@@ -80,10 +81,14 @@ def gathered(
         after=shrink.rms_after_m,
         floor=floor.rms_m,
         independent=floor.independent,
-        parts=_parts(unseen),
+        parts=tuple(float(part @ part) / whole for part in parts),
         refused=tuple(_refused(robot, e) for e in result.refused if beyond(robot, e)),
-        lacking=tuple(_lacking(e) for e in result.refused if not beyond(robot, e)),
-        families=weighed_families(result, unseen, beliefs) if result.dense else None,
+        lacking=tuple(
+            f'{Site.of(e)}, which was taken out of the library'
+            for e in result.refused
+            if not beyond(robot, e)
+        ),
+        families=families,
         leverage=_leverage(unseen, floor),
     )
 
@@ -97,13 +102,6 @@ def _leverage(unseen: Unseen, floor: NoiseFloor) -> float:
     return chance_ratio(columns, unseen.precision, ways, known=floor.independent)
 
 
-def _parts(unseen: Unseen) -> tuple[float, ...]:
-    """Return the squared contribution of every effect over the square of their sum."""
-    parts = unseen.targets[1:]
-    total = parts.sum(axis=0)
-    return tuple(float(p @ p) / max(float(total @ total), 1e-300) for p in parts)
-
-
 def _refused(robot: Robot, effect: Effect) -> str:
     """Return an effect that no machine has, with the values that say so."""
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
@@ -111,9 +109,4 @@ def _refused(robot: Robot, effect: Effect) -> str:
         f'{name} {value:.3g} {units[name]} (the limit of machines is {limit:.3g})'
         for name, value, limit in beyond(robot, effect)
     )
-    return f'{Site(effect.name, effect.site)} with {values}'
-
-
-def _lacking(effect: Effect) -> str:
-    """Return an effect that was taken out of the library."""
-    return f'{Site(effect.name, effect.site)}, which was taken out of the library'
+    return f'{Site.of(effect)} with {values}'

@@ -10,11 +10,10 @@ marginals are sums over a row, so a place may be certain where several names at 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeVar
 
-from ...effects.effect import Effect
 from ...effects.registry import REGISTRY
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
@@ -22,6 +21,7 @@ from ..result import Site
 
 Key = TypeVar('Key')
 Slot = tuple[Rival, ...]
+"""An effect found and its alternatives, most probable first; their weights add up to one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,53 +29,43 @@ class Row:
     """One effect found, with what could stand in its place."""
 
     slot: Slot
-    """Most probable first; their weights add up to one."""
     listed: tuple[Site, ...]
     """Those named together: the leader alone where it has nearly all of the weight."""
 
+    @classmethod
+    def of(cls, slot: Slot, beliefs: Beliefs) -> Row:
+        """Return the row of an effect found."""
+        return cls(slot, named_together(slot, beliefs))
+
     @property
     def leader(self) -> Rival:
-        """Return the most probable."""
+        """Return the most probable; its evidence is how far the answer with it is ahead."""
         return self.slot[0]
 
     @property
     def mass(self) -> float:
         """Return the weight of all that are named together."""
-        return float(
-            sum(
-                alternative.probability
-                for alternative in self.slot
-                if alternative.site in self.listed
-            )
-        )
-
-    @property
-    def gap(self) -> float:
-        """Return by how much evidence the best answer with it is ahead of the best without [nats]."""
-        return self.leader.nats
+        return float(sum(one.probability for one in self.slot if one.site in self.listed))
 
     def names(self) -> dict[Site, float]:
         """Return the weight of every name."""
-        return _marginal(self.slot, lambda alternative: alternative.site)
+        return marginal((one.site, one.probability) for one in self.slot)
 
     def places(self) -> dict[str, float]:
         """Return the weight of every place."""
-        return _marginal(self.slot, place_of)
+        return marginal((one.place, one.probability) for one in self.slot)
 
     def dependences(self) -> dict[str, float]:
         """Return the weight of everything that it may depend on."""
-        return _marginal(self.slot, dependence_of)
+        return marginal((one.dependence, one.probability) for one in self.slot)
 
 
-def table_of(slots: Sequence[Slot], beliefs: Beliefs) -> tuple[Row, ...]:
-    """
-    Return the table of answers, a row for every effect found.
-
-    slots: for every effect found, itself and its rivals, most probable first.
-    """
-    return tuple(
-        Row(candidate_set, named_together(candidate_set, beliefs)) for candidate_set in slots
-    )
+def marginal(weights: Iterable[tuple[Key, float]]) -> dict[Key, float]:
+    """Return the sum of the weights of every key, in the order in which keys come."""
+    out: dict[Key, float] = {}
+    for key, weight in weights:
+        out[key] = out.get(key, 0.0) + weight
+    return out
 
 
 def named_together(candidate_set: Slot, beliefs: Beliefs) -> tuple[Site, ...]:
@@ -84,34 +74,6 @@ def named_together(candidate_set: Slot, beliefs: Beliefs) -> tuple[Site, ...]:
         return (candidate_set[0].site,)
     listed = dict.fromkeys(r.site for r in candidate_set if r.probability >= beliefs.listed)
     return tuple(sorted(listed, key=_numbers))
-
-
-def effect_of(alternative: Rival) -> Effect | None:
-    """Return a rival's effect as it was fitted."""
-    for effect in alternative.fit.model.found:
-        if (effect.name, effect.site) == (alternative.site.effect, alternative.site.joint):
-            return effect
-    return None
-
-
-def place_of(alternative: Rival) -> str:
-    """Return where a rival sits."""
-    effect = effect_of(alternative)
-    return effect.at if effect is not None else str(alternative.site.joint)
-
-
-def dependence_of(alternative: Rival) -> str:
-    """Return what a rival depends on."""
-    effect = effect_of(alternative)
-    return effect.on if effect is not None else REGISTRY[alternative.site.effect].traits.depends_on
-
-
-def _marginal(candidate_set: Slot, key: Callable[[Rival], Key]) -> dict[Key, float]:
-    out: dict[Key, float] = {}
-    for alternative in candidate_set:
-        own = key(alternative)
-        out[own] = out.get(own, 0.0) + alternative.probability
-    return out
 
 
 def _numbers(site: Site) -> int:

@@ -38,7 +38,7 @@ from .recording import Measurements, Recording
 FOCAL, CENTRE = 3e-3, 3e-3
 """Spread of focal length and of the centre of the image, in shares of the focal length: what
 calibrations of one camera with a printed board differ by."""
-BENT = (0.03, 0.15, 1e-3, 1e-3, 0.4)
+_BENT = (0.03, 0.15, 1e-3, 1e-3, 0.4)
 """Spread of k1 k2 p1 p2 k3 between such calibrations."""
 SHIFT, TURN = 1.0, 1.0
 """Spread [m, rad] of the places of further cameras and targets: they may be anywhere."""
@@ -50,7 +50,7 @@ _LEAST_PIXEL = 1e-3
 """Noise of a pixel [px] that is taken at the least: images without any are computed."""
 ROUNDS = 30
 """Steps at the most; six are usual."""
-SETTLED = 1e-6
+_SETTLED = 1e-6
 """Share by which the cost must still fall."""
 _DAMPED = 1e8
 """Damping of a step, in units of its columns, at which the search ends."""
@@ -66,7 +66,7 @@ from the centre, which is off by some per cent."""
 LOOSEST, LOOSER = 10.0, 1.5
 """Times what was said that the points of a target may turn out to be off, and from where on that is
 believed: a printed board of a few dozen points errs by half more by chance in its figure at most."""
-LEARNED = 3
+_LEARNED = 3
 """Times that it is learned how well points are known; the last changes it by a few per cent."""
 _SHOWN = 1.0
 """Deviations by which an unknown of one deviation must move all poses together to be kept."""
@@ -105,7 +105,7 @@ class _State:
         """Return the spread of every unknown that the stamps share, shape (Z,)."""
         lenses = [
             np.concatenate(
-                [FOCAL * c.lens.focal, CENTRE * c.lens.focal, BENT],
+                [FOCAL * c.lens.focal, CENTRE * c.lens.focal, _BENT],
             )
             for c in self.seen.cameras
         ]
@@ -315,7 +315,7 @@ def _loosened(state: _State, reported: Array) -> _State:
     that no image shows say nothing of it.
     """
     said = [target.sigma for target in state.seen.targets]
-    for _ in range(LEARNED):
+    for _ in range(_LEARNED):
         weight, _ = _weights(state, reported)
         normal = _Point.at(state, weight).reduced.normal
         known = 1.0 - np.diag(np.linalg.inv(normal + np.eye(len(normal))))
@@ -423,7 +423,7 @@ def _descended(here: _Point) -> _Point:
             break
         gain, here = here.cost - there.cost, there
         damping = max(damping * 0.1, 1e-9)
-        if gain < SETTLED * here.cost:
+        if gain < _SETTLED * here.cost:
             break
     return here
 

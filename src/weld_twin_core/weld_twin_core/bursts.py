@@ -15,16 +15,16 @@ _ENOUGH = 30
 """Stamps below which their steps show no bursts."""
 _SHORT = 0.1
 """A step of less than this share of the mean step lies inside a burst."""
-MANY = 0.4
+_MANY = 0.4
 """Share of the steps that must be so short; bursts of two have half. Of messages that arrive at
 random one step in ten is."""
-LEAST = 5
+_LEAST = 5
 """Bursts below which there is no rate of bursts."""
 _WINDOW = 5
 """Bursts whose least delay is that of the time: some were sent right after a sample."""
 _SKIPPED = 0.6
 """Steps that the least delay must grow by at once for a sample to have been lost."""
-SETTLED = 3
+_SETTLED = 3
 """Times that lost samples and the step are found in turn."""
 _SOONEST = 0.05
 """Quantile of the delays of the last sample of a burst that counts as the least; a few may be off."""
@@ -77,13 +77,13 @@ def bursts(t: Array) -> Bursts | None:
     if t.size < _ENOUGH or t[-1] <= t[0]:
         return None
     inside = steps < _SHORT * float(steps.mean())
-    if inside.mean() < MANY:
+    if inside.mean() < _MANY:
         return None
     last = np.append(np.flatnonzero(~inside), t.size - 1)
-    if last.size < LEAST:
+    if last.size < _LEAST:
         return None
     start, lost = np.append(0, last[:-1] + 1), np.zeros(0, dtype=int)
-    for _ in range(SETTLED):
+    for _ in range(_SETTLED):
         counted = last + np.searchsorted(lost, last, side='right')
         step = float(np.polyfit(counted, t[last], 1)[0])
         lost = _lost(t[last] - step * last, start, step)

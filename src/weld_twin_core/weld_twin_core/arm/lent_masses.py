@@ -19,7 +19,7 @@ from .chain import Frames, frames
 from .dynamics import link_point
 from .robot import Robot
 
-NEAR = 0.015
+_NEAR = 0.015
 """Distance [m] between axes up to which two models are of one arm: calibration moves them by
 millimetres, the next size of a series by centimetres."""
 _TURNED = 0.03
@@ -72,7 +72,7 @@ def _alike(one: tuple[Array, Array], other: tuple[Array, Array]) -> bool:
     if (turned > _TURNED).any() or ((one[0] * other[0]).sum(axis=1) < 0.0).any():
         return False
     away = np.linalg.norm(np.cross(one[1] - other[1], other[0]), axis=1)
-    return bool((away < NEAR).all())
+    return bool((away < _NEAR).all())
 
 
 def _moved(lender: Robot, robot: Robot) -> Array:

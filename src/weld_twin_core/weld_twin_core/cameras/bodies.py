@@ -19,7 +19,7 @@ from .sightings import Sightings
 
 _LEVER = 0.5
 """Length [m] at which a turn counts against a shift where views are compared: a tool's reach."""
-COMPARED = 60
+_COMPARED = 60
 """Views that are compared with each other at the most, to find the one that most agree with."""
 
 
@@ -125,7 +125,7 @@ def _joined(
 
 def _agreed(poses: Array) -> Array:
     """Return the pose that most others are near to."""
-    some = poses[np.linspace(0, len(poses) - 1, min(len(poses), COMPARED)).astype(int)]
+    some = poses[np.linspace(0, len(poses) - 1, min(len(poses), _COMPARED)).astype(int)]
     shift = np.linalg.norm(some[:, None, :3, 3] - some[None, :, :3, 3], axis=-1)
     turn = rotation_vector(some[:, None, :3, :3] @ np.swapaxes(some[None, :, :3, :3], -1, -2))
     away = shift + _LEVER * np.linalg.norm(turn, axis=-1)

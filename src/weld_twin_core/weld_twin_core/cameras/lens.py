@@ -23,11 +23,11 @@ from ..errors import DataError
 
 UNKNOWNS = 9
 """Numbers of a lens that may be off: fx fy cx cy [px] and k1 k2 p1 p2 k3."""
-NEAR = 1e-6
+_NEAR = 1e-6
 """Depth [m] that counts as none; keeps a point in the plane of the lens from a division by zero."""
 ROUNDS = 20
 """Newton steps at the most from a pixel to its ray; four are enough for lenses of usual cameras."""
-SETTLED = 1e-12
+_SETTLED = 1e-12
 """Change of a ray at which its search ends."""
 _SIZES = (0, 4, 5, 8)
 """Numbers of distortion that are understood; what is missing is zero."""
@@ -109,7 +109,7 @@ class Lens:
             bent, turn, _ = self._bent(flat)
             step = np.linalg.solve(turn, (wanted - bent)[..., None])[..., 0]
             flat = flat + step
-            if np.abs(step).max(initial=0.0) < SETTLED:
+            if np.abs(step).max(initial=0.0) < _SETTLED:
                 break
         return np.asarray(flat)
 
@@ -169,4 +169,4 @@ class Lens:
 def _depth(points: Array) -> Array:
     """Return the depth of points, shape (N, 1) [m], never none."""
     z = points[:, 2:]
-    return np.where(np.abs(z) < NEAR, NEAR, z)
+    return np.where(np.abs(z) < _NEAR, _NEAR, z)

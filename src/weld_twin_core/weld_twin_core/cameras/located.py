@@ -26,7 +26,7 @@ _FEWEST = 4
 """Points of a target in an image from which its pose follows."""
 _FLAT = 1e-3
 """Thickness over width below which points are taken for a plane."""
-STEPS = 15
+_STEPS = 15
 """Least-squares steps at the most; five are usual."""
 _CLOSER = 10
 """Rounds in which a view from far away is made nearer."""
@@ -114,7 +114,7 @@ def _nearest(matrix: Array) -> Array:
 def _refined(pose: Array, own: Array, flat: Array) -> tuple[float, Array]:
     """Return the squared distance that is left and the pose after least squares."""
     cost, remaining, columns = _seen(pose, own, flat)
-    for _ in range(STEPS):
+    for _ in range(_STEPS):
         normal = columns.T @ columns
         normal[np.diag_indices(6)] *= 1.0 + _DAMPED
         step = np.linalg.lstsq(normal, columns.T @ remaining, rcond=1e-14)[0]

@@ -15,7 +15,7 @@ from .surfaces import Surface
 
 ROUNDS = 8
 """Steps at the most; two are enough for points, five for faces found at first sight."""
-SETTLED = 1e-9
+_SETTLED = 1e-9
 """Step [m, rad] below which a place stays."""
 _HUBER = 3.0
 """A contact this many robust deviations off starts to lose weight: one in a wrong socket."""
@@ -159,7 +159,7 @@ def places(contacts: Contacts, points: Array) -> Places:
     for _ in range(ROUNDS):
         step = _step(now, points)
         now = now.moved(step)
-        if np.abs(step).max(initial=0.0) < SETTLED:
+        if np.abs(step).max(initial=0.0) < _SETTLED:
             break
     return now
 

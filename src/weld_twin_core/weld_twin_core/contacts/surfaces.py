@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Array
 from .contact import Contact
 
-LEAST = 1e-9
+_LEAST = 1e-9
 """Length [m] that counts as none; keeps a direction from a division by zero."""
 
 
@@ -100,7 +100,7 @@ class Surface:
             free = np.concatenate([np.ones((count, 1)), -away @ self.across.T], axis=1)
             return -(away @ self.axis)[:, None], seen, free[:, None]
         far = np.linalg.norm(away, axis=1)
-        seen = (away / np.maximum(far, LEAST)[:, None])[:, None]
+        seen = (away / np.maximum(far, _LEAST)[:, None])[:, None]
         radius = self.radius if self.contact.kind == 'sphere' or value is None else value
         free = seen
         if self.freedom == 4:
@@ -150,7 +150,7 @@ class Surface:
             return np.asarray(p - np.outer(away @ self.axis, self.axis))
         if self.contact.kind == 'point':
             return np.broadcast_to(self.point, p.shape)
-        far = np.maximum(np.linalg.norm(away, axis=1), LEAST)
+        far = np.maximum(np.linalg.norm(away, axis=1), _LEAST)
         radius = self.radius or float(np.median(far))
         return np.asarray(self.point + away * (radius / far)[:, None])
 
@@ -162,6 +162,6 @@ def _ball(contact: Contact, p: Array, radius: Array | None) -> Surface:
     right = (x**2).sum(axis=1) - (0.0 if radius is None else radius**2)
     columns = np.column_stack([2.0 * x, np.ones(len(x))])
     result = np.linalg.lstsq(columns, right, rcond=1e-9)[0]
-    size = float(np.sqrt(max(result[3] + result[:3] @ result[:3], LEAST)))
+    size = float(np.sqrt(max(result[3] + result[:3] @ result[:3], _LEAST)))
     size = size if radius is None else float(np.median(radius))
     return Surface(contact, middle + result[:3], np.array([0.0, 0.0, 1.0]), size)

@@ -21,7 +21,7 @@ AT_REST = 2e-3
 speed that the noise of encoders makes of a standing joint."""
 
 
-def constant(view: View, index: int) -> Array:
+def _constant(view: View, index: int) -> Array:
     """Return zero, shape (..., N): a curve over nothing has one knot, at zero."""
     return np.zeros(np.shape(view.q[..., index]))
 
@@ -36,7 +36,7 @@ def direction(view: View, index: int) -> Array:
     return np.tanh(view.qd[..., index] / AT_REST)
 
 
-def speed(view: View, index: int) -> Array:
+def _speed(view: View, index: int) -> Array:
     """Return the joint's velocity, shape (..., N) [rad/s or m/s]."""
     return view.qd[..., index]
 
@@ -52,7 +52,7 @@ def load(view: View, index: int) -> Array:
     return np.asarray(torque[index])
 
 
-def temperature(view: View, index: int) -> Array:
+def _temperature(view: View, index: int) -> Array:
     """
     Return the recorded temperature, shape (N,) [degC].
 
@@ -70,12 +70,12 @@ def time(view: View, index: int) -> Array:
 
 _Quantity = Callable[[View, int], Array]
 QUANTITIES: dict[str, _Quantity] = {
-    'constant': constant,
+    'constant': _constant,
     'angle': angle,
     'direction': direction,
-    'speed': speed,
+    'speed': _speed,
     'load': load,
-    'temperature': temperature,
+    'temperature': _temperature,
     'time': time,
 }
 """What a curve may run over; the second argument is the joint's index."""

@@ -19,7 +19,7 @@ from .hooks import Traits
 from .registry import register
 from .view import Parameter, Stage, Value, View
 
-FRAMES = ('base', 'tool')
+_FRAMES = ('base', 'tool')
 _OVER = ('constant', 'temperature', 'time')
 
 
@@ -56,7 +56,7 @@ class FrameCurve(Effect):
         for part in (self.xyz, self.rotvec):
             count = np.shape(part)[-1]
             check_knots(self.name, self.over, self.knots, count // 3 if count % 3 == 0 else -1)
-        if self.frame not in FRAMES or self.over not in _OVER:
+        if self.frame not in _FRAMES or self.over not in _OVER:
             raise ModelError(
                 f'{self.name}: frame must be base or tool and over constant, temperature or time, '
                 f'got {self.frame!r} and {self.over!r}'

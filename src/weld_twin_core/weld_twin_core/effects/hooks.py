@@ -296,10 +296,10 @@ class FitHooks(_Hooks):
         return type(self).starts is not FitHooks.starts
 
 
-GROUPS: dict[str, type[_Hooks]] = {'twin': TwinHooks, 'search': SearchHooks, 'fit': FitHooks}
+_GROUPS: dict[str, type[_Hooks]] = {'twin': TwinHooks, 'search': SearchHooks, 'fit': FitHooks}
 """Groups of questions by the attribute of an effect that answers them."""
 TRAITS = frozenset(each.name for each in fields(Traits))
-OF_GROUP = {k: at for at, g in GROUPS.items() for k in vars(g) if not k.startswith('_')}
+OF_GROUP = {k: at for at, g in _GROUPS.items() for k in vars(g) if not k.startswith('_')}
 """Which group has a question."""
 
 

@@ -25,7 +25,7 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
-CONSTANTS = (0.15, 0.6, 2.5)
+_CONSTANTS = (0.15, 0.6, 2.5)
 """Time constants that a search starts from, in lengths of the recording: beyond, it is a ramp."""
 _WARMER = 1.0
 """Kelvin by which a temperature must vary to be followed: sensors wander by some tenths."""
@@ -158,7 +158,7 @@ class LinkWarmUp(Effect):
         if view.robot.a[i] == 0.0 and view.robot.d[i] == 0.0:
             return
         span = max(float(np.max(view.elapsed, initial=0.0)), 1.0)
-        for share in CONSTANTS:
+        for share in _CONSTANTS:
             yield cls(str(joint), 0.0, share * span)
         if view.temperature is not None and (rise := float(np.ptp(view.temperature))) > _WARMER:
             yield cls(str(joint), 0.0, span, (float(np.min(view.temperature)), rise))

@@ -25,7 +25,7 @@ from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 
-SHARES = (0.03, 0.15)
+_SHARES = (0.03, 0.15)
 """Torques at which the flank is certain that a search starts from, in the largest load seen."""
 
 _CHANGED = 0.3
@@ -38,7 +38,7 @@ class _Search(SearchHooks):
     def constants(self, view: View, joint: str | None) -> Iterable[Effect]:
         """Yield play of a gear that slides easily, where the load keeps it on one flank."""
         torque = load(view, view.robot.index(str(joint)))
-        held = SHARES[0] * float(np.abs(torque).max(initial=0.0))
+        held = _SHARES[0] * float(np.abs(torque).max(initial=0.0))
         if held > 0.0 and not _changes(torque, held):
             yield self.kind(str(joint), 0.0, held)
 
@@ -96,7 +96,7 @@ class LoadedPlay(LinearEffect):
         """Yield play of a gear that slides easily, and of one that sticks."""
         torque = load(view, view.robot.index(str(joint)))
         most = float(np.abs(torque).max(initial=0.0))
-        for share in SHARES:
+        for share in _SHARES:
             # Where the load stays on one side, so does the flank, and that is an offset.
             if most > 0.0 and _changes(torque, share * most):
                 yield cls(str(joint), 0.0, share * most)

@@ -56,7 +56,7 @@ seeds than those that are judged, this gave fewer than one false alarm in two ye
 """
 
 
-class Shape(NamedTuple):
+class _Shape(NamedTuple):
     """A kind of change, its instant (the first diagnosis after it) and its columns (W, m)."""
 
     kind: str
@@ -90,7 +90,7 @@ class Change:
 class Found(NamedTuple):
     """A shape on a coordinate that was taken in."""
 
-    shape: Shape
+    shape: _Shape
     place: int
 
 
@@ -145,7 +145,7 @@ class _Look(NamedTuple):
     """What is tried in one look, and how much each has to explain."""
 
     series: Series
-    shapes: list[Shape]
+    shapes: list[_Shape]
     bar: Array
     """Shape (shapes, P)."""
     sooner: Array
@@ -192,18 +192,18 @@ def value_and_rise(
     return _System(series, taken).now(series.names.index(name))
 
 
-def _shapes(days: Array) -> list[Shape]:
+def _shapes(days: Array) -> list[_Shape]:
     """Return the steps before every diagnosis but the first, the trends from each, and a season."""
     count = days.size
     shapes = [
-        Shape('step', k, (np.arange(count) >= k).astype(float)[:, None]) for k in range(1, count)
+        _Shape('step', k, (np.arange(count) >= k).astype(float)[:, None]) for k in range(1, count)
     ]
     shapes += [
-        Shape('trend', k, np.maximum(days - days[k], 0.0)[:, None]) for k in range(count - 2)
+        _Shape('trend', k, np.maximum(days - days[k], 0.0)[:, None]) for k in range(count - 2)
     ]
     if days[-1] - days[0] > _SEASON_SPAN * _YEAR:
         phase = 2.0 * np.pi * days / _YEAR
-        shapes.append(Shape('season', 0, np.column_stack([np.cos(phase), np.sin(phase)])))
+        shapes.append(_Shape('season', 0, np.column_stack([np.cos(phase), np.sin(phase)])))
     return shapes
 
 
@@ -259,7 +259,7 @@ class _System:
             at += width
         return weights @ self.solution, self.scatter * (weights @ self._inverse @ weights.T)
 
-    def _against(self, shape: Shape, places: NDArray[np.int_]) -> tuple[Array, Array, Array]:
+    def _against(self, shape: _Shape, places: NDArray[np.int_]) -> tuple[Array, Array, Array]:
         """Return a shape on some coordinates: against the first state, itself, and the data."""
         x, series = shape.columns, self._series
         cross = np.tensordot(x, series.precision[:, :, places], axes=(0, 0))
@@ -276,19 +276,19 @@ class _System:
                 break
         return out
 
-    def gains(self, shape: Shape) -> Array:
+    def gains(self, shape: _Shape) -> Array:
         """Return by how much the sum of squares falls with a shape on each coordinate, (P,)."""
         mean, information = self.sizes(shape)
         return np.asarray(np.einsum('jm,jmn,jn->j', mean, information, mean))
 
-    def sizes(self, shape: Shape) -> tuple[Array, Array]:
+    def sizes(self, shape: _Shape) -> tuple[Array, Array]:
         """Return the size of a shape on each coordinate, (P, m), and its information, (P, m, m)."""
         key = shape.kind, shape.begin
         if key not in self._sizes:
             self._sizes[key] = self._fitted(shape)
         return self._sizes[key]
 
-    def _fitted(self, shape: Shape) -> tuple[Array, Array]:
+    def _fitted(self, shape: _Shape) -> tuple[Array, Array]:
         series = self._series
         places = series.changing
         cross, own, reported = self._against(shape, places)
@@ -326,7 +326,7 @@ def _symmetric(blocks: list[list[Array]]) -> Array:
 def _told(
     series: Series,
     system: _System,
-    shapes: Sequence[Shape],
+    shapes: Sequence[_Shape],
     gain: Array,
     best: tuple[int, int],
     sooner: Array,
@@ -369,7 +369,7 @@ def _told(
     )
 
 
-def _slowly(series: Series, shapes: Sequence[Shape], gain: Array, top: float) -> float | None:
+def _slowly(series: Series, shapes: Sequence[_Shape], gain: Array, top: float) -> float | None:
     """Return the earliest day from which a trend explains as much as a step; None for none."""
     begins = [
         each.begin
@@ -379,7 +379,7 @@ def _slowly(series: Series, shapes: Sequence[Shape], gain: Array, top: float) ->
     return float(series.days[min(begins)]) if begins else None
 
 
-def _odds(series: Series, system: _System, shape: Shape, place: int, scatter: float) -> float:
+def _odds(series: Series, system: _System, shape: _Shape, place: int, scatter: float) -> float:
     """Return the logarithm of the odds of a shape on a coordinate against none, its prior in."""
     mean, information = system.sizes(shape)
     known = information[place] / scatter

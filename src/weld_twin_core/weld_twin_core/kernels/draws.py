@@ -47,7 +47,7 @@ _MIXTURES = 48
 """Mixtures that stand for all features; a motion with more independent ones is worked on whole."""
 _BLOCK = 504
 """Draws whose weights are built at once."""
-POINTS = 8000
+_POINTS = 8000
 """Draws times samples worked on at once; a few of such arrays fit the processor's cache..."""
 _FOLLOWING = 16_000
 """... and twice as many where samples follow from others."""
@@ -170,7 +170,7 @@ class SeamDraws:
 
     def _of_all(self, draws: DhDraws) -> Iterator[Array]:
         pieces = self._pieces(draws)
-        step = max(1, POINTS // self._count)
+        step = max(1, _POINTS // self._count)
         memory = aligned(5, 3 * step * self._count)
         for k in range(0, len(draws.theta), step):
             near, far = (piece[..., k : k + step] for piece in pieces)

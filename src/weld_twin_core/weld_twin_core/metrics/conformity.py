@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 PASS, FAIL, OPEN = 'pass', 'fail', 'open'
-SURE = 0.95
+_SURE = 0.95
 """Probability with which a statement has to hold: the default of ISO 14253-1:2017."""
 
 
@@ -26,7 +26,7 @@ class Rule:
     @property
     def to_pass(self) -> float:
         """Return the standard uncertainties that a deviation must stay below the tolerance."""
-        return NormalDist().inv_cdf(SURE)
+        return NormalDist().inv_cdf(_SURE)
 
     @property
     def to_fail(self) -> float:
@@ -35,7 +35,7 @@ class Rule:
 
         Noise alone makes the largest of many larger, so that it says less than a single one.
         """
-        return NormalDist().inv_cdf(SURE ** (1.0 / max(self.readings, 1)))
+        return NormalDist().inv_cdf(_SURE ** (1.0 / max(self.readings, 1)))
 
     def judged(self, largest_m: float) -> str | None:
         """

@@ -35,7 +35,7 @@ END = 0.1
 """Share of a stop left out at its end, where clocks that differ would see the arm leave."""
 
 
-class Stop(NamedTuple):
+class _Stop(NamedTuple):
     """What was measured while the arm stood."""
 
     t: float
@@ -78,7 +78,7 @@ def measured_of(recording: Recording) -> Measurements:
     return recording.measured
 
 
-def stops(recording: Recording) -> list[Stop]:
+def stops(recording: Recording) -> list[_Stop]:
     """
     Return where the arm stood and was measured, in order of time.
 
@@ -91,7 +91,7 @@ def stops(recording: Recording) -> list[Stop]:
         rows = joints.nearest(measured.t)
         turns = measured.rotation
         return [
-            Stop(
+            _Stop(
                 float(measured.t[k]),
                 joints.q[row],
                 measured.position[k],
@@ -101,12 +101,12 @@ def stops(recording: Recording) -> list[Stop]:
         ]
     return [
         result
-        for start, end in rests(joints)
+        for start, end in _rests(joints)
         if (result := _mean_stop(joints, measured, start, end)) is not None
     ]
 
 
-def rests(joints: JointMotion) -> list[tuple[float, float]]:
+def _rests(joints: JointMotion) -> list[tuple[float, float]]:
     """
     Return start and end [s] of the stretches in which the arm stands for `_DWELL` or longer.
 
@@ -127,7 +127,7 @@ def rests(joints: JointMotion) -> list[tuple[float, float]]:
 
 def _mean_stop(
     joints: JointMotion, measured: Measurements, start: float, end: float
-) -> Stop | None:
+) -> _Stop | None:
     """Return the mean of the later half of a stop, without its last moments."""
     late = start + 0.5 * (end - start)
     rows = (measured.t >= late) & (measured.t <= end - END * (end - start))
@@ -137,10 +137,12 @@ def _mean_stop(
     if measured.rotation is not None:
         u, _, vt = np.linalg.svd(measured.rotation[rows].mean(axis=0))
         rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-    return Stop(late, joints.at(np.array(late))[0], measured.position[rows].mean(axis=0), rotation)
+    return _Stop(
+        late, joints.at(np.array(late))[0], measured.position[rows].mean(axis=0), rotation
+    )
 
 
-def pose_cycles(result: list[Stop], robot: Robot) -> list[PoseCycles]:
+def pose_cycles(result: list[_Stop], robot: Robot) -> list[PoseCycles]:
     """
     Return the stops by commanded pose, in the order in which the poses first came.
 
@@ -177,7 +179,7 @@ def _labels(q: Array) -> np.ndarray:
     return labels
 
 
-def _cycles(result: list[Stop], commands: Array, came_from: tuple[int, ...]) -> PoseCycles:
+def _cycles(result: list[_Stop], commands: Array, came_from: tuple[int, ...]) -> PoseCycles:
     first = commands[0]
     position = np.stack([stop.position for stop in result])
     turns = [stop.rotation for stop in result if stop.rotation is not None]

@@ -28,7 +28,7 @@ _REFERENCES = 8
 """Cycles with which all are compared; one of the first eight is of the path that is repeated."""
 _SHAPE = 100
 """Points at which two cycles are compared; a weave has some ten turns."""
-POINTS = 200
+_POINTS = 200
 """Points of the command path at which the criteria are evaluated."""
 _CUT = 0.02
 """Share of the path left out at either end, where one cycle runs into the next."""
@@ -40,13 +40,13 @@ _SLACK_S = 0.25
 """... or seconds, whichever is more: clocks that differ, and lag."""
 _FINER = 8
 """Points put between two measurements, on a cubic: chords would cut the corners of a weave."""
-GAP = 3.0
+_GAP = 3.0
 """Spacings of the measurements that may be bridged so; where more is missing, nothing is known."""
 _FEWEST = 10
 """Points of the path that every cycle was measured at, below which it is not judged."""
 
 
-class Span(NamedTuple):
+class _Span(NamedTuple):
     """Start and end of one cycle [s]."""
 
     start: float
@@ -57,7 +57,7 @@ class Span(NamedTuple):
 class PathCycles:
     """The cycles of one commanded path."""
 
-    spans: tuple[Span, ...]
+    spans: tuple[_Span, ...]
     arc: Array
     """Length of the path to each point of evaluation, shape (m,) [m]."""
     command: Array
@@ -85,7 +85,7 @@ def path_cycles(recording: Recording, robot: Robot) -> PathCycles | None:
     return _crossings(measured, joints, robot, best) if len(best) > 1 else None
 
 
-def spans(joints: JointMotion, anchor: Array) -> list[Span]:
+def spans(joints: JointMotion, anchor: Array) -> list[_Span]:
     """
     Return the stretches of a motion from leaving a joint position to coming back to it.
 
@@ -100,12 +100,12 @@ def spans(joints: JointMotion, anchor: Array) -> list[Span]:
     gaps = np.searchsorted(far, near[1:]) > np.searchsorted(far, near[:-1])
     moment = joints.t[:-1] + part * np.diff(joints.t)
     return [
-        Span(float(moment[i]), float(moment[j]))
+        _Span(float(moment[i]), float(moment[j]))
         for i, j in zip(near[:-1][gaps], near[1:][gaps], strict=True)
     ]
 
 
-def _of_one_path(joints: JointMotion, result: list[Span]) -> list[Span]:
+def _of_one_path(joints: JointMotion, result: list[_Span]) -> list[_Span]:
     """Return the largest group of spans that go the same way."""
     if len(result) < 2:
         return result
@@ -115,14 +115,14 @@ def _of_one_path(joints: JointMotion, result: list[Span]) -> list[Span]:
     return [span for span, same in zip(result, chosen, strict=True) if same]
 
 
-def _shape(joints: JointMotion, span: Span) -> Array:
+def _shape(joints: JointMotion, span: _Span) -> Array:
     """Return joint positions at even shares of the way through the joints, (_SHAPE, n)."""
     t, q = _within(joints, span)
     way = np.concatenate([[0.0], np.linalg.norm(np.diff(q, axis=0), axis=1).cumsum()])
     return joints.at(_when(way, t, np.linspace(0.0, way[-1], _SHAPE)))[0]
 
 
-def _within(joints: JointMotion, span: Span) -> tuple[Array, Array]:
+def _within(joints: JointMotion, span: _Span) -> tuple[Array, Array]:
     """Return the joint stream of a span with both its ends, stamps (K,) and positions (K, n)."""
     inside = joints.t[(joints.t > span.start) & (joints.t < span.end)]
     t = np.concatenate([[span.start], inside, [span.end]])
@@ -136,7 +136,7 @@ def _when(way: Array, t: Array, wanted: Array) -> Array:
 
 
 def _crossings(
-    measured: Measurements, joints: JointMotion, robot: Robot, result: Sequence[Span]
+    measured: Measurements, joints: JointMotion, robot: Robot, result: Sequence[_Span]
 ) -> PathCycles | None:
     times, arc = _even_times(joints, robot, result)
     ways = _positions(joints, robot, times[0])
@@ -162,10 +162,10 @@ def _positions(joints: JointMotion, robot: Robot, t: Array) -> Array:
 
 
 def _even_times(
-    joints: JointMotion, robot: Robot, result: Sequence[Span]
+    joints: JointMotion, robot: Robot, result: Sequence[_Span]
 ) -> tuple[list[Array], Array]:
     """Return when each cycle was commanded to be at even steps of the path, and their lengths."""
-    shares = np.linspace(_CUT, 1.0 - _CUT, POINTS)
+    shares = np.linspace(_CUT, 1.0 - _CUT, _POINTS)
     times, arc = [], np.zeros(0)
     for span in result:
         t, _ = _within(joints, span)
@@ -176,7 +176,7 @@ def _even_times(
     return times, arc
 
 
-def _passes(measured: Measurements, ways: Array, along: Array, when: Array, span: Span) -> Array:
+def _passes(measured: Measurements, ways: Array, along: Array, when: Array, span: _Span) -> Array:
     """Return where one cycle passed the planes, (m, 3); NaN where nothing was measured."""
     slack = max(_SLACK * (span.end - span.start), _SLACK_S)
     rows = (measured.t >= span.start - slack) & (measured.t <= span.end + slack)
@@ -198,5 +198,5 @@ def _finer(t: Array, position: Array) -> tuple[Array, Array]:
     steps = np.diff(t)
     dense = (t[:-1, None] + steps[:, None] * share).ravel()
     points = hermite(t, position, slopes_of_many(t, position), dense)[0]
-    points[np.repeat(steps > GAP * np.median(steps), _FINER)] = np.nan
+    points[np.repeat(steps > _GAP * np.median(steps), _FINER)] = np.nan
     return dense, points

@@ -73,7 +73,7 @@ class Remembered:
 
     def left(self, own: Array) -> Array:
         """Return what the slope leaves of the displacements by draws (D, M), shape (D, N)."""
-        out = displacement(self.study, self.joint, self.tolerances, own)
+        out = _displacement(self.study, self.joint, self.tolerances, own)
         out -= own @ self.slope
         return out
 
@@ -184,12 +184,14 @@ def remembered(
     for joint, members in columns.items():
         own = tuple(tolerances[k] for k in members)
         size = scale[members]
-        slope = displacement(study, joint, own, np.diag(size)) / size[:, None]
+        slope = _displacement(study, joint, own, np.diag(size)) / size[:, None]
         out.append(Remembered(study, joint, tuple(members), own, slope))
     return tuple(out)
 
 
-def displacement(study: Study, joint: int, tolerances: Sequence[Tolerance], draws: Array) -> Array:
+def _displacement(
+    study: Study, joint: int, tolerances: Sequence[Tolerance], draws: Array
+) -> Array:
     """
     Return displacements of a joint, shape (D, N) [rad or m], beyond those of the known effects.
 

@@ -30,7 +30,7 @@ from .outcome import refuse_unfinite
 
 _LEVELS = 8
 """Levels of the grid of each input; even, as the method wants, so that all are visited alike."""
-STEP = _LEVELS / (2.0 * (_LEVELS - 1.0))
+_STEP = _LEVELS / (2.0 * (_LEVELS - 1.0))
 """How far an input moves at a time, as a part of the grid: as the method wants [1]_."""
 _CONFIDENCE = 0.95
 """Of the intervals of mu star."""
@@ -112,7 +112,7 @@ class MorrisDesign:
         steps = np.diff(self.samples().reshape(self.trajectories, inputs + 1, inputs), axis=1)
         change = np.diff(values.reshape(self.trajectories, inputs + 1), axis=1)
         # One input moves at a time: its step says at which place of the trajectory, and whereto.
-        effects = np.einsum('tk,tkp->pt', change, np.sign(steps)) / STEP
+        effects = np.einsum('tk,tkp->pt', change, np.sign(steps)) / _STEP
         rng = _numbers(self.seed, 1)
         picks = rng.integers(self.trajectories, size=(inputs, _RESAMPLES, self.trajectories))
         size = np.abs(effects)
@@ -139,9 +139,9 @@ def _trajectory(inputs: int, rng: np.random.Generator) -> Array:
     order = np.eye(inputs)
     rng.shuffle(order)
     way = rng.choice([-1, 1], inputs)
-    start = rng.choice(np.linspace(0.0, 1.0 - STEP, _LEVELS // 2), inputs)
+    start = rng.choice(np.linspace(0.0, 1.0 - _STEP, _LEVELS // 2), inputs)
     moved = np.tril(np.ones((inputs + 1, inputs)), -1) @ order.T
-    out: Array = start + 0.5 * STEP * ((2.0 * moved - 1.0) * way + 1.0)
+    out: Array = start + 0.5 * _STEP * ((2.0 * moved - 1.0) * way + 1.0)
     return out
 
 

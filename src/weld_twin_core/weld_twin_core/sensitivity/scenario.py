@@ -32,7 +32,7 @@ class Sizes:
     """[rad]"""
 
 
-def sources(robot: Robot, sizes: Sizes | None = None) -> dict[str, tuple[Effect, ...]]:
+def _sources(robot: Robot, sizes: Sizes | None = None) -> dict[str, tuple[Effect, ...]]:
     """Return the effects of every source of the combined scenario."""
     size = sizes or Sizes()
     joints = robot.joint_names
@@ -60,7 +60,7 @@ def scenario_deviations(study: Study, sizes: Sizes | None = None) -> dict[str, A
         By source; 'combined' for all together.
 
     """
-    each = sources(study.robot, sizes)
+    each = _sources(study.robot, sizes)
     out = {name: study.deviations((*study.known, *effects)) for name, effects in each.items()}
     every = tuple(effect for effects in each.values() for effect in effects)
     return {**out, 'combined': study.deviations((*study.known, *every))}

@@ -29,7 +29,7 @@ from .outcome import refuse_unfinite
 
 _CONFIDENCE = 0.95
 """Of the intervals of the indices."""
-SETTLED = 0.05
+_SETTLED = 0.05
 """Half-width and change of a total index below which a study counts as converged."""
 
 
@@ -51,7 +51,7 @@ class SobolIndices:
     change: float
     """Largest change of a total index from half to all of the base samples."""
     converged: bool
-    """Whether the change and every half-width of a total index are below `SETTLED`."""
+    """Whether the change and every half-width of a total index are below `_SETTLED`."""
     seed: int
 
     def as_dict(self) -> dict[str, Any]:
@@ -141,7 +141,7 @@ class SobolDesign:
         first_half, total_half = sobol_half_widths(runs, _CONFIDENCE, rng)
         before = sobol_estimates(runs[: self.base_samples // 2])[1]
         change = float(np.abs(total - before).max())
-        settled = max(change, float(total_half.max())) < SETTLED
+        settled = max(change, float(total_half.max())) < _SETTLED
         return SobolIndices(
             names=self.labels,
             first=first,

@@ -15,7 +15,7 @@ from ..arrays import Array
 from ..errors import DataError
 from .outcome import Outcomes, refuse_unfinite
 
-PERCENTILES = (5.0, 25.0, 50.0, 75.0, 90.0, 95.0, 99.0)
+_PERCENTILES = (5.0, 25.0, 50.0, 75.0, 90.0, 95.0, 99.0)
 """What the distribution is told by [%]."""
 _COVERAGE = 0.95
 """Confidence of the intervals of the percentiles."""
@@ -54,7 +54,7 @@ class ToleranceStack:
     runs: int
     seed: int
     percentiles: dict[str, Array]
-    """Value and 95 % interval at `PERCENTILES` of d_norm, max_m, across_m and stickout_m, shape
+    """Value and 95 % interval at `_PERCENTILES` of d_norm, max_m, across_m and stickout_m, shape
     (K, 3)."""
     inside_across: Probability
     inside_stickout: Probability
@@ -77,7 +77,7 @@ class ToleranceStack:
             'percentiles': {
                 key: [
                     {'percent': p, 'value': float(v), 'low': float(a), 'high': float(b)}
-                    for p, (v, a, b) in zip(PERCENTILES, rows, strict=True)
+                    for p, (v, a, b) in zip(_PERCENTILES, rows, strict=True)
                 ]
                 for key, rows in self.percentiles.items()
             },
@@ -160,7 +160,7 @@ def _percentiles(values: Array) -> Array:
     """Return percentiles with the interval that order statistics give without a model."""
     ordered, runs, tail = np.sort(values), values.size, 0.5 * (1.0 - _COVERAGE)
     out = []
-    for percent in PERCENTILES:
+    for percent in _PERCENTILES:
         chance = np.array([tail, 1.0 - tail])
         low, high = np.clip(_ranks(chance, runs, percent / 100.0), 0, runs - 1)
         out.append([float(np.percentile(ordered, percent)), ordered[low], ordered[high]])

@@ -25,7 +25,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     'base_pose': (0.0, 1e-3),
 }
 """First and last size swept; those of offsets and lengths are the paper's (III.v)."""
-BENT = 0.01
+_BENT = 0.01
 """Departure from proportion that counts as the end of linearity."""
 
 
@@ -132,7 +132,7 @@ def default_values(tolerance: Tolerance, count: int = 25) -> Array:
 
 def end_of_linearity(study: Study, tolerance: Tolerance, largest: float = 1.0) -> float | None:
     """
-    Return the smallest error at which D departs from proportion by `BENT`.
+    Return the smallest error at which D departs from proportion by `_BENT`.
 
     Parameters
     ----------
@@ -147,5 +147,5 @@ def end_of_linearity(study: Study, tolerance: Tolerance, largest: float = 1.0) -
 
     """
     result = sweep(study, tolerance, np.geomspace(1e-3 * largest, largest, 121))
-    bent = np.abs(result.departure) > BENT
+    bent = np.abs(result.departure) > _BENT
     return float(result.values[np.argmax(bent)]) if bent.any() else None

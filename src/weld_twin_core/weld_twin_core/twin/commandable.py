@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from ..effects.effect import Effect, Stage
 
-BEYOND_COMMANDS = frozenset(
+_BEYOND_COMMANDS = frozenset(
     {
         'measurement_scale',
         'measurement_noise',
@@ -19,15 +19,15 @@ BEYOND_COMMANDS = frozenset(
     }
 )
 """Effects of the measurement, or new in every run: they do nothing to a motion to come."""
-ROUNDING = 'quantization'
+_ROUNDING = 'quantization'
 """A rounding of what is commanded, which is as near as it gets: no joint command mends it."""
 
 
 def commandable(effect: Effect) -> bool:
     """Tell whether joint commands can mend an effect."""
-    return acts(effect) and effect.name != ROUNDING
+    return acts(effect) and effect.name != _ROUNDING
 
 
 def acts(effect: Effect) -> bool:
     """Tell whether an effect moves the tool on a motion to come, which nobody measures."""
-    return effect.name not in BEYOND_COMMANDS and effect.stage not in (Stage.CLOCK, Stage.NOISE)
+    return effect.name not in _BEYOND_COMMANDS and effect.stage not in (Stage.CLOCK, Stage.NOISE)

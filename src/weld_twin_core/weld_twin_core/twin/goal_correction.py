@@ -35,22 +35,22 @@ from .reversals import approached, is_play, play_steps, spread
 from .turns import just_turned
 from .twin import Twin
 
-SHARES = (0.125, 0.25, 0.5)
+_SHARES = (0.125, 0.25, 0.5)
 """How near its turn a joint must be for its step of play, in steps: at half of one the arm is off by as
 much as without a correction, and only there."""
-BESIDE = 1e-4
+_BESIDE = 1e-4
 """How far before and behind a point the correction is looked at for its rates [rad or m]: the square of
 it is far below the resolution of a drive, and solutions are exact to 1e-12."""
-AT_REST = 1e-9
+_AT_REST = 1e-9
 """Motion [rad or m, per s] that is none."""
-SURE_AT = 24
+_SURE_AT = 24
 """Places of a goal where it is asked how sure the model is; it changes slowly along a motion."""
-HOLDS = 0.9
+_HOLDS = 0.9
 """Share of the models which the recordings allow whose error stays within the bound that is told. What
 is left over on unseen postures is sized for as many."""
-HERE = 2e-5
+_HERE = 2e-5
 """Distance of a joint [rad or m] from where a goal begins that is noise of its encoder."""
-NEAR = 0.01
+_NEAR = 0.01
 """A goal begins where the arm stands if no joint is farther from there [rad or m]."""
 SMOOTH_PEAK = 5.7735
 """Largest acceleration of a step that is made smoothly, for one unit in one second."""
@@ -250,7 +250,7 @@ class _Work:
             recording = self._recording(fine)
             came = self.start.came
             steps = play_steps(self.model.robot, self.plays, recording, came)
-            for share in SHARES:
+            for share in _SHARES:
                 more = spread(steps, fine, share, self.goal.t, came, rests=self._rests)
                 yield (
                     Goal(
@@ -279,9 +279,9 @@ class _Work:
 
     @staticmethod
     def _beside(qd: Array, qdd: Array) -> float:
-        """Return the time [s] in which no joint goes farther than `BESIDE`."""
-        fast, bent = np.abs(qd).max(initial=AT_REST), np.abs(qdd).max(initial=AT_REST)
-        return float(min(BESIDE / fast, np.sqrt(2.0 * BESIDE / bent), 1.0))
+        """Return the time [s] in which no joint goes farther than `_BESIDE`."""
+        fast, bent = np.abs(qd).max(initial=_AT_REST), np.abs(qdd).max(initial=_AT_REST)
+        return float(min(_BESIDE / fast, np.sqrt(2.0 * _BESIDE / bent), 1.0))
 
     def _solved(self, t: Array, q: Array) -> Array:
         recording = self.model.recording(JointMotion(t, q))
@@ -317,7 +317,7 @@ class _Work:
     @property
     def _places(self) -> Array:
         count = self.meant.t.size
-        return np.unique(np.linspace(0, count - 1, min(SURE_AT, count)).round().astype(int))
+        return np.unique(np.linspace(0, count - 1, min(_SURE_AT, count)).round().astype(int))
 
     def _bound(self, after: Array, way: Course) -> float | None:
         """Return the largest distance on a way that is told not to be exceeded [m]."""
@@ -332,7 +332,7 @@ class _Work:
         # Where joints turn around more is left than beside, and few places would miss that.
         near = np.searchsorted(places, np.arange(len(after))).clip(max=places.size - 1)
         result = accuracy([after], [Drawn(near, posterior.drawn(seen, self.model.setup))])
-        return None if result is None else result.likely_within(HOLDS)
+        return None if result is None else result.likely_within(_HOLDS)
 
     def _added(self, result: Goal, at: Array) -> Array:
         """Return what a corrected goal adds to the pose at stamps, shape (N, 6), seen from the base."""
@@ -344,7 +344,7 @@ class _Work:
         if here is None or not self._rests:
             return 0.0
         step = result.q[0] - here
-        if np.abs(step).max() < HERE:
+        if np.abs(step).max() < _HERE:
             return 0.0
         length, turn = np.abs(_largest(self._between(here, result.q[0])))
         most = np.minimum(self.model.robot.max_acceleration, self.limits.acceleration)
@@ -359,13 +359,13 @@ class _Work:
     def _near(self) -> bool:
         """Return whether the arm is where the goal begins."""
         here = self.start.q
-        return here is not None and bool(np.abs(self.goal.q[0] - here).max() <= NEAR)
+        return here is not None and bool(np.abs(self.goal.q[0] - here).max() <= _NEAR)
 
     @property
     def _rests(self) -> bool:
         """Return whether the arm stands where the goal begins, or comes to rest with it there."""
         rate = self.goal.qd
-        begins_at_rest = rate is not None and bool(np.abs(rate[0]).max() < AT_REST)
+        begins_at_rest = rate is not None and bool(np.abs(rate[0]).max() < _AT_REST)
         return self._near and (begins_at_rest or not self.start.moving)
 
     def _between(self, here: Array, there: Array) -> Array:

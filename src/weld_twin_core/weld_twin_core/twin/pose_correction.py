@@ -31,20 +31,20 @@ from .program_model import ProgramModel
 
 ROUNDS = 12
 """Newton rounds; with the real arm's own slope every one squares what is left."""
-SIDE = 1e-4
+_SIDE = 1e-4
 """Step [rad or m] of a joint to either side over which slopes are taken: what bends there is below
 1e-8, and nearly the same for both arms, whose difference counts; rounding is below 1e-11."""
-SETTLED = 1e-6
+_SETTLED = 1e-6
 """Step [rad or m] of all joints that is the last one: it leaves its square."""
-CLOSED = 1e-11
+_CLOSED = 1e-11
 """Error [m, rad] that the last step may leave to first order."""
-OPEN = 1e-9
+_OPEN = 1e-9
 """Error [m, rad] that a solution must not have: that of `compensate`."""
-EXACT = 2e-10
+_EXACT = 2e-10
 """Largest error [m], of way and turn, that what is told between two looks should have."""
-REACH = (2e-5, 5e-4, 1e-2)
+_REACH = (2e-5, 5e-4, 1e-2)
 """Least, first and largest distance [m] between two exact looks; a turn counts half a metre a radian."""
-ONWARD = 0.97
+_ONWARD = 0.97
 """Cosine of the angle between two ways [m, rad] that go on in one direction; another bends otherwise."""
 LEVER = 0.5
 """Distance [m] at which a turn of the tool counts as much as its way: between wrist and torch."""
@@ -90,14 +90,14 @@ class PoseCorrection:
         self._back = np.linalg.inv(robot.T_world_base)
         self._still = still
         self._at: Looked | None = None
-        self._sides = SIDE * np.concatenate(
+        self._sides = _SIDE * np.concatenate(
             [np.zeros((1, robot.n)), np.eye(robot.n), -np.eye(robot.n)]
         )
         self._begin()
 
     def _begin(self) -> None:
         """Know nothing yet of how what is added bends."""
-        self._reach, self._bend, self._way = REACH[1], np.zeros((1, 1)), np.zeros(6)
+        self._reach, self._bend, self._way = _REACH[1], np.zeros((1, 1)), np.zeros(6)
 
     @property
     def looked(self) -> Looked | None:
@@ -128,10 +128,10 @@ class PoseCorrection:
             step = least_step(rise, error, SINGULAR)
             q = q + step
             remaining = np.abs(error - rise @ step).max()
-            if remaining < CLOSED and np.abs(step).max() < SETTLED:
+            if remaining < _CLOSED and np.abs(step).max() < _SETTLED:
                 break
         else:
-            if not size < OPEN:
+            if not size < _OPEN:
                 raise DataError('the pose cannot be reached from where the arm stands')
         back = least_step(rise, np.eye(6), SINGULAR).T
         apart = _rise(forward(self._arm, beside)) - rise
@@ -155,13 +155,13 @@ class PoseCorrection:
         way, size = _away(before, looked.pose)
         reported = _told(before, self._bend, way, size)
         off = _size((reported - looked.values)[:6])
-        if size > REACH[0]:
+        if size > _REACH[0]:
             self._bend = (looked.slope - before.slope) / size
             self._way = way
         # The error of what bends evenly grows with the third power of its length.
-        best = size * float(np.cbrt(EXACT / max(off, 1e-2 * EXACT)))
-        best = min(best, 1.5 * self._reach) if off < EXACT else best
-        self._reach = float(np.clip(best, REACH[0], REACH[2]))
+        best = size * float(np.cbrt(_EXACT / max(off, 1e-2 * _EXACT)))
+        best = min(best, 1.5 * self._reach) if off < _EXACT else best
+        self._reach = float(np.clip(best, _REACH[0], _REACH[2]))
 
     def added(self, pose: Array) -> tuple[Array, float]:
         """
@@ -179,7 +179,7 @@ class PoseCorrection:
         assert self._at is not None
         way, size = _away(self._at, pose)
         onward = _onward(self._way, way)
-        reach = self._reach if onward else min(self._reach, REACH[1])
+        reach = self._reach if onward else min(self._reach, _REACH[1])
         return _told(self._at, self._bend, way, size)[:6], size / reach
 
     def joints(self, pose: Array) -> Array:
@@ -233,7 +233,7 @@ class PoseCorrection:
 def _rise(poses: Array) -> Array:
     """Return d pose / d joint, shape (6, n), of a pose and those with joints to either side of it."""
     ahead, behind = np.split(poses[1:], 2)
-    return np.asarray(between(behind, ahead).T / (2.0 * SIDE))
+    return np.asarray(between(behind, ahead).T / (2.0 * _SIDE))
 
 
 def _standing(q: Array) -> JointMotion:
@@ -258,7 +258,7 @@ def _told(at: Looked, bend: Array, way: Array, size: float) -> Array:
 
 def _onward(before: Array, way: Array) -> bool:
     """Return whether a way goes on in the direction of the one before."""
-    return bool(before @ way > ONWARD * sqrt((before @ before) * (way @ way)))
+    return bool(before @ way > _ONWARD * sqrt((before @ before) * (way @ way)))
 
 
 def between(start: Array, end: Array) -> Array:

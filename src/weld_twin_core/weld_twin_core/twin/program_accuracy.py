@@ -14,7 +14,7 @@ from ..arrays import Array
 from .posterior import Drawn
 from .program_correction import ProgramCorrection
 
-SPAN = (5.0, 95.0)
+_SPAN = (5.0, 95.0)
 """Percentiles between which nine of ten draws lie."""
 SURE = 0.95
 """Probability from which on a tolerance counts as kept, or as not kept: what a guard band of ISO 14253-1
@@ -94,7 +94,7 @@ def accuracy(
     )
     # Drawn models are off by something everywhere. The one that was found, which may be off by
     # nothing, is allowed as well.
-    low, high = np.percentile([same[0], own[0]], SPAN, axis=1)
+    low, high = np.percentile([same[0], own[0]], _SPAN, axis=1)
     low, high = np.minimum(low, rms), np.maximum(high, rms)
     return Accuracy(
         float(np.sqrt((same[0] ** 2).mean())),

@@ -37,18 +37,18 @@ ROUNDS = 5
 """Rounds of moving points; effects are small, each takes away all but some thousandths."""
 SINGULAR = 1e-9
 """Damping of a joint step [m^2]: invisible but within micrometres of a singularity."""
-APART = (2e-4, 2e-3)
+_APART = (2e-4, 2e-3)
 """Two uses of one point may want corrections this far apart [m, rad]; the mean serves both."""
 BETTER = 0.8
 """Share of its worst error that a seam may keep: of arms with sealed causes that were to keep more, five
 came out farther off than before, up to twice as far."""
 NOTHING = 1e-9
 """Error [m] that is rounding."""
-WORTH = 0.5
+_WORTH = 0.5
 """Share of a correction that must be trusted: below it the doubt is larger than the correction."""
 
 
-Written = Callable[[Sequence[Array]], Sequence[Array]]
+_Written = Callable[[Sequence[Array]], Sequence[Array]]
 """From points to what they read like once they are written."""
 
 
@@ -59,7 +59,7 @@ class Caps(NamedTuple):
     turn: float = np.pi / 180.0
 
 
-class MoveResult(NamedTuple):
+class _MoveResult(NamedTuple):
     """What a correction does to one move."""
 
     length: float
@@ -99,7 +99,7 @@ class ProgramCorrection:
     covariances: tuple[Array | None, ...]
     """In the set-up that was recorded, shape (N, 6, 6)."""
     drawn: tuple[Drawn | None, ...]
-    results: tuple[MoveResult, ...]
+    results: tuple[_MoveResult, ...]
     """One for every move, in the order of the program."""
 
 
@@ -110,7 +110,7 @@ def correct_program(
     held: dict[int, str] | None = None,
     caps: Caps | None = None,
     start: Array | None = None,
-    written: Written | None = None,
+    written: _Written | None = None,
 ) -> ProgramCorrection:
     """
     Return a program whose points are moved so that the real tool goes where it was to go.
@@ -146,7 +146,7 @@ class _Work(NamedTuple):
     travel: Travel
     caps: Caps
     still: ProgramModel | None
-    written: Written | None
+    written: _Written | None
 
     @property
     def seams(self) -> list[int]:
@@ -210,7 +210,7 @@ class _Work(NamedTuple):
                     f'degrees, at most {self.caps.length * 1e3:g} mm and '
                     f'{np.degrees(self.caps.turn):g} degrees are allowed'
                 )
-        if shares is not None and shares[piece.ends[k]] < WORTH:
+        if shares is not None and shares[piece.ends[k]] < _WORTH:
             return 'the model is less sure of this place than the correction is large'
         return ''
 
@@ -226,7 +226,7 @@ class _Work(NamedTuple):
             sizes = [self._sizes(piece, one) for one in (piece.motion, motion)]
             for k, move in enumerate(piece.moves):
                 off = meant[piece.ends[k]]
-                apart = np.linalg.norm(off[:3]) > APART[0] or np.linalg.norm(off[3:]) > APART[1]
+                apart = np.linalg.norm(off[:3]) > _APART[0] or np.linalg.norm(off[3:]) > _APART[1]
                 if apart and move.end is not None and move.end.leads:
                     size = f'{np.linalg.norm(off[:3]) * 1e3:.3f} mm would be left here'
                     out.setdefault(move.seam, f'{move.where}: {size}, {self._left(move.end)}')
@@ -310,7 +310,7 @@ class _Work(NamedTuple):
         before: list[Array],
         after: list[Array],
         sure: list[Array | None],
-    ) -> tuple[MoveResult, ...]:
+    ) -> tuple[_MoveResult, ...]:
         seen: dict[int, tuple[float, float, str, float | None]] = {}
         for k, piece in enumerate(self.travel.pieces):
             outside, spread = _outside(self.model, piece), sure[k]
@@ -323,7 +323,7 @@ class _Work(NamedTuple):
         out = []
         for move in (move for piece in self.program.pieces for move in piece):
             by = (0.0, 0.0) if move.end is None else self.moved_by(moved, move.end, move.tool)
-            out.append(MoveResult(*by, *seen.get(id(move), (None, None, '', None))))
+            out.append(_MoveResult(*by, *seen.get(id(move), (None, None, '', None))))
         return tuple(out)
 
 

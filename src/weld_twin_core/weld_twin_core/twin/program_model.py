@@ -22,10 +22,10 @@ from .features import Features
 from .posterior import Drawn, Posterior, places, pose_covariances
 from .twin import Twin
 
-SAME_TOOL = 1e-5
+_SAME_TOOL = 1e-5
 """Numbers of two tool frames [m, and parts of a unit vector] that mean the same tool: programs are
 written to a micrometre and some thousandths of a degree."""
-TOOL_EFFECT = 'tool_pose'
+_TOOL_EFFECT = 'tool_pose'
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +76,13 @@ class ProgramModel:
         if key not in self._twins:
             same = self.same_tool(tool)
             acting = tuple(e for e in self.effects if acts(e)) if whole else self.acting
-            effects = [e for e in acting if same or e.name != TOOL_EFFECT]
+            effects = [e for e in acting if same or e.name != _TOOL_EFFECT]
             self._twins[key] = Twin(self.robot.with_frames(tool=tool), effects)
         return self._twins[key]
 
     def same_tool(self, tool: Array) -> bool:
         """Tell whether a tool is the one that the effects were found with."""
-        return bool(np.abs(tool - self.robot.T_flange_tool).max() < SAME_TOOL)
+        return bool(np.abs(tool - self.robot.T_flange_tool).max() < _SAME_TOOL)
 
     def wanted(self, piece: Piece) -> Array:
         """Return ``T_base_tool`` as the program means it at every sample, shape (N, 4, 4)."""

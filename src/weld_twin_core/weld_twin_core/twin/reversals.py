@@ -24,16 +24,16 @@ from .goal_motion import Course
 from .memory import run_all
 from .twin import Twin
 
-CAME_FROM = 0.02
+_CAME_FROM = 0.02
 """How far a joint is taken to have come [rad or m] where the direction is known: more than any play."""
 ROUNDS = 16
 """Each takes what is added into account for the motion that plays see. A gap is then crossed within one
 part in so many of its width, which is within the narrowest standstill that a step is spread over."""
-STEP = 1e-7
+_STEP = 1e-7
 """What is added for play and varies by less [rad or m] has no step."""
 
 
-class Spread(NamedTuple):
+class _Spread(NamedTuple):
     """What is added for play at stamps (K,): values, rates and bends, each (K, n)."""
 
     q: Array
@@ -64,7 +64,7 @@ def approached(recording: Recording, came: Array | None, stands: Array | None = 
     way = np.zeros((0, motion.q.shape[1]))
     if came is not None and np.any(came):
         end = motion.q[0] if stands is None else stands
-        way = np.stack([end - CAME_FROM * np.sign(came), end])
+        way = np.stack([end - _CAME_FROM * np.sign(came), end])
     elif stands is not None:
         way = stands[None]
     if not way.size:
@@ -103,7 +103,7 @@ def spread(
     came: Array | None = None,
     *,
     rests: bool = False,
-) -> Spread:
+) -> _Spread:
     """
     Return steps spread over the standstill of each reversal, looked up at stamps.
 
@@ -114,12 +114,12 @@ def spread(
     came: as for `play_steps`, shape (n,).
     rests: the arm stands still before the first sample, and makes its first steps there.
     """
-    out = Spread(*np.zeros((3, at.size, steps.shape[1])))
+    out = _Spread(*np.zeros((3, at.size, steps.shape[1])))
     place = np.searchsorted(course.t, at)
     for i, column in enumerate(steps.T):
         out.q[:, i] = column[place]
         size = float(np.ptp(column))
-        if size < STEP:
+        if size < _STEP:
             continue
         before = 0.0 if came is None else float(came[i])
         for a, b in _standstills(course.q[:, i], before, share * size):

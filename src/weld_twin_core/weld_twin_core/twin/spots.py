@@ -15,9 +15,9 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..recording import Recording
 
-TESTED = 3
+_TESTED = 3
 """Places from which on each can be left out and foretold from the others."""
-ALONE = 0.1
+_ALONE = 0.1
 """Distance [m] from a place within which it is believed where no place could be left out: that of a
 plate with sockets. Of an arm touched at one place alone, a third of the others came out worse."""
 
@@ -45,8 +45,8 @@ class Spots:
             return None
         bare = robot.with_frames(base=np.eye(4))
         at = np.array([_points(bare, r.joints.q).mean(axis=0) for r in recordings])
-        reach = ALONE
-        if len(at) >= TESTED:
+        reach = _ALONE
+        if len(at) >= _TESTED:
             apart = np.linalg.norm(at[:, None] - at, axis=2) + np.diag(np.full(len(at), np.inf))
             reach = max(reach, float(apart.min(axis=1).max()))
         return cls(bare, at, reach)

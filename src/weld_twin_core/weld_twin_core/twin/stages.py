@@ -20,10 +20,10 @@ from ..errors import ModelError
 from .memory import Tangent, indexed
 from .poses import Poses, posed
 
-CLOCK_ROUNDS = 3
+_CLOCK_ROUNDS = 3
 """Rounds that find the stamp of an instant: each leaves a ten-thousandth, the rate of a clock."""
-POINTWISE = (Stage.JOINT, Stage.LOAD, Stage.ELASTIC, Stage.LINK, Stage.POSE)
-SETTLING_ROUNDS = 3
+_POINTWISE = (Stage.JOINT, Stage.LOAD, Stage.ELASTIC, Stage.LINK, Stage.POSE)
+_SETTLING_ROUNDS = 3
 """Rounds in which springs settle: each leaves a hundredth, how much a sag changes its own load."""
 
 
@@ -74,7 +74,7 @@ class EffectStages:
         instants = np.asarray(elapsed, dtype=np.float64)
         late = np.zeros(instants.shape)
         # What a clock is behind by goes by its own stamps, and these are what is asked for.
-        for _ in range(CLOCK_ROUNDS if self.of_stage(Stage.CLOCK) else 0):
+        for _ in range(_CLOCK_ROUNDS if self.of_stage(Stage.CLOCK) else 0):
             late = self.behind(np.ravel(instants + late)).reshape(instants.shape)
         return late
 
@@ -112,7 +112,7 @@ class EffectStages:
     ) -> tuple[View, tuple[Tangent, ...]]:
         slopes: dict[Channel, Any] = {}
         own: list[Tangent] = []
-        for stage in POINTWISE:
+        for stage in _POINTWISE:
             effects = [(k, e) for k, e in enumerate(self.effects) if e.stage == stage]
             if stage == Stage.LOAD:
                 view = self._settled(view)
@@ -136,7 +136,7 @@ class EffectStages:
         rigid = [spring.displace(loaded) for spring in springs if not spring.twin.settles]
         settling = [spring for spring in springs if spring.twin.settles]
         give = [*rigid, *(spring.displace(loaded) for spring in settling)]
-        for _ in range(SETTLING_ROUNDS if settling else 0):
+        for _ in range(_SETTLING_ROUNDS if settling else 0):
             loaded = _loaded(view.displaced(*give), loads)
             give = [*rigid, *(spring.displace(loaded) for spring in settling)]
         torque = {key: value for key, value in loaded.shift.items() if key[0] == 'tau'}

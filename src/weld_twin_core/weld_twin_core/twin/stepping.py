@@ -20,7 +20,7 @@ from .memory import added, in_series
 from .poses import Poses, posed
 from .stages import EffectStages
 
-BESIDE = ('tau', 'pose')
+_BESIDE = ('tau', 'pose')
 """Channels that act through the joints and behind the chain, not within it."""
 
 
@@ -52,8 +52,8 @@ class LiveTwin:
         self._states: dict[tuple[Any, ...], Any] = {}
         self._start = 0.0
         self._last = -np.inf
-        self._command = Rate()
-        self._moved = Rate()
+        self._command = _Rate()
+        self._moved = _Rate()
 
     @property
     def twin(self) -> EffectStages:
@@ -69,7 +69,7 @@ class LiveTwin:
         """Forget the motion so far, as after a jump back in time."""
         self._states.clear()
         self._last = -np.inf
-        self._command, self._moved = Rate(), Rate()
+        self._command, self._moved = _Rate(), _Rate()
 
     def step(
         self,
@@ -120,7 +120,7 @@ class LiveTwin:
         for (name, i), value in view.shift.items():
             if name == 'q':
                 joints[i] += np.ravel(value)[0]
-            elif name not in BESIDE:
+            elif name not in _BESIDE:
                 others[name, i] = float(np.ravel(value)[0])
         return joints, self._pose(view, joints, others)
 
@@ -200,7 +200,7 @@ class LiveTwin:
         return replace(view, q=q, qd=view.qd + moved)
 
 
-class Rate:
+class _Rate:
     """How fast values change from one call to the next, as `recording.backward_rates` has it."""
 
     def __init__(self) -> None:

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from ..arrays import Array
 from ..recording import JointMotion
 
-TAKEN_UP = 1e-3
+_TAKEN_UP = 1e-3
 """Way after a turn [rad or m] within which a joint takes up what it loses: play and the wind-up of
 gears are some tenths of a milliradian."""
-BACK = 1e-5
+_BACK = 1e-5
 """Way back [rad or m] from which on it is a turn: more than an encoder's noise, less than any play."""
 
 
 def just_turned(motion: JointMotion, at: Array) -> NDArray[np.bool_]:
     """
-    Return whether joints turned around less than `TAKEN_UP` ago, shape (M, n).
+    Return whether joints turned around less than `_TAKEN_UP` ago, shape (M, n).
 
     at: stamps within it, shape (M,) [s]. Nothing has turned at rest at stations, or before a first
     turn.
@@ -34,12 +34,12 @@ def just_turned(motion: JointMotion, at: Array) -> NDArray[np.bool_]:
             continue
         before = np.searchsorted(motion.t[turns], at, side='right') - 1
         since = np.abs(q[:, i] - column[turns[before]])
-        out[:, i] = (before >= 0) & (since < TAKEN_UP)
+        out[:, i] = (before >= 0) & (since < _TAKEN_UP)
     return out
 
 
 def _turns(q: Array) -> NDArray[np.int_]:
-    """Return the samples at which a joint turned around, by more than `BACK`."""
+    """Return the samples at which a joint turned around, by more than `_BACK`."""
     # Only samples at which the step changes its sign can be turns: few of a long motion.
     steps = np.sign(np.diff(q))
     moved = np.flatnonzero(steps)
@@ -51,11 +51,11 @@ def _turns(q: Array) -> NDArray[np.int_]:
     for k in corners[1:]:
         gone = float(q[k] - q[far])
         if way == 0.0:
-            if abs(gone) > BACK:
+            if abs(gone) > _BACK:
                 way, far = float(np.sign(gone)), k
         elif way * gone >= 0.0:
             far = k
-        elif abs(gone) > BACK:
+        elif abs(gone) > _BACK:
             result.append(far)
             way, far = -way, k
     return np.array(result, dtype=int)

@@ -23,11 +23,11 @@ from .resampling import Picker
 from .stages import EffectStages, Evaluation
 from .stepping import LiveTwin
 
-__all__ = ['Component', 'LiveTwin', 'Poses', 'Twin']
+__all__ = ['LiveTwin', 'Poses', 'Twin']
 
 
 @dataclass(frozen=True)
-class Component:
+class _Component:
     """One differentiable scalar of one effect."""
 
     effect: int
@@ -109,10 +109,10 @@ class Twin(EffectStages):
         ]
         return np.stack(np.broadcast_arrays(*parts), axis=-1)
 
-    def components(self) -> tuple[Component, ...]:
+    def components(self) -> tuple[_Component, ...]:
         """Return the differentiable scalars, in the order of the columns of `linearise`."""
         return tuple(
-            Component(k, parameter, index)
+            _Component(k, parameter, index)
             for k, effect in enumerate(self.effects)
             for parameter, index in effect.components()
             if parameter.differentiable

@@ -30,7 +30,7 @@ from .weights import on_half_angles
 _BLOCK = 1504
 """Poses worked on at once; the working memory of a six-joint arm then fits a cache of 2 MB."""
 
-POSE = 12
+_POSE = 12
 """Rows that make up the pose of a piece; in the far piece those of its screws come before."""
 LENGTHS = 4
 """Lengths of blocks whose working memory a kernel keeps."""
@@ -159,26 +159,26 @@ class BulkKernel:
         features, (near_rows, far_rows) = memory.features, memory.pieces
         np.matmul(self._near_pose, features[0], out=near_rows)
         if screws is None:
-            np.matmul(self._far[-POSE:], features[1], out=far_rows[-POSE:])
+            np.matmul(self._far[-_POSE:], features[1], out=far_rows[-_POSE:])
         else:
             np.matmul(self._far, features[1], out=far_rows)
             for k, weights in self._near_screws.items():
                 np.matmul(weights, features[0][: weights.shape[1]], out=screws[:, k])
-        near, far = near_rows.reshape(4, 3, n), far_rows[-POSE:].reshape(4, 3, n)
+        near, far = near_rows.reshape(4, 3, n), far_rows[-_POSE:].reshape(4, 3, n)
         products = memory.products
         np.multiply(far.swapaxes(0, 1)[:, :, None], near[:3, None], products)
         pose = products[0]
         pose += products[1]
         pose += products[2]
         pose[3] += near[3]
-        memory.pose[POSE] = 1.0
+        memory.pose[_POSE] = 1.0
         np.matmul(memory.pose.T, _SPREAD, out=out.reshape(n, 16))
         return memory
 
     def _screw_block(self, memory: _Memory, out: Array) -> None:
         near, far = memory.pieces
         n = near.shape[1]
-        velocities = far[:-POSE].reshape(self.turned, 2, 3, n).transpose(2, 1, 0, 3)
+        velocities = far[:-_POSE].reshape(self.turned, 2, 3, n).transpose(2, 1, 0, 3)
         turn = near[:9].reshape(3, 3, 1, 1, n)
         for region, channels, part in self._runs:
             wanted = out[:, channels].reshape(2, 3, -1, n)
@@ -254,7 +254,7 @@ def _spread() -> Array:
     for i in range(3):
         for j in range(4):
             out[3 * j + i, i, j] = 1.0
-    out[POSE, 3, 3] = 1.0
+    out[_POSE, 3, 3] = 1.0
     return out.reshape(ROWS, 16)
 
 
@@ -275,10 +275,10 @@ class _Memory:
         self.sizes = kernel.sizes
         self.sliding = [int(i) for i in np.flatnonzero(kernel.robot.prismatic)]
         rows = [3**size for size in kernel.sizes]
-        outputs = POSE, len(kernel._far)
+        outputs = _POSE, len(kernel._far)
         near = len(kernel._near_screws)
         spare = max(2 * near, 12 * kernel.turned)
-        first = max((DEGREE + 1) * joints, sum(rows), 3 * POSE, ROWS + spare)
+        first = max((DEGREE + 1) * joints, sum(rows), 3 * _POSE, ROWS + spare)
         memory = aligned(first + max(3 * joints, sum(outputs)), n)
         shared, rest = memory[:first], memory[first:]
         powers = shared[: (DEGREE + 1) * joints].reshape(DEGREE + 1, joints * n)
@@ -286,7 +286,7 @@ class _Memory:
         self.half = HalfAngle(joints, n, powers=powers, own=own)
         self.features = (shared[: rows[0]], shared[rows[0] : sum(rows)])
         self.pieces = (rest[: outputs[0]], rest[outputs[0] : sum(outputs)])
-        self.products = shared[: 3 * POSE].reshape(3, 4, 3, n)
+        self.products = shared[: 3 * _POSE].reshape(3, 4, 3, n)
         self.pose = shared[:ROWS]
         self._spare = shared[ROWS:].reshape(-1)
 

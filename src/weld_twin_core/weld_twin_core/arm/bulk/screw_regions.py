@@ -35,7 +35,7 @@ class Region(Enum):
     FIRST, NEAR, FAR, LAST = range(4)
 
 
-class Place(NamedTuple):
+class _Place(NamedTuple):
     """A DH value acts before some factor of the chain, about one of its coordinate axes."""
 
     before: int
@@ -43,7 +43,7 @@ class Place(NamedTuple):
     region: Region
 
 
-class Run(NamedTuple):
+class _Run(NamedTuple):
     """Channels of one region that follow each other; ``part`` counts them within the region."""
 
     region: Region
@@ -71,11 +71,11 @@ class Division:
         self.far = Piece(self._factors[self._cut :], np.eye(4), robot.T_flange_tool)
         self.places = [self._place(channel) for channel in channels]
 
-    def _place(self, channel: Channel) -> Place:
+    def _place(self, channel: Channel) -> _Place:
         kind, row = channel
         for before, (i, factor) in enumerate(self._rows):
             if i == row and kind in factor.kinds:
-                return Place(before, factor.axis, self._region(before))
+                return _Place(before, factor.axis, self._region(before))
         raise ModelError(
             f'channel {channel} is no DH value of robot {self._robot.name!r}, whose rows are 0 to '
             f'{self._robot.n - 1}'
@@ -98,13 +98,13 @@ class Division:
         """Return the same of the far piece, in the order of its channels."""
         return [(p.before - self._cut, p.axis) for p in self.places if p.region is Region.FAR]
 
-    def runs(self) -> list[Run]:
+    def runs(self) -> list[_Run]:
         """Return the channels as runs of one region each."""
         out, first, met = [], 0, dict.fromkeys(Region, 0)
         for region, places in groupby(place.region for place in self.places):
             count = len(list(places))
             part = slice(met[region], met[region] + count)
-            out.append(Run(region, slice(first, first + count), part))
+            out.append(_Run(region, slice(first, first + count), part))
             first += count
             met[region] += count
         return out
@@ -114,7 +114,7 @@ class Division:
         of = {Region.FIRST: self._in_world, Region.LAST: self._in_tool}
         return {k: of[p.region](p) for k, p in enumerate(self.places) if p.region in of}
 
-    def _in_world(self, place: Place) -> Array:
+    def _in_world(self, place: _Place) -> Array:
         """Return the matrix of a screw that stands still in the world: m + axis x origin."""
         moment, axis = self.near.screws([(place.before, place.axis)])[0, 0]
         out = np.zeros((6, ROWS))
@@ -122,7 +122,7 @@ class Division:
         out[:3, 12], out[3:, 12] = moment, axis
         return out
 
-    def _in_tool(self, place: Place) -> Array:
+    def _in_tool(self, place: _Place) -> Array:
         """
         Return the matrix of a screw that stands still in the tool.
 

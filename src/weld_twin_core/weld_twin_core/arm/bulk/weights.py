@@ -29,7 +29,7 @@ _TURNS = np.stack([skew(axis) for axis in np.eye(3)])
 """Generators of turns about the coordinate axes, shape (3, 3, 3)."""
 
 
-class Factor(NamedTuple):
+class _Factor(NamedTuple):
     """One of the factors of a row: which DH values it holds, which axis, and its matrices."""
 
     kinds: tuple[str, ...]
@@ -64,12 +64,12 @@ def _joint(robot: Robot, i: int) -> Array:
     return np.stack(parts) @ fixed
 
 
-def factors(robot: Robot, i: int) -> list[Factor]:
+def factors(robot: Robot, i: int) -> list[_Factor]:
     """Return the factors of a row, from the base outward."""
     out = []
     for kinds in row_factors(robot.convention):
         axis = AXIS[kinds[0]]
-        out.append(Factor(kinds, axis, _joint(robot, i) if axis == 2 else _link(robot, i, kinds)))
+        out.append(_Factor(kinds, axis, _joint(robot, i) if axis == 2 else _link(robot, i, kinds)))
     return out
 
 
@@ -86,7 +86,7 @@ def _link(robot: Robot, i: int, kinds: tuple[str, ...]) -> Array:
     return out[None]
 
 
-def product(first: Array, second: Array) -> Array:
+def _product(first: Array, second: Array) -> Array:
     """Return the product of two stacks of matrices, every one with every one, the last fastest."""
     out: Array = first[:, None] @ second[None]
     return out.reshape(-1, *out.shape[2:])
@@ -117,20 +117,20 @@ class Piece:
     before, after: base or tool frame, where the piece begins or ends the chain, shape (4, 4).
     """
 
-    def __init__(self, run: Sequence[Factor], before: Array, after: Array) -> None:
+    def __init__(self, run: Sequence[_Factor], before: Array, after: Array) -> None:
         self._factors = list(run)
         self._before = before[None]
         self._upto = [self._before]
         for factor in self._factors:
-            self._upto.append(product(self._upto[-1], factor.matrices))
+            self._upto.append(_product(self._upto[-1], factor.matrices))
         self._onward = [after[None]]
         for factor in reversed(self._factors):
-            self._onward.append(product(factor.matrices, self._onward[-1]))
+            self._onward.append(_product(factor.matrices, self._onward[-1]))
         self._onward.reverse()
 
     def poses(self) -> Array:
         """Return the weights of the pose, shape (features, 4, 4)."""
-        return product(self._upto[-1], self._onward[-1])
+        return _product(self._upto[-1], self._onward[-1])
 
     def velocities(self, turns: Sequence[tuple[int, int]]) -> Array:
         """
@@ -142,7 +142,7 @@ class Piece:
         out = np.zeros((len(self._upto[-1]), len(turns), 2, 3))
         for t, (k, axis) in enumerate(turns):
             turned = self._upto[k] @ generator(axis)
-            out[:, t, 0] = product(turned, self._onward[k][:, :, 3:])[:, :3, 0]
+            out[:, t, 0] = _product(turned, self._onward[k][:, :, 3:])[:, :3, 0]
             out[:, t, 1] = self._axis(k, axis)
         return out
 
@@ -150,7 +150,7 @@ class Piece:
         """Return weights of moment about the origin and axis, shape (features, turns, 2, 3)."""
         acting = [_adjoint(self._before)]
         for factor in self._factors:
-            acting.append(product(acting[-1], _adjoint(factor.matrices)))
+            acting.append(_product(acting[-1], _adjoint(factor.matrices)))
         out = np.zeros((len(self._upto[-1]), len(turns), 2, 3))
         for t, (k, axis) in enumerate(turns):
             out[:, t, 0] = self._all_features(acting[k][:, :3, 3 + axis])

@@ -17,17 +17,17 @@ from ..algebra.problem import Model, Problem
 from .postures import Limits, Room, joined
 
 NAME = 'next measurement'
-STATIONS = 80
+_STATIONS = 80
 """Stations to choose from; more only take time."""
-PATHS = 9
+_PATHS = 9
 """Paths of all joints to choose from: three, each at three speeds."""
-SINGLE = 4
+_SINGLE = 4
 """Joints at most that move alone in some paths: those in question."""
 STAY = 15.0
 """Time [s] that a station takes with the way to it."""
-STEP = 0.02
+_STEP = 0.02
 """Approach of a station from either side [rad, m]."""
-SOAK = 60.0
+_SOAK = 60.0
 """Time [s] from station to station while the arm warms up."""
 RISE = 15.0
 """Warming [K] in an hour: arms do that at work."""
@@ -37,15 +37,15 @@ LONGER = 0.2
 """Length [m] added to the tool: a turn of 0.1 mrad then moves its tip by 0.02 mm more."""
 PRESS = 50.0
 """Force [N] on the tool: a judgement; a hand can press so hard."""
-SPEEDS = (1.0, 0.5, 0.25)
+_SPEEDS = (1.0, 0.5, 0.25)
 """Of paths, as shares of the fastest."""
-LONGEST = 40.0
+_LONGEST = 40.0
 """Time [s] of a recorded seam that is run again, backward or slower: half the least experiment."""
-EVERY = 0.1
+_EVERY = 0.1
 """Time [s] between the points that a recorded seam is run again through: encoders' noise stays out."""
-SLOWER = 2.0
+_SLOWER = 2.0
 """How much slower a recorded seam is run again."""
-ANOTHER = 20.0
+_ANOTHER = 20.0
 """Time [min] to set up an instrument that follows the tool where so far only stations were
 measured."""
 
@@ -117,13 +117,13 @@ class _Here:
         self.problem, self.model = problem, model
         self.room = Room(problem, model.robot, limits)
         # Elsewhere than the experiments before.
-        skip = STATIONS * (len(problem.recordings) - 1)
-        self.spread = self.room.spread(STATIONS, skip)
+        skip = _STATIONS * (len(problem.recordings) - 1)
+        self.spread = self.room.spread(_STATIONS, skip)
 
     def path(self, joints: Sequence[str]) -> Candidate:
         """Return ways from home and back: all joints at once, seams, those in question alone."""
         room, motions, at = self.room, [], 0
-        for k in range(PATHS):
+        for k in range(_PATHS):
             stops = [room.home]
             while len(stops) < 4 and at < len(self.spread):
                 if room.way([stops[-1], self.spread[at]]):
@@ -131,16 +131,16 @@ class _Here:
                 at += 1
             if len(stops) > 1:
                 # Back the same way: every place is passed in both directions.
-                motions.append(room.travel([*stops, *stops[-2::-1]], SPEEDS[k % 3]))
+                motions.append(room.travel([*stops, *stops[-2::-1]], _SPEEDS[k % 3]))
         motions += _retraced(self.problem, room)
         together = len(motions)
-        for name in list(dict.fromkeys(joints))[:SINGLE]:
+        for name in list(dict.fromkeys(joints))[:_SINGLE]:
             i = self.model.robot.index(name)
-            motions += [room.travel(_alone(room, i), speed) for speed in SPEEDS[::2]]
+            motions += [room.travel(_alone(room, i), speed) for speed in _SPEEDS[::2]]
         return Candidate(
             'path',
             'Run the proposed path, and record joints and tool all the way.',
-            ANOTHER if self.problem.at_rest else 0.0,
+            _ANOTHER if self.problem.at_rest else 0.0,
             tuple(_with_sides(self.problem, motion) for motion in motions),
             tuple(Piece(k, None, float(m.t[-1])) for k, m in enumerate(motions)),
             self.model,
@@ -156,7 +156,7 @@ class _Here:
             self.spread,
         )
         few = self.spread[: len(self.spread) // 4]
-        approach = np.array([[-STEP], [0.0], [STEP], [0.0]])
+        approach = np.array([[-_STEP], [0.0], [_STEP], [0.0]])
         both = np.repeat(few, 4, axis=0) + np.tile(approach, (len(few), 1))
         yield self._stations(
             'bidirectional',
@@ -185,7 +185,7 @@ class _Here:
         """Return a few stations again and again, while it grows warmer."""
         again = np.concatenate([self.spread[:5]] * 12)
         sentence = 'Measure five stations again and again for an hour while the arm warms up.'
-        made = self._stations('warm_up', sentence, again, len(again), seconds=SOAK)
+        made = self._stations('warm_up', sentence, again, len(again), seconds=_SOAK)
         (recording,) = made.recordings
         if recording.temperature is not None:
             t, first = recording.joints.t, recording.temperature.value[0]
@@ -244,12 +244,12 @@ def _retraced(problem: Problem, room: Room) -> list[JointMotion]:
     joints = problem.recordings[0].joints
     if joints.static:
         return []
-    t: Array = np.arange(0.0, min(float(np.ptp(joints.t)), LONGEST), EVERY)
+    t: Array = np.arange(0.0, min(float(np.ptp(joints.t)), _LONGEST), _EVERY)
     seam = joints.at(joints.t[0] + t)[0]
     there, back = [room.home, seam[0]], [seam[-1], room.home]
     if len(t) < 2 or not (room.way(there) and room.way(back) and room.passed(seam)):
         return []
-    slow = SLOWER * t
+    slow = _SLOWER * t
     return [
         joined(
             room.travel(back[::-1], 1.0), JointMotion(t, seam[::-1]), room.travel(there[::-1], 1.0)

@@ -21,25 +21,25 @@ DECIDES = 6.0
 """Standard deviations from which a measurement decides between two explanations."""
 NOTHING = 3.0
 """Standard deviations below which it changes no verdict."""
-MARGIN = 2.5
+_MARGIN = 2.5
 """An experiment is made so long that it parts its explanations by this factor more than a decision
 needs: how far they will part is foreseen with the effects as they are believed to be, and a diagnosis
 counts fewer independent samples than are foreseen. With 1.5, two experiments that were to part theirs
 by 9 and 12 standard deviations did not."""
 LEAST = 75.0
 """Time [s] of an experiment at least: what nobody thought of shows only where there is room for it."""
-NAMED = 3.0
+_NAMED = 3.0
 """Weight of what parts explanations that a verdict names beside each other, against what parts one of
 them from others: that question is put to whoever reads the verdict. A judgement."""
-AS_IT_WORKS = ('time', 'temperature')
+_AS_IT_WORKS = ('time', 'temperature')
 """Dependences on how long the arm has been at work: a station shows more of them the later it comes."""
-GAIN = 0.05
+_GAIN = 0.05
 """A further piece has to add this share to the decision."""
-NEAREST = 1e-3
+_NEAREST = 1e-3
 """Weight of what does not show yet against what does; its square is that of a second."""
 
 
-SAFE = MARGIN * DECIDES
+SAFE = _MARGIN * DECIDES
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,10 +164,10 @@ def planned(
         plan, others=tuple((asked + 1).tolist()), known=known[asked], gains=np.zeros(asked.size)
     )
     # Stations are foreseen one after the other; any other choice of them would come sooner.
-    in_turn = option.static and any(e.on in AS_IT_WORKS for each in alternatives for e in each)
+    in_turn = option.static and any(e.on in _AS_IT_WORKS for each in alternatives for e in each)
     while more := plan.open(room)[: 1 if in_turn else None]:
         longer = _longer(plan, [every[k] for k in asked], more)
-        if plan.seconds >= LEAST and (plan.enough or longer.score < (1.0 + GAIN) * plan.score):
+        if plan.seconds >= LEAST and (plan.enough or longer.score < (1.0 + _GAIN) * plan.score):
             break
         plan = replace(longer, score=max(longer.score, plan.score))
     # Stops on the way take time as well.
@@ -179,11 +179,11 @@ def planned(
 def _longer(plan: Plan, asked: Sequence[Parting], more: Sequence[int]) -> Plan:
     """Return the plan with the piece that adds most for its time."""
     gains = np.array([parting.gained(plan.chosen, more) for parting in asked])
-    weight = np.where(np.array(plan.others) < plan.named, NAMED, 1.0)
+    weight = np.where(np.array(plan.others) < plan.named, _NAMED, 1.0)
     scores = weight @ np.where(gains > NOTHING, np.minimum(gains, SAFE), 0.0)
     # While nothing shows yet, what comes nearest to it; of what is alike, the shortest.
     seconds = np.array([plan.candidate.pieces[k].seconds for k in more])
-    best = int(np.argmax(scores + NEAREST * gains.sum(axis=0) - NEAREST**2 * seconds))
+    best = int(np.argmax(scores + _NEAREST * gains.sum(axis=0) - _NEAREST**2 * seconds))
     chosen = (*plan.chosen, more[best])
     return replace(plan, chosen=chosen, score=float(scores[best]), gains=gains[:, best])
 

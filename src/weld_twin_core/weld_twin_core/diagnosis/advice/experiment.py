@@ -19,19 +19,19 @@ from .chosen_pieces import Plan, planned, widening
 from .postures import Limits
 from .separation import at_hand
 
-WORTH = 0.8
+_WORTH = 0.8
 """A cheaper measurement is taken when it decides this share of what the best one does."""
-NEAR = 0.5
+_NEAR = 0.5
 """Minutes within which measurements take equally long."""
-Explanation = tuple[Effect, ...]
-PACE = 0.1
+_Explanation = tuple[Effect, ...]
+_PACE = 0.1
 """Time [s] between the samples of a path as it is written: a spline through them is the path."""
 
 
 def next_experiment(
     problem: Problem,
     model: Model,
-    alternatives: Sequence[Explanation],
+    alternatives: Sequence[_Explanation],
     scale: Scale,
     limits: Limits | None = None,
     *,
@@ -82,13 +82,13 @@ def next_experiment(
     elif best == 0.0:
         reported = _outside(alternatives[0], alternatives[1]) if closed else wider(_ALIKE)
     else:
-        good = [plan for plan in plans if plan.score >= WORTH * best]
+        good = [plan for plan in plans if plan.score >= _WORTH * best]
         if not problem.at_rest:
             # An instrument that follows the tool learns more in a minute than at four stations.
             good = [plan for plan in good if not plan.candidate.static] or good
         least = min(plan.minutes for plan in good)
         # Half a minute is no reason to learn less.
-        near = [plan for plan in good if plan.minutes <= least + NEAR]
+        near = [plan for plan in good if plan.minutes <= least + _NEAR]
         reported = _told(max(near, key=lambda plan: plan.apart), alternatives, model)
     return reported | {'skipped': skipped} if skipped else reported
 
@@ -109,7 +109,7 @@ def confirming(
 def _plans(
     problem: Problem,
     model: Model,
-    alternatives: Sequence[Explanation],
+    alternatives: Sequence[_Explanation],
     scale: Scale,
     limits: Limits,
     options: Sequence[Candidate],
@@ -148,7 +148,7 @@ _NARROW = (
 )
 
 
-def _told(plan: Plan, alternatives: Sequence[Explanation], model: Model) -> dict[str, Any]:
+def _told(plan: Plan, alternatives: Sequence[_Explanation], model: Model) -> dict[str, Any]:
     one, other = _apart(alternatives[0], alternatives[plan.other])
     reported = ' from '.join(filter(None, (_named(one, other), _named(other, one))))
     reason = (
@@ -158,7 +158,7 @@ def _told(plan: Plan, alternatives: Sequence[Explanation], model: Model) -> dict
     return _entry(plan, reason, model, [_side(one), _side(other)])
 
 
-def _outside(first: Explanation, second: Explanation) -> dict[str, Any]:
+def _outside(first: _Explanation, second: _Explanation) -> dict[str, Any]:
     """Return what to do when no motion of the joints separates two explanations."""
     one, other = _apart(first, second)
     names = [_named(*pair) or 'nothing more' for pair in ((one, other), (other, one))]
@@ -174,7 +174,7 @@ def _outside(first: Explanation, second: Explanation) -> dict[str, Any]:
     }
 
 
-def _apart(first: Explanation, second: Explanation) -> tuple[list[Effect], list[Effect]]:
+def _apart(first: _Explanation, second: _Explanation) -> tuple[list[Effect], list[Effect]]:
     """Return the effects of each of two explanations that the other has not."""
     one, other = ({(e.key, e.on) for e in effects} for effects in (first, second))
     return [e for e in first if (e.key, e.on) not in other], [
@@ -233,7 +233,7 @@ def _entry(
 def _motion(joints: JointMotion, names: Sequence[str]) -> dict[str, Any]:
     t, q = joints.t, joints.q
     if not joints.static:
-        t = np.linspace(0.0, t[-1], int(np.ceil(t[-1] / PACE)) + 1)
+        t = np.linspace(0.0, t[-1], int(np.ceil(t[-1] / _PACE)) + 1)
         q = joints.at(t)[0]
     return {
         'static': joints.static,

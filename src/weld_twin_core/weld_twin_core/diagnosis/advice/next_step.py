@@ -30,12 +30,12 @@ from .experiment import confirming, next_experiment
 from .next_touches import next_touches
 from .postures import Limits, Room
 
-TOUCHED = 4
+_TOUCHED = 4
 """The same where contacts measured: every touch that could be made is tried with each."""
-NAMELESS = 0.5
+_NAMELESS = 0.5
 """Confidence of an unknown cause from which what is believed most has no name: it is then likelier
 than not that the library lacks it."""
-FORESEEN = 2.0
+_FORESEEN = 2.0
 """Factor within which what parts two explanations is foreseen, as one standard deviation: how large the
 effect is, and how many samples are independent, shows only afterwards. A judgement; of five
 experiments that were to part theirs by 6 to 16 standard deviations three did."""
@@ -43,19 +43,19 @@ NAMED, GAINED = 0.6, 0.4
 """Of experiments asked for by answers that name something, the share that decides, where the answer
 has no confidence, and what full confidence adds. Of 21 in cells that this was developed on, 19 did;
 the two others came from answers with 0.3 and 0.55."""
-EVEN = 0.5
+_EVEN = 0.5
 """The same where an explanation without a name is to be found by its place and dependence: too few such
 experiments were seen to promise more than an even chance."""
 MOST = 6
 """Explanations compared at most; each is predicted for every measurement that could be made."""
-RIVALS = 2
+_RIVALS = 2
 """Other places or dependences that are compared with the one that fits best."""
-ROWS = 2000
+_ROWS = 2000
 """Rows that a rival's curves are fitted on: only its shape counts."""
-MOST_KNOTS = 40
+_MOST_KNOTS = 40
 """Knots of a curve that is carried on over the whole range of an experiment."""
 
-Explanation = tuple[Effect, ...]
+_Explanation = tuple[Effect, ...]
 
 
 def next_step(
@@ -89,7 +89,7 @@ def _touches(result: Search, verdict: Verdict) -> dict[str, Any] | None:
     if verdict.status in ('identified', 'none'):
         return None
     listed = [result.small.model.found, *_in_place(result, verdict, named=True)]
-    return next_touches(result.problem, result.final.model, listed[:TOUCHED], result.scale)
+    return next_touches(result.problem, result.final.model, listed[:_TOUCHED], result.scale)
 
 
 def _parting(
@@ -104,7 +104,7 @@ def _parting(
     if not closed:
         room = Room(result.work.problem, result.small.model.robot, limits)
         shapes = _without_names(result, alternative, room.low, room.high)
-        if verdict.status == 'unknown' and verdict.confidence >= NAMELESS:
+        if verdict.status == 'unknown' and verdict.confidence >= _NAMELESS:
             listed, named = [*shapes, *listed], 1
         else:
             listed += shapes[:1]
@@ -146,7 +146,7 @@ def _promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
     sigma = wanted['expected_separation_sigma']
     if wanted['between'] is None or wanted['motion'] is None or sigma is None:
         return None
-    beyond = np.log(max(sigma, 1e-9) / DECIDES) / np.log(FORESEEN)
+    beyond = np.log(max(sigma, 1e-9) / DECIDES) / np.log(_FORESEEN)
     parted = 0.5 * erfc(-beyond / sqrt(2.0))
     if verdict.status != 'unknown':
         return parted * (NAMED + GAINED * verdict.confidence)
@@ -154,7 +154,7 @@ def _promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
         REGISTRY[item['effect']].traits.cause for side in wanted['between'] for item in side
     )
     believed = verdict.confidence if verdict.sets else 1.0 - verdict.confidence
-    return parted * max(believed, 0.0 if named else EVEN)
+    return parted * max(believed, 0.0 if named else _EVEN)
 
 
 def _in_place(result: Search, verdict: Verdict, *, named: bool) -> list[tuple[Effect, ...]]:
@@ -183,7 +183,7 @@ def _beside(result: Search) -> list[tuple[Effect, ...]]:
 
 def _without_names(
     result: Search, alternative: Curved | None, low: Array, high: Array
-) -> list[Explanation]:
+) -> list[_Explanation]:
     """
     Return the free-form explanation and the nearest other ones, likeliest first; none without a rival.
 
@@ -218,11 +218,11 @@ def _others(parts: Sequence[Part]) -> list[Group]:
         if (group.at, group.on) not in taken and group.carried:
             taken.add((group.at, group.on))
             out.append(group)
-    return out[:RIVALS]
+    return out[:_RIVALS]
 
 
-def _fitted(result: Search, effects: Explanation) -> Explanation:
-    few = result.problem.thinned(ROWS)
+def _fitted(result: Search, effects: _Explanation) -> _Explanation:
+    few = result.problem.thinned(_ROWS)
     scale = replace(result.scale, weights=tuple(np.ones(m) for m in few.samples))
     return fit(few, result.final.model.with_found(effects), scale, None, 3).model.found
 
@@ -235,7 +235,7 @@ def _wide(effect: Effect, ends: dict[str, tuple[float, float]]) -> Effect:
     low, high = ends[effect.joint]
     low, high = min(low, knots[0]), max(high, knots[-1])
     step = float(np.diff(knots).mean())
-    count = min(int(np.ceil((high - low) / step)) + 1, MOST_KNOTS)
+    count = min(int(np.ceil((high - low) / step)) + 1, _MOST_KNOTS)
     wide = np.linspace(low, high, count)
     values = np.asarray(effect.values, dtype=float) @ basis(effect.knots, wide)
     return replace(effect, values=tuple(values.tolist()), knots=tuple(wide.tolist()))

@@ -15,15 +15,15 @@ from ..algebra.problem import PLACES, Model, Problem, Scale
 from ..hypotheses.library import plain_causes
 from .touch_design import SECONDS, Design, Touchable, again, beside, chosen, scatter
 
-COUNT = 12
+_COUNT = 12
 """Touches that are proposed: a quarter of an hour by hand."""
 MOST = 40
 """Touches up to which it is told how many are needed."""
-REACHABLE = 0.9
+_REACHABLE = 0.9
 """Share of what all touches together could narrow that counts as enough."""
-LEAST = 1e-9
+_LEAST = 1e-9
 """Size of an effect that counts as none; keeps a share from a division by zero."""
-MOVING = 10.0
+_MOVING = 10.0
 """Cost [min] of fastening the artefact elsewhere."""
 
 
@@ -92,12 +92,14 @@ class _Option(NamedTuple):
     @property
     def best(self) -> Design:
         """Return what is known after the touches that are proposed."""
-        return self.known[: COUNT + 1][-1]
+        return self.known[: _COUNT + 1][-1]
 
     def needed(self, spread: Array) -> int | None:
         """Return how many touches reach most of what more of them can narrow."""
         scatters = np.sqrt([design.open(spread) for design in self.known])
-        enough = np.flatnonzero(scatters[0] - scatters >= REACHABLE * (scatters[0] - scatters[-1]))
+        enough = np.flatnonzero(
+            scatters[0] - scatters >= _REACHABLE * (scatters[0] - scatters[-1])
+        )
         return int(enough[0]) if len(self.order) == MOST else None
 
 
@@ -138,14 +140,14 @@ def _sizes(design: Design, effects: Sequence[Effect], disputed: set[tuple[str, .
     for effect in effects:
         x = effect.fit.coordinates()
         if effect.key in disputed:
-            out[at : at + x.size] = 1.0 / np.maximum(x @ x, LEAST**2)
+            out[at : at + x.size] = 1.0 / np.maximum(x @ x, _LEAST**2)
         at += x.size
     return np.diag(out)
 
 
 def _entry(best: _Option, spread: Array, model: Model, parted: float | None) -> dict[str, Any]:
     """Return the proposal as plain numbers and strings."""
-    rows, touches, place = best.order[:COUNT], best.touches, best.place
+    rows, touches, place = best.order[:_COUNT], best.touches, best.place
     q = np.concatenate([each.recording.joints.q for each in touches])[rows]
     labels = [label for each in touches for label in each.recording.touched.labels]
     both = (best.known[0], best.best)
@@ -165,7 +167,7 @@ def _entry(best: _Option, spread: Array, model: Model, parted: float | None) -> 
         'reason': f'What the model predicts about here is foreseen to scatter by {after:.2f} mm instead '
         f'of {before:.2f} mm.{enough}',
         'expected_separation_sigma': parted,
-        'cost': len(rows) * SECONDS / 60.0 + (0.0 if place is None else MOVING),
+        'cost': len(rows) * SECONDS / 60.0 + (0.0 if place is None else _MOVING),
         'between': None,
         'needed': needed,
         'motion': {

@@ -54,22 +54,22 @@ class Limits:
         object.__setattr__(self, 'box', box)
 
 
-WIDE = 1.2
+_WIDE = 1.2
 """Half the range [rad, m] about the recorded middle that every joint may use, within its limits: the
 instrument still sees the tool, and the arm does not turn over."""
-INSET = 0.02
+_INSET = 0.02
 """Distance to a joint's limits [rad, m]; an approach from either side has room in it."""
-DRAWN = 12
+_DRAWN = 12
 """Postures drawn for each that is wanted, before fewer have to do."""
-LOOKED_FOR = 2000
+_LOOKED_FOR = 2000
 """Postures that are drawn to find one in the box of the cell."""
-CHECKED = 8
+_CHECKED = 8
 """Places of a way between two postures that are checked."""
-FASTEST = 0.5
+_FASTEST = 0.5
 """Share of the joints' velocity limits that an experiment uses at most."""
-GENTLE = 0.5
+_GENTLE = 0.5
 """Share of the joints' acceleration limits."""
-RATE = 100.0
+_RATE = 100.0
 """Samples per second that a path is predicted with."""
 
 
@@ -102,9 +102,9 @@ class Room:
         self._space = Space(robot, self._seen, limits.box)
         middle = np.median(problem.recordings[0].joints.q, axis=0)
         self.home = q[int(np.argmin(np.abs(q - middle).sum(axis=1)))]
-        inset = np.where(np.isfinite(robot.upper - robot.lower), INSET, 0.0)
-        self.low = np.maximum(np.minimum(self.home - WIDE, q.min(axis=0)), robot.lower + inset)
-        self.high = np.minimum(np.maximum(self.home + WIDE, q.max(axis=0)), robot.upper - inset)
+        inset = np.where(np.isfinite(robot.upper - robot.lower), _INSET, 0.0)
+        self.low = np.maximum(np.minimum(self.home - _WIDE, q.min(axis=0)), robot.lower + inset)
+        self.high = np.minimum(np.maximum(self.home + _WIDE, q.max(axis=0)), robot.upper - inset)
         self.low = np.minimum(self.low, self.home)
         self.high = np.maximum(self.high, self.home)
         if limits.box is not None and not self.free(self.home[None])[0]:
@@ -112,7 +112,7 @@ class Room:
 
     def _inside(self, middle: Array) -> Array:
         """Return the free posture nearest to the middle, of those recorded or drawn."""
-        drawn = self.low + halton(self._robot.n, LOOKED_FOR) * (self.high - self.low)
+        drawn = self.low + halton(self._robot.n, _LOOKED_FOR) * (self.high - self.low)
         for places in (self._seen, drawn):
             inside = places[self.free(places)]
             if len(inside):
@@ -137,7 +137,7 @@ class Room:
         The way from home to each is free too. ``skip`` are left out, so that later experiments go
         elsewhere.
         """
-        unit = halton(self._robot.n, skip + DRAWN * count)[skip:]
+        unit = halton(self._robot.n, skip + _DRAWN * count)[skip:]
         q = self.low + unit * (self.high - self.low)
         some = q[np.flatnonzero(self.free(q))[: 2 * count]]
         kept = some[self._ways(np.broadcast_to(self.home, some.shape), some)][:count]
@@ -153,10 +153,10 @@ class Room:
 
     def _ways(self, start: Array, end: Array) -> Array:
         """Return which straight ways, between postures of shape (K, n) each, are free, (K,)."""
-        share = np.linspace(0.0, 1.0, CHECKED + 1)[:, None]
+        share = np.linspace(0.0, 1.0, _CHECKED + 1)[:, None]
         places = start[:, None] + share * (end - start)[:, None]
         good = self.free(places.reshape(-1, self._robot.n))
-        return np.asarray(good.reshape(len(start), CHECKED + 1).all(axis=1))
+        return np.asarray(good.reshape(len(start), _CHECKED + 1).all(axis=1))
 
     def linked(self, q: Array) -> Array:
         """Return stations with a stop at home wherever the straight way to the next is not free."""
@@ -172,8 +172,10 @@ class Room:
         ``speed`` is the share of the fastest that an experiment may.
         """
         robot = self._robot
-        fast = FASTEST * speed * np.where(np.isfinite(robot.max_velocity), robot.max_velocity, 1.0)
-        hard = GENTLE * np.where(np.isfinite(robot.max_acceleration), robot.max_acceleration, 5.0)
+        fast = (
+            _FASTEST * speed * np.where(np.isfinite(robot.max_velocity), robot.max_velocity, 1.0)
+        )
+        hard = _GENTLE * np.where(np.isfinite(robot.max_acceleration), robot.max_acceleration, 5.0)
         pieces = [np.asarray(stops[0])[None]]
         for start, end in pairwise(stops):
             way = np.abs(end - start)
@@ -181,13 +183,13 @@ class Room:
             span = max(
                 float((0.5 * np.pi * way / fast).max()),
                 float(np.pi * np.sqrt(0.5 * way / hard).max()),
-                4.0 / RATE,
+                4.0 / _RATE,
             )
-            count = int(np.ceil(span * RATE))
+            count = int(np.ceil(span * _RATE))
             s = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, count + 1) / count))
             pieces.append(start + s[:, None] * (end - start))
         q = np.concatenate(pieces)
-        return JointMotion(np.arange(len(q)) / RATE, q)
+        return JointMotion(np.arange(len(q)) / _RATE, q)
 
 
 def joined(*motions: JointMotion) -> JointMotion:
@@ -199,9 +201,9 @@ def joined(*motions: JointMotion) -> JointMotion:
     return JointMotion(t, q)
 
 
-REACH = 1.3
+_REACH = 1.3
 """The recorded range of every joint is widened by this factor, within its limits, for touches."""
-LEAST = 0.35
+_LEAST = 0.35
 """Half the range [rad, m] that touches use at least."""
 
 
@@ -213,8 +215,8 @@ def widened(problem: Problem, robot: Robot) -> tuple[Array, Array]:
     """
     q = np.concatenate([r.joints.q for r in problem.recordings])
     middle = 0.5 * (q.min(axis=0) + q.max(axis=0))
-    half = np.maximum(REACH * 0.5 * np.ptp(q, axis=0), LEAST)
-    inset = np.where(np.isfinite(robot.upper - robot.lower), INSET, 0.0)
+    half = np.maximum(_REACH * 0.5 * np.ptp(q, axis=0), _LEAST)
+    inset = np.where(np.isfinite(robot.upper - robot.lower), _INSET, 0.0)
     low = np.maximum(middle - half, robot.lower + inset)
     high = np.maximum(np.minimum(middle + half, robot.upper - inset), low)
     return np.asarray(low), np.asarray(high)

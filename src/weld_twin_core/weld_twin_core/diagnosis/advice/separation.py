@@ -32,16 +32,16 @@ from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem, Scale
 from .candidates import Candidate, Piece
 
-ROWS = 1200
+_ROWS = 1200
 """Rows of the data at hand that take part."""
-SAMPLES = 120
+_SAMPLES = 120
 """Samples of a path that are computed; neighbours of a moving arm say the same."""
-EVERY = 0.15
+_EVERY = 0.15
 """Time [s] after which a moving arm says something new: in it the arm moves by centimetres."""
-LOOSE = 1e-10
+_LOOSE = 1e-10
 """Added to the diagonal of a normal matrix, as a share of it: what is less is rounding."""
 
-Alternative = tuple[Effect, ...]
+_Alternative = tuple[Effect, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def _left(matrices: Array) -> Array:
     scaled = matrices / size[:, :, None]
     scaled /= size[:, None, :]
     each = np.arange(matrices.shape[1] - 1)
-    scaled[:, each, each] += LOOSE
+    scaled[:, each, each] += _LOOSE
     try:
         # The last pivot of the factor is what is left, at half the work of solving.
         return np.asarray(size[:, -1] * np.linalg.cholesky(scaled)[:, -1, -1])
@@ -103,7 +103,7 @@ def _left(matrices: Array) -> Array:
 def partings(
     problem: Problem,
     model: Model,
-    alternatives: Sequence[Alternative],
+    alternatives: Sequence[_Alternative],
     scale: Scale,
     candidate: Candidate,
     now: Side,
@@ -160,7 +160,7 @@ def _stacked(side: Side, true: int, alternative: int, names: list[str]) -> Array
 
 
 def at_hand(
-    problem: Problem, model: Model, alternatives: Sequence[Alternative], scale: Scale
+    problem: Problem, model: Model, alternatives: Sequence[_Alternative], scale: Scale
 ) -> Side:
     """
     Return what the alternatives say of the data at hand.
@@ -168,7 +168,7 @@ def at_hand(
     model: what is believed so far; everything is taken about it.
     alternatives: the explanations to tell apart.
     """
-    few = problem.thinned(ROWS)
+    few = problem.thinned(_ROWS)
     return _side(few, model, alternatives, with_weights(scale, few), '')
 
 
@@ -176,7 +176,7 @@ def _ahead(
     problem: Problem,
     candidate: Candidate,
     recording: Recording,
-    alternatives: Sequence[Alternative],
+    alternatives: Sequence[_Alternative],
     scale: Scale,
 ) -> Side:
     """Return what the alternatives say of one recording of a candidate."""
@@ -192,7 +192,7 @@ def _ahead(
     side = _side(further, candidate.model, alternatives, with_weights(scale, further), mark)
     if recording.joints.static:
         return side
-    reported = float(np.ptp(recording.joints.t)) / EVERY / made.seen.t.size
+    reported = float(np.ptp(recording.joints.t)) / _EVERY / made.seen.t.size
     share = float(np.sqrt(min(reported, 1.0)))
     return replace(
         side,
@@ -202,7 +202,7 @@ def _ahead(
 
 
 def _side(
-    problem: Problem, model: Model, alternatives: Sequence[Alternative], scale: Scale, mark: str
+    problem: Problem, model: Model, alternatives: Sequence[_Alternative], scale: Scale, mark: str
 ) -> Side:
     predicted, columns, names = [], [], []
     for effects in alternatives:
@@ -228,7 +228,7 @@ def _measured(model: Model, recording: Recording, *, points: bool) -> Recording:
     """Return the recording with measurements of an arm without any effect, to compare with."""
     t = recording.joints.t
     if not recording.joints.static:
-        t = t[np.linspace(0, t.size - 1, min(SAMPLES, t.size)).round().astype(int)]
+        t = t[np.linspace(0, t.size - 1, min(_SAMPLES, t.size)).round().astype(int)]
     poses = model.twin(0).poses(recording, t)
     seen = Measurements(t, poses.position, None if points else poses.rotation)
     return replace(recording, measured=seen)

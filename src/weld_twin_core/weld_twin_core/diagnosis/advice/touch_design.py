@@ -33,26 +33,26 @@ from ..algebra.prior import effect_precision, frame_prior
 from ..algebra.problem import Model, Problem, Scale
 from .postures import widened
 
-ANYWHERE = 0.1
+_ANYWHERE = 0.1
 """Spread [m] of where a contact may be: as good as not known."""
-SLACK = 5e-6
+_SLACK = 5e-6
 """Noise [m] of a touch at the least: a few touches may be fitted without any rest, and no ball rests
 better than that."""
-DETERMINED = 1e-14
+_DETERMINED = 1e-14
 """Share of the strongest direction below which information is rounding."""
-TRIED = 160
+_TRIED = 160
 """Postures that are started from at every place; a third of them reach it within the limits."""
-ENOUGH = 40
+_ENOUGH = 40
 """Postures that are weighed at every place."""
 SECONDS = 60.0
 """Time from one touch to the next [s], by hand."""
-NEW = 'new place'
+_NEW = 'new place'
 """Label of what is touched where nothing has been touched yet."""
-NEW_PLACES = 4
+_NEW_PLACES = 4
 """New places that are weighed."""
-APART = 0.2
+_APART = 0.2
 """Distance [m] of a new place from the others at the least."""
-BELOW = 0.05
+_BELOW = 0.05
 """How far a new place may lie below the lowest one [m]: there is a table."""
 
 
@@ -107,11 +107,11 @@ class Design:
         problem = replace(problem, align=problem.align & {'tool'})
         model, tool = model.with_found(tuple(effects)), 'tool' in problem.align
         taken = [unknown for unknown in problem.touched if unknown is not None]
-        sigma = max(scale.position, SLACK)
+        sigma = max(scale.position, _SLACK)
         prior = np.concatenate([frame_prior(problem, model)[0], effect_precision(model)])
         freedom = [unknown.freedom for unknown in taken]
         starts = prior.size + np.cumsum([0, *freedom])
-        information = np.diag(np.append(prior, np.full(sum(freedom), ANYWHERE**-2.0)))
+        information = np.diag(np.append(prior, np.full(sum(freedom), _ANYWHERE**-2.0)))
         surfaces = []
         for k, recording in enumerate(problem.recordings):
             points = model.twin(k).poses(recording, recording.joints.t).position
@@ -137,7 +137,7 @@ class Design:
         size = len(self.root)
         wider = np.zeros((size + 3, size + 3))
         wider[:size, :size] = self.root
-        wider[size:, size:] = ANYWHERE * np.eye(3)
+        wider[size:, size:] = _ANYWHERE * np.eye(3)
         return replace(self, starts=(*self.starts, size), root=wider)
 
     def touchable(self, k: int, recording: Recording) -> Touchable:
@@ -225,7 +225,7 @@ def _root(information: Array) -> Array:
     """Return a root of the inverse of a normal matrix."""
     size = np.sqrt(np.diag(information))
     strength, ways = np.linalg.eigh(information / np.outer(size, size))
-    strength = np.maximum(strength, DETERMINED * strength[-1])
+    strength = np.maximum(strength, _DETERMINED * strength[-1])
     return np.asarray(ways / np.sqrt(strength) / size[:, None])
 
 
@@ -238,9 +238,9 @@ def again(problem: Problem, model: Model) -> Iterator[tuple[int, Recording]]:
     """
     for k, recording in enumerate(problem.recordings):
         contacts, measured = recording.touched, recording.seen
-        rows = np.arange(TRIED) % contacts.size
+        rows = np.arange(_TRIED) % contacts.size
         q, good = _reached(problem, model, [recording], measured.position[rows])
-        kept = np.flatnonzero(good)[:ENOUGH]
+        kept = np.flatnonzero(good)[:_ENOUGH]
         if kept.size:
             rows = rows[kept]
             labels = tuple(contacts.labels[row] for row in rows)
@@ -253,23 +253,23 @@ def beside(problem: Problem, model: Model) -> Iterator[Recording]:
     """Yield touches of places where nothing was touched, each far from all others."""
     low, high = widened(problem, model.robot)
     known = [recording.seen.position.mean(axis=0) for recording in problem.recordings]
-    lowest = min(float(point[2]) for point in known) - BELOW
-    free = forward(model.robot, low + halton(model.robot.n, TRIED) * (high - low))[:, :3, 3]
+    lowest = min(float(point[2]) for point in known) - _BELOW
+    free = forward(model.robot, low + halton(model.robot.n, _TRIED) * (high - low))[:, :3, 3]
     free = free[free[:, 2] > lowest]
-    for _ in range(NEW_PLACES):
+    for _ in range(_NEW_PLACES):
         if not free.size:
             return
         away = np.min([np.linalg.norm(free - point, axis=1) for point in known], axis=0)
         point = free[int(np.argmax(away))]
-        if away.max() < APART:
+        if away.max() < _APART:
             return
         known.append(point)
-        targets = np.tile(point, (TRIED, 1))
+        targets = np.tile(point, (_TRIED, 1))
         q, good = _reached(problem, model, problem.recordings, targets)
-        kept = np.flatnonzero(good)[:ENOUGH]
+        kept = np.flatnonzero(good)[:_ENOUGH]
         if not kept.size:
             continue
-        contacts = Contacts(Artefact((Contact(NEW),)), (NEW,) * kept.size)
+        contacts = Contacts(Artefact((Contact(_NEW),)), (_NEW,) * kept.size)
         yield _touching(problem.recordings[0], q[kept], targets[kept], contacts)
 
 

@@ -80,15 +80,15 @@ def answer(
     effects, verdict, reported = named_effects(result, unseen, verdict, reported, posterior)
     step = None if limits is None else next_step(result, verdict, limits, alternative)
     return Diagnosis(
-        gap=gap(result, evidence.floor),
+        gap=_gap(result, evidence.floor),
         where=locate(result, evidence.structure, reported),
         status=verdict.status,
         effects=effects,
         indistinguishable=verdict.sets,
         reasons=verdict.reasons,
-        candidates=weighed_candidates(result, evidence),
+        candidates=_weighed_candidates(result, evidence),
         shrink=shrink,
-        unexplained=unexplained(result.work.beliefs, evidence, verdict, shrink, placing),
+        unexplained=_unexplained(result.work.beliefs, evidence, verdict, shrink, placing),
         next_experiment=step,
         actions=_mended(result, effects),
         model=result.final.model,
@@ -131,17 +131,17 @@ def _compared(result: Search, examined: Examined, verdict: Verdict) -> dict[str,
     return {
         'efforts': compared(result.problem.recordings, result.baseline.model.robot),
         'recordings': result.problem.recordings,
-        'traces': traces(result),
+        'traces': _traces(result),
         'absent': result.library.absent | dict.fromkeys(other_causes(result.problem), NOT_TOLD),
-        'checks': (*examined.checks, *untold_check(result, named)),
-        'changed': changed(result, named),
+        'checks': (*examined.checks, *_untold_check(result, named)),
+        'changed': _changed(result, named),
         'may_change': named,
         'unsound': examined.told(result.final.model.found),
         'same': never_parted(result.baseline.model.robot, result.work.problem.align, verdict.sets),
     }
 
 
-def changed(result: Search, families: Sequence[str]) -> tuple[Changed, ...]:
+def _changed(result: Search, families: Sequence[str]) -> tuple[Changed, ...]:
     """Return what differs between the recordings beyond noise, by recording."""
     if not families:
         return ()
@@ -156,7 +156,7 @@ def changed(result: Search, families: Sequence[str]) -> tuple[Changed, ...]:
     )
 
 
-def untold_check(result: Search, families: Sequence[str]) -> tuple[Check, ...]:
+def _untold_check(result: Search, families: Sequence[str]) -> tuple[Check, ...]:
     """Return a note of what may have changed without being seen."""
     names = untold(result.problem, result.final.model, families)
     if not names:
@@ -171,7 +171,7 @@ def untold_check(result: Search, families: Sequence[str]) -> tuple[Check, ...]:
     )
 
 
-def gap(result: Search, floor: float) -> Gap:
+def _gap(result: Search, floor: float) -> Gap:
     """
     Return the size of the gap over trusted samples.
 
@@ -197,7 +197,7 @@ def gap(result: Search, floor: float) -> Gap:
     )
 
 
-def traces(result: Search) -> Traces:
+def _traces(result: Search) -> Traces:
     """Return the position residuals before and after, sample by sample."""
     recordings = result.problem.recordings
     before = result.problem.residuals(result.baseline.model)
@@ -211,7 +211,7 @@ def traces(result: Search) -> Traces:
     )
 
 
-def weighed_candidates(result: Search, evidence: Evidence) -> tuple[Candidate, ...]:
+def _weighed_candidates(result: Search, evidence: Evidence) -> tuple[Candidate, ...]:
     """Return the hypotheses for every slot, those of the strongest effect first."""
     out = []
     for candidate_set in evidence.slots:
@@ -231,7 +231,7 @@ def _position_rms(result: Search, alternative: Rival) -> float:
     return result.work.scale.position * float(np.sqrt(total / max(count, 1)))
 
 
-def unexplained(
+def _unexplained(
     beliefs: Beliefs,
     evidence: Evidence,
     verdict: Verdict,

@@ -48,10 +48,10 @@ def contact_spreads(result: Search, unseen: Unseen) -> ContactResult | None:
     was_m, now_m, held_m = (
         float(np.concatenate(list(each.values())).mean()) for each in (before, after, held)
     )
-    return ContactResult(was_m, now_m, held_m, touched, known, not_seen(result))
+    return ContactResult(was_m, now_m, held_m, touched, known, _not_seen(result))
 
 
-def not_seen(result: Search) -> tuple[str, ...]:
+def _not_seen(result: Search) -> tuple[str, ...]:
     """
     Return what no contact shows, in words: errors that would hide below the noise of all together.
 

@@ -32,9 +32,9 @@ from ..result import Cause, Found, Site
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 
-LEAST_SHARE = 1e-3
+_LEAST_SHARE = 1e-3
 """Share of the rows that counts as independent at the least; keeps a division finite."""
-UNSEEN = 1e-2
+_UNSEEN = 1e-2
 """A coordinate a thousand times its typical size must move some row by this much noise."""
 
 
@@ -66,7 +66,7 @@ def named_effects(
     reported.sort(key=lambda pair: -squares[pair[0]])
     if not reported:
         return (), replace(verdict, sets=()), tuple(replace(c, effect=None) for c in causes)
-    share = max(result.effective(result.small) / result.small.residual.size, LEAST_SHARE)
+    share = max(result.effective(result.small) / result.small.residual.size, _LEAST_SHARE)
     fitted = result.problem, model, result.scale, result.precision
     errors = standard_errors(*fitted, share, posterior, verdict.sets)
     effects = tuple(Found(model.found[member], errors[member]) for member, _ in reported)
@@ -175,7 +175,7 @@ def _visible(columns: Columns, model: Model) -> NDArray[np.bool_]:
     """Return which columns the data show, shape (P,)."""
     scales = np.concatenate([effect.fit.coordinate_scales() for effect in model.found])
     reach = np.concatenate([np.ones(columns.count - scales.size), 1e3 * scales])
-    return np.asarray(columns.peaks() * reach > UNSEEN)
+    return np.asarray(columns.peaks() * reach > _UNSEEN)
 
 
 def _elsewhere(problem: Problem, model: Model, scale: Scale, k: int, share: float) -> Array:

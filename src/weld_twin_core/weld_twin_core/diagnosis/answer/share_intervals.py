@@ -27,11 +27,11 @@ from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from .named_effects import covariance, idealised
 
-DRAWS = 1000
+_DRAWS = 1000
 """Enough for the ends of an interval to be good to a few per cent of its width."""
-SEED = 1
+_SEED = 1
 """Of the draws: the same recordings give the same intervals."""
-ENDS = (0.05, 0.95)
+_ENDS = (0.05, 0.95)
 """Quantiles between which nine draws of ten lie."""
 TOLD = 5e-4
 """Half of the last digit of a share as pages tell it, 0.1 %: no interval is finer."""
@@ -60,14 +60,14 @@ def with_intervals(
 
 def _held(cause: Cause, tries: Array) -> Cause:
     """Return a cause whose interval holds its own share and nine tries of ten."""
-    low, high = np.quantile(tries, ENDS)
+    low, high = np.quantile(tries, _ENDS)
     low, high = min(low, cause.share) - TOLD, max(high, cause.share) + TOLD
     return replace(cause, share_ci90=(float(max(low, 0.0)), float(min(high, 1.0))))
 
 
 def _tries(result: Search, unseen: Unseen, floor: float) -> Array:
-    """Return draws of the share of every effect, (DRAWS, K)."""
-    rng = np.random.default_rng(SEED)
+    """Return draws of the share of every effect, (_DRAWS, K)."""
+    rng = np.random.default_rng(_SEED)
     before = float(unseen.squares(unseen.bare).mean())
     after = float(unseen.squares(unseen.whole).mean())
     noise = min(floor**2, after)
@@ -75,14 +75,14 @@ def _tries(result: Search, unseen: Unseen, floor: float) -> Array:
     parted = _parted(_along(unseen, moved))
     unsure = _noise_unsure(result, unseen, noise, before, after)
     # Of what is left above the noise any part may be the causes'.
-    remaining = rng.uniform(noise, after, DRAWS) + unsure * rng.standard_normal(DRAWS)
+    remaining = rng.uniform(noise, after, _DRAWS) + unsure * rng.standard_normal(_DRAWS)
     explained = 1.0 - remaining[:, None] / before
     return parted * explained
 
 
 def _coordinates(rng: np.random.Generator, result: Search, missed: float) -> Array:
     """
-    Return how far the coordinates of all effects may be off, (DRAWS, K).
+    Return how far the coordinates of all effects may be off, (_DRAWS, K).
 
     missed: share of what is left that is no noise. It spreads over a number of directions, as what
     formulas are believed to miss does.
@@ -101,12 +101,12 @@ def _coordinates(rng: np.random.Generator, result: Search, missed: float) -> Arr
         np.concatenate([idealised(effect) for effect in model.found]) ** 2
     )
     variances, ways = np.linalg.eigh(spread)
-    unit = rng.standard_normal((DRAWS, variances.size))
+    unit = rng.standard_normal((_DRAWS, variances.size))
     return np.asarray(unit @ (ways * np.sqrt(np.maximum(variances, 0.0))).T)
 
 
 def _along(unseen: Unseen, moved: Array) -> Array:
-    """Return how far each effect moves the tool along with all of them, (DRAWS, K) [m^2]."""
+    """Return how far each effect moves the tool along with all of them, (_DRAWS, K) [m^2]."""
     count, first = len(unseen.parts), unseen.frames
     own_columns = unseen.columns.chosen(np.arange(first, unseen.columns.count)).written_out()
     rows = (*unseen.targets[1:], *own_columns)

@@ -38,7 +38,7 @@ _Solver = Callable[[_Screws, Array, Array], Array]
 
 
 @lru_cache(maxsize=8)
-def screws(robot: Robot) -> _Screws:
+def _screws(robot: Robot) -> _Screws:
     """Return the joint axes of a robot at joint position zero, in the world frame."""
     zero = np.zeros(robot.n)
     rows = frames(robot, zero).rows
@@ -54,7 +54,7 @@ def family(robot: Robot) -> str | None:
     """Return 'spherical wrist', 'three parallel', or None where no closed form applies."""
     if robot.n != 6 or robot.prismatic.any():
         return None
-    arm = screws(robot)
+    arm = _screws(robot)
     wrist = _meeting(arm, 4, 5)
     if wrist is None or not _parallel(arm, 1, 2):
         return None
@@ -74,7 +74,7 @@ def branches(robot: Robot, poses: Array) -> Array:
     robot: of one of the two families.
     poses: ``T_world_tool``, shape (N, 4, 4).
     """
-    arm = screws(robot)
+    arm = _screws(robot)
     solver = _SOLVERS[str(family(robot))]
     rotation = poses[:, :3, :3] @ arm.home[:3, :3].T
     wrist = _meeting(arm, 4, 5)

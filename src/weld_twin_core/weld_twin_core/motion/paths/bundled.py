@@ -38,7 +38,7 @@ _HEADINGS = (0.0, 0.5 * np.pi, -0.5 * np.pi, np.pi)
 """Turns about the first axis [rad]: an arm's zero may look to any side of its base."""
 
 
-class Place(NamedTuple):
+class _Place(NamedTuple):
     """Where a seam lies: centre, direction, out of the work (world frame), and its size [m]."""
 
     centre: Array
@@ -53,35 +53,35 @@ class Place(NamedTuple):
         return self.centre + local[:, :1] * self.along + local[:, 1:] * across
 
 
-def _line(place: Place) -> Path:
+def _line(place: _Place) -> Path:
     start, end = place.points((-0.5, 0.0), (0.5, 0.0))
     return Line(start, end, place.normal)
 
 
-def _arc(place: Place) -> Path:
+def _arc(place: _Place) -> Path:
     start, middle, end = place.points((-0.45, -0.15), (0.0, 0.15), (0.45, -0.15))
     return Arc(start, middle, end, place.normal)
 
 
-def _circle(place: Place) -> Path:
+def _circle(place: _Place) -> Path:
     return Circle(place.centre, 0.2 * place.size, place.normal, place.along)
 
 
-def _polyline(place: Place) -> Path:
+def _polyline(place: _Place) -> Path:
     points = place.points((-0.4, -0.2), (-0.4, 0.2), (0.0, 0.0), (0.4, 0.2), (0.4, -0.2))
     return Polyline(points, 0.03 * place.size, place.normal)
 
 
-def _spline(place: Place) -> Path:
+def _spline(place: _Place) -> Path:
     points = place.points((-0.5, 0.0), (-0.25, 0.15), (0.0, 0.0), (0.25, -0.15), (0.5, 0.0))
     return Spline(points, place.normal)
 
 
-def _weave(place: Place) -> Path:
+def _weave(place: _Place) -> Path:
     return Weave(_line(place), 0.01 * place.size, 0.05 * place.size)
 
 
-_SHAPES: dict[str, Callable[[Place], Path]] = {
+_SHAPES: dict[str, Callable[[_Place], Path]] = {
     'line': _line,
     'arc': _arc,
     'circle': _circle,
@@ -152,7 +152,7 @@ def _comfort(robot: Robot, path: Path, torch: Torch) -> float:
     return min(room, _COMFORT_CONDITION / float(solution.condition.max()))
 
 
-def _places(robot: Robot) -> Iterator[list[Place]]:
+def _places(robot: Robot) -> Iterator[list[_Place]]:
     """Yield places from the likeliest on, scaled with the robot; later lists are rarely needed."""
     over = [0.0 if rising(robot) > 0.0 else np.pi, 0.0, 0.0]
     foot = robot.T_world_base @ transform(rotation_matrix(over), np.zeros(3))
@@ -167,7 +167,7 @@ def _places(robot: Robot) -> Iterator[list[Place]]:
 
 def _places_at(
     base: Array, above: Array, heights: Sequence[float], size: float
-) -> Iterator[Place]:
+) -> Iterator[_Place]:
     """Yield places in front of a base, on heights in sizes of the robot."""
     for height in heights:
         for distance in (0.5, 0.4, 0.6, 0.3):
@@ -177,4 +177,4 @@ def _places_at(
                     continue
                 centre = base[:3, :3] @ [distance * size, 0.0, height * size] + base[:3, 3]
                 direction = base[:3, :3] @ (flat / np.linalg.norm(flat))
-                yield Place(centre, direction, base[:3, :3] @ above, 0.25 * size)
+                yield _Place(centre, direction, base[:3, :3] @ above, 0.25 * size)

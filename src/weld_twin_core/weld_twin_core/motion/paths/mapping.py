@@ -32,7 +32,7 @@ SEAMS: dict[str, type[Any]] = {
 """The seams by their ``kind``."""
 
 
-BESIDE = ('kind', 'weave', 'torch', 'external')
+_BESIDE = ('kind', 'weave', 'torch', 'external')
 """Keys of a path file that are no arguments of its seam."""
 
 
@@ -56,7 +56,7 @@ def from_mapping(data: Mapping[str, Any]) -> Path:
     kind = data.get('kind')
     if not isinstance(kind, str) or kind not in SEAMS:
         raise PathError(f"path 'kind' must be one of {', '.join(SEAMS)}, got {kind!r}")
-    rest = {str(k): v for k, v in data.items() if k not in BESIDE}
+    rest = {str(k): v for k, v in data.items() if k not in _BESIDE}
     seam: Path = _build(SEAMS[kind], rest, f'path of kind {kind!r}')
     weave = data.get('weave')
     if weave is None:

@@ -26,7 +26,7 @@ from ..inverse import CarriedArm
 from ..paths import Arc
 from .moves import Move, MoveProgram
 
-STEP = 0.01
+_STEP = 0.01
 """Way of the tool [m] between two samples of a linear or circular move."""
 _SAMPLES = (5, 120)
 """Fewest and most samples of a move: enough to follow a posture, and to keep long programs quick."""
@@ -36,7 +36,7 @@ _SHORT = 32
 """Samples below which a move is followed from its begin alone."""
 _REST = 0.3
 """Stay [s] after which the arm is where its controller wants it; servo lag is some 50 ms."""
-NEAR = 0.15
+_NEAR = 0.15
 """A linear move that would begin farther than this [rad or m] from the posture reached so far has
 to change the posture."""
 CLOSED = 1e-7
@@ -171,10 +171,10 @@ def _on_the_way(carried: CarriedArm, poses: Array, q: Array, reported: Array) ->
         start = carried.whole(reported, np.tile(q[reported.shape[1] :], (len(poses), 1)))
         near, error = carried.polish(start, poses)
         steps = np.abs(np.diff(near, axis=0, prepend=q[None])).max()
-        if np.abs(error).max() < CLOSED and steps < NEAR:
+        if np.abs(error).max() < CLOSED and steps < _NEAR:
             return near
     result = carried.whole(reported, carried.solve_path(poses, reported, q).q)
-    if np.abs(result[0] - q).max() > NEAR:
+    if np.abs(result[0] - q).max() > _NEAR:
         raise ReachError('the arm would have to change its posture on the way')
     return result
 
@@ -281,7 +281,7 @@ def _share_of(arc: Arc, point: Array) -> float:
 
 
 def _count(length: float) -> int:
-    return int(np.clip(np.ceil(length / STEP) + 1, *_SAMPLES))
+    return int(np.clip(np.ceil(length / _STEP) + 1, *_SAMPLES))
 
 
 def _turning(begin: Array, end: Array, share: Array) -> Array:

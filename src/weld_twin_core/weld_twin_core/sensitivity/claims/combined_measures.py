@@ -16,7 +16,7 @@ from ..sweep import DEGREE
 from ..tolerance import with_draws
 from .claim_case import Case, Measure
 
-GROUPS = {
+_GROUPS = {
     'joint_offset': 'angular',
     'link_twist': 'angular',
     'backlash': 'backlash',
@@ -33,13 +33,13 @@ _FACTOR = 3.0
 """Tolerances of a group are multiplied by up to this, or divided, to see whether ranks hold."""
 
 
-def sums(case: Case) -> dict[str, float]:
+def _sums(case: Case) -> dict[str, float]:
     """Measure the deviation by all errors over the sum of those by each source."""
     study, tolerances = case.smooth, case.tolerances
     rng = np.random.default_rng(case.seed)
     draws = draws_at(tolerances, rng.random((_DRAWS, len(tolerances))))
     combined = np.linalg.norm(exact_deviations(study, tolerances, draws), axis=-1)
-    labels = np.array([GROUPS[t.effect] for t in tolerances])
+    labels = np.array([_GROUPS[t.effect] for t in tolerances])
     parts = np.zeros_like(combined)
     for label in _ORDER:
         own = [k for k, name in enumerate(labels) if name == label]
@@ -92,10 +92,10 @@ def growth_exponent(path: Array, total: Array) -> float:
     return float(np.polyfit(np.log(path[late]), np.log(total[late]), 1)[0])
 
 
-def ranking(case: Case) -> dict[str, float]:
+def _ranking(case: Case) -> dict[str, float]:
     """Measure the ranking by group Sobol indices, and how it stands changed tolerances."""
     tolerances = case.tolerances
-    labels = tuple(GROUPS[t.effect] for t in tolerances)
+    labels = tuple(_GROUPS[t.effect] for t in tolerances)
     design = SobolDesign(tuple(t.name for t in tolerances), 1024, labels, case.seed)
     fast = model(case.aggressive, tolerances)
     result = design.indices(fast.at_probabilities(design.samples()).d_norm)
@@ -110,7 +110,7 @@ def _stability(case: Case) -> dict[str, float]:
     """Return how often groups keep the paper's order when their tolerances change."""
     square = dict.fromkeys(_ORDER, 0.0)
     for tolerance, value in zip(case.local.tolerances, case.local.contribution, strict=True):
-        square[GROUPS[tolerance.effect]] += float(value) ** 2
+        square[_GROUPS[tolerance.effect]] += float(value) ** 2
     size = np.sqrt([square[label] for label in _ORDER])
     rng = np.random.default_rng(case.seed)
     scaled = size * _FACTOR ** rng.uniform(-1.0, 1.0, (_RANKED, len(_ORDER)))
@@ -126,9 +126,9 @@ def _per_unit(case: Case) -> dict[str, float]:
     best = dict.fromkeys(_ORDER, 0.0)
     for tolerance, value in zip(case.local.tolerances, case.local.peak, strict=True):
         unit = 1e3 * DEGREE if tolerance.unit == 'rad' else 1.0
-        label = GROUPS[tolerance.effect]
+        label = _GROUPS[tolerance.effect]
         best[label] = max(best[label], float(value) * unit)
     return {f'unit_{label}': value for label, value in best.items()}
 
 
-MEASURES: tuple[Measure, ...] = (sums, drift, ranking)
+MEASURES: tuple[Measure, ...] = (_sums, drift, _ranking)

@@ -27,7 +27,7 @@ _POSTURES = 2000
 """Postures drawn over the joint limits; a rank correlation is then good to 0.02."""
 
 
-def baseline(case: Case) -> dict[str, float]:
+def _baseline(case: Case) -> dict[str, float]:
     """Measure the seam without errors against the poses that were planned."""
     law = Constant()
     planned = plan(case.robot, case.path, law, POINTS / (case.path.length / law.speed), fit=True)
@@ -36,7 +36,7 @@ def baseline(case: Case) -> dict[str, float]:
     return {'baseline_d_norm': off.max() / planned.length}
 
 
-def initialization(case: Case) -> dict[str, float]:
+def _initialization(case: Case) -> dict[str, float]:
     """Measure displacements and turns of the base, and how the deviation changes on the way."""
     study, size = case.smooth, 5e-4
     shifted = _distance(case, BasePose(xyz=np.full(3, size / np.sqrt(3.0))))
@@ -73,7 +73,7 @@ def _linearity(case: Case) -> dict[str, float]:
     }
 
 
-def leverage(case: Case) -> dict[str, float]:
+def _leverage(case: Case) -> dict[str, float]:
     """Measure which joints matter for equal angles, with the model's tool and a bent torch."""
     robot = case.robot.with_frames(tool=case.robot.T_flange_tool @ BENT_TORCH)
     nominal = Twin(robot).poses(case.smooth.recording)
@@ -94,7 +94,7 @@ def leverage(case: Case) -> dict[str, float]:
     }
 
 
-def lengths(case: Case) -> dict[str, float]:
+def _lengths(case: Case) -> dict[str, float]:
     """Measure link length errors: their coefficients, their proportion, their shape."""
     links = default_tolerances(case.robot, ('link_length',))
     result = local_sensitivity(case.smooth, links)
@@ -132,7 +132,7 @@ def _anywhere(case: Case) -> tuple[Array, Array]:
     return gain / np.maximum(strength[:, -1], 1e-12), gain
 
 
-def bound(case: Case) -> dict[str, float]:
+def _bound(case: Case) -> dict[str, float]:
     """Measure the deviation by random offsets as a part of the bound |J| |dtheta|."""
     rng = np.random.default_rng(case.seed)
     gain = posture(case.smooth).amplification
@@ -148,11 +148,11 @@ def bound(case: Case) -> dict[str, float]:
 
 
 MEASURES: tuple[Measure, ...] = (
-    baseline,
-    initialization,
+    _baseline,
+    _initialization,
     _linearity,
-    leverage,
-    lengths,
+    _leverage,
+    _lengths,
     _conditioning,
-    bound,
+    _bound,
 )

@@ -37,7 +37,7 @@ def _rms(study: Study, distance: Array) -> float:
     return float(np.sqrt((distance**2 * arc_weights(study.s)).sum()))
 
 
-def offset(case: Case) -> dict[str, float]:
+def _offset(case: Case) -> dict[str, float]:
     """Measure constant joint offsets on both motions at the same arc length."""
     effects = [JointOffset(joint, 0.05 * DEGREE) for joint in case.robot.joint_names]
     smooth, aggressive = (_distance(s, effects) for s in (case.smooth, case.aggressive))
@@ -49,14 +49,14 @@ def offset(case: Case) -> dict[str, float]:
     }
 
 
-def lag(case: Case) -> dict[str, float]:
+def _lag(case: Case) -> dict[str, float]:
     """Measure a servo lag on every joint, which does depend on the motion."""
     effects = [ServoLag(joint, _LAG) for joint in case.robot.joint_names]
     smooth, aggressive = (_distance(s, effects) for s in (case.smooth, case.aggressive))
     return {'lag_ratio': aggressive.max() / smooth.max(), 'lag_smooth_m': smooth.max()}
 
 
-def play(case: Case) -> dict[str, float]:
+def _play(case: Case) -> dict[str, float]:
     """Measure play of every joint: peak, rms and range on both motions."""
     effects = [Backlash(joint, _WIDTH) for joint in case.robot.joint_names]
     studies = (case.smooth, case.aggressive)
@@ -96,7 +96,7 @@ def _locality(case: Case) -> dict[str, float]:
     }
 
 
-def frequency(case: Case) -> dict[str, float]:
+def _frequency(case: Case) -> dict[str, float]:
     """Measure what more reversals do to the mean and the peak, as play and as written."""
     few, many = case.reversing(2), case.reversing(20)
     out: dict[str, float] = {}
@@ -136,4 +136,4 @@ def _planning(case: Case) -> dict[str, float]:
     return out
 
 
-MEASURES: tuple[Measure, ...] = (offset, lag, play, _locality, frequency, _planning)
+MEASURES: tuple[Measure, ...] = (_offset, _lag, _play, _locality, _frequency, _planning)

@@ -117,3 +117,22 @@ def evenly(first: float, step: float, lost: NDArray[np.int_], size: int, count: 
     """
     index = np.arange(size) * (count / size)
     return np.asarray(first + step * (index + np.searchsorted(lost, index, side='right')))
+
+
+ONE_CLOCK = 'Stamp both streams with one clock, or synchronise the two (PTP, NTP)'
+"""The remedy, in the imperative, wherever two clocks are told of."""
+
+
+def apart(joints: tuple[float, float], measured: tuple[float, float]) -> str | None:
+    """
+    Return that measurements and joint states have no time in common; None where they have.
+
+    joints, measured: first and last stamp of either [s].
+    """
+    gap = max(measured[0] - joints[1], joints[0] - measured[1])
+    if gap <= 0.0:
+        return None
+    return (
+        f'measurements and joint states do not overlap in time, they are {gap:.3f} s apart: their '
+        'stamps come from two clocks'
+    )

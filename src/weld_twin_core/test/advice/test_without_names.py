@@ -8,7 +8,7 @@ from small_arm import small_arm
 
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.advice import Limits
-from weld_twin_core.effects.joint_curve import JointCurve
+from weld_twin_core.effects.curves import JointCurve
 
 BENT = JointCurve('elbow_joint', (1e-3, -4e-4, 0.0, -4e-4, 1e-3), (-1, -0.5, 0, 0.5, 1), 'speed')
 """Nothing in the library depends on speed like this; at half of it four waves leave the noise alone."""

@@ -19,8 +19,7 @@ from weld_twin_core.diagnosis.unseen.folds import posture_regions, steadiness
 from weld_twin_core.diagnosis.unseen.groups import Group
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.diagnosis.verdict.decision import Verdict
-from weld_twin_core.effects.curve import basis
-from weld_twin_core.effects.joint_curve import JointCurve
+from weld_twin_core.effects.curves import JointCurve, basis
 
 NOISE = 2e-5
 ELBOW = 2

@@ -10,13 +10,13 @@ from measured_cells import anywhere, moving, recorded, rejointed, remeasured, st
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.fingerprint import fingerprint
+from weld_twin_core.arm.controller_lookup import fingerprint
 from weld_twin_core.arm.rotation import transform
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.soundness.gate import examine
 from weld_twin_core.diagnosis.soundness.mending import Given
 from weld_twin_core.effects import REGISTRY, JointCoupling, JointOffset, effects_from_list
-from weld_twin_core.effects.setup_motion import of_the_robot
+from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.recording import JointMotion
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.effects import effect_from_mapping
-from weld_twin_core.effects.setup_motion import of_the_robot, seen_from
+from weld_twin_core.effects.dated import of_the_robot, seen_from
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.twin import Twin
 

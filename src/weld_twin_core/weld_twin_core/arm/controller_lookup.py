@@ -1,14 +1,15 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the controller of any robot has its base and flange: said by it, or known of its arm."""
+"""Which arm a model is of, and where the controller of any robot has its base and flange."""
 
 from __future__ import annotations
+
+import hashlib
 
 import numpy as np
 
 from .catalog import load, names
 from .controller_frames import ControllerFrames
-from .fingerprint import fingerprint
 from .robot import Robot
 
 _NO_TOOL = 1e-9
@@ -39,3 +40,24 @@ def bundled_name(robot: Robot) -> str:
     if robot.name in names() and fingerprint(load(robot.name)) == own:
         return robot.name
     return next((name for name in names() if fingerprint(load(name)) == own), '')
+
+
+_GRID = 1e-6
+"""Rounding [m, rad]: finer than any arm is known, coarser than files and conversions round."""
+
+
+def fingerprint(robot: Robot) -> str:
+    """
+    Return 16 hexadecimal digits that stand for the kinematics of a robot.
+
+    Rows and kinds of its joints count. Names, limits, masses, and where the arm stands and what
+    tool it carries do not.
+
+    """
+    angles = np.stack([robot.alpha, robot.theta, robot.beta])
+    turned = np.angle(np.exp(1j * (angles + 0.25 * _GRID))) - 0.25 * _GRID
+    rows = np.concatenate([turned, np.stack([robot.a, robot.d])])
+    steps = np.round(rows / _GRID).astype(np.int64)
+    behind = f'{robot.behind} behind ' if robot.behind else ''
+    text = f'{behind}{robot.convention}{robot.prismatic.astype(int).tolist()}{steps.tolist()}'
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

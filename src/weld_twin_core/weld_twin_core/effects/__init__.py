@@ -23,36 +23,29 @@ from pkgutil import iter_modules
 from .backlash import Backlash
 from .bearing_tilt import BearingTilt
 from .cartesian_compliance import CartesianCompliance
-from .clock_rate import ClockRate
+from .clocks import ClockRate, TimeDelay
+from .curves import FrameCurve, JointCurve
 from .dated import InstrumentKnock, JointSlip, SetupSettling, SetupStep, ToolSlip
 from .drift import Drift
 from .effect import Effect, LinearEffect, MemoryEffect
-from .frame_curve import FrameCurve
-from .frame_errors import BasePose, ToolPose
+from .frame_errors import BasePose, RootPose, ToolPose
 from .friction import Friction
-from .gear_ratio import GearRatio
-from .gear_ratio_by_direction import GearRatioByDirection
+from .gear_ratio import GearRatio, GearRatioByDirection
 from .geometry import AxisParallelism, JointOffset, LinkLength, LinkOffset, LinkTwist
-from .guide_bend import GuideBend
-from .guide_tilt import GuideTilt
+from .guide import GuideBend, GuideTilt
 from .hose_pull import HosePull
 from .hysteresis import Hysteresis
 from .joint_compliance import JointCompliance
 from .joint_coupling import JointCoupling
-from .joint_curve import JointCurve
-from .link_warm_up import LinkWarmUp
 from .loaded_play import LoadedPlay
-from .measurement_noise import MeasurementNoise
-from .measurement_scale import MeasurementScale
+from .measurement import MeasurementNoise, MeasurementScale
 from .payload import Payload
 from .pedestal_tilt import PedestalTilt
 from .quantization import Quantization
 from .refraction import Refraction
 from .registry import REGISTRY, effect_from_mapping, effects_from_list, register
-from .root_pose import RootPose
 from .servo_lag import ServoLag
-from .thermal_growth import ThermalGrowth
-from .time_delay import TimeDelay
+from .thermal import LinkWarmUp, ThermalGrowth
 from .transmission_ripple import TransmissionRipple
 from .vibration import Vibration
 from .view import Parameter, Plausible, Stage, View

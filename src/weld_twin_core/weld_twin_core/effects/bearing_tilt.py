@@ -30,9 +30,9 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
-from .base_leans import base_leans
 from .effect import LinearEffect
 from .hooks import Hooked, SearchHooks, Traits
+from .pedestal_tilt import base_leans
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import turn

@@ -12,7 +12,7 @@ fits, and is not carried over to another set-up.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, TypeVar
 
@@ -21,9 +21,10 @@ import numpy as np
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
-from .constant import ChannelError, FrameError, frame_parameters
+from ..recording import Recording
 from .effect import Effect
-from .geometry import JointOffset
+from .frame_errors import FrameError, frame_parameters
+from .geometry import ChannelError, JointOffset
 from .hooks import Hooked, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -283,3 +284,25 @@ class SetupSettling(_SetupMotion):
             f'Let the set-up settle before measuring: it started {base_frame(self.vector()[:6])} from '
             'where it ended.'
         )
+
+
+def of_the_robot(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return what is left of the effects for the robot ever after, without those of one set-up."""
+    return tuple(e for e in (effect.twin.lasting() for effect in effects) if e is not None)
+
+
+def seen_from(
+    effects: Sequence[Effect], epoch_ns: int, span_ns: tuple[int, int], other: Recording
+) -> tuple[Effect, ...]:
+    """
+    Return effects for another recording: the set-up's motion at its right time, or left out.
+
+    epoch_ns, span_ns: what the stamps of the recording whose set-up moved count from; its first
+    and last stamp.
+    other: where it does not overlap in time it is taken for another set-up.
+    """
+    first, last = other.span_ns
+    if last < span_ns[0] or first > span_ns[1]:
+        return of_the_robot(effects)
+    later = (other.epoch_ns - epoch_ns) * 1e-9
+    return tuple(e.recounted(later) if isinstance(e, Timed) else e for e in effects)

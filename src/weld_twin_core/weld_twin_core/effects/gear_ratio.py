@@ -1,18 +1,33 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Gear ratio: theta -> (1 + scale) theta."""
+"""
+Gear ratio: theta -> (1 + scale) theta, and by direction, (1 + difference / 2 * way) theta.
+
+way goes from -1 (down) to 1 (up). Teeth touch on one flank while the joint turns up and on the other
+while it turns down. Where the two are not cut alike, either way has a ratio of its own. Their mean is
+`gear_ratio`, their distance at the joint's zero is `backlash`; the difference is what that distance
+grows by with the angle. Once a joint turns back, the teeth change flanks evenly over ``travel``; at
+rest they stay.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
-from .effect import LinearEffect
+from ..arrays import Array
+from .associative_scan import last_true, play
+from .effect import Effect, LinearEffect, MemoryEffect
 from .hooks import Hooked, Traits, TwinHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View, single
-from .wording import number
+from .wording import number, size
 
 
 class _Twin(TwinHooks):
@@ -77,4 +92,134 @@ class GearRatio(LinearEffect):
             f'Enter the gear ratio of {self.site} times {1.0 + scale:.6f} where it is turns of the '
             'joint per turn of the motor, divided by it where it is turns of the motor per turn of '
             f'the joint: it turns {number(scale * 100.0)} % of its angle further than it reads.'
+        )
+
+
+_TRAVELS = (3e-5, 3e-4)
+"""Travels [rad] that a search starts from: a longer one is a loop, `hysteresis`."""
+_SHOWN = 0.04
+"""
+Angle [rad] that must be left, RMS, of what one unit of it does: less is play and a constant ratio.
+
+As far as a joint has to move for its gear ratio to be looked for.
+"""
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class GearRatioByDirection(MemoryEffect):
+    """The gear ratio is ``difference`` larger on the way up than on the way down."""
+
+    joint: str
+    difference: Value = 0.0
+    travel: Value = 1e-4
+
+    name = 'gear_ratio_by_direction'
+    traits = Traits(
+        title='gear ratio that differs by direction',
+        meaning='the same, with another factor each way',
+        entered="the joint's gear",
+        depends_on='direction',
+        common=False,
+        by_motion=True,
+    )
+    of = 'joint'
+    stage = Stage.PLAY
+    parameters = (
+        Parameter(
+            'difference',
+            '-',
+            typical=3e-4,
+            idealised=0.05,
+            range=Plausible.even(
+                1e-3,
+                2e-2,
+                'derived: as gear_ratio; at a radian from zero the flanks are then as far apart '
+                'as the play of a gear that is broken',
+            ),
+        ),
+        Parameter(
+            'travel',
+            'rad',
+            typical=1e-4,
+            lower=1e-6,
+            linear=False,
+            idealised=0.3,
+            range=Plausible(
+                1e-3,
+                1e-6,
+                2e-3,
+                'derived: teeth change flanks as friction builds up; a longer travel is '
+                'a loop of the gear, hysteresis',
+            ),
+            sliding=Plausible(1e-4, 1e-7, 2e-4, 'derived: as the travel of friction'),
+        ),
+    )
+    needs = frozenset({'order'})
+
+    def _way(self, q: Array, state: Any = None) -> tuple[Array, NDArray[np.intp], Any]:
+        """Return the way, the sample at which a flank was last touched, -1 for none, the state."""
+        half = 0.5 * self.number('travel')
+        output = play(q, 2.0 * half, q[..., 0] if state is None else state)
+        behind = q - output
+        rounding = 4.0 * np.spacing(np.abs(q).max(initial=1.0))
+        return behind / half, last_true(np.abs(behind) >= half - rounding), output[..., -1]
+
+    def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
+        """Return half the difference of the angle, up or down, and where the gear is as state."""
+        i = view.robot.index(self.joint)
+        way, _, state = self._way(view.joint(i), state)
+        return {('q', i): 0.5 * self.number('difference') * way * view.joint(i)}, state
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return half the angle, up or down, and how the change of flanks waits for the travel."""
+        i = view.robot.index(self.joint)
+        q = view.joint(i)
+        way, touched, _ = self._way(q)
+        remaining = np.where(
+            touched >= 0, np.take_along_axis(way, np.maximum(touched, 0), -1), 0.0
+        )
+        slow = (np.sign(remaining) - way) / self.number('travel')
+        slow = np.where(np.arange(q.shape[-1]) == touched, 0.0, slow)
+        return [
+            {('q', i): 0.5 * way * q},
+            {('q', i): 0.5 * self.number('difference') * slow * q},
+        ]
+
+    def push(self, view: View, tangent: Array) -> Array:
+        """Add the tangent's own part of the ratio, and what it hastens a change of flanks by."""
+        q = view.joint(view.robot.index(self.joint))
+        way, touched, _ = self._way(q)
+        at = np.broadcast_to(np.maximum(touched, 0), tangent.shape)
+        since = tangent - np.take_along_axis(tangent, at, -1)
+        turned = q * since / (0.5 * self.number('travel'))
+        return np.asarray(tangent + 0.5 * self.number('difference') * (way * tangent + turned))
+
+    def atoms(self, view: View) -> list[Shift]:
+        """Return the ratio's part alone."""
+        i = view.robot.index(self.joint)
+        return [{('q', i): 0.5 * self._way(view.joint(i))[0] * view.joint(i)}]
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
+        """Yield a quick and a slow change of flanks where the joint went both ways over its angle."""
+        i = view.robot.index(str(joint))
+        unit = view.radian(i)
+        angle = view.joint(i)
+        for travel in _TRAVELS:
+            made = cls(str(joint), 0.0, travel * unit)
+            way = made._way(angle)[0]
+            alike = np.stack([np.ones_like(angle), angle, way], axis=1)
+            one = 0.5 * way * angle
+            remaining = one - alike @ np.linalg.lstsq(alike, one, rcond=None)[0]
+            if float(np.sqrt((remaining**2).mean())) > _SHOWN * unit:
+                yield made
+
+    def remedy(self, robot: Robot) -> str:
+        difference = self._plain('difference')
+        more, less = ('up', 'down') if difference > 0.0 else ('down', 'up')
+        return (
+            f'Compensate the gear of {self.site} by direction, or approach seams from one side: on '
+            f'the way {more} it turns {size(difference * 100.0)} % of its angle further than on the '
+            f'way {less}.'
         )

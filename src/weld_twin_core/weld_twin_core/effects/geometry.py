@@ -11,12 +11,16 @@ nearly parallel (IEEE CDC 1983).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
+import numpy as np
+
+from ..arm.channels import Shift
 from ..arm.robot import Robot
-from .constant import ChannelError
+from .effect import Effect
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value
-from .wording import stands, to_mend
+from .view import Parameter, Plausible, Stage, Value, View, single
+from .wording import metres, radians, stands, to_mend
 
 _URS = (
     'controller calibrations of a UR3 (github.com/MyRobotLab/pyrobotlab issue 145) and of a UR5 '
@@ -24,6 +28,37 @@ _URS = (
     'are not parallel'
 )
 """Where errors of links were read."""
+
+
+class ChannelError(Effect):
+    """A constant error of one channel of one joint or row; the parameter displaces it."""
+
+    channel: ClassVar[str]
+    off: ClassVar[str] = 'it is off by'
+    """How a robot file is wrong that lacks it."""
+
+    def remedy(self, robot: Robot) -> str:
+        """Return which number of the robot file to mend; see `Effect.remedy`."""
+        error = self._plain(self.parameters[0].name)
+        now = float(getattr(robot, self.channel)[robot.index(str(self.site))])
+        if self.channel in ('a', 'd'):
+            old, new = f'{now * 1e3:.3f} mm', f'{(now + error) * 1e3:.3f} mm'
+        else:
+            old, new = f'{np.degrees(now):.4f} deg', f'{np.degrees(now + error):.4f} deg'
+        by = metres(error) if self.channel in ('a', 'd') else radians(error)
+        return (
+            f'Enter {self.channel} = {new} for {self.site} in the kinematic model in place of '
+            f'{old}: {self.off} {by}.'
+        )
+
+    def displace(self, view: View) -> Shift:
+        """Return the parameter on the channel."""
+        channel = (self.channel, view.robot.index(str(self.site)))
+        return single(channel, self.number(self.parameters[0].name), view)
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        """Return one: the displacement is the parameter."""
+        return [single((self.channel, view.robot.index(str(self.site))), np.ones(()), view)]
 
 
 @register

@@ -19,7 +19,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import ModelError
 from .backlash import RV
-from .curve import load
+from .curves import load
 from .effect import Effect, LinearEffect
 from .hooks import Hooked, SearchHooks, Traits
 from .registry import register

@@ -17,12 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arm.channels import Shift
+from ..arm.channels import Channel, Shift
 from ..arm.dynamics import base_moment, wrench_rotation
 from ..arm.robot import Robot
 from ..arm.vectors import components, dot, pad
 from ..arrays import Array
-from .base_leans import base_leans
 from .effect import LinearEffect
 from .hooks import Traits
 from .registry import register
@@ -104,3 +103,22 @@ def _moments(view: View) -> tuple[Array, Array]:
     axes = wrench_rotation(view.robot, view.frames, 'base')
     x, y = (dot(pad(components(axes[..., k]), moment.ndim - 1), moment) for k in range(2))
     return x, y
+
+
+def base_leans(robot: Robot, axes: Array) -> list[dict[Channel, float]]:
+    """
+    Return the channels that turn an arm's base about axes through its origin.
+
+    Beside a positioner a lean of the arm is that of the positioner the other way round: the frames
+    between the two are all that the chain has.
+
+    axes: in the base frame of the arm's rows, shape (K, 3).
+    """
+    if not robot.behind:
+        turned = axes @ robot.T_world_base[:3, :3].T
+        return [{('base', 3 + k): float(axis[k]) for k in range(3)} for axis in turned]
+    foot = np.linalg.inv(robot.T_root_base)[:3, 3]
+    return [
+        {('root', k): float(value) for k, value in enumerate([*-np.cross(axis, foot), *-axis])}
+        for axis in axes
+    ]

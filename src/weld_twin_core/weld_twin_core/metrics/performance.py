@@ -13,7 +13,7 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError
 from ..recording import Recording
-from .cycles import PoseCycles, pose_cycles, stops
+from .cycles import PathCycles, PoseCycles, path_cycles, pose_cycles, stops
 from .iso9283 import (
     DRIFT_CYCLES,
     PATH_CYCLES,
@@ -27,7 +27,6 @@ from .iso9283 import (
     multidirectional_variation,
     pose_performance,
 )
-from .path_cycles import PathCycles, path_cycles
 
 _HOUR = 3600.0
 """Seconds."""

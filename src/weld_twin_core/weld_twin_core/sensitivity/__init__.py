@@ -24,11 +24,20 @@ from .evaluate import Model, draws_at, exact_deviations, model
 from .local import LocalSensitivity, Posture, arc_weights, local_sensitivity, posture
 from .morris import MorrisDesign, Screening, morris_screening
 from .outcome import Outcomes, outcomes
-from .scenario import Sizes, cumulative, scenario_deviations, spread_of_passes
 from .seam_study import POINTS, Study, planned_study, recorded_study, study_of_plan, with_known
 from .sobol import SobolDesign, SobolIndices, sobol_indices
 from .stack import Probability, ToleranceStack, WeldTolerance, probabilities, tolerance_stack
-from .sweep import Sweep, default_values, end_of_linearity, sweep, together
+from .sweep import (
+    Sizes,
+    Sweep,
+    cumulative,
+    default_values,
+    end_of_linearity,
+    scenario_deviations,
+    spread_of_passes,
+    sweep,
+    together,
+)
 from .tolerance import (
     FAMILIES,
     Tolerance,

@@ -11,11 +11,59 @@ import numpy as np
 
 from ..arrays import Array, readonly
 from ..errors import ModelError
-from .dh_draws import DhStudy, dh_study
+from ..kernels.draws import DhDraws, SeamDraws
 from .expansion import CHUNK, Expansion, expand, expandable
 from .outcome import Outcomes, joined, outcomes
 from .seam_study import Study
 from .tolerance import Tolerance, with_draws
+
+_VALUES = {
+    ('joint_offset', 'offset'): 'theta',
+    ('link_offset', 'dd'): 'd',
+    ('link_length', 'da'): 'a',
+    ('link_twist', 'dalpha'): 'alpha',
+}
+"""Effect and parameter, and the DH value that it adds to; an offset of a joint turns its row."""
+
+
+@dataclass(frozen=True, eq=False)
+class DhStudy:
+    """A study whose tolerances are all of DH values."""
+
+    study: Study
+    tolerances: tuple[Tolerance, ...]
+    seam: SeamDraws
+    """The nominal robot at the samples of the study."""
+
+    def deviations(self, draws: Array) -> Array:
+        """
+        Return the deviations of draws in seam axes, shape (3, D, N) [m].
+
+        draws: in the units of the tolerances, shape (D, P).
+        """
+        robot = self.study.robot
+        values = {
+            key: np.repeat(getattr(robot, key)[None], len(draws), axis=0)
+            for key in DhDraws._fields
+        }
+        for column, tolerance in zip(draws.T, self.tolerances, strict=True):
+            key = _VALUES[tolerance.effect, tolerance.parameter]
+            values[key][:, robot.index(str(tolerance.joint))] += column
+        away = self.seam.deviations(DhDraws(**values))
+        return np.moveaxis(self.study.on_seam(away), -1, 0)
+
+
+def dh_study(study: Study, tolerances: Sequence[Tolerance]) -> DhStudy | None:
+    """Return the fast form of a study, or None where something else than DH values counts."""
+    if study.known or any((t.effect, t.parameter) not in _VALUES for t in tolerances):
+        return None
+    joints = study.recording.joints
+    q = joints.q if study.at is None else joints.at(study.at)[0]
+    try:
+        return DhStudy(study, tuple(tolerances), SeamDraws(study.robot, q))
+    except ModelError:  # modified rows, or joints that slide
+        return None
+
 
 _CHECKED = 32
 """Runs on which the expansion is compared with the exact twin."""

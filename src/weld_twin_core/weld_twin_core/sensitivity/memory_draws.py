@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..effects import REGISTRY, Effect, Stage
-from ..twin.memory import in_series, run_all
-from ..twin.resampling import Picker
+from ..twin.memory import Picker, in_series, run_all
 from ..twin.twin import Twin
 from .seam_study import Study
 from .tolerance import Tolerance, with_draws

@@ -20,10 +20,9 @@ from ..arm.chain import frames
 from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix, transform
 from ..arrays import Array
-from ..effects.effect import Effect, MemoryEffect
+from ..effects.effect import Effect, MemoryEffect, Stage
 from ..motion.inverse.newton import chain_jacobian, least_step
 from ..recording import JointMotion, Recording
-from .commandable import commandable
 from .poses import missing
 from .twin import Twin
 
@@ -159,3 +158,30 @@ def _commands(nominal: JointMotion, q: Array) -> JointMotion:
 
 def _rms(error: Array) -> float:
     return float(np.sqrt((error[:, :3] ** 2).sum(axis=1).mean()))
+
+
+_BEYOND_COMMANDS = frozenset(
+    {
+        'measurement_scale',
+        'measurement_noise',
+        'refraction',
+        'time_delay',
+        'drift',
+        'setup_step',
+        'setup_settling',
+        'instrument_knock',
+    }
+)
+"""Effects of the measurement, or new in every run: they do nothing to a motion to come."""
+_ROUNDING = 'quantization'
+"""A rounding of what is commanded, which is as near as it gets: no joint command mends it."""
+
+
+def commandable(effect: Effect) -> bool:
+    """Tell whether joint commands can mend an effect."""
+    return acts(effect) and effect.name != _ROUNDING
+
+
+def acts(effect: Effect) -> bool:
+    """Tell whether an effect moves the tool on a motion to come, which nobody measures."""
+    return effect.name not in _BEYOND_COMMANDS and effect.stage not in (Stage.CLOCK, Stage.NOISE)

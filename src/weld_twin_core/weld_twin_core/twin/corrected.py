@@ -13,8 +13,9 @@ import numpy as np
 from ..arm.chain import base_frame, root_frame, tool_frame
 from ..arm.robot import Robot
 from ..arm.rotation import transform
-from ..effects.constant import ChannelError, FrameError
 from ..effects.effect import Effect
+from ..effects.frame_errors import FrameError
+from ..effects.geometry import ChannelError
 from ..effects.payload import Payload
 
 

@@ -10,6 +10,7 @@ derivative of the pose by each channel are computed once.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -18,8 +19,8 @@ from ..arm.channels import Channel, Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects.effect import Effect, Stage, View
-from ..recording import Recording
-from .resampling import Picker
+from ..recording import JointSignal, Recording
+from .memory import Picker
 from .stages import Evaluation, load_torque
 from .twin import Twin
 
@@ -141,3 +142,19 @@ def joints_of(kind: type[Effect], robot: Robot) -> Sequence[str | None]:
     """Return the joints an effect can sit on, or one None for effects of the whole robot."""
     sites = robot.joint_names if kind.of in ('joint', 'link') else (None,)
     return [site for site in sites if kind.search.fits(robot, site)]
+
+
+def with_expected_effort(recording: Recording, robot: Robot, load_of_effort: float) -> Recording:
+    """
+    Return a motion with the effort that the model's statics expect, where efforts are measured.
+
+    recording: a motion that is thought of: a measurement to come, postures elsewhere.
+    robot: links without masses weigh nothing.
+    load_of_effort: load torque for each N m of effort, 1 or -1; of 0 the motion stays as it is.
+    """
+    if not load_of_effort:
+        return recording
+    load = load_torque(Twin(robot).joint_view(recording))
+    each = np.stack([load['tau', i] for i in range(robot.n)], axis=-1)
+    effort = JointSignal(recording.joints.t, load_of_effort * each)
+    return replace(recording, effort=effort, effort_holds=load_of_effort < 0.0)

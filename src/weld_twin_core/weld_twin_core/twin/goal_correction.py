@@ -22,8 +22,7 @@ from ..arrays import Array
 from ..effects.effect import Effect, Stage
 from ..errors import DataError
 from ..recording import JointMotion, Recording
-from .commandable import commandable
-from .compensation import compensate
+from .compensation import commandable, compensate
 from .features import Features
 from .goal_motion import Course, Goal, course, fine_times
 from .poses import missing
@@ -31,8 +30,7 @@ from .posterior import Drawn, pose_covariances
 from .program_accuracy import accuracy
 from .program_correction import BETTER, NOTHING
 from .program_model import ProgramModel
-from .reversals import approached, is_play, play_steps, spread
-from .turns import just_turned
+from .reversals import approached, is_play, just_turned, play_steps, spread
 from .twin import Twin
 
 _SHARES = (0.125, 0.25, 0.5)

@@ -19,8 +19,7 @@ from ..arm.rotation import rotation_matrix
 from ..arrays import Array
 from ..effects.effect import MemoryEffect
 from ..errors import DataError
-from ..kernels.single_pose import SinglePose
-from ..kernels.single_turn import turn_between, turn_matrix
+from ..kernels.single_pose import SinglePose, turn_between, turn_matrix
 from ..motion.inverse.newton import least_step
 from ..recording import JointMotion
 from .goal_correction import GoalLimits, not_corrected, too_large

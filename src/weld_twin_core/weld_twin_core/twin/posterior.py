@@ -27,11 +27,10 @@ from ..effects.effect import Effect
 from ..errors import DataError, ModelError
 from ..recording import JointMotion, Recording, Signal
 from ..sequences import halton
-from .commandable import commandable
+from .compensation import commandable
 from .domain import Domain
-from .expected_effort import with_expected_effort
-from .features import Features
-from .turns import just_turned
+from .features import Features, with_expected_effort
+from .reversals import just_turned
 from .twin import Twin
 
 DRAWS = 400

@@ -16,7 +16,7 @@ from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect
 from ..motion.programs import Move, Piece
 from ..recording import JointMotion, Recording, Signal
-from .commandable import acts, commandable
+from .compensation import acts, commandable
 from .domain import Domain, Outside
 from .features import Features
 from .posterior import Drawn, Posterior, places, pose_covariances

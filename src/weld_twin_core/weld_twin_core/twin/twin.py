@@ -17,9 +17,8 @@ from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects.effect import Parameter, Stage, View
 from ..recording import Recording
-from .memory import Tangent, indexed, rates, run_all
+from .memory import Picker, Tangent, indexed, rates, run_all
 from .poses import Poses
-from .resampling import Picker
 from .stages import EffectStages, Evaluation
 from .stepping import LiveTwin
 

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import Diagnosis
 from weld_twin_core.diagnosis.algebra.problem import Model
-from weld_twin_core.effects.setup_motion import seen_from
+from weld_twin_core.effects.dated import seen_from
 from weld_twin_core.recording import Measurements, Recording
 from weld_twin_core.twin.posterior import largest_sigma, pose_covariances
 from weld_twin_core.twin.twin import Twin

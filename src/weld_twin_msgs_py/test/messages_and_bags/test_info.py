@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm.catalog import load
+from weld_twin_core.bursts import ONE_CLOCK
 from weld_twin_core.errors import DataError
-from weld_twin_core.two_clocks import ONE_CLOCK
 from weld_twin_msgs_py.bags import BagWriter, bag_info, read_recording, write_recording
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_msgs_py.messages.topics import TopicNames

@@ -11,6 +11,7 @@ import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
+from weld_twin_core.bursts import ONE_CLOCK, apart
 from weld_twin_core.errors import DataError
 from weld_twin_core.pose_noise import PoseNoise, alike, positive
 from weld_twin_core.recording import (
@@ -21,7 +22,6 @@ from weld_twin_core.recording import (
     Signal,
     backward_rates,
 )
-from weld_twin_core.two_clocks import ONE_CLOCK, apart
 
 from .intake import PLAIN, Role, rotations
 from .station_stamps import looks_static

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_core.bursts import Bursts, bursts
-from weld_twin_core.two_clocks import ONE_CLOCK, apart
+from weld_twin_core.bursts import ONE_CLOCK, Bursts, apart, bursts
 
 from ..assembly.foreign_types import split_topic
 from ..messages.topics import (

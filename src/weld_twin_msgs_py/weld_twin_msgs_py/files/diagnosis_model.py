@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_core.arm.fingerprint import fingerprint
+from weld_twin_core.arm.controller_lookup import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.diagnosis.algebra.model import Alone
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.soundness.mending import Given, replayed
 from weld_twin_core.effects import effects_from_list
-from weld_twin_core.effects.setup_motion import of_the_robot, seen_from
+from weld_twin_core.effects.dated import of_the_robot, seen_from
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.twin import Twin

@@ -18,7 +18,7 @@ import numpy as np
 
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.errors import DataError
-from weld_twin_core.kernels.single_turn import quaternion_matrix
+from weld_twin_core.kernels.single_pose import quaternion_matrix
 from weld_twin_core.recording import JointMotion
 
 NANOSECONDS = 1_000_000_000

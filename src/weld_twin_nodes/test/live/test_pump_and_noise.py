@@ -4,7 +4,7 @@
 
 import numpy as np
 
-from weld_twin_core.effects.measurement_noise import MeasurementNoise
+from weld_twin_core.effects.measurement import MeasurementNoise
 from weld_twin_nodes.live.pacing import STALLED, Pump
 from weld_twin_nodes.streams.injected_noise import Noise
 

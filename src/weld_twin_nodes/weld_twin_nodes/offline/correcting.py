@@ -16,7 +16,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects import Effect
-from weld_twin_core.effects.setup_motion import of_the_robot
+from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.motion.programs.repeated import repeated
 from weld_twin_core.twin.program_accuracy import Accuracy, along_seams

@@ -14,7 +14,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.diagnosis.soundness.mending import reading_map, turned_joints
 from weld_twin_core.effects import Effect
-from weld_twin_core.effects.setup_motion import of_the_robot
+from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.effects.wording import TURNED_ROUND, stands, to_mend
 from weld_twin_core.twin.corrected import corrected, joint_offsets
 from weld_twin_msgs_py.files.csv_text import csv_text

@@ -29,7 +29,7 @@ from weld_twin_core.diagnosis.algebra.noise_floor import noise_floor
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, frames_named, usable
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.result import Site
-from weld_twin_core.effects.setup_motion import of_the_robot
+from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Measurements, Recording
 from weld_twin_core.twin.twin import Twin

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from weld_twin_core.arrays import Array
-from weld_twin_core.effects.curve import AT_REST
+from weld_twin_core.effects.curves import AT_REST
 from weld_twin_core.twin.goal_correction import Start
 
 STILL = 2e-4

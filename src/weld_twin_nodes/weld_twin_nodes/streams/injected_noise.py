@@ -10,7 +10,7 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects import Effect
-from weld_twin_core.effects.measurement_noise import MeasurementNoise
+from weld_twin_core.effects.measurement import MeasurementNoise
 
 
 class Noise:

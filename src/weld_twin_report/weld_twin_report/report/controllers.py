@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects.effect import Effect
-from weld_twin_core.effects.root_pose import RootPose
+from weld_twin_core.effects.frame_errors import RootPose
 from weld_twin_core.effects.wording import further
 
 BRANDS = {

@@ -11,10 +11,8 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.result import Cause, Diagnosis
-from weld_twin_core.effects.curve import basis
+from weld_twin_core.effects.curves import FrameCurve, JointCurve, basis
 from weld_twin_core.effects.effect import Effect
-from weld_twin_core.effects.frame_curve import FrameCurve
-from weld_twin_core.effects.joint_curve import JointCurve
 from weld_twin_core.effects.servo_lag import ServoLag
 from weld_twin_nodes.wording.quantities import DEGREES, in_short, millimetres, short_rows, turned
 from weld_twin_nodes.wording.words import CURVES, parameter_word

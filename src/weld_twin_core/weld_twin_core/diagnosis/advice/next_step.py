@@ -13,9 +13,8 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects import REGISTRY
-from ...effects.curve import basis
+from ...effects.curves import JointCurve, basis
 from ...effects.effect import Effect
-from ...effects.joint_curve import JointCurve
 from ..algebra.fit import fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Scale

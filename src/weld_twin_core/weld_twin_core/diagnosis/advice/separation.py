@@ -26,7 +26,7 @@ import numpy as np
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...recording import Measurements, Recording
-from ...twin.expected_effort import with_expected_effort
+from ...twin.features import with_expected_effort
 from ..algebra.fit import design, with_weights
 from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem, Scale

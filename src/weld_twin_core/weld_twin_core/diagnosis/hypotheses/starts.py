@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays import Array
 from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features
-from ...twin.resampling import Picker
+from ...twin.memory import Picker
 from ..algebra.alias import outside, span_of
 from ..algebra.columns import Maker, Piece
 from ..algebra.fit import design

@@ -27,7 +27,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
 from ...arrays import Array
-from ...effects.curve import QUANTITIES
+from ...effects.curves import QUANTITIES
 from ...twin.features import Features
 from ..algebra.independent_rows import measured_axes
 from ..hypotheses.search import Search

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ...effects.setup_motion import of_the_robot
+from ...effects.dated import of_the_robot
 from ...recording import Recording
 from ...twin.domain import Domain
 from ...twin.posterior import Directions, Posterior, postures_within_limits, usual_sigma

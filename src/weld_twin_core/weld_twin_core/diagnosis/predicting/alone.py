@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...effects import REGISTRY
-from ...effects.constant import ChannelError, FrameError
+from ...effects.dated import of_the_robot
 from ...effects.effect import Effect
-from ...effects.setup_motion import of_the_robot
+from ...effects.frame_errors import FrameError
+from ...effects.geometry import ChannelError
 from ...twin.corrected import corrected
 from ...twin.features import joints_of
 from ..algebra.fit import fit, robust_scale, trusted

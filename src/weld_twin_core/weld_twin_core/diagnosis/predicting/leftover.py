@@ -22,7 +22,7 @@ from scipy.special import chdtri
 
 from ...arrays import Array
 from ...recording import Recording
-from ...twin.turns import just_turned
+from ...twin.reversals import just_turned
 from ..algebra.definite import unit_diagonal
 from ..algebra.fit import trusted
 from ..algebra.noise_floor import NoiseFloor

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from ...arrays import Array
-from ...effects.measurement_scale import MeasurementScale
+from ...effects.measurement import MeasurementScale
 from ...effects.plausible import spreads
 from ...twin.features import Features
 from ..algebra.alias import outside, span_of

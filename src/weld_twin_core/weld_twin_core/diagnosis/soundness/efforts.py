@@ -18,10 +18,10 @@ from ...arm.chain import Frames, frames
 from ...arm.dynamics import chain_gravity_torque, payload_torque
 from ...arm.robot import Robot
 from ...arrays import Array
-from ...effects.curve import AT_REST
+from ...effects.curves import AT_REST
 from ...errors import DataError
 from ...recording import Recording
-from ...twin.expected_effort import with_expected_effort
+from ...twin.features import with_expected_effort
 from ..result import EffortCause, Efforts, JointEffort
 from .evidence import Case, Finding, note, warning
 from .limits import CLEAR, FEW, SAMPLES

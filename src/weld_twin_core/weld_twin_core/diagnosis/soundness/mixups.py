@@ -14,13 +14,11 @@ import numpy as np
 from ...arm.robot import Robot
 from ...arm.rotation import quaternion_from_matrix, rotation_vector
 from ...arrays import Array
-from ...effects.constant import ChannelError
 from ...effects.effect import Effect
-from ...effects.frame_errors import BasePose, ToolPose
-from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
+from ...effects.frame_errors import BasePose, RootPose, ToolPose
+from ...effects.geometry import ChannelError, JointOffset, LinkLength, LinkOffset, LinkTwist
 from ...effects.joint_compliance import JointCompliance
 from ...effects.plausible import beyond
-from ...effects.root_pose import RootPose
 from ..algebra.prior import effect_precision
 from ..algebra.problem import Model, Problem
 from .evidence import Case, Finding, mistake

@@ -14,9 +14,9 @@ import numpy as np
 from ...arm.robot import Robot
 from ...arrays import Array
 from ...effects.effect import Effect
+from ...effects.frame_errors import RootPose
 from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
 from ...effects.plausible import ranges
-from ...effects.root_pose import RootPose
 from ...recording import JointMotion, Measurements, Recording
 from ..algebra.fit import fit, robust_scale
 from ..algebra.prior import effect_precision

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arrays import Array
-from ...bursts import Bursts, bursts, evenly
+from ...bursts import ONE_CLOCK, Bursts, bursts, evenly
 from ...effects.plausible import plausible
 from ...recording import Recording
-from ...two_clocks import ONE_CLOCK
 from ..algebra.independent_rows import robust_spread
 from ..algebra.problem import FRAMES
 from ..frames.aligned import aligned

@@ -24,12 +24,10 @@ import numpy as np
 from ...arm.dynamics import payload_torque, wrench_rotation
 from ...arrays import Array
 from ...effects.associative_scan import play
-from ...effects.curve import QUANTITIES, basis
+from ...effects.curves import QUANTITIES, FrameCurve, JointCurve, basis
 from ...effects.effect import Effect
-from ...effects.frame_curve import FrameCurve
-from ...effects.joint_curve import JointCurve
 from ...twin.features import Features
-from ...twin.resampling import Picker
+from ...twin.memory import Picker
 from ..algebra.problem import Model, Problem, Scale
 
 KNOTS = {'angle': 7, 'direction': 2, 'speed': 5, 'load': 4, 'temperature': 3, 'time': 6}

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ...effects.setup_motion import of_the_robot, seen_from
+from ...effects.dated import of_the_robot, seen_from
 from ...recording import Recording
 from ..algebra.fit import fit, robust_scale, trusted
 from ..algebra.problem import Model, Problem, usable

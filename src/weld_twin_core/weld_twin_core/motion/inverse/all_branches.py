@@ -12,9 +12,8 @@ from ...arm.robot import Robot
 from ...arrays import Array
 from ...errors import ReachError
 from .closed_form import branches, family
-from .multi_start import CLOSED, search
+from .multi_start import CLOSED, centred, search
 from .newton import polish
-from .whole_turns import centred
 
 OTHER_POSTURE = (
     'the arm would have to change its posture on the way; '

@@ -22,9 +22,8 @@ from .all_branches import OTHER_POSTURE, gap, past_limit, where, why_not
 from .closed_form import branches, family
 from .continuity import Mask, distances, joined, jumps, reach, travel
 from .following import follow
-from .multi_start import CLOSED, centring, null_space, search
+from .multi_start import CLOSED, TURN, centring, null_space, search, turns_to_middle
 from .newton import chain_jacobian, polish
-from .whole_turns import TURN, turns_to_middle
 
 _KNOTS = 64
 """Samples a numerical solution is followed over; between them a spline is the start."""

@@ -14,9 +14,8 @@ Examples
 
 from .arc import Arc, Circle
 from .bundled import KINDS, default_seam
-from .line import Line
 from .mapping import from_mapping
-from .polyline import Polyline
+from .polyline import Line, Polyline
 from .seam_path import Path, SeamFrames
 from .spline import Spline
 from .torch import Torch

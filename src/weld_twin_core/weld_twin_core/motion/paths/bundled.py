@@ -17,8 +17,7 @@ from ...errors import PathError, ReachError
 from ..inverse import CarriedArm, rest, solve_path
 from ..inverse.continuity import reach
 from .arc import Arc, Circle
-from .line import Line
-from .polyline import Polyline
+from .polyline import Line, Polyline
 from .seam_path import Path
 from .spline import Spline
 from .torch import Torch

@@ -15,8 +15,7 @@ from typing import Any
 
 from ...errors import DataError, PathError
 from .arc import Arc, Circle
-from .line import Line
-from .polyline import Polyline
+from .polyline import Line, Polyline
 from .seam_path import Path
 from .spline import Spline
 from .weave import Weave

@@ -10,9 +10,8 @@ import numpy as np
 
 from ...arrays import Array
 from ..evaluate import draws_at, exact_deviations, model
-from ..scenario import cumulative, scenario_deviations
 from ..sobol import SobolDesign
-from ..sweep import DEGREE
+from ..sweep import DEGREE, cumulative, scenario_deviations
 from ..tolerance import with_draws
 from .claim_case import Case, Measure
 

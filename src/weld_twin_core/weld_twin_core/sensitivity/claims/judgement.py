@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ...errors import DataError
-from .rule import Measured, Range, Rule
-from .rules import RULES
+from .rules import RULES, Measured, Range, Rule
 
 HOLDS, HOLDS_WHEN, DOES_NOT = 'holds', 'holds when', 'does not hold'
 

@@ -14,9 +14,8 @@ from ...effects.backlash import Backlash
 from ...effects.geometry import JointOffset
 from ...effects.servo_lag import ServoLag
 from ..local import arc_weights
-from ..scenario import spread_of_passes
 from ..seam_study import Study
-from ..sweep import DEGREE
+from ..sweep import DEGREE, spread_of_passes
 from ..tolerance import default_tolerances
 from ..trajectory_advice import compare_profiles
 from .claim_case import POINTS, Case, Measure

@@ -208,7 +208,7 @@ def _read(
 
 def _in_region(result: Diagnosis, reported: str, judged: Array) -> Diagnosis:
     """Return the diagnosis with what to expect in a region that was asked for."""
-    from weld_twin_core.effects.setup_motion import of_the_robot
+    from weld_twin_core.effects.dated import of_the_robot
     from weld_twin_core.twin.posterior import usual_sigma
     from weld_twin_core.twin.twin import Twin
 

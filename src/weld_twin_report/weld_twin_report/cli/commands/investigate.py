@@ -146,7 +146,7 @@ def _more(
 ) -> Planned:
     """Return the plan of what to measure on top of a diagnosis, and say how sure it is so far."""
     from weld_twin_core.diagnosis.predicting.planned import Wanted, plan_more
-    from weld_twin_core.effects.setup_motion import of_the_robot
+    from weld_twin_core.effects.dated import of_the_robot
     from weld_twin_core.twin.twin import Twin
     from weld_twin_msgs_py.files.diagnosis_model import load_model
     from weld_twin_msgs_py.files.posterior_entry import read_posterior

@@ -1,12 +1,22 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Measurement scale: the instrument reads (1 + scale) times the position in its own frame."""
+"""
+The instrument: its unit of length, and its white noise, which is the floor and never a cause.
 
+A wrong unit reads (1 + scale) times the position in the instrument's own frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+import numpy as np
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
-from .effect import LinearEffect
+from ..arrays import Array
+from .effect import Effect, LinearEffect
 from .hooks import Traits
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
@@ -55,3 +65,33 @@ class MeasurementScale(LinearEffect):
             'Have the instrument calibrated, or correct for air temperature: lengths read '
             f'{number(self._plain("scale") * 1e3)} mm per m too long.'
         )
+
+
+@register
+@dataclass(frozen=True, eq=False)
+class MeasurementNoise(Effect):
+    """Independent errors of ``sigma`` on each coordinate; drawn by the injector only."""
+
+    sigma: Value = 0.0
+
+    name = 'measurement_noise'
+    traits = Traits(depends_on='constant', place='instrument', cause=False)
+    of = 'robot'
+    stage = Stage.NOISE
+    parameters = (Parameter('sigma', 'm', typical=2e-5, lower=0.0, differentiable=False),)
+
+    def displace(self, view: View) -> Shift:
+        """Return nothing: the expected error is zero."""
+        return {}
+
+    def gradient(self, view: View) -> list[Shift | None]:
+        return [None]
+
+    def draw(self, samples: int, rng: np.random.Generator) -> Array:
+        """Return errors of measured positions, shape (samples, 3) [m]."""
+        return rng.normal(scale=float(self.sigma), size=(samples, 3))
+
+    @classmethod
+    def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
+        """Yield nothing: noise is no cause."""
+        return ()

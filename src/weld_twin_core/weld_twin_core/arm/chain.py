@@ -42,14 +42,12 @@ class _RowAxes(NamedTuple):
 
 class Frames(NamedTuple):
     """
-    The chain at given joint positions; every field is in the world frame.
+    The chain at joint positions, all in the world: tool, rows, flange, base and root.
 
-    ``rotation`` is (..., 3, 3) and ``position`` (..., 3) of the tool; ``flange_rotation`` and
-    ``flange_point`` are those of the chain's end before the tool frame; ``base_rotation`` and
-    ``base_point`` those of the base. ``root_rotation`` and ``root_point`` are those of the frame
-    where the robot's rows begin: the base itself, unless a positioner stands between. ``ends`` are
-    the frames at the outer end of the rows that the chain passes backwards: axes x, y, z and
-    origin, components first.
+    The flange is the chain's end before the tool frame; the root, where the robot's rows begin, is
+    the base unless a positioner stands between. Rotations are (..., 3, 3), points (..., 3).
+    ``ends`` are axes x, y, z and origin, components first, at the outer end of the rows that the
+    chain passes backwards.
     """
 
     rotation: Array
@@ -124,12 +122,7 @@ def _turn(first: Array, second: Array, angle: Array) -> tuple[Array, Array]:
 
 
 def frames(robot: Robot, q: Array, shift: Shift = NO_SHIFT) -> Frames:
-    """
-    Return the chain's frames.
-
-    q: joint positions, shape (..., n) [rad or m]; leading axes are draws and samples.
-    shift: displaced channels; each value broadcasts with ``q[..., 0]``.
-    """
+    """Return the frames at joint positions (..., n) [rad or m] with shifts like ``q[..., 0]``."""
     base_rotation, base_point = base_frame(robot, shift)
     axes = max([q.ndim - 1, *(np.ndim(value) for value in shift.values())])
     triad, p = _started(base_rotation, base_point, axes)
@@ -277,13 +270,9 @@ def column(robot: Robot, chain: Frames, channel: Channel, shift: Shift = NO_SHIF
     Return d(pose) / d(channel), shape (6, ...): velocity of the tool point, then turn.
 
     Screw columns as in Everett, Driels and Mooring (1987); 'base' and 'tool' turns use the left
-    Jacobian of the rotation vector, so the derivative is exact at any displacement.
-
+    Jacobian of the rotation vector, so the derivative is exact at the shift that ``chain`` was
+    made with.
     Raises KeyError: the channel has no direct column ('tau' reaches the tool through a spring).
-
-    chain: the chain at the samples; see `frames`.
-    channel: name and index of one channel, such as ``('q', 2)`` or ``('tool', 5)``.
-    shift: the displacement that ``chain`` was made with.
     """
     name, i = channel
     if name == 'pose':

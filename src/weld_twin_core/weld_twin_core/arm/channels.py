@@ -33,11 +33,6 @@ NO_SHIFT: Shift = {}
 
 
 def row_factors(convention: str, *, without: str = '') -> list[tuple[str, ...]]:
-    """
-    Return the motions of a row, those about one axis together, from the base outward.
-
-    convention: 'standard' or 'modified'.
-    without: a motion that is left out, as the beta of a row that has none.
-    """
+    """Return the motions of a row from the base outward, those about one axis together."""
     order = (kind for kind in ROW_ORDER[convention] if kind != without)
     return [tuple(kinds) for _, kinds in groupby(order, AXIS.__getitem__)]

@@ -58,11 +58,7 @@ class _Body(NamedTuple):
 
 
 def body(robot: Robot, q: Array) -> _Body:
-    """
-    Return the arm's capsules in the measuring frame.
-
-    q: shape (..., n) [rad or m].
-    """
+    """Return the arm's capsules in the measuring frame at positions (..., n) [rad or m]."""
     whole = _whole(robot, q)
     return whole.of(whole.long)
 
@@ -97,13 +93,7 @@ def _line(robot: Robot, chain: Frames) -> tuple[Array, Array]:
 
 
 def clearances(shape: _Body) -> Array:
-    """
-    Return how far links that are no neighbours stay apart, shape (..., pairs) [m].
-
-    Negative where they overlap.
-
-    shape: as `body` returns it.
-    """
+    """Return the gaps of links that are no neighbours, (..., pairs) [m]; below 0 they overlap."""
     share = np.linspace(0.0, 1.0, PLACES)[:, None]
     along = shape.start[..., None, :] * (1.0 - share) + shape.end[..., None, :] * share
     out = []
@@ -118,24 +108,17 @@ def clearances(shape: _Body) -> Array:
 
 
 def free(robot: Robot, q: Array, seen: Array, box: Array | None = None) -> Array:
-    """
-    Return which postures are free, shape (N,), bool.
-
-    q: shape (N, n) [rad or m].
-    seen: postures that the arm was in: whatever is near there is no collision, for the arm was
-    there, shape (K, n) [rad or m].
-    box: corners, in the measuring frame, that the arm stays between, shape (2, 3) [m]. Without it
-    an arm that stands upright stays above its foot, or above the lowest place that it was at.
-    """
+    """Return which postures (N, n) are free, shape (N,), bool; see `Space`."""
     return Space(robot, seen, box).free(q)
 
 
 class Space:
     """
-    Where an arm has room, asked again and again; see `free`.
+    Where an arm has room, asked again and again.
 
-    seen: shape (K, n) [rad or m].
-    box: shape (2, 3) [m].
+    seen: postures (K, n) [rad or m] that the arm was in: whatever is near there is no collision.
+    box: corners in the measuring frame that the arm stays between, shape (2, 3) [m]. Without it an
+    arm that stands upright stays above its foot, or above the lowest place that it was at.
     """
 
     def __init__(self, robot: Robot, seen: Array, box: Array | None = None) -> None:
@@ -150,11 +133,7 @@ class Space:
         self._foot = min(standing, _lowest(known.end @ self._up).min())
 
     def free(self, q: Array) -> Array:
-        """
-        Return which postures are free, shape (N,), bool.
-
-        q: shape (N, n) [rad or m].
-        """
+        """Return which postures (N, n) [rad or m] are free, shape (N,), bool."""
         whole = _whole(self._robot, q)
         long = np.logical_or(whole.long, self._known.long)
         asked = whole.of(long)

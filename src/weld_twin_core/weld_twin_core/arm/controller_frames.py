@@ -25,11 +25,7 @@ _KEYS = {'base', 'flange', 'foot', 'base_link', 'flange_link'}
 
 @dataclass(frozen=True, eq=False)
 class ControllerFrames:
-    """
-    Where a controller has its base and its flange.
-
-    Raises DataError: a frame has the wrong shape or a value that is not finite.
-    """
+    """Where a controller has its base and flange; DataError where a frame is none."""
 
     base: Array = field(default_factory=lambda: np.eye(4))
     """The controller's base, which positions of programs count from, in the base frame of the
@@ -52,21 +48,7 @@ class ControllerFrames:
 
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any]) -> ControllerFrames:
-        """
-        Build the frames from the mapping a robot file holds.
-
-        Parameters
-        ----------
-        data : mapping
-            ``base``, ``flange`` and ``foot``, each with ``xyz`` and ``quat_xyzw``, and the names
-            of links.
-
-        Raises
-        ------
-        DataError
-            A key is unknown, or a frame is none.
-
-        """
+        """Build the frames from a robot file's mapping; DataError for an unknown key."""
         unknown = sorted(set(map(str, data)) - _KEYS)
         if unknown:
             raise DataError(

@@ -20,10 +20,9 @@ def controller_frames(robot: Robot) -> ControllerFrames:
     """
     Return the controller's base and flange on a robot.
 
-    A robot that says them has its own; an arm with the rows of a bundled one has the flange of that;
-    of any other robot file the rows begin at the base and end at the flange, which a tool frame
-    without a length turns.
-
+    A robot that says them has its own; an arm with the rows of a bundled one has the flange of
+    that; of any other robot file the rows begin at the base and end at the flange, which a tool
+    frame without a length turns.
     """
     if robot.controller is not None:
         return robot.controller
@@ -47,13 +46,7 @@ _GRID = 1e-6
 
 
 def fingerprint(robot: Robot) -> str:
-    """
-    Return 16 hexadecimal digits that stand for the kinematics of a robot.
-
-    Rows and kinds of its joints count. Names, limits, masses, and where the arm stands and what
-    tool it carries do not.
-
-    """
+    """Return 16 hexadecimal digits that stand for a robot's rows and kinds of joints alone."""
     angles = np.stack([robot.alpha, robot.theta, robot.beta])
     turned = np.angle(np.exp(1j * (angles + 0.25 * _GRID))) - 0.25 * _GRID
     rows = np.concatenate([turned, np.stack([robot.a, robot.d])])

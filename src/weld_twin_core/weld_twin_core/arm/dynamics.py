@@ -27,12 +27,9 @@ def point_force_torque(
     robot: Robot, chain: Frames, point: Array, force: Array, *, contact: bool = False
 ) -> Array:
     """
-    Return joint torques, shape (n, ...), of a force at a point carried by the tool.
+    Return joint torques (n, ...) of a force [N] at a point [m] that the tool carries, (3, ...).
 
-    chain: the chain at the samples.
-    point, force: components first, in the world frame, shape (3, ...) [m, N].
-    contact: the force comes from the workpiece, and pushes back on it; otherwise a positioner does
-    not feel it.
+    In a contact the force pushes back on the workpiece; otherwise a positioner does not feel it.
     """
     axes = max(point.ndim, force.ndim, chain.position.ndim) - 1
     point, force = pad(point, axes), pad(force, axes)
@@ -53,13 +50,7 @@ def _gravity_direction(robot: Robot, chain: Frames) -> Array:
 
 
 def payload_torque(robot: Robot, chain: Frames, mass: Array | float, com: Array) -> Array:
-    """
-    Return load torques, shape (n, ...) [N m], of a mass carried by the tool.
-
-    chain: the chain at the samples.
-    mass: [kg]
-    com: centre of the mass in the tool frame, shape (..., 3) [m].
-    """
+    """Return torques (n, ...) [N m] of a mass [kg] that the tool carries at com (..., 3) [m]."""
     weight = mass * pad(_gravity_direction(robot, chain), np.ndim(mass))
     return point_force_torque(robot, chain, _carried_point(chain, com), weight)
 
@@ -70,12 +61,7 @@ def _carried_point(chain: Frames, point: Array) -> Array:
 
 
 def wrench_rotation(robot: Robot, chain: Frames, frame: str) -> Array:
-    """
-    Return the axes of a wrench in the world, shape (..., 3, 3).
-
-    chain: the chain at the samples.
-    frame: where the wrench is expressed: 'tool', or 'base' for the link that the arm stands in.
-    """
+    """Return a wrench's axes in the world, (..., 3, 3): of the 'tool', or 'base', the foot."""
     if frame == 'tool':
         return chain.rotation
     return np.asarray(chain.root_rotation @ robot.T_base_foot[:3, :3])
@@ -91,13 +77,7 @@ def _wrench_in_world(
 
 
 def wrench_torque(robot: Robot, chain: Frames, wrench: Array, frame: str = 'tool') -> Array:
-    """
-    Return load torques, shape (n, ...) [N m], of a wrench on the tool: J^T w.
-
-    chain: the chain at the samples.
-    wrench: force and torque, shape (..., 6) [N, N m]; both act at the tool centre point.
-    frame: where they are expressed: 'tool' or 'base'.
-    """
+    """Return torques (n, ...) [N m] of a wrench (..., 6) [N, N m] at the tool point: J^T w."""
     force, moment = _wrench_in_world(robot, chain, wrench, frame)
     torque = point_force_torque(robot, chain, components(chain.position), force, contact=True)
     moment = pad(moment, torque.ndim - 1)
@@ -185,28 +165,15 @@ def torque_slope(
     Return how the load torques change with the joints, d tau_i / d q_j, shape (n, n, ...).
 
     Of gravity it is minus the Hessian of the potential: what joint j sets in motion shifts the
-    first moment that joint i carries. A wrench fixed to the tool turns along with it.
-
-    chain: the chain at the samples.
-    wrench: on the tool, shape (..., 6) [N, N m]; see `wrench_torque`.
-    frame: where the wrench is expressed: 'tool' or 'base'.
+    first moment that joint i carries. A wrench, see `wrench_torque`, that is fixed to the tool
+    turns along.
     """
     slope = _weight_slope(robot, chain, _carried(robot, chain))
     return slope if wrench is None else slope + _wrench_slope(robot, chain, wrench, frame)
 
 
 def payload_slope(robot: Robot, chain: Frames, mass: Array | float, com: Array) -> Array:
-    """
-    Return how the load torques of a mass carried by the tool change with the joints.
-
-    robot, chain, mass, com: as for `payload_torque`.
-
-    Returns
-    -------
-    array, shape (n, n, ...)
-        Torque first, then joint.
-
-    """
+    """Return how torques of `payload_torque` change with the joints, (n, n, ...), torque first."""
     centre = _carried_point(chain, com)
     levers = [mass * (centre - pad(row.z_point, centre.ndim - 1)) for row in chain.rows]
     carried: list[tuple[Any, Array]] = [(mass, lever) for lever in levers]
@@ -254,13 +221,7 @@ def _wrench_slope(robot: Robot, chain: Frames, wrench: Array, frame: str) -> Arr
 
 
 def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
-    """
-    Return a point of a link in the world frame, components first, shape (3, ...) [m].
-
-    chain: the chain at the samples.
-    i: which link, counted from 0; its DH frame is at its far end.
-    point: in that DH frame, shape (3,) [m].
-    """
+    """Return a point (3,) of link i's DH frame, at its far end, in the world, (3, ...) [m]."""
     if i < robot.behind:
         x, y, z, origin = chain.ends[i]
         outer: Array = origin + point[0] * x + point[1] * y + point[2] * z
@@ -282,16 +243,7 @@ def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
 def base_moment(
     robot: Robot, chain: Frames, wrench: Array | None = None, frame: str = 'tool'
 ) -> Array:
-    """
-    Return the moment of all load about the arm's foot, world frame, shape (3, ...) [N m].
-
-    What a pedestal has to hold: weights of links and payload, and the wrench on the tool.
-
-    robot: links without masses weigh nothing.
-    chain: the chain at the samples.
-    wrench: on the tool, shape (..., 6) [N, N m]; see `wrench_torque`.
-    frame: where the wrench is expressed: 'tool' or 'base'.
-    """
+    """Return the moment of weights and wrench about the foot, in the world, (3, ...) [N m]."""
     samples = chain.position.shape[:-1]
     origin = pad(components(chain.root_point), len(samples))
     lever = np.zeros((3, *samples))

@@ -27,15 +27,7 @@ _TURNED = 0.03
 
 
 def with_lent_masses(robot: Robot) -> Robot:
-    """
-    Return the robot with the masses of the bundled arm whose axes are its own, where it has none.
-
-    Returns
-    -------
-    Robot
-        The same one where it has masses, or where no bundled arm, or more than one, is like it.
-
-    """
+    """Return a robot without masses with those of the one bundled arm of the same axes."""
     if robot.mass is not None:
         return robot
     own = _axes(robot)

@@ -22,12 +22,7 @@ _REACHED = 1e-9
 
 
 def least_step(robot: Robot, q: Array, off: Array) -> Array:
-    """
-    Return the least joint step that moves the tool point, shape (M, n).
-
-    q: shape (M, n) [rad or m].
-    off: the way that the tool point has to go, shape (M, 3) [m].
-    """
+    """Return the least steps (M, n) that move tool points by (M, 3) [m] from postures (M, n)."""
     turn = jacobian(robot, q)[:, :3]
     inverse = np.linalg.inv(turn @ np.swapaxes(turn, 1, 2) + _DAMPING * np.eye(3))
     return np.asarray(np.einsum('mji,mjk,mk->mi', turn, inverse, off))
@@ -35,18 +30,9 @@ def least_step(robot: Robot, q: Array, off: Array) -> Array:
 
 def reaching(robot: Robot, points: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
     """
-    Return postures near their starts with the tool point at points, and which of them reach it.
+    Return postures (M, n) near starts with tool points at points (M, 3) [m], and which are there.
 
     Limits of the joints are not looked at.
-
-    points: shape (M, 3) [m].
-    start: shape (M, n) [rad or m].
-
-    Returns
-    -------
-    postures : array, shape (M, n) [rad or m]
-    reached : array, shape (M,)
-
     """
     q = np.array(start)
     for _ in range(ROUNDS):

@@ -29,23 +29,11 @@ _STILL = 1e-9
 
 def play(q: Array, width: Array | float, start: Array) -> Array:
     r"""
-    Return the output of the operator of play, which is dead-zone hysteresis.
+    Return the operator of play (dead-zone hysteresis) of positions (..., N), w = ``start`` before.
 
     .. math:: w_k = \min(q_k + \delta/2, \max(q_k - \delta/2, w_{k-1}))
 
-    Parameters
-    ----------
-    q : array, shape (..., N) [rad]
-        Input, in order of time.
-    width : array, broadcasts with q [rad]
-        Full width of the gap, non-negative.
-    start : array, shape (...) [rad]
-        Output before the first sample.
-
-    Returns
-    -------
-    array, shape (..., N) [rad]
-
+    The full width of the gap broadcasts with the input.
     """
     if q.ndim == 1 and np.ndim(width) > 1:
         return _play_of_many(q, 0.5 * np.asarray(width), np.asarray(start))
@@ -80,28 +68,14 @@ def _play_of_many(q: Array, half: Array, start: Array) -> Array:
 
 def bristle(step: Array, travel: Array | float, leak: Array | float, start: Array) -> Array:
     r"""
-    Return how far bristles between two rubbing parts are bent, from -1 to 1.
+    Return how far bristles between two rubbing parts are bent, from -1 to 1, shape (..., N).
 
     .. math:: dz = (\mathrm{sign}(dq) - z)\,|dq| / \mathrm{travel} - z\,\mathrm{leak}
 
     Dahl's model [3]_, with a leak by which what is bent lets go in time; solved exactly for steps
-    that are even between samples.
-
-    Parameters
-    ----------
-    step : array, shape (..., N) [rad or m]
-        By how much the input moved since the sample before.
-    travel : float or array, broadcasts with step [rad or m]
-        Over which bristles bend.
-    leak : float or array, broadcasts with step
-        What is lost since the sample before: the time over that in which bristles let go.
-    start : array, shape (...)
-        z before the first sample.
-
-    Returns
-    -------
-    array, shape (..., N)
-
+    that are even between samples. ``step`` is since the sample before, ``travel`` what bristles
+    bend over [rad or m]; ``leak`` is the time since the sample before over that in which bristles
+    let go.
     """
     bent = np.abs(step) / travel
     whole = bent + leak
@@ -114,11 +88,9 @@ def bristle_tangent(
     step: Array, travel: Array | float, leak: Array | float, z: Array, change: Array
 ) -> Array:
     """
-    Return how a small change of the steps, or of the travel, comes out in `bristle` from rest.
+    Return how a small change comes out in `bristle`, which returned z (..., N) from rest.
 
-    step, travel, leak: as for `bristle`.
-    z: what `bristle` returned, from rest, shape (..., N).
-    change: of step over travel, along the direction of the step, shape (..., N).
+    The change is that of step over travel, along the direction of the step, shape (..., N).
     """
     bent = np.abs(step) / travel
     whole = bent + leak
@@ -140,12 +112,7 @@ def last_true(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def linear(gain: NDArray[Any], drive: NDArray[Any], start: NDArray[Any]) -> NDArray[Any]:
-    """
-    Return y_k = gain_k y_{k-1} + drive_k; real or complex, |gain| <= 1.
-
-    gain, drive: shape (..., N).
-    start: y before the first sample, shape (...).
-    """
+    """Return y_k = gain_k y_{k-1} + drive_k from a start; real or complex, |gain| <= 1."""
     factor, value = (np.array(part) for part in np.broadcast_arrays(gain, drive))
     value[..., 0] += factor[..., 0] * start
     step = 1

@@ -108,15 +108,7 @@ class BearingTilt(LinearEffect):
     search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
-        """
-        Refuse an effect this robot cannot have.
-
-        Raises
-        ------
-        ModelError
-            As of every effect, or a second wave of other than four numbers.
-
-        """
+        """Refuse what every effect does, and a second wave of other than four numbers."""
         super().check(robot)
         if np.shape(self.second)[-1:] not in ((0,), (4,)):
             raise ModelError(

@@ -59,11 +59,7 @@ def load(view: View, index: int) -> Array:
 
 
 def _temperature(view: View, index: int) -> Array:
-    """
-    Return the recorded temperature, shape (N,) [degC].
-
-    Raises DataError: none was recorded.
-    """
+    """Return the recorded temperature, shape (N,) [degC]; DataError where there is none."""
     if view.temperature is None:
         raise DataError('a curve over temperature needs one: record /temperature')
     return view.temperature
@@ -89,13 +85,10 @@ QUANTITIES: dict[str, _Quantity] = {
 
 def basis(knots: Sequence[float], x: Array) -> Array:
     """
-    Return how much the value at each knot counts at x, shape (K, ...).
+    Return how much the value at each of K increasing knots counts at x, shape (K, ...).
 
     Natural cubic splines through unit values, one for each knot; beyond the knots, where nothing
     is known, the value at the end stays.
-
-    knots: increasing.
-    x: shape (...).
     """
     if len(knots) == 1:
         return np.ones((1, *np.shape(x)))
@@ -121,17 +114,7 @@ def _slopes(knots: tuple[float, ...]) -> Array:
 
 
 def check_knots(name: str, over: str, knots: Sequence[float], count: int) -> None:
-    """
-    Refuse a curve that is none.
-
-    Raises ModelError: it runs over something unknown, or knots do not increase, or not each has a
-    value.
-
-    name: how the message names the curve.
-    over: the quantity that it runs over.
-    knots: where it has values, in the unit of that quantity.
-    count: how many values it has.
-    """
+    """Raise ModelError unless knots over a known quantity increase, and each has its value."""
     if over not in QUANTITIES:
         raise ModelError(f'{name}: over must be one of {", ".join(QUANTITIES)}, got {over!r}')
     least = 1 if over == 'constant' else 2

@@ -297,9 +297,8 @@ def seen_from(
     """
     Return effects for another recording: the set-up's motion at its right time, or left out.
 
-    epoch_ns, span_ns: what the stamps of the recording whose set-up moved count from; its first
-    and last stamp.
-    other: where it does not overlap in time it is taken for another set-up.
+    Where the other does not overlap in time with ``span_ns``, first and last stamp of the one
+    whose set-up moved, which count from ``epoch_ns``, it is taken for another set-up.
     """
     first, last = other.span_ns
     if last < span_ns[0] or first > span_ns[1]:

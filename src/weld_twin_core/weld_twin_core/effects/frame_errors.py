@@ -173,16 +173,8 @@ class RootPose(FrameError):
         """
         Return where the positioner's rows begin, as the robot file has it and as it is.
 
-        Parameters
-        ----------
-        base : array, shape (4, 4) [m]
-            The base that it is told in, in the frame where the robot's own rows begin.
-
-        Returns
-        -------
-        array, array
-            ``T_base_root``, shape (4, 4) [m].
-
+        In a base (4, 4), itself in the frame where the robot's own rows begin; ``T_base_root``,
+        (4, 4) [m].
         """
         now, step = np.linalg.inv(robot.T_root_base), self.vector()
         new = now.copy()

@@ -54,11 +54,9 @@ def carriage_axes(view: View, i: int) -> tuple[Array, Array, Array]:
 
 def carried(view: View, i: int, slide: Array | None, turn: Array | None) -> Shift:
     """
-    Return how the pose moves where the carriage of joint i is slid, or turned about itself.
+    Return how the pose moves where the carriage of joint i is slid or turned against its guide.
 
-    i: the joint, counted from 0.
-    slide, turn: in the world, components first, shape (3, ...) [m, rad]; what is carried moves so
-    against the guide.
+    slide, turn: in the world, components first, shape (3, ...) [m, rad].
     """
     way = -1.0 if i < view.robot.behind else 1.0
     if turn is None:

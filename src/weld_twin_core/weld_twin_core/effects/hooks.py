@@ -187,7 +187,7 @@ class SearchHooks(_Hooks):
         """
         Return the instances that a fit of many small errors takes along, of hardly any size.
 
-        most: pairs of coordinates that the measurements allow every joint.
+        ``most`` pairs of coordinates is what the measurements allow every joint.
         """
         return list(self.kind.seeds(view, joint))[:2]
 
@@ -244,15 +244,7 @@ class FitHooks(_Hooks):
         return [shift for shift in shifts if shift is not None]
 
     def errors(self, std: Array) -> dict[str, Any]:
-        """
-        Return standard errors by parameter, None for a component that has none.
-
-        Parameters
-        ----------
-        std : array, shape (K,)
-            Of the fit coordinates; NaN where the data tell nothing.
-
-        """
+        """Return standard errors by parameter from those of coordinates, (K,); None for NaN."""
         out: dict[str, Any] = {}
         values = iter(None if np.isnan(value) else float(value) for value in std)
         specs = self.effect.components()
@@ -337,7 +329,7 @@ _SAME = 1e-3
 
 def highest_order(q: Array) -> float:
     """
-    Return the highest order [1/rev] that a joint's positions can tell, shape (N,).
+    Return the highest order [1/rev] that a joint's positions (N,) can tell.
 
     Above it waves look like slower ones: positions on a grid of whole degrees show nothing beyond
     180. Half a wave needs a position of its own, and positions that all but coincide are one.

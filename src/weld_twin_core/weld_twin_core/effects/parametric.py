@@ -51,11 +51,7 @@ class Parametric:
             ) from None
 
     def _check_values(self) -> None:
-        """
-        Refuse parameters without physical meaning; they are looked at once.
-
-        Raises ModelError: wrong length, not a number, or outside the bounds.
-        """
+        """Raise ModelError for a wrong length, no number, or one outside the bounds; look once."""
         if '_sound' in self.__dict__:
             return
         for parameter in self.parameters:

@@ -107,12 +107,10 @@ def _moments(view: View) -> tuple[Array, Array]:
 
 def base_leans(robot: Robot, axes: Array) -> list[dict[Channel, float]]:
     """
-    Return the channels that turn an arm's base about axes through its origin.
+    Return the channels that turn an arm's base about axes (K, 3) of its frame through its origin.
 
     Beside a positioner a lean of the arm is that of the positioner the other way round: the frames
     between the two are all that the chain has.
-
-    axes: in the base frame of the arm's rows, shape (K, 3).
     """
     if not robot.behind:
         turned = axes @ robot.T_world_base[:3, :3].T

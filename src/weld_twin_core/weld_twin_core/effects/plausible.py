@@ -39,17 +39,7 @@ def table() -> dict[tuple[str, str], Plausible]:
 
 
 def plausible(robot: Robot, effect: str, parameter: str, joint: str | None = None) -> Plausible:
-    """
-    Return spread and range of one parameter on a robot.
-
-    joint: where the effect sits.
-
-    Returns
-    -------
-    Plausible
-        As wide as can be where the effect says nothing.
-
-    """
+    """Return spread and range of a parameter on a robot; as wide as can be where none is told."""
     kind = REGISTRY.get(effect)
     each = next((p for p in kind.parameters if p.name == parameter), None) if kind else None
     result = (each and each.range) or _UNKNOWN

@@ -96,15 +96,7 @@ class ThermalGrowth(LinearEffect):
         return 'temperature' if self.warmup is None else 'time'
 
     def rise(self, view: View) -> Array:
-        """
-        Return the temperature above the reference, shape (N,) [K].
-
-        Raises
-        ------
-        DataError
-            There is neither a recorded temperature nor a warm-up curve.
-
-        """
+        """Return the temperature above the reference, (N,) [K]; DataError where there is none."""
         if self.warmup is not None:
             return self.warmup[0] * -np.expm1(-view.elapsed / self.warmup[1])
         if view.temperature is None:

@@ -197,12 +197,7 @@ class View:
 
 
 def single(channel: Channel, value: Array | float, view: View) -> Shift:
-    """
-    Return a shift of one channel, the same at every sample of a view.
-
-    channel: such as ``('q', 2)`` for the third joint.
-    value: [rad or m]
-    """
+    """Return a shift of one channel, such as ``('q', 2)``, the same at every sample [rad or m]."""
     if np.ndim(value) == 0:
         return {channel: np.full(view.t.shape, value)}
     wanted = np.broadcast_shapes(np.shape(value), view.t.shape)

@@ -64,7 +64,6 @@ def frame(step: Array, shifted: str, turned: str) -> str:
     """
     Return a displacement [m] and a turn [rad] of a frame, shape (6,), in mm and degrees.
 
-    step: shape (6,) [m, rad].
     shifted, turned: whose axes they are along and about, such as 'of the measuring frame'.
     """
     moved = _axes(np.asarray(step[:3]) * 1e3, _LEAST_MM, 'mm along', 3)
@@ -99,18 +98,7 @@ def placed(pose: Array) -> str:
 
 
 def further(offset: float, *, sliding: bool = False) -> str:
-    """
-    Return how much further than its reading a joint stands, to follow the reading in a sum.
-
-    offset: the joint stands at reading + offset [rad or m].
-    sliding: whether the joint slides; its offset is then in metres.
-
-    Returns
-    -------
-    str
-        Such as ``+ 0.0456 deg``: a sign, a blank, a number and its unit.
-
-    """
+    """Return how much further than its reading a joint stands [rad or m], as ``+ 0.0456 deg``."""
     places, unit = (3, 'mm') if sliding else (4, 'deg')
     shown = offset * 1e3 if sliding else float(np.degrees(offset))
     return f'{"-" if shown < 0.0 else "+"} {abs(shown):.{places}f} {unit}'

@@ -66,14 +66,10 @@ class DhDraws(NamedTuple):
 
 class SeamDraws:
     """
-    A robot of revolute joints at the samples of a seam, prepared for draws of its DH values.
+    A robot of revolute joints at samples (N, n) [rad] of a seam, ready for draws of its DH values.
 
-    robot: the nominal robot, 'standard' convention, without Hayati angles.
-    q: shape (N, n) [rad].
-    smooth: look for samples that determine the others; False works on all samples.
-
-    Raises ModelError: the robot has modified rows, Hayati angles, joints that slide or a
-    positioner.
+    The samples that determine the others are looked for where it is ``smooth``. Raises ModelError:
+    the robot has modified rows, Hayati angles, joints that slide or a positioner.
     """
 
     def __init__(self, robot: Robot, q: Array, *, smooth: bool = True) -> None:
@@ -126,11 +122,7 @@ class SeamDraws:
         return out
 
     def deviations(self, draws: DhDraws) -> Array:
-        """
-        Return deviations of the tool point from the nominal one in the world, (D, N, 3) [m].
-
-        draws: shape (D, n) each.
-        """
+        """Return the tool point's deviations from nominal in the world, (D, N, 3) [m]."""
         out = np.empty((len(draws.theta), self._count, 3))
         with unbuffered():
             for start in range(0, len(out), _BLOCK):
@@ -197,11 +189,7 @@ class SeamDraws:
             yield np.matmul(squares, some, out=every).T
 
     def _carried(self, draws: DhDraws) -> Array:
-        """
-        Return tool points as in `_points`, carried down the chain, shape (3, S, D).
-
-        Two coordinates are one complex number, which turns by one multiplication.
-        """
+        """Return tool points carried down the chain, two coordinates in one number, (3, S, D)."""
         rows = _Rows(draws)
         turns, twists = rows.cosine + 1j * rows.sine, rows.alpha_cosine + 1j * rows.alpha_sine
         yz, xy, spin = np.empty((3, len(self._phases[0]), draws.theta.shape[0]), dtype=complex)
@@ -228,11 +216,7 @@ class SeamDraws:
         return rows.linked(rows.carried(start, range(_SPLIT - 1, 0, -1)), 0), far
 
     def _points(self, near: Array, far: Array, memory: Array) -> Array:
-        """
-        Return tool points after the first joint's turn was taken away, shape (3, D, S).
-
-        They lie in the memory, of which there must be five times as much.
-        """
+        """Return tool points before the first joint's turn, (3, D, S), in a fifth of memory."""
         tip = _on_features(far, self._far, memory[4])[:, 0]
         frame = _on_features(near, self._near, memory[:4].reshape(-1))
         out = frame[:, 3]
@@ -273,8 +257,7 @@ class _Rows:
         """
         Apply Rz(theta) Tz(d) Tx(a) Rx(alpha) of row i, the joint at zero, in place.
 
-        ``vectors`` are shape (3, features, k, D); the last of the k is a point, the others are
-        directions.
+        Vectors are (3, features, k, D); the last of the k is a point, the others are directions.
         """
         x, y, z = vectors
         _turn(y, z, self.alpha_cosine[i], self.alpha_sine[i])

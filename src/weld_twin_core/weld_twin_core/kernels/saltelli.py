@@ -29,12 +29,7 @@ _CONSTANT = np.finfo(np.float64).eps
 
 
 def base_pair(inputs: int, base: int, seed: int) -> tuple[Array, Array]:
-    """
-    Return probabilities of every input, two independent sets of shape (base, inputs).
-
-    base: samples of each set, a power of two.
-    seed: of the scrambling.
-    """
+    """Return two independent sets of probabilities (base, inputs), base a power of two."""
     from scipy.stats import qmc  # half a second, for nothing but this
 
     pair = qmc.Sobol(2 * inputs, scramble=True, seed=seed).random(base)
@@ -43,13 +38,11 @@ def base_pair(inputs: int, base: int, seed: int) -> tuple[Array, Array]:
 
 def mixed(first: Array, second: Array, groups: Sequence[str] | None = None) -> Array:
     """
-    Return the runs of Saltelli's design, shape (base, G + 2, inputs).
+    Return the runs of Saltelli's design, shape (base, G + 2, inputs), of the sets of `base_pair`.
 
     Of the runs of one base sample the first is that of ``first``, the last that of ``second``, and
     run 1 + g is the first with the inputs of group g from the second. Every input is a group of
     its own unless ``groups`` names that of each; they count in order of appearance.
-
-    first, second: two independent sets of probabilities, shape (base, inputs); see `base_pair`.
     """
     base, inputs = first.shape
     names = list(range(inputs)) if groups is None else list(groups)
@@ -72,13 +65,7 @@ def sobol_estimates(results: Array) -> tuple[Array, Array]:
 def sobol_half_widths(
     results: Array, confidence: float, rng: np.random.Generator, resamples: int = 100
 ) -> tuple[Array, Array]:
-    """
-    Return half-widths of the intervals of both indices, shape (G,), by the bootstrap [2]_.
-
-    results: model results in the order of `mixed`, shape (base, G + 2).
-    confidence: such as 0.95.
-    rng: chooses the resamples.
-    """
+    """Return half-widths of both indices' intervals, (G,), by the bootstrap [2]_."""
     base = len(results)
     picks = rng.integers(base, size=(base, resamples)) + base * np.arange(resamples)
     counts = np.bincount(picks.ravel(), minlength=base * resamples).reshape(resamples, base)

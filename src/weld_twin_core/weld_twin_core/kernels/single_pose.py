@@ -157,12 +157,7 @@ _UNIT = (0.981, 1.019)
 
 
 def quaternion_matrix(x: float, y: float, z: float, w: float, name: str) -> Array:
-    """
-    Return the rotation matrix, shape (3, 3), of a quaternion.
-
-    Raises DataError: it is not finite or its length is not 1 within 1 %; ``name`` says whose it
-    is.
-    """
+    """Return the matrix (3, 3) of a quaternion; DataError as `matrix_from_quaternion`."""
     square = x * x + y * y + z * z + w * w
     if not _UNIT[0] < square < _UNIT[1]:
         return matrix_from_quaternion([x, y, z, w], name)

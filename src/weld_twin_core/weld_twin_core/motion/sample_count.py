@@ -14,13 +14,7 @@ Samples a motion may have: four and a half hours at 125 Hz, half an hour at 1 kH
 
 
 def refuse_endless(duration: float, dt: float, most: int = MOST_SAMPLES) -> None:
-    """
-    Refuse a motion of more samples than make sense.
-
-    Raises PathError: it would have more samples than that.
-
-    duration, dt: [s]
-    """
+    """Raise PathError where a motion has more samples than make sense; times are in s."""
     if not duration <= most * dt:
         raise PathError(
             f'the motion would take {duration / dt:.3g} samples, and {most:,} are the most; lower '

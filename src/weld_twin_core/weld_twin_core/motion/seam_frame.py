@@ -28,9 +28,7 @@ def path_tangents(position: ArrayLike) -> Array:
     Return unit directions of travel, shape (N, 3), of positions, shape (N, 3) [m].
 
     The chord between the neighbours of each sample; at rest, the last direction of travel (at a
-    rest before the start, the first).
-
-    Raises DataError: the positions do not move.
+    rest before the start, the first). Raises DataError: the positions do not move.
     """
     points = readonly(position, (None, 3), 'path positions')
     index = np.arange(len(points))
@@ -47,11 +45,9 @@ def path_tangents(position: ArrayLike) -> Array:
 
 def seam_axes(tangent: ArrayLike, normal: ArrayLike) -> Array:
     """
-    Return seam axes as rows along, across, normal, shape (..., 3, 3).
+    Return seam axes as rows along, across, normal, shape (..., 3, 3); DataError for none.
 
-    Raises DataError: a tangent is zero, or a normal lies along its tangent.
-
-    tangent, normal: of any length, shape (..., 3); the normal is made square to the tangent.
+    The normal (..., 3) is made square to the tangent; their lengths do not matter.
     """
     along, normal = np.broadcast_arrays(
         np.asarray(tangent, dtype=np.float64), np.asarray(normal, dtype=np.float64)
@@ -65,15 +61,7 @@ def seam_axes(tangent: ArrayLike, normal: ArrayLike) -> Array:
 
 
 def seam_components(deviation: ArrayLike, tangent: ArrayLike, normal: ArrayLike) -> Array:
-    """
-    Return deviations as components along, across and normal to a seam, shape (..., 3) [m].
-
-    Raises DataError: a tangent is zero, or a normal lies along its tangent.
-
-    deviation: in the world frame, shape (..., 3) [m].
-    tangent, normal: directions of the travel and out of the work, shape (3,) or (..., 3); their
-    lengths do not matter.
-    """
+    """Return deviations (..., 3) [m] of the world as components along `seam_axes`."""
     vector = np.asarray(deviation, dtype=np.float64)
     components: Array = (seam_axes(tangent, normal) @ vector[..., None])[..., 0]
     return components

@@ -36,11 +36,7 @@ class DhStudy:
     """The nominal robot at the samples of the study."""
 
     def deviations(self, draws: Array) -> Array:
-        """
-        Return the deviations of draws in seam axes, shape (3, D, N) [m].
-
-        draws: in the units of the tolerances, shape (D, P).
-        """
+        """Return the deviations of draws (D, P) in seam axes, shape (3, D, N) [m]."""
         robot = self.study.robot
         values = {
             key: np.repeat(getattr(robot, key)[None], len(draws), axis=0)

@@ -105,9 +105,9 @@ class _Left(NamedTuple):
     """
     What the slopes leave of some draws.
 
-    ``order`` of the path points (N,) puts those where anything is left last, K of them;
-    ``shapes`` are in it. ``rests`` are displacements of the joints, S columns in all, and
-    ``carried`` (3, S, K) how far each moves the tool there.
+    ``order`` of the path points (N,) puts those where anything is left last, K of them; ``shapes``
+    are in it. ``rests`` are displacements of the joints, S columns in all, and ``carried`` (3, S,
+    K) how far each moves the tool there.
     """
 
     order: NDArray[np.intp]

@@ -170,11 +170,7 @@ def _different(draws: Array) -> tuple[Array, NDArray[np.intp]]:
 def remembered(
     study: Study, tolerances: Sequence[Tolerance], scale: Array
 ) -> tuple[Remembered, ...]:
-    """
-    Return the memory of every joint that has tolerances of it.
-
-    scale: typical size of each, in its unit, shape (P,); slopes are taken at it.
-    """
+    """Return the memory of every joint that has tolerances of it, slopes at their sizes (P,)."""
     columns: dict[int, list[int]] = {}
     for k, tolerance in enumerate(tolerances):
         if REGISTRY[tolerance.effect].stage in MEMORY:
@@ -191,13 +187,7 @@ def remembered(
 def _displacement(
     study: Study, joint: int, tolerances: Sequence[Tolerance], draws: Array
 ) -> Array:
-    """
-    Return displacements of a joint, shape (D, N) [rad or m], beyond those of the known effects.
-
-    joint: counted from 0.
-    tolerances: of effects with memory on that joint.
-    draws: in the units of the tolerances, shape (D, M).
-    """
+    """Return displacements (D, N) of a joint by draws (D, M) beyond those of the known effects."""
     name = study.robot.joint_names[joint]
     known = tuple(e for e in study.known if e.stage in MEMORY and e.site == name)
     drawn = with_draws(known, tolerances, draws)

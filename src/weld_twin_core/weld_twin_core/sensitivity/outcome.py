@@ -60,11 +60,7 @@ def joined(parts: list[Outcomes]) -> Outcomes:
 
 
 def refuse_unfinite(values: Array, what: str) -> None:
-    """
-    Refuse model results that are not numbers.
-
-    Raises DataError: says how many there are and which run is the first.
-    """
+    """Raise DataError where model results are no numbers, with how many and the first run."""
     bad = ~np.isfinite(values)
     if bad.any():
         first = int(np.argmax(bad.reshape(len(values), -1).any(axis=1)))

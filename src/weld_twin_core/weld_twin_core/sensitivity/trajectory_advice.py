@@ -327,13 +327,7 @@ class _Search:
     def best(
         self, label: str, free: list[int], tries: int, seed: int, start: PlacementResult
     ) -> PlacementResult:
-        """
-        Return the best placement found with some of the values free.
-
-        label: what the result is called.
-        free: which of torch rotation, base x, base y and base yaw may change.
-        start: what the values that are not free stay at.
-        """
+        """Return the best placement found with some of torch rotation, base x, y and yaw free."""
         # Both bring most of scipy along, and whoever asks for no placement needs neither.
         from scipy.optimize import minimize
         from scipy.stats import qmc

@@ -62,10 +62,9 @@ def corrected(robot: Robot, effects: Sequence[Effect]) -> tuple[Robot, tuple[Eff
 
 def joint_offsets(robot: Robot, effects: Sequence[Effect]) -> np.ndarray:
     """
-    Return the offset of every joint, shape (n,) [rad or m].
+    Return how much further than its reading every joint stands, shape (n,) [rad or m].
 
-    The joint really stands this much further than its reading; a controller that keeps its
-    own offsets adds it to the reading.
+    A controller that keeps its own offsets adds it to the reading.
     """
     out = np.zeros(robot.n)
     for effect in effects:

@@ -32,10 +32,10 @@ class Features:
     """
     First-order features of effects, for one recording and one set of stamps.
 
-    twin: where the features are taken: its effects act, the ones asked about come on top.
-    at: shape (M,) [s].
-    remembered: keeps what effects with memory make of the commanded motion, which no frame and no
-    other effect changes. Features of one recording at other models may share it.
+    They are taken where the effects of a twin act, at stamps (M,) [s]. ``remembered`` keeps what
+    effects
+    with memory make of the commanded motion, which no frame and no other effect changes: features
+    of one recording at other models may share it.
     """
 
     def __init__(
@@ -128,10 +128,10 @@ class Features:
         self, kind: type[Effect], joint: str | None, pull: Array | None = None
     ) -> tuple[list[Effect], float]:
         """
-        Return the instances a search for this kind of effect starts from, and among how many.
+        Return the instances a search for this kind starts from, and among how many.
 
-        joint: the joint it would sit on; None for the robot as a whole.
-        pull: how strongly what is to be explained pulls at the joint, shape (M,).
+        The joint is None for the robot as a whole; what is to be explained pulls at it, shape
+        (M,).
         """
         view = self.joint_view if kind.stage in (Stage.SERVO, Stage.PLAY) else self.view
         seeds = list(kind.seeds(view, joint, pull))
@@ -146,11 +146,9 @@ def joints_of(kind: type[Effect], robot: Robot) -> Sequence[str | None]:
 
 def with_expected_effort(recording: Recording, robot: Robot, load_of_effort: float) -> Recording:
     """
-    Return a motion with the effort that the model's statics expect, where efforts are measured.
+    Return a motion to come with the effort that the model's statics expect, where it is measured.
 
-    recording: a motion that is thought of: a measurement to come, postures elsewhere.
-    robot: links without masses weigh nothing.
-    load_of_effort: load torque for each N m of effort, 1 or -1; of 0 the motion stays as it is.
+    ``load_of_effort`` is the load torque for each N m, 1 or -1; of 0 the motion stays as it is.
     """
     if not load_of_effort:
         return recording

@@ -119,12 +119,7 @@ class _RefusedError(DataError):
 def corrected_goal(
     model: ProgramModel, goal: Goal, limits: GoalLimits | None = None, start: Start | None = None
 ) -> CorrectedGoal | Refusal:
-    """
-    Return a goal corrected at every point, or why it is not.
-
-    Raises DataError: the goal is none: no point, times that do not increase, numbers that are not
-    finite.
-    """
+    """Return a goal corrected at every point, or why it is not; DataError where it is none."""
     checked = goal.checked(model.robot.n)
     work = _Work(model, checked, limits or GoalLimits(), start or Start())
     try:

@@ -31,7 +31,7 @@ class Goal(NamedTuple):
 
     def checked(self, joints: int) -> Goal:
         """
-        Return the goal as finite arrays of the shapes they should have.
+        Return the goal as finite arrays of their shapes.
 
         Raises DataError: there is no point, a shape or a number is wrong, or the times do not
         increase.
@@ -78,12 +78,7 @@ def course(goal: Goal, at: Array) -> Course:
     """
     Return the motion through the points: straight, cubic or quintic, by what the points tell.
 
-    at: within the goal, shape (K,) [s].
-
-    References
-    ----------
-    .. [1] ros2_controllers, joint_trajectory_controller, trajectory representation.
-
+    As ros2_controllers' joint_trajectory_controller has it; stamps (K,) [s] are within the goal.
     """
     if goal.t.size == 1:
         q = np.repeat(goal.q, at.size, axis=0)

@@ -36,12 +36,7 @@ def in_series(effects: Sequence[Effect]) -> list[tuple[int, MemoryEffect]]:
 def run_all(
     effects: Sequence[Effect], view: View, want: bool
 ) -> tuple[Array | None, list[Tangent]]:
-    """
-    Return displacements of the joints, shape (..., N, n) or None, and their derivatives.
-
-    view: the commanded motion on the joint stamps.
-    want: whether derivatives are wanted.
-    """
+    """Return joints' displacements, shape (..., N, n) or None, and, if wanted, derivatives."""
     moved: Array | None = None
     tangents: list[Tangent] = []
     for k, effect in in_series(effects):
@@ -79,11 +74,7 @@ def _pushed(effect: MemoryEffect, view: View, shift: Shift) -> dict[Any, Array]:
 
 
 class Picker:
-    """
-    Straight-line interpolation from joint stamps to measurement stamps, draws and all.
-
-    t: where to look, shape (M,) or (D, M) [s]; static stations give the nearest in time.
-    """
+    """Straight lines from joint stamps to stamps (M,) or (D, M) [s]; at stations the nearest."""
 
     def __init__(self, motion: JointMotion, t: Array) -> None:
         if motion.static or motion.t.size < 2:

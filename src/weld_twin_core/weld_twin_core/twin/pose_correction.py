@@ -73,11 +73,9 @@ class Looked(NamedTuple):
 
 class PoseCorrection:
     """
-    The correction of poses of a tool that follow each other.
+    The correction of poses of a tool, ``T_flange_tool`` (4, 4), that follow each other.
 
-    model: its effects without memory are corrected; a stream does not tell where a joint will
-    turn.
-    tool: ``T_flange_tool`` that the poses are given for, shape (4, 4).
+    Effects without memory are corrected; a stream does not tell where a joint will turn.
     """
 
     def __init__(self, model: ProgramModel, tool: Array) -> None:
@@ -114,9 +112,8 @@ class PoseCorrection:
         Return the exact correction of a pose, found from joints near it.
 
         Its joints are those at which the real tool is at the pose: Newton, with the real arm's own
-        slope. What is added takes the pose to where the nominal arm has the tool at them.
-
-        Raises DataError: it cannot be reached from there.
+        slope. What is added takes the pose to where the nominal arm has the tool at them. Raises
+        DataError: it cannot be reached from there.
         """
         q, size = near, np.inf
         for _ in range(ROUNDS):
@@ -138,11 +135,7 @@ class PoseCorrection:
         return Looked(pose, np.concatenate([added, q]), np.concatenate([apart @ back, back]))
 
     def exact(self, pose: Array) -> Looked:
-        """
-        Return the exact correction of a pose, found from the latest one.
-
-        Raises DataError: it cannot be reached.
-        """
+        """Return a pose's exact correction from the latest one; DataError out of reach."""
         return self.first(pose, self.joints(pose))
 
     def adopt(self, looked: Looked | None) -> None:
@@ -164,16 +157,9 @@ class PoseCorrection:
 
     def added(self, pose: Array) -> tuple[Array, float]:
         """
-        Return what is to be added to a pose, and how far the latest look is.
+        Return what is to be added to a pose (4, 4), (6,) [m, rad], and how far the latest look is.
 
-        pose: shape (4, 4).
-
-        Returns
-        -------
-        added : array, shape (6,) [m, rad]
-        far : float
-            Distance from the latest exact correction, in units of how far it may be.
-
+        That is in units of how far it may be.
         """
         assert self._at is not None
         way, size = _away(self._at, pose)

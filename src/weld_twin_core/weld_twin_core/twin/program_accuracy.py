@@ -74,9 +74,8 @@ def accuracy(
     """
     Return the accuracy over samples, or None without any.
 
-    gaps: what is missing by the model, shape (N, 6) [m, rad].
-    drawn: of the same samples.
-    ways: how much of the way each sample stands for, shape (N,) [m]; all alike without.
+    By the gaps (N, 6) [m, rad] of the model and what is drawn of the same samples, each of which
+    stands for so much of the way (N,) [m]; all alike without.
     """
     gap = np.concatenate([np.zeros((0, 3)), *(g[:, :3] for g in gaps)])
     if not len(gap):

@@ -115,9 +115,9 @@ def correct_program(
     """
     Return a program whose points are moved so that the real tool goes where it was to go.
 
-    held: points that must not be moved, with the reason; their seams are left as they were.
-    start: joint positions before the first move, shape (n,).
-    written: returns points as they read once they are written; a language has only so many digits.
+    Points that are held must not be moved, with the reason; their seams are left as they were. The
+    arm is at ``start`` (n,) before the first move. ``written`` returns points as they read once
+    they are written; a language has only so many digits.
     """
     way = travel(model.robot, program, start, model.recorded if model.posterior else None)
     work = _Work(model, program, way, caps or Caps(), model.without_memory(), written)
@@ -255,13 +255,7 @@ class _Work(NamedTuple):
         return 'for the correction itself would turn a joint around, and lost motion the other way'
 
     def moved_by(self, moved: MoveProgram, use: Use, tool: Array) -> tuple[float, float]:
-        """
-        Return how far a place moved [m, rad].
-
-        moved: the corrected program.
-        use: where the place is used.
-        tool: the tool frame there, shape (4, 4).
-        """
+        """Return how far the place of a use, with a tool (4, 4), moved in a program [m, rad]."""
         old, new = self.program.place(use), moved.place(use)
         if old.ndim == 1:
             old, new = forward(self.model.arm(tool), np.stack([old, new]))

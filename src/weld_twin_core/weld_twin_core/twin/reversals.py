@@ -58,8 +58,8 @@ def approached(recording: Recording, came: Array | None, stands: Array | None = 
     """
     Return a recording that begins with a motion to its first sample from where joints came.
 
-    came: sign of the last motion of every joint, shape (n,); 0 where it is not known.
-    stands: where that motion ended, shape (n,) [rad or m]; left out, at the first sample.
+    That is by the sign of every joint's last motion, 0 where it is not known, which ended where
+    the arm ``stands``, shape (n,) each; left out, at the first sample.
     """
     motion = recording.joints
     way = np.zeros((0, motion.q.shape[1]))
@@ -83,9 +83,7 @@ def play_steps(
     """
     Return what takes play away at every sample, as steps, shape (K, n) [rad or m].
 
-    recording: the motion that the joints are to make behind the gaps.
-    came: sign of the last motion of every joint before the first sample, shape (n,); 0 where it is
-    not known.
+    The recording is the motion that the joints are to make behind the gaps; see `approached`.
     """
     motion = recording.joints
     steps = np.zeros_like(motion.q)
@@ -106,14 +104,11 @@ def spread(
     rests: bool = False,
 ) -> _Spread:
     """
-    Return steps spread over the standstill of each reversal, looked up at stamps.
+    Return steps of `play_steps` spread over the standstill of each reversal, at samples (N,) [s].
 
-    steps: from `play_steps`, at the samples of the course, shape (K, n) [rad or m].
-    share: how far a joint may be from where it turns around while its step is made, in units of
-    what is added for play at most.
-    at: samples of the course, shape (N,) [s].
-    came: as for `play_steps`, shape (n,).
-    rests: the arm stands still before the first sample, and makes its first steps there.
+    A joint may be as far from where it turns around while its step is made as a share of the
+    largest step. An arm that ``rests`` stands still before the first sample, and makes its first
+    steps there.
     """
     out = _Spread(*np.zeros((3, at.size, steps.shape[1])))
     place = np.searchsorted(course.t, at)
@@ -139,9 +134,9 @@ def spread(
 
 def _standstills(q: Array, before: float, near: float) -> list[tuple[int, int]]:
     """
-    Return first and last sample about every place where a joint turns around.
+    Return first and last sample about every place where a joint turns around, joined if they meet.
 
-    Those that meet are one. A joint that came from nobody knows where turns around at its start.
+    A joint that came from nobody knows where turns around at its start.
     """
     ways = np.concatenate([[np.sign(before)], np.sign(np.diff(q))])
     last = np.maximum.accumulate(np.where(ways != 0.0, np.arange(ways.size), 0))
@@ -170,10 +165,9 @@ _BACK = 1e-5
 
 def just_turned(motion: JointMotion, at: Array) -> NDArray[np.bool_]:
     """
-    Return whether joints turned around less than `_TAKEN_UP` ago, shape (M, n).
+    Return whether joints turned around less than `_TAKEN_UP` before stamps (M,) [s], shape (M, n).
 
-    at: stamps within it, shape (M,) [s]. Nothing has turned at rest at stations, or before a first
-    turn.
+    Nothing has turned at rest at stations, or before a first turn.
     """
     out = np.zeros((at.size, motion.q.shape[1]), dtype=bool)
     if motion.static:

@@ -36,11 +36,7 @@ class Spots:
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], robot: Robot) -> Spots | None:
-        """
-        Return the places of contacts; None where an instrument measured.
-
-        recordings: one for every place.
-        """
+        """Return the places of contacts, a recording each; None where an instrument measured."""
         if any(recording.contacts is None for recording in recordings):
             return None
         bare = robot.with_frames(base=np.eye(4))

@@ -61,16 +61,7 @@ class EffectStages:
         return np.broadcast_shapes(*(effect.draws for effect in self.effects))
 
     def late(self, elapsed: Array | float) -> Array:
-        """
-        Return how much later measurements are stamped than the instants they show.
-
-        elapsed: instants, since the first joint stamp, shape (N,), or float [s].
-
-        Returns
-        -------
-        array, shape as ``elapsed`` [s]
-
-        """
+        """Return how much later instants since the first joint stamp are stamped, as given [s]."""
         instants = np.asarray(elapsed, dtype=np.float64)
         late = np.zeros(instants.shape)
         # What a clock is behind by goes by its own stamps, and these are what is asked for.
@@ -79,12 +70,7 @@ class EffectStages:
         return late
 
     def behind(self, elapsed: Array, *, static: bool = False) -> Array:
-        """
-        Return how far before their stamps measurements show the robot, shape (..., N) [s].
-
-        elapsed: stamps of measurements, since the first joint stamp, shape (N,) [s].
-        static: the measurements are of stations at rest.
-        """
+        """Return how far before their stamps (N,) measurements show the robot, (..., N) [s]."""
         still = np.zeros((1, self.robot.n))
         view = View(self.robot, elapsed, elapsed, still, still, static)
         each = [effect.displace(view)['clock', 0] for effect in self.of_stage(Stage.CLOCK)]
@@ -95,11 +81,7 @@ class EffectStages:
         return [effect for effect in self.effects if effect.stage == stage]
 
     def pointwise(self, view: View, tangents: Sequence[Tangent] | None = None) -> Evaluation:
-        """
-        Run the stages without memory.
-
-        ``tangents`` are the derivatives of what came before; left out, none are computed.
-        """
+        """Run the stages without memory; with derivatives behind those of what came before."""
         view, ordered = self._stages(view, tangents)
         return Evaluation(view, view.frames, posed(view), ordered)
 
@@ -146,9 +128,8 @@ class EffectStages:
         """
         Return how joints before the springs move those behind, shape (n, n, ...); None if alike.
 
-        (1 - C dtau/dq)^-1, the derivative of q = theta + C tau(q) by theta.
-
-        view: behind all stages, as `pointwise` leaves it.
+        (1 - C dtau/dq)^-1, the derivative of q = theta + C tau(q) by theta, of a view behind all
+        stages.
         """
         springs = [spring for spring in self.of_stage(Stage.ELASTIC) if spring.twin.settles]
         if not springs:

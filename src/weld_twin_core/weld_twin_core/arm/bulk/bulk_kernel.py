@@ -79,12 +79,10 @@ class BulkKernel:
 
     def poses(self, q: Array, out: Array | None = None) -> Array:
         """
-        Return tool poses ``T_world_tool``, shape (N, 4, 4), of joint positions (N, n).
+        Return tool poses ``T_world_tool``, shape (N, 4, 4), of joint positions (N, n) [rad or m].
 
-        Raises ModelError: ``q`` or ``out`` are of another shape, or ``out`` is not contiguous.
-
-        q: shape (N, n) [rad or m].
-        out: where they are written to, shape (N, 4, 4); contiguous.
+        Raises ModelError: a shape is wrong, or ``out``, where they are written to, is not
+        contiguous.
         """
         out = self._poses_like(q, out)
         with unbuffered():
@@ -99,15 +97,11 @@ class BulkKernel:
         Return tool poses and how the tool turns with each channel, shape (6, channels, N).
 
         Velocity of the tool point [m/rad] first, then the axis. A channel that slides moves the
-        tool point along the axis of its screw: what `chain.column` gives for 'd' is rows 3 to 5
-        of the screw of 'theta', and 'a' goes with 'alpha' likewise in standard rows.
-
-        Raises ModelError: ``q``, ``poses`` or ``out`` are of another shape, or ``poses`` is not
-        contiguous.
-
-        q: shape (N, n) [rad or m].
-        poses: where the poses are written to, shape (N, 4, 4).
-        out: where the turns are written to, shape (6, channels, N); may be a view.
+        tool point
+        along the axis of its screw: what `chain.column` gives for 'd' is rows 3 to 5 of the screw
+        of 'theta', and 'a' goes with 'alpha' likewise in standard rows. Both are written to arrays
+        that are given, of which that of the poses must be contiguous; raises ModelError where a
+        shape is wrong.
         """
         poses = self._poses_like(q, poses)
         shape = 6, len(self.channels), len(q)
@@ -210,11 +204,7 @@ def _columns(poses: Array) -> Array:
 
 
 def _on_features(joints: int, weights: Array) -> Array:
-    """
-    Return weights with one row for every output, shape (outputs, features).
-
-    Features that leave the last joints at 1 come first.
-    """
+    """Return weights, a row for every output; features with the last joints at 1 come first."""
     flat = on_half_angles(weights.reshape(len(weights), -1), joints).T
     every = flat.reshape(-1, *[3] * joints)
     reverse = (0, *range(joints, 0, -1))

@@ -67,12 +67,9 @@ _BY_TANGENT = _tangent_is_vectorised()
 
 class HalfAngle:
     """
-    Takes the features (u, v) of many angles, in memory of its own.
+    Takes the features (u, v) of many angles, in memory that is free between calls.
 
-    *shape: shape of the angles.
-    powers: shape (DEGREE + 1, size).
-    own: memory that is free during a call and may be used otherwise between calls, shape (3,
-    size). Of the second the result is part.
+    powers: shape (DEGREE + 1, size). own: shape (3, size); the result is part of it.
     """
 
     def __init__(

@@ -52,11 +52,7 @@ class _Run(NamedTuple):
 
 
 class Division:
-    """
-    A robot's chain of factors, divided in two pieces at one of its joints.
-
-    channels: what is asked for.
-    """
+    """A robot's chain of factors, divided in two pieces at a joint, for some channels."""
 
     def __init__(self, robot: Robot, channels: Sequence[Channel]) -> None:
         self._robot = robot

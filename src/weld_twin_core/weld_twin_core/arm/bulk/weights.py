@@ -111,11 +111,7 @@ def _adjoint(matrices: Array) -> Array:
 
 
 class Piece:
-    """
-    A run of factors with what stands before and after them.
-
-    before, after: base or tool frame, where the piece begins or ends the chain, shape (4, 4).
-    """
+    """A run of factors, and the base or tool frame before and after them, (4, 4) each."""
 
     def __init__(self, run: Sequence[_Factor], before: Array, after: Array) -> None:
         self._factors = list(run)
@@ -134,10 +130,9 @@ class Piece:
 
     def velocities(self, turns: Sequence[tuple[int, int]]) -> Array:
         """
-        Return weights of the tip's velocity and of the axis, shape (features, turns, 2, 3).
+        Return weights of velocity and axis before the piece, (features, turns, 2, 3).
 
-        Both are in the frame before the piece; a turn is that of a coordinate axis before one of
-        the factors.
+        A turn is that of a coordinate axis before one of the factors.
         """
         out = np.zeros((len(self._upto[-1]), len(turns), 2, 3))
         for t, (k, axis) in enumerate(turns):

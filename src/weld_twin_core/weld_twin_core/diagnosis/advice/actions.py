@@ -19,8 +19,7 @@ def actions(
     """
     Return what to do about every effect found, one sentence each, in their order.
 
-    robot: the nominal model: what is entered in the controller now.
-    mends: what was undone of the data, as a model has it.
+    By the nominal model, which is entered in the controller now, and what was undone of the data.
     """
     turned = turned_joints(mends, robot)
     return tuple(_action(effect, robot, turned) for effect in result)

@@ -94,11 +94,7 @@ class Candidate:
 def candidates(
     problem: Problem, model: Model, limits: Limits, joints: Sequence[str] = ()
 ) -> Iterator[Candidate]:
-    """
-    Yield what could be measured next, beside the recordings at hand.
-
-    ``joints`` are those that causes in question sit on.
-    """
+    """Yield what could be measured next beside the recordings; what is in doubt sits on joints."""
     here = _Here(problem, replace(model, bases=model.bases[:1], found=()), limits)
     if limits.set_up or not problem.at_rest:
         yield here.path(joints)

@@ -66,9 +66,8 @@ def next_step(
     """
     Return the next experiment as `next_experiment` does, None when the question is closed.
 
-    verdict: with the confidence that it has earned.
-    limits: what an experiment may cost, and where it has to stay.
-    alternative: what explains the gap without a formula.
+    The verdict has the confidence that it has earned; ``alternative`` explains the gap without a
+    formula.
     """
     limits = limits or Limits()
     if result.problem.untracked:
@@ -184,7 +183,7 @@ def _without_names(
     result: Search, alternative: Curved | None, low: Array, high: Array
 ) -> list[_Explanation]:
     """
-    Return the free-form explanation and the nearest other ones, likeliest first; none without a rival.
+    Return the free-form explanation and the nearest other ones, likeliest first, or none.
 
     Curves over an angle go on, free to bend, to what the joints may reach, from low to high, (n,).
     """

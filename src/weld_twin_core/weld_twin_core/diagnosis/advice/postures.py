@@ -75,24 +75,11 @@ _RATE = 100.0
 
 class Room:
     """
-    Where an arm may go in an experiment.
+    Where an arm may go in an experiment; what was recorded, there it has been.
 
-    Parameters
-    ----------
-    problem : Problem
-        What was recorded: the arm has been there.
-
-    Raises
-    ------
-    DataError
-        The box of the cell holds no posture near those recorded.
-
-    Attributes
-    ----------
-    home : array, shape (n,) [rad, m]
-        The recorded posture in the middle of all, or the nearest to it that lies in the box.
-    low, high : array, shape (n,) [rad, m]
-
+    ``home`` (n,) is the recorded posture in the middle of all, or the nearest to it that lies in
+    the box; ``low`` and ``high`` are the range about it [rad, m]. Raises DataError: the box of the
+    cell holds no posture near those recorded.
     """
 
     def __init__(self, problem: Problem, robot: Robot, limits: Limits) -> None:
@@ -132,7 +119,7 @@ class Room:
 
     def spread(self, count: int, skip: int = 0) -> Array:
         """
-        Return postures that fill the range evenly, as many as are free, shape (count, n).
+        Return free postures that fill the range evenly, as far as there are, (count, n).
 
         The way from home to each is free too. ``skip`` are left out, so that later experiments go
         elsewhere.
@@ -166,11 +153,7 @@ class Room:
         return np.array(out)
 
     def travel(self, stops: Sequence[Array], speed: float) -> JointMotion:
-        """
-        Return the motion from stop to stop, (n,) [rad, m], at rest at each.
-
-        ``speed`` is the share of the fastest that an experiment may.
-        """
+        """Return the motion from stop to stop, (n,), at rest at each, at a share of fastest."""
         robot = self._robot
         fast = (
             _FASTEST * speed * np.where(np.isfinite(robot.max_velocity), robot.max_velocity, 1.0)

@@ -162,12 +162,7 @@ def _stacked(side: Side, true: int, alternative: int, names: list[str]) -> Array
 def at_hand(
     problem: Problem, model: Model, alternatives: Sequence[_Alternative], scale: Scale
 ) -> Side:
-    """
-    Return what the alternatives say of the data at hand.
-
-    model: what is believed so far; everything is taken about it.
-    alternatives: the explanations to tell apart.
-    """
+    """Return what explanations say of the data at hand; everything is taken about the model."""
     few = problem.thinned(_ROWS)
     return _side(few, model, alternatives, with_weights(scale, few), '')
 

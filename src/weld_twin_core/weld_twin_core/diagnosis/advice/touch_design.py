@@ -96,13 +96,7 @@ class Design:
 
     @classmethod
     def of(cls, problem: Problem, model: Model, effects: Sequence[Effect], scale: Scale) -> Design:
-        """
-        Return what the touches at hand tell.
-
-        problem: of contacts.
-        model: with its frames as found.
-        effects: the errors that take part, as large as they were found.
-        """
+        """Return what the touches at hand tell of errors as large as they were found."""
         # A base that is fitted along counts as known: another touch tells more of it anyway.
         problem = replace(problem, align=problem.align & {'tool'})
         model, tool = model.with_found(tuple(effects)), 'tool' in problem.align
@@ -176,11 +170,7 @@ class Design:
 
 
 def scatter(touches: Sequence[Touchable], errors: int) -> Array:
-    """
-    Return the weight of errors in how far tool points scatter about their places, squared.
-
-    In units of the noise; its shape is (E, E), where E unknowns, ``errors``, are no place.
-    """
+    """Return the weight of errors in how far tool points scatter, in noise squared, (E, E)."""
     each = [t.rows[..., :errors] - t.rows[..., :errors].mean(axis=0) for t in touches]
     count = sum(len(rows) for rows in each)
     return np.asarray(sum(np.einsum('mcp,mcq->pq', rows, rows) for rows in each) / count)
@@ -192,8 +182,7 @@ def chosen(
     """
     Return which touches to make, in order, and what is known after each.
 
-    rows: of every touch that could be made, shape (N, 3, P).
-    weight: how much the errors' variances and covariances count, shape (E, E).
+    Of the rows (N, 3, P) of all that could be made; the weight (E, E) is how much variances count.
     """
     free = np.ones(len(rows), dtype=bool)
     order: list[int] = []
@@ -233,8 +222,9 @@ def again(problem: Problem, model: Model) -> Iterator[tuple[int, Recording]]:
     """
     Yield further touches of every place that can be reached: its number, and a recording.
 
-    The joints stay within the recorded range, a little widened, and the tool leans no further
-    than it has leaned there: what holds the artefact is not known.
+    The joints stay within the recorded range, a little widened, and the tool leans no further than
+    it has
+    leaned there: what holds the artefact is not known.
     """
     for k, recording in enumerate(problem.recordings):
         contacts, measured = recording.touched, recording.seen

@@ -64,10 +64,8 @@ def answer(
     limits: Limits | None = None,
 ) -> Diagnosis:
     """
-    Return the diagnosis.
+    Return the diagnosis of what was found in data that were examined.
 
-    examined: whether the data are sound, and what was mended.
-    posterior: the models that the recordings allow.
     before: the table of answers, and what is said of the names.
     alternative: what explains the gap without a formula.
     placing: what tells place and dependence of an unknown gap.
@@ -172,12 +170,7 @@ def _untold_check(result: Search, families: Sequence[str]) -> tuple[Check, ...]:
 
 
 def _gap(result: Search, floor: float) -> Gap:
-    """
-    Return the size of the gap over trusted samples.
-
-    result: its baseline holds frames and known effects only.
-    floor: RMS of the noise alone, [m].
-    """
+    """Return the gap over trusted samples, without frames and known effects; the floor is in m."""
     parts = result.problem.residuals(result.baseline.model)
     good = trusted(result.scale.weights)
     distance = np.concatenate(
@@ -241,8 +234,7 @@ def _unexplained(
     """
     Return what remains after the verdict, and what that or the gap itself depends on.
 
-    shrink: of the model that is carried.
-    placing: what tells the places of an unknown gap, so that this says what the causes say.
+    The places of an unknown gap are told by ``placing``, so that this says what the causes say.
     """
     case = Left(evidence, beliefs)
     names = evidence.structure.depends_on if case.structured else ()
@@ -252,11 +244,7 @@ def _unexplained(
 
 
 def refusal(examined: Examined) -> Diagnosis:
-    """
-    Return the diagnosis that there is none: status 'unsound', every figure not a number.
-
-    examined: with the mistakes found.
-    """
+    """Return the diagnosis that there is none: status 'unsound', every figure not a number."""
     robot = examined.given.robot
     return Diagnosis(
         gap=Gap(nan, nan, nan, None, 0, nan),

@@ -23,9 +23,9 @@ back on its feet is off by that much."""
 
 def contact_spreads(result: Search, unseen: Unseen) -> ContactResult | None:
     """
-    Return how far tool points are from their contacts, or None where an instrument measured.
+    Return how far tool points are from their contacts, None where an instrument measured.
 
-    unseen: of the final model; each place is left out in turn where there are enough.
+    Each place is left out in turn where there are enough.
     """
     problem = result.problem
     if not problem.touched:

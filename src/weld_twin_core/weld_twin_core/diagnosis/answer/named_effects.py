@@ -45,21 +45,7 @@ def named_effects(
     causes: Sequence[Cause],
     posterior: Posterior,
 ) -> tuple[tuple[Found, ...], Verdict, tuple[Cause, ...]]:
-    """
-    Return the effects told, those that move the tool most first.
-
-    unseen: of the final model; tells how far each effect moves the tool.
-    posterior: the models that the recordings allow.
-
-    Returns
-    -------
-    effects : tuple of Found
-    verdict : Verdict
-        With its sets in the same order.
-    causes : tuple of Cause
-        Each with its index in both.
-
-    """
+    """Return the effects told, those that move the tool most first, with verdict and causes."""
     model = result.final.model
     reported = _told(model.found, verdict, causes, dense=result.dense)
     squares = (unseen.targets[1:] ** 2).sum(axis=1)
@@ -107,7 +93,6 @@ def standard_errors(
 
     Parameters that are not fitted, that rest on a bound or that the data do not show have none.
 
-    problem, model, scale: a model fitted to all measurements.
     precision: of the prior of all fit coordinates, about zero, shape (K,).
     share: of the rows that count as independent.
     posterior: the models that the recordings allow; without, the one that was fitted alone counts.
@@ -140,11 +125,7 @@ def _instead(effect: Effect, sets: Sequence[tuple[Site, ...]]) -> set[tuple[str,
 def covariance(
     problem: Problem, model: Model, scale: Scale, precision: Array, share: float
 ) -> Array:
-    """
-    Return the covariance of all fit coordinates, shape (K, K); NaN for those that have none.
-
-    problem, model, scale, precision, share: as `standard_errors` takes them.
-    """
+    """Return the covariance of fit coordinates, (K, K); NaN for those that have none."""
     columns = designed(problem, model, scale)
     count = coordinates(model).size
     prior = precision if precision.size else np.zeros(count)

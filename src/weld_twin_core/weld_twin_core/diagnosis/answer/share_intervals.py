@@ -41,12 +41,10 @@ def with_intervals(
     reported: Sequence[Cause], result: Search, unseen: Unseen, verdict: Verdict, floor: float
 ) -> tuple[Cause, ...]:
     """
-    Return causes with the 90 % intervals of their shares.
+    Return causes with the 90 % intervals of their shares, above a noise of RMS ``floor`` [m].
 
     Where curves or many small errors stand for the causes, intervals are those that stretches
     tell.
-
-    floor: RMS of the noise alone [m].
     """
     curved = len(result.slots) != len(unseen.parts)
     if verdict.status == 'unknown' or curved or not any(result.slots) or not unseen.parts:
@@ -82,10 +80,10 @@ def _tries(result: Search, unseen: Unseen, floor: float) -> Array:
 
 def _coordinates(rng: np.random.Generator, result: Search, missed: float) -> Array:
     """
-    Return how far the coordinates of all effects may be off, (_DRAWS, K).
+    Return how far the coordinates of all effects may be off, (DRAWS, K).
 
-    missed: share of what is left that is no noise. It spreads over a number of directions, as what
-    formulas are believed to miss does.
+    A share of what is left is missed and no noise: it spreads over as many directions as what
+    formulas are believed to miss.
     """
     rows = result.small.residual.size
     doubt = (

@@ -95,12 +95,7 @@ def why_not(robot: Robot, pose: Array) -> str:
 
 
 def past_limit(robot: Robot, joint: int, value: float) -> str:
-    """
-    Return what is wrong with a joint position for a message.
-
-    joint: counted from 0.
-    value: the position that would be needed [rad or m].
-    """
+    """Return for a message that joint number ``joint`` would need a position [rad or m]."""
     return (
         f'joint {robot.joint_names[joint]!r} would have to be at {value:.3f}, outside '
         f'[{robot.lower[joint]:.3f}, {robot.upper[joint]:.3f}]; move the seam or turn the torch'

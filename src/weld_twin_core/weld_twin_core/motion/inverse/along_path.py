@@ -46,6 +46,7 @@ class PathSolution:
     ----------
     .. [1] T. Yoshikawa, "Manipulability of robotic mechanisms", IJRR 4(2), 1985.
 
+
     """
 
     robot: Robot
@@ -63,11 +64,7 @@ class PathSolution:
 
     @property
     def condition(self) -> Array:
-        """
-        Return the condition number of the Jacobian with lengths over the arm's reach, shape (N,).
-
-        Large means near a singularity.
-        """
+        """Return the Jacobian's condition number, lengths over the arm's reach, shape (N,)."""
         return self._posture[0]
 
     @property

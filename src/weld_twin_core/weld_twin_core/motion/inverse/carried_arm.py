@@ -28,11 +28,10 @@ def rest(robot: Robot) -> Array:
 @dataclass(frozen=True, eq=False)
 class CarriedArm:
     """
-    A robot whose first joints are told, as a controller is told its external axes.
+    A robot whose first joints are told, as a controller is told its external axes: (..., count).
 
-    Inverse kinematics is that of the arm behind them, with its base where they put it.
-
-    Raises DataError: a joint of the positioner is not told, or no joint is left.
+    Inverse kinematics is that of the arm behind them, with its base where they put it. Raises
+    DataError: a joint of the positioner is not told, or no joint is left.
     """
 
     robot: Robot
@@ -74,31 +73,13 @@ class CarriedArm:
         return forward(self._track, reported[..., self.robot.behind :])
 
     def feet(self, reported: Array) -> Array:
-        """
-        Return where the base of the arm is in the frame that the chain begins in.
-
-        reported: shape (..., count) [rad or m].
-
-        Returns
-        -------
-        array, shape (..., 4, 4) [m]
-
-        """
+        """Return the base of the arm in the frame that the chain begins in, (..., 4, 4) [m]."""
         if not self.count:
             return np.broadcast_to(np.eye(4), (*reported.shape[:-1], 4, 4))
         return np.asarray(self.roots(reported) @ self._slid(reported))
 
     def roots(self, reported: Array) -> Array:
-        """
-        Return where the robot's own rows begin in the frame that the chain begins in.
-
-        reported: shape (..., count) [rad or m].
-
-        Returns
-        -------
-        array, shape (..., 4, 4) [m]
-
-        """
+        """Return where the robot's own rows begin in that frame, shape (..., 4, 4) [m]."""
         robot = self.robot
         if not robot.behind:
             return np.broadcast_to(robot.T_world_base, (*reported.shape[:-1], 4, 4))
@@ -106,12 +87,7 @@ class CarriedArm:
         return np.asarray(np.linalg.inv(table) @ robot.T_root_base)
 
     def seen(self, poses: Array, reported: Array) -> Array:
-        """
-        Return poses as the arm's base sees them, shape (..., 4, 4).
-
-        poses: in the frame that the chain begins in, shape (..., 4, 4).
-        reported: shape (..., count) [rad or m].
-        """
+        """Return poses (..., 4, 4) as the arm's base sees them."""
         return np.asarray(np.linalg.inv(self.feet(reported)) @ poses) if self.count else poses
 
     def whole(self, reported: Array, q: Array) -> Array:
@@ -122,40 +98,17 @@ class CarriedArm:
         return np.concatenate([reported, q], axis=-1)
 
     def solve(self, pose: Array, reported: Array, seed: Array | None = None) -> Array:
-        """
-        Return every posture that reaches a pose, shape (K, n), as `solve` does.
-
-        Parameters
-        ----------
-        pose : array, shape (4, 4)
-        reported : array, shape (count,)
-        seed : array, shape (n,), optional
-
-        """
+        """Return every posture that reaches a pose (4, 4), shape (K, n), as `solve` does."""
         seed = None if seed is None else seed[self.count :]
         return self.whole(reported, solve(self.arm, self.seen(pose, reported), seed))
 
     def solve_path(self, poses: Array, reported: Array, seed: Array | None = None) -> PathSolution:
-        """
-        Return the arm's own joints along a path, as `solve_path` does.
-
-        Parameters
-        ----------
-        poses : array, shape (N, 4, 4)
-        reported : array, shape (N, count)
-        seed : array, shape (n,), optional
-
-        """
+        """Return the arm's own joints along a path of poses (N, 4, 4), as `solve_path` does."""
         seed = None if seed is None else seed[self.count :]
         return solve_path(self.arm, self.seen(poses, reported), seed)
 
     def polish(self, q: Array, poses: Array) -> tuple[Array, Array]:
-        """
-        Return joint positions closed onto poses by the arm, and the error left, as `polish` does.
-
-        q: shape (N, n).
-        poses: shape (N, 4, 4).
-        """
+        """Return positions (N, n) closed onto poses by the arm, and the error left as `polish`."""
         reported = q[..., : self.count]
         result, error = polish(self.arm, q[..., self.count :], self.seen(poses, reported))
         return self.whole(reported, result), error

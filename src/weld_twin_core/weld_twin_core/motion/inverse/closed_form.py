@@ -67,12 +67,9 @@ def family(robot: Robot) -> str | None:
 
 def branches(robot: Robot, poses: Array) -> Array:
     """
-    Return all branches, shape (8, N, 6) [rad], NaN where a branch does not reach a pose.
+    Return all branches, shape (8, N, 6) [rad], NaN where a branch does not reach a pose (N, 4, 4).
 
     The index of a branch means the same arm posture at every sample. Angles are in (-pi, pi].
-
-    robot: of one of the two families.
-    poses: ``T_world_tool``, shape (N, 4, 4).
     """
     arm = _screws(robot)
     solver = _SOLVERS[str(family(robot))]
@@ -116,11 +113,7 @@ def _listed(*angles: Array) -> Array:
 
 
 def _wrist(h4: Array, h5: Array, h6: Array, rotation: Array) -> tuple[Array, Array, Array]:
-    """
-    Return both (q4, q5, q6) with R(h4, q4) R(h5, q5) R(h6, q6) = rotation.
-
-    Of rotations (2, 2, N, 3, 3), shape (2, 2, 2, N) each.
-    """
+    """Return both (q4, q5, q6), each (2, 2, 2, N), of wrists' rotations (2, 2, N, 3, 3)."""
     last = rotation @ h6
     q5 = _two_ways(angle_to_height(h4, h5, np.broadcast_to(h6, last.shape), last @ h4), 2)
     q4 = angle_onto(h4, turn(h5, q5, np.broadcast_to(h6, (*q5.shape, 3))), last[:, :, None])
@@ -150,11 +143,7 @@ def _three_parallel(arm: _Screws, rotation: Array, point: Array) -> Array:
 
 
 def _planar(arm: _Screws, foot: Array, total: Array) -> tuple[Array, Array, Array]:
-    """
-    Return both (q2, q3, q4) that put axis 4 at ``foot`` from axis 2 and turn by ``total``.
-
-    Of feet (2, 2, N, 3), shape (2, 2, 2, N) each.
-    """
+    """Return both (q2, q3, q4), each (2, 2, 2, N), of axis 4's foot from axis 2 and total turn."""
     h, upper, fore = arm.axis, arm.point[2] - arm.point[1], arm.point[3] - arm.point[2]
     q3 = _two_ways(angle_to_distance(upper, h[2], fore, np.linalg.norm(foot, axis=-1)), 2)
     bent = upper + turn(h[2], q3, np.broadcast_to(fore, (*q3.shape, 3)))
@@ -194,13 +183,7 @@ _SOLVERS: dict[str, _Solver] = {
 
 
 def turn(axis: Array, angle: Array, vector: Array) -> Array:
-    """
-    Return vectors turned about a fixed axis, shape (..., 3).
-
-    axis: shape (3,), of length 1.
-    angle: shape (...) [rad].
-    vector: shape (..., 3).
-    """
+    """Return vectors (..., 3) turned by angles (...) about a fixed unit axis (3,)."""
     cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
     along = (vector @ axis)[..., None] * axis
     return along + cosine * (vector - along) + sine * _cross(axis, vector)
@@ -214,13 +197,7 @@ def turn_matrix(axis: Array, angle: Array) -> Array:
 
 
 def angle_onto(axis: Array, start: Array, end: Array) -> Array:
-    """
-    Return the angle that turns one vector onto another, shape (...) [rad].
-
-    axis: shape (3,), of length 1.
-    start, end: of equal length and height along the axis, shape (..., 3); otherwise the nearest
-    angle is returned.
-    """
+    """Return the angle about an axis that turns one vector onto, or nearest to, another, (...)."""
     sine = _cross(start, end) @ axis
     cosine = (start * end).sum(axis=-1) - (start @ axis) * (end @ axis)
     return np.asarray(np.arctan2(sine, cosine))
@@ -228,12 +205,9 @@ def angle_onto(axis: Array, start: Array, end: Array) -> Array:
 
 def angle_to_height(along: Array, axis: Array, start: Array, height: Array) -> Array:
     """
-    Return both angles at which a turned vector has a given component, shape (2, ...) [rad].
+    Return both angles about an axis at which a turned vector has a component, (2, ...) [rad].
 
-    along: direction of the component, shape (..., 3); the component counts in units of its length.
-    axis: shape (3,), of length 1.
-    start: the vector to turn, shape (..., 3).
-    height: the component wanted, shape (...).
+    The component counts along ``along`` (..., 3), in units of its length.
     """
     level = (start @ axis)[..., None] * axis
     cosine = ((start - level) * along).sum(axis=-1)
@@ -246,14 +220,7 @@ def angle_to_height(along: Array, axis: Array, start: Array, height: Array) -> A
 
 
 def angle_to_distance(offset: Array, axis: Array, start: Array, distance: Array) -> Array:
-    """
-    Return both angles at which a sum has a given length, shape (2, ...) [rad].
-
-    offset: shape (..., 3).
-    axis: shape (3,), of length 1.
-    start: the vector to turn, shape (..., 3); the sum is ``offset`` plus the turned vector.
-    distance: the length wanted, shape (...).
-    """
+    """Return both angles at which ``offset`` plus the turned vector has a length, (2, ...)."""
     height = 0.5 * (distance**2 - (offset**2).sum(axis=-1) - (start**2).sum(axis=-1))
     return angle_to_height(offset, axis, start, height)
 

@@ -61,13 +61,10 @@ def joined(tracks: Array) -> Array:
 
 def jumps(robot: Robot, q: Array, poses: Array) -> Mask:
     """
-    Tell, shape (..., N - 1), where the arm leaves the path between two samples.
+    Tell, (..., N - 1), where joints (..., N, n) leave the path of poses (N, 4, 4) between samples.
 
-    Half way between two joint positions of one motion the tool is near both; half way between
-    two branches it is somewhere else, or the joints move much farther than the tool.
-
-    q: shape (..., N, n) [rad or m].
-    poses: where the tool should be, shape (N, 4, 4).
+    Half way between two joint positions of one motion the tool is near both; half way between two
+    branches it is somewhere else, or the joints move much farther than the tool.
     """
     if len(poses) < 2:
         return np.zeros((*q.shape[:-2], 0), dtype=bool)

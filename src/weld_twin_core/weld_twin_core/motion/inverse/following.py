@@ -49,13 +49,11 @@ _ROUNDS = 8
 
 def follow(robot: Robot, poses: Array, seed: Array) -> Array | None:
     """
-    Return joint positions, shape (N, 6), that start near the seed and go on without a jump.
+    Return joint positions (N, 6) that start near a seed (6,) and go on without a jump.
 
-    None where they do not start there, reach a limit, come near a singularity, or leave any
-    other doubt; also for few samples, or an arm that does not have six joints.
-
-    poses: evenly spaced, by and large: the polynomials are over the samples, shape (N, 4, 4).
-    seed: shape (6,) [rad or m].
+    None where they do not start there, reach a limit, come near a singularity, or leave any other
+    doubt; also for few poses (N, 4, 4), or an arm that does not have six joints. The polynomials
+    are over the samples, which are evenly spaced by and large.
     """
     if robot.n != 6 or len(poses) < _SHORT:
         return None

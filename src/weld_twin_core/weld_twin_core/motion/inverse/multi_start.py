@@ -35,11 +35,9 @@ def search(robot: Robot, pose: Array, seed: Array | None = None) -> tuple[Array,
     """
     Return distinct solutions within the limits, shape (K, n), and the smallest error, shape (6,).
 
-    The starts are the same for every call, so the answer is repeatable. A chain with more
-    than six joints gets from each start the solution nearest the middle of its range.
-
-    pose: shape (4, 4).
-    seed: one more start, tried first, shape (n,).
+    The starts are the same for every call, after one that is given, so the answer is repeatable. A
+    chain with more than six joints gets from each start the solution nearest the middle of its
+    range.
     """
     lower, upper = _range(robot)
     rng = np.random.default_rng(0)
@@ -119,16 +117,6 @@ def centred(robot: Robot, q: Array) -> Array:
 
 
 def turns_to_middle(robot: Robot, low: Array, high: Array) -> Array:
-    """
-    Return how many whole turns bring a range of positions to the middle of the limits.
-
-    low, high: ends of the range of every joint, shape (..., n) [rad or m].
-
-    Returns
-    -------
-    array, shape (..., n)
-        Whole numbers; 0 for joints that slide.
-
-    """
+    """Return how many turns bring ranges (..., n) to the middle of limits; 0 for slides."""
     turns = np.round((middle(robot) - 0.5 * (low + high)) / TURN)
     return np.where(robot.prismatic, 0.0, turns)

@@ -29,11 +29,9 @@ def chain_jacobian(robot: Robot, chain: Frames) -> Array:
 
 def least_step(jacobian: Array, error: Array, damping: Array | float = _FLOOR) -> Array:
     """
-    Return the smallest joint step that takes a pose error away, shape (..., n) [rad or m].
+    Return the smallest joint steps (..., n) that take pose errors (..., 6) [m, rad] away.
 
-    jacobian: shape (..., 6, n).
-    error: what is missing to the pose wanted, shape (..., 6) [m, rad].
-    damping: keeps the step finite near a singularity, shape (...) [m^2].
+    The damping (...) [m^2] keeps them finite near a singularity.
     """
     transposed = np.swapaxes(jacobian, -1, -2)
     square = jacobian @ transposed + np.asarray(damping)[..., None, None] * np.eye(6)
@@ -41,13 +39,7 @@ def least_step(jacobian: Array, error: Array, damping: Array | float = _FLOOR) -
 
 
 def polish(robot: Robot, q: Array, poses: Array, rounds: int = 12) -> tuple[Array, Array]:
-    """
-    Return joint positions closed onto the poses and the error left, shapes (N, n) and (N, 6).
-
-    q: a start near the solution, shape (N, n).
-    poses: shape (N, 4, 4).
-    rounds: most Newton steps; convergence is quadratic.
-    """
+    """Return positions (N, n) closed onto poses (N, 4, 4) from near them, and the error (N, 6)."""
     chain = frames(robot, q)
     error = pose_error(chain, poses)
     for _ in range(rounds):

@@ -121,13 +121,7 @@ class _Circle:
 
     @classmethod
     def about(cls, centre: Array, axis: Array, start: Array) -> _Circle:
-        """
-        Return the circle about a point and an axis of length 1, through a start (3,) [m].
-
-        centre: shape (3,) [m].
-        axis: the travel turns about it by the right hand, shape (3,), of length 1.
-        start: a point on the circle, where it starts, shape (3,) [m].
-        """
+        """Return the circle through a start about a centre and, by the right hand, a unit axis."""
         radius = float(np.linalg.norm(start - centre))
         out = (start - centre) / radius
         return cls(centre, radius, out, np.cross(axis, out))

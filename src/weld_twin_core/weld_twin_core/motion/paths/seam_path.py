@@ -56,11 +56,7 @@ def up() -> Array:
 
 
 def unit(vector: ArrayLike, name: str) -> Array:
-    """
-    Return a vector of length 1, shape (3,).
-
-    Raises PathError: the vector has no length.
-    """
+    """Return a vector of length 1, shape (3,); PathError where it has none."""
     value = readonly(vector, (3,), name)
     size = float(np.linalg.norm(value))
     if size < 1e-12:
@@ -69,11 +65,7 @@ def unit(vector: ArrayLike, name: str) -> Array:
 
 
 def positive(value: object, name: str) -> float:
-    """
-    Return a number that is positive and finite.
-
-    Raises PathError: it is not.
-    """
+    """Return a number that is positive and finite; PathError where it is not."""
     if not (isinstance(value, (int, float)) and np.isfinite(value) and value > 0.0):
         raise PathError(f'{name} must be a positive number, got {value!r}')
     return float(value)
@@ -81,13 +73,9 @@ def positive(value: object, name: str) -> float:
 
 def frames_on(position: Array, tangent: Array, normal: Array) -> SeamFrames:
     """
-    Return frames with the part of ``normal`` that is perpendicular to the travel.
+    Return frames with the part of a normal (3,) or (N, 3) that is perpendicular to the travel.
 
     Raises PathError: somewhere the normal lies along the seam.
-
-    position: shape (N, 3) [m].
-    tangent: shape (N, 3), of length 1.
-    normal: shape (3,) or (N, 3).
     """
     flat = normal - (normal * tangent).sum(axis=-1, keepdims=True) * tangent
     size = np.linalg.norm(flat, axis=-1, keepdims=True)

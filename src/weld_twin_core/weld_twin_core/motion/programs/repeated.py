@@ -21,9 +21,6 @@ def repeated(robot: Robot, program: MoveProgram, piece: Piece) -> JointMotion:
     Return the motion of a piece with the same samples between points that moved a little.
 
     Raises ReachError: a pose is out of reach now.
-
-    program: with the points moved.
-    piece: as they were.
     """
     q = np.array(piece.motion.q)
     for k, move in enumerate(piece.moves):

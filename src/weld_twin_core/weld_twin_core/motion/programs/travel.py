@@ -102,10 +102,9 @@ def travel(
     """
     Return the motion of a program; seams that cannot be followed are left out, with the reason.
 
-    robot: its base frame does not matter; the tool is that of each move.
-    start: joint positions before the first move of every piece, shape (n,).
-    known: tells the postures that the arm is known to work in, shape (K, n) to (K,). Where a
-    program names no posture and one of them alone is known, it is taken.
+    Every piece starts at joint positions (n,), whatever the base frame. ``known`` tells the
+    postures (K, n) that the arm is known to work in: where a program names none and one of them
+    alone is, it is taken.
     """
     course = _Course(robot, program, known, {}, [])
     pieces: list[Piece] = []
@@ -244,11 +243,8 @@ def tool_way(
     """
     Return the poses of a linear or circular move, shape (K, 4, 4), and the sample on its way.
 
-    Raises PathError: three places of an arc lie on a line.
-
-    arm: with the tool of the move.
-    begin: ``T_base_tool`` where it begins, shape (4, 4).
-    count, at: samples, and which of them passes the place on the way; 0 to choose them.
+    Samples, and which passes the place on the way, are chosen where 0. Raises PathError: three
+    places of an arc lie on a line.
     """
     assert move.end is not None
     end = _pose(arm, program.place(move.end))

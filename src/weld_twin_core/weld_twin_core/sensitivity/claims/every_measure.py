@@ -13,17 +13,7 @@ from .motion_measures import MEASURES as MOTION
 
 
 def measure_case(robot: Robot, path: Path, seed: int = 0) -> dict[str, float]:
-    """
-    Return everything the claims need to know about a robot on a seam.
-
-    seed: of the draws that some measures take.
-
-    Returns
-    -------
-    dict of str to float
-        Measures by name; units are in the names of `rules`.
-
-    """
+    """Return all that the claims need of a robot on a seam by name; units as in `rules`."""
     case = Case(robot, path, seed)
     out: dict[str, float] = {}
     for measure in (*GEOMETRIC, *MOTION, *COMBINED):

@@ -53,11 +53,7 @@ class Claim:
 
 
 def judge(cases: Mapping[CaseName, Measured]) -> tuple[Claim, ...]:
-    """
-    Return a verdict on every claim from the measurements of every case.
-
-    Raises DataError: there are no cases.
-    """
+    """Return a verdict on every claim by the measurements of all cases; DataError for none."""
     if not cases:
         raise DataError('the claims need at least one robot on one seam')
     return tuple(_decide(rule, list(cases.values())) for rule in RULES)

@@ -16,15 +16,10 @@ def readonly(
     value: ArrayLike, shape: tuple[int | None, ...], name: str, *, finite: bool = True
 ) -> Array:
     """
-    Copy a value into a read-only float64 array and check it.
+    Copy a value into a read-only float64 array of a shape, where None matches any length.
 
-    Raises DataError: not numeric, wrong shape, or not finite; the message names the first bad
+    Raises DataError: not numeric, wrong shape, or not finite; the message has name and first bad
     index.
-
-    value: what the caller gave.
-    shape: wanted shape; ``None`` matches any length.
-    name: how the message names the value.
-    finite: refuse NaN and infinity.
     """
     try:
         array = np.array(value, dtype=np.float64, order='C')  # messages are rows of bytes
@@ -47,11 +42,7 @@ def readonly(
 
 
 def increasing(t: ArrayLike, name: str) -> Array:
-    """
-    Return stamps, shape (n,) [s], checked to be strictly increasing.
-
-    Raises DataError: a stamp repeats or goes back; the message names the sample.
-    """
+    """Return stamps, shape (n,) [s]; DataError names the sample where one repeats or goes back."""
     stamps = readonly(t, (None,), name)
     steps = np.diff(stamps)
     if steps.size and steps.min() <= 0.0:

@@ -283,8 +283,7 @@ def adjusted(seen: Sightings) -> _Adjusted:
     """
     Return the poses that images tell.
 
-    Raises DataError: images show too little of targets, or cameras and targets do not hang
-    together.
+    Raises DataError: images show too little, or cameras and targets do not hang together.
     """
     start = bodies(seen)
     seen = seen.take(start.rows)

@@ -109,11 +109,9 @@ def _lost(delay: Array, start: NDArray[np.int_], step: float) -> NDArray[np.int_
 
 def evenly(first: float, step: float, lost: NDArray[np.int_], size: int, count: int) -> Array:
     """
-    Return the stamps of an even clock, shape (size,) [s].
+    Return the stamps of an even clock, shape (size,) [s]: evenly thinned where fewer than count.
 
-    first, step: [s]
-    lost: as `Bursts` has it, counted in ``count`` samples.
-    size, count: how many stamps are wanted, of how many: evenly thinned where they are fewer.
+    ``lost`` is as `Bursts` has it, counted in ``count`` samples.
     """
     index = np.arange(size) * (count / size)
     return np.asarray(first + step * (index + np.searchsorted(lost, index, side='right')))
@@ -124,11 +122,7 @@ ONE_CLOCK = 'Stamp both streams with one clock, or synchronise the two (PTP, NTP
 
 
 def apart(joints: tuple[float, float], measured: tuple[float, float]) -> str | None:
-    """
-    Return that measurements and joint states have no time in common; None where they have.
-
-    joints, measured: first and last stamp of either [s].
-    """
+    """Return that measurements and joint states have no time [s] in common; None if they have."""
     gap = max(measured[0] - joints[1], joints[0] - measured[1])
     if gap <= 0.0:
         return None

@@ -69,12 +69,7 @@ def spline_slopes(x: Array, y: Array, *, natural: bool = False) -> Array:
 
 
 def slopes_of_many(x: Array, y: Array) -> Array:
-    """
-    Return what `spline_slopes` does, for thousands of knots: no row of the equations is stored whole.
-
-    x: strictly increasing, four or more, shape (N,).
-    y: shape (N, n).
-    """
+    """Return what `spline_slopes` does, for thousands of knots: no row of it is stored whole."""
     from scipy.linalg import solve_banded
 
     h = np.diff(x)

@@ -74,11 +74,7 @@ class PoseNoise:
         return replace(self, root=self.root[index], sigma=self.sigma[index])
 
     def moved(self, back: Array) -> PoseNoise:
-        """
-        Return the noise of errors that became others.
-
-        back: from the new errors to those of old, shape (M, c, c).
-        """
+        """Return the noise of new errors, from which (M, c, c) leads back to those of old."""
         root = self.root @ back
         spread = np.linalg.inv(root)[:, :3] * self.typical
         return PoseNoise(root, self.typical, np.sqrt((spread**2).sum(axis=(1, 2)) / 3.0))
@@ -134,8 +130,7 @@ def inverse_error(position: Array, rotation: Array) -> Array:
     """
     Return what errors of poses do to the inverse poses, shape (M, 6, 6).
 
-    position, rotation: the poses that are inverted [m] and (M, 3, 3); errors are shifts and turns
-    about the axes outside.
+    Errors are shifts and turns about the axes outside.
     """
     back = np.swapaxes(rotation, 1, 2)
     out = np.zeros((len(position), 6, 6))

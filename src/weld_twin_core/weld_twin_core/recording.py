@@ -21,17 +21,7 @@ _WRENCH_FRAMES = ('tool', 'base')
 
 
 def backward_rates(t: Array, values: Array) -> Array:
-    """
-    Return how fast values change since the sample before, zero at the first.
-
-    t: strictly increasing, shape (N,) [s].
-    values: shape (..., N, n).
-
-    Returns
-    -------
-    array, shape (..., N, n) [1/s]
-
-    """
+    """Return how fast values (..., N, n) change since the sample before [1/s], zero at first."""
     rates = np.zeros_like(values)
     rates[..., 1:, :] = np.diff(values, axis=-2) / np.diff(t)[:, None]
     return rates

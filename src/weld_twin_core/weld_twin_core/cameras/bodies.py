@@ -51,8 +51,7 @@ def bodies(seen: Sightings) -> Bodies:
     """
     Return a start from what every image shows by itself.
 
-    Raises DataError: no image shows enough of a target, or nothing joins a camera or a target with
-    the others.
+    Raises DataError: no image shows enough of a target, or a camera or target hangs with no other.
     """
     views = _views(seen)
     if not views:

@@ -70,20 +70,12 @@ class Lens:
         object.__setattr__(self, 'distortion', readonly(whole, (8,), 'distortion'))
 
     def project(self, points: Array) -> Array:
-        """
-        Return where points of the camera's frame appear, shape (N, 2) [px].
-
-        points: z ahead, x to the right, y down, shape (N, 3) [m].
-        """
+        """Return where points (N, 3) [m], z ahead, x right, y down, appear, shape (N, 2) [px]."""
         points = np.asarray(points, dtype=float)
         return self._bent(points[:, :2] / _depth(points))[0] * self.focal + self.centre
 
     def derivatives(self, points: Array) -> tuple[Array, Array, Array]:
-        """
-        Return pixels (N, 2), and their change with the point (N, 2, 3) and with the lens (N, 2, 9).
-
-        points: shape (N, 3) [m].
-        """
+        """Return pixels (N, 2), and their change with points (N, 2, 3) and lens (N, 2, 9)."""
         depth = _depth(points)
         flat = points[:, :2] / depth
         bent, turn, own = self._bent(flat)
@@ -98,11 +90,7 @@ class Lens:
         return bent * self.focal + self.centre, by_point, by_lens
 
     def rays(self, pixels: Array) -> Array:
-        """
-        Return where rays of pixels, shape (N, 2), meet the plane one ahead, shape (N, 2).
-
-        Newton's way, as distortion has no inverse in closed form.
-        """
+        """Return where rays of pixels (N, 2) meet the plane one ahead, (N, 2), by Newton's way."""
         wanted = (np.asarray(pixels, dtype=float) - self.centre) / self.focal
         flat = wanted.copy()
         for _ in range(ROUNDS):

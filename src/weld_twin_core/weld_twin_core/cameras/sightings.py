@@ -169,11 +169,7 @@ class Sightings:
 
 
 def described(entry: Mapping[str, Any]) -> tuple[tuple[Camera, ...], tuple[Target, ...]]:
-    """
-    Return the cameras and targets that `Sightings.as_mapping` gave.
-
-    Raises DataError: something in it cannot be understood.
-    """
+    """Return the cameras and targets of `Sightings.as_mapping`; DataError where it is none."""
     try:
         cameras = tuple(
             Camera(

@@ -24,11 +24,7 @@ _FACE = 0.1
 
 @dataclass(frozen=True)
 class Contact:
-    """
-    One thing that the tool point touches in many postures.
-
-    Raises DataError: there is no such kind, or a known place is not whole.
-    """
+    """One thing that the tool point touches; DataError for no such kind, or half a place."""
 
     label: str
     kind: str = 'point'

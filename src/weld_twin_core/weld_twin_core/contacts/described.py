@@ -26,11 +26,7 @@ what a milled block from any shop has."""
 
 
 def described(entry: Mapping[str, Any]) -> tuple[tuple[Contact, ...], tuple[Tie, ...]]:
-    """
-    Return the contacts and ties of an artefact file; see `Artefact.from_mapping`.
-
-    Raises DataError: something in it cannot be understood; the message says what.
-    """
+    """Return the contacts and ties of an artefact file; see `Artefact.from_mapping`."""
     if not isinstance(entry, Mapping) or not set(entry) <= set(_ENTRIES):
         result = ', '.join(map(str, entry)) if isinstance(entry, Mapping) else 'no mapping'
         raise DataError(f'an artefact has contacts, blocks, distances and angles; got {result}')

@@ -36,11 +36,7 @@ class Places:
     """In the order of the artefact."""
 
     def rows(self, points: Array) -> tuple[Array, Array, Array]:
-        """
-        Return residual (M, c), what it sees (M, c, 3), and all unknowns (M, c, Z).
-
-        points: shape (M, 3) [m].
-        """
+        """Return residual (M, c), what it sees of points (M, c, 3), and all unknowns (M, c, Z)."""
         count, c = self.contacts.size, self.contacts.rows
         total = sum(surface.freedom for surface in self.surfaces)
         residual, seen = np.zeros((count, c)), np.zeros((count, c, 3))
@@ -59,8 +55,8 @@ class Places:
         """
         Return how far what is known is off, its change with unknowns, and its uncertainty.
 
-        Shapes (T,), (T, Z) and (T,) [m or rad]: lengths and angles between contacts, and the
-        places of those that are known.
+        Shapes (T,), (T, Z) and (T,) [m or rad]: lengths and angles between contacts, and known
+        places.
         """
         ends = np.cumsum([0, *(surface.freedom for surface in self.surfaces)])
         where = {s.contact.label: k for k, s in enumerate(self.surfaces)}
@@ -143,12 +139,9 @@ def _apart(tie: Tie, first: Surface, second: Surface) -> tuple[Array, Array, Arr
 
 def places(contacts: Contacts, points: Array) -> Places:
     """
-    Return where contacts are, from the tool points that touched them.
+    Return where contacts of a place are, from the tool points (M, 3) [m] that touched them.
 
     Least squares that gives gross outliers little weight; known distances and angles are met.
-
-    contacts: of one place.
-    points: shape (M, 3) [m].
     """
     surfaces = []
     for contact in contacts.artefact.contacts:

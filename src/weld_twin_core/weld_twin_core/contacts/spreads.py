@@ -25,13 +25,11 @@ class Length(NamedTuple):
 
 def spreads(contacts: Contacts, points: Array) -> dict[str, Array]:
     """
-    Return how far tool points are from their contact, (m,) [m] per label.
+    Return how far tool points (M, 3) are from their contact, (m,) [m] per label.
 
     Every contact is put where its own points have it: of a point that is their mean, so that the
     mean of these distances is the usual spread. Known lengths are not used; a contact whose place
-    is known stays there.
-
-    points: shape (M, 3) [m].
+    is known stays.
     """
     out = {}
     for label in dict.fromkeys(contacts.labels):
@@ -47,11 +45,7 @@ def spreads(contacts: Contacts, points: Array) -> dict[str, Array]:
 
 
 def lengths(contacts: Contacts, points: Array) -> list[Length]:
-    """
-    Return what tool points make of the known distances and angles.
-
-    points: shape (M, 3) [m].
-    """
+    """Return what tool points, shape (M, 3) [m], make of the known distances and angles."""
     out = []
     artefact = contacts.artefact
     for tie in artefact.ties:

@@ -35,12 +35,7 @@ class Surface:
 
     @classmethod
     def start(cls, contact: Contact, p: Array, value: Array | None) -> Surface:
-        """
-        Return the contact where tool points put it at first sight.
-
-        p: tool points that touched it, shape (m, 3) [m].
-        value: measured distances, of kind 'length', shape (m,) [m].
-        """
+        """Return the contact where points (m, 3), with distances (m,) of a 'length', put it."""
         if contact.at is not None:
             return cls._known(contact, p)
         middle = np.median(p, axis=0)
@@ -79,12 +74,7 @@ class Surface:
         return np.stack([first, np.cross(self.axis, first)])
 
     def rows(self, p: Array, value: Array | None) -> tuple[Array, Array, Array]:
-        """
-        Return residual (m, c), what it sees of the tool point (m, c, 3), and its unknowns (m, c, z).
-
-        p: shape (m, 3) [m].
-        value: shape (m,) [m].
-        """
+        """Return residual (m, c), what it sees of points (m, c, 3), and unknowns (m, c, z)."""
         count, away = len(p), p - self.point
         if self.contact.kind == 'point':
             every = np.broadcast_to(np.eye(3), (count, 3, 3))
@@ -124,8 +114,8 @@ class Surface:
         """
         Return how far it is from its known place (k,), the change of that, and its uncertainty.
 
-        The change (k, z) is by the unknowns, the uncertainty (k,) in m or rad; k is 0 of a contact
-        that may be anywhere.
+        The change (k, z) is by the unknowns, the uncertainty (k,) in m or rad; k is 0 where it may
+        be anywhere.
         """
         known = self.contact
         if known.at is None:

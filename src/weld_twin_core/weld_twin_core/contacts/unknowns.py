@@ -46,9 +46,8 @@ class Unknowns:
         """
         Return orthonormal directions (k, rows) that places can take up, and the share they leave.
 
-        Whitened rows lose ``(1 - left) * u (u' rows)`` along each direction u.
-
-        unit: what whitens each posture's rows, [1/m], shape (M,).
+        Whitened rows, by ``unit`` (M,) [1/m] in each posture, lose ``(1 - left) * u (u' rows)``
+        along each.
         """
         count = self.free.shape[0] * self.free.shape[1]
         columns = (unit[:, None, None] * self.free).reshape(count, -1)
@@ -67,12 +66,7 @@ class Unknowns:
 
 
 def unknowns(contacts: Contacts, points: Array) -> Unknowns:
-    """
-    Return the unknowns of a place at tool points.
-
-    contacts: of one place.
-    points: shape (M, 3) [m].
-    """
+    """Return the unknowns of the contacts of a place at tool points, shape (M, 3) [m]."""
     here = places(contacts, points)
     _, seen, free = here.rows(points)
     _, change, sigma = here.ties()

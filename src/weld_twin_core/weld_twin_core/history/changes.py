@@ -102,15 +102,13 @@ def changes(
     alarms: float = _ALARMS,
 ) -> tuple[Change, ...]:
     """
-    Return what changed, the surest first.
+    Return what changed, the surest first, with a number of false alarms allowed in this look.
 
     Raises DataError: there is no observation, or two are of the same instant.
 
     named: coordinates that a diagnosis has named as causes: of those that explain a change equally
-    well, they come first.
-    likely: coordinates that knocks, wear, service or warmth can change; they come before the
-    others, too.
-    alarms: false alarms allowed in this look.
+    well, they come first. likely: those that knocks, wear, service or warmth can change, before
+    others.
     """
     series = series_of(observations)
     if series.days.size < 2:

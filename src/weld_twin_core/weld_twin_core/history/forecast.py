@@ -36,10 +36,8 @@ def outlook(
     """
     Return where a coordinate is and how fast it moves; None if it has no trend.
 
-    All diagnoses are fitted together with what changed, so that value and rise have one covariance.
-
-    result: what `changes` returned for them.
-    name: the coordinate.
+    All diagnoses are fitted together with what `changes` found, so that value and rise have one
+    covariance.
     """
     if not any(each.name == name and each.kind == 'trend' for each in result):
         return None
@@ -48,17 +46,10 @@ def outlook(
 
 def reaches(limit: float, now: Outlook) -> tuple[float, float, float]:
     """
-    Return in how many days a value reaches a limit: the median and a 90 % interval, ends included.
+    Return in how many days a size reaches a limit: 5 %, 50 % and 95 % of the chances.
 
-    Raises DataError: the limit is not positive.
-
-    limit: size of the value that must not be passed, on the side it moves to.
-
-    Returns
-    -------
-    tuple of float
-        5 %, 50 % and 95 % of the days; 0 where it is beyond already, infinity where it never is.
-
+    0 where it is beyond already, infinity where it never is. Raises DataError: a limit that is not
+    positive.
     """
     if not limit > 0.0:
         raise DataError(f'a limit must be positive, got {limit}')

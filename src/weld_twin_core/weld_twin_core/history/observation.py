@@ -60,7 +60,7 @@ class Observation:
 
     def information(self) -> tuple[Array, Array]:
         """
-        Return what the data alone say: precision, shape (P, P), and precision times value, (P,).
+        Return what the data alone say: precision, (P, P), and precision times value, (P,).
 
         The prior is taken out again, else every diagnosis would repeat it.
         """

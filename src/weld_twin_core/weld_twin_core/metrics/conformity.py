@@ -31,7 +31,7 @@ class Rule:
     @property
     def to_fail(self) -> float:
         """
-        Return the standard uncertainties that the largest of all readings must exceed it by.
+        Return by how many standard uncertainties the largest reading must exceed it.
 
         Noise alone makes the largest of many larger, so that it says less than a single one.
         """

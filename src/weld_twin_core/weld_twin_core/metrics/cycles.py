@@ -71,24 +71,14 @@ class PoseCycles:
 
 
 def measured_of(recording: Recording) -> Measurements:
-    """
-    Return the measurements of a recording.
-
-    Raises DataError: it has none.
-    """
+    """Return the measurements of a recording; DataError where it has none."""
     if recording.measured is None or recording.measured.t.size == 0:
         raise DataError(f'{recording.name} holds no measured poses or points')
     return recording.measured
 
 
 def stops(recording: Recording) -> list[_Stop]:
-    """
-    Return where the arm stood and was measured, in order of time.
-
-    Raises DataError: nothing was measured.
-
-    recording: static, or of a motion in which the arm stands now and then.
-    """
+    """Return where the arm stood and was measured, in order of time; DataError for none."""
     measured, joints = measured_of(recording), recording.joints
     if joints.static:
         rows = joints.nearest(measured.t)
@@ -110,11 +100,7 @@ def stops(recording: Recording) -> list[_Stop]:
 
 
 def _rests(joints: JointMotion) -> list[tuple[float, float]]:
-    """
-    Return start and end [s] of the stretches in which the arm stands for `_DWELL` or longer.
-
-    joints: of a motion.
-    """
+    """Return start and end [s] of where the arm of a motion stands for `_DWELL` or longer."""
     t = np.arange(joints.t[0], joints.t[-1], _LOOK)
     if t.size < 2:
         return []
@@ -146,11 +132,7 @@ def _mean_stop(
 
 
 def pose_cycles(result: list[_Stop], robot: Robot) -> list[PoseCycles]:
-    """
-    Return the stops by commanded pose, in the order in which the poses first came.
-
-    robot: tells where a commanded joint position should have brought the tool.
-    """
+    """Return the stops by the pose that the robot was commanded to, as the poses first came."""
     if not result:
         return []
     q = np.stack([stop.q for stop in result])
@@ -254,8 +236,6 @@ def path_cycles(recording: Recording, robot: Robot) -> PathCycles | None:
     Return the cycles of the path that is repeated for most of the time; None where none is.
 
     Raises DataError: nothing was measured.
-
-    robot: tells where a commanded joint position should have brought the tool.
     """
     measured, joints = measured_of(recording), recording.joints
     if joints.static or joints.t.size < 3:
@@ -268,11 +248,7 @@ def path_cycles(recording: Recording, robot: Robot) -> PathCycles | None:
 
 
 def spans(joints: JointMotion, anchor: Array) -> list[_Span]:
-    """
-    Return the stretches of a motion from leaving a joint position to coming back to it.
-
-    anchor: shape (n,).
-    """
+    """Return the stretches of a motion from leaving joint positions (n,) to coming back there."""
     a, step = joints.q[:-1], np.diff(joints.q, axis=0)
     length = np.maximum((step**2).sum(axis=1), 1e-30)
     part = np.clip(((anchor - a) * step).sum(axis=1) / length, 0.0, 1.0)

@@ -68,11 +68,7 @@ class DeviationMetrics:
 
 
 def deviation(deviations: ArrayLike) -> Array:
-    """
-    Return D, shape (...) [m]: how far the tool is off.
-
-    deviations: actual minus nominal position, shape (..., 3) [m].
-    """
+    """Return how far the tool is off, shape (...) [m], of deviations (..., 3) from nominal."""
     size: Array = np.linalg.norm(np.asarray(deviations, dtype=np.float64), axis=-1)
     return size
 

@@ -167,24 +167,14 @@ def path_performance(
 
 
 def crossing_performance(crossed: Array, command: Array) -> PathPerformance:
-    """
-    Return accuracy and repeatability of a path from where each cycle passed its points.
-
-    crossed: as `normal_plane_crossings` gives them, shape (cycles, m, 3) [m].
-    command: shape (m, 3) [m].
-    """
+    """Return accuracy and repeatability of a path (m, 3) [m] from its cycles' crossings."""
     off, spread = along_path(crossed, command)
     worst, loosest = int(off.argmax()), int(spread.argmax())
     return PathPerformance(len(crossed), float(off[worst]), float(spread[loosest]), worst, loosest)
 
 
 def along_path(crossed: Array, command: Array) -> tuple[Array, Array]:
-    """
-    Return accuracy and repeatability [m] at every point of a path, shape (m,) each.
-
-    crossed: shape (cycles, m, 3) [m].
-    command: shape (m, 3) [m].
-    """
+    """Return accuracy and repeatability [m] at every point of a path, shape (m,) each."""
     return np.linalg.norm(crossed.mean(axis=0) - command, axis=-1), _repeatability(crossed)
 
 
@@ -192,16 +182,10 @@ def normal_plane_crossings(
     path: ArrayLike, command: ArrayLike, tangent: ArrayLike, name: str = 'the path'
 ) -> Array:
     """
-    Return where a path passes the planes square to the command path, shape (m, 3) [m].
+    Return where a path (K, 3) passes the planes square to the command path, shape (m, 3) [m].
 
-    Of several passes the one nearest to the command point counts.
-
-    Raises DataError: the path never passes one of the planes.
-
-    path: shape (K, 3) [m].
-    command: points of the command path, shape (m, 3) [m].
-    tangent: direction of the command path there, shape (m, 3); its length does not matter.
-    name: how the message names the path.
+    Of several passes the one nearest to the command point counts; the length of a tangent (m, 3)
+    does not matter. Raises DataError: the path never passes one of the planes.
     """
     points = readonly(path, (None, 3), 'attained path')
     goal = readonly(command, (None, 3), 'command path')
@@ -220,15 +204,9 @@ def normal_plane_crossings(
 
 def nearest_pass(points: Array, centre: Array, normal: Array) -> Array | None:
     """
-    Return where a path passes a plane in the direction of its normal, nearest to its centre.
+    Return where a path (K, 3) passes a plane along its normal, nearest to its centre, (3,) [m].
 
-    points: rows that are not numbers are gaps, over which nothing passes, shape (K, 3) [m].
-    centre, normal: of the plane, shape (3,); the length of the normal does not matter.
-
-    Returns
-    -------
-    array, shape (3,) [m], or None where the path does not pass it
-
+    None where it does not. Rows that are not numbers are gaps, over which nothing passes.
     """
     height = (points - centre) @ normal
     before = np.flatnonzero((height[:-1] <= 0.0) & (height[1:] >= 0.0))

@@ -113,12 +113,9 @@ class Performance:
 
 def performance_of(recording: Recording, robot: Robot) -> Performance:
     """
-    Return pose and path criteria of the cycles found in a recording.
+    Return pose and path criteria of the cycles found in a recording of a robot that is placed.
 
     Raises DataError: nothing was measured, or neither a pose nor a path is repeated.
-
-    recording: measured in the frame that the robot is placed in.
-    robot: tells where each command should have brought the tool [m].
     """
     groups = pose_cycles(stops(recording), robot)
     poses = tuple(_pose_test(group) for group in groups if group.t.size > 1)

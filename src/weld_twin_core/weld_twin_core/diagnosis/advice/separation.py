@@ -108,12 +108,7 @@ def partings(
     candidate: Candidate,
     now: Side,
 ) -> list[Parting]:
-    """
-    Return how a candidate's pieces part the first alternative, believed most, from every other.
-
-    problem, model, alternatives, scale: as `at_hand` takes them.
-    now: as `at_hand` returned it.
-    """
+    """Return how a candidate's pieces part the first alternative, believed most, from others."""
     ahead = [
         _ahead(problem, candidate, recording, alternatives, scale)
         for recording in candidate.recordings

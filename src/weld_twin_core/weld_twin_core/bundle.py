@@ -335,12 +335,7 @@ def _loosened(state: _State, reported: Array) -> _State:
 
 
 def seen_by(recording: Recording, seen: Sightings) -> Recording:
-    """
-    Return a recording with the poses that images tell, and what the images say of the lenses.
-
-    Raises DataError: images show too little of targets, or cameras and targets do not hang
-    together.
-    """
+    """Return a recording with the poses that images tell, and what they say of the lenses."""
     seen, said = _upright(seen)
     result = adjusted(seen)
     images, poses = len(seen.t), result.measured.t.size

@@ -15,18 +15,7 @@ from .arrays import Array
 
 
 def hermite(x: Array, y: Array, slope: Array, at: Array) -> tuple[Array, Array]:
-    """
-    Return values and slopes of the cubic pieces with given values and slopes at their ends.
-
-    x: strictly increasing, shape (N,).
-    y, slope: shape (N, n).
-    at: within ``x``.
-
-    Returns
-    -------
-    value, rate : array, shape at.shape + (n,)
-
-    """
+    """Return values and slopes, at.shape + (n,), of cubic pieces given by those at their ends."""
     low = np.clip(np.searchsorted(x, at, side='right') - 1, 0, x.size - 2)
     width = (x[low + 1] - x[low])[..., None]
     s = (at - x[low])[..., None]
@@ -39,13 +28,10 @@ def hermite(x: Array, y: Array, slope: Array, at: Array) -> tuple[Array, Array]:
 
 def spline_slopes(x: Array, y: Array, *, natural: bool = False) -> Array:
     """
-    Return the slopes that make a curve of cubic pieces bend without a jump, shape (N, n).
+    Return slopes (N, n) that make a curve of cubic pieces bend without a jump, for few knots (N,).
 
-    For few knots: the equations are solved as a full matrix.
-
-    x: strictly increasing, four or more, shape (N,); two or more where ``natural``.
-    y: shape (N, n).
-    natural: the curve is straight at its ends; else its first two and its last two pieces are one.
+    A ``natural`` one is straight at its ends; of another, of four knots or more, the first two and
+    the last two pieces are one. The equations are solved as a full matrix.
     """
     h, count = np.diff(x), x.size
     chord = np.diff(y, axis=0) / h[:, None]

@@ -47,11 +47,7 @@ class PoseNoise:
 
     @classmethod
     def of(cls, covariance: Array) -> PoseNoise:
-        """
-        Return the noise of covariances.
-
-        covariance: positive definite, shape (M, 3, 3) or (M, 6, 6) [m^2, rad^2].
-        """
+        """Return the noise of positive definite covariances (M, c, c) [m^2, rad^2], c 3 or 6."""
         variance = np.einsum('mii->mi', covariance)
         each = variance.reshape(len(variance), -1, 3).mean(axis=2)
         typical = np.repeat(np.median(np.sqrt(each), axis=0), 3)

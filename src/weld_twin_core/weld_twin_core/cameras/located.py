@@ -37,12 +37,7 @@ _DAMPED = 1e-9
 
 
 def located(lens: Lens, points: Array, pixels: Array) -> Array | None:
-    """
-    Return the pose of a target in the camera's frame, shape (4, 4); None where nothing follows.
-
-    points: in the target's frame, shape (N, 3) [m].
-    pixels: shape (N, 2) [px].
-    """
+    """Return the pose (4, 4) of a target of points (N, 3) in the camera's frame, or None."""
     if len(points) < _FEWEST:
         return None
     middle = points.mean(axis=0)

@@ -49,7 +49,6 @@ class _Search(SearchHooks):
     kind: type[Backlash]
 
     def small(self, view: View, joint: str | None, most: int) -> list[Backlash]:
-        """Return a gap that is all but closed."""
         return [self.kind(str(joint), _CLOSED)]
 
 
@@ -104,20 +103,18 @@ class Backlash(MemoryEffect):
     fit = Hooked(_Fit)
 
     def check(self, robot: Robot) -> None:
-        """Refuse an unknown form and a negative width."""
         super().check(robot)
         if self.form not in _FORMS:
             raise ModelError(f'backlash: form must be one of {_FORMS}, got {self.form!r}')
 
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
         """Return output minus input of the gap, and its output (or last motion) as state."""
-        i = view.robot.index(self.joint)
-        q = view.joint(i)
+        q = self._theta(view)
         if self.form == 'reversal':
             flips, state = _reversals(q, state)
-            return {('q', i): -self.number('width') * flips}, state
+            return self._moves(view, -self.number('width') * flips), state
         output = play(q, self.number('width'), q[..., 0] if state is None else state)
-        return {('q', i): self._side * (output - q)}, output[..., -1]
+        return self._moves(view, self._side * (output - q)), output[..., -1]
 
     @property
     def _side(self) -> float:
@@ -126,19 +123,18 @@ class Backlash(MemoryEffect):
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return the side of the gap last touched, -1/2 or +1/2; 0 before it is first touched."""
-        i = view.robot.index(self.joint)
-        q = view.joint(i)
+        q = self._theta(view)
         if self.form == 'reversal':
-            return [{('q', i): -_reversals(q, None)[0]}]
+            return [self._moves(view, -_reversals(q, None)[0])]
         contact, touched = self._contact(q)
         side = self._side * np.take_along_axis(np.sign(contact), np.maximum(touched, 0), -1)
-        return [{('q', i): np.where(touched >= 0, 0.5 * side, 0.0)}]
+        return [self._moves(view, np.where(touched >= 0, 0.5 * side, 0.0))]
 
     def push(self, view: View, tangent: Array) -> Array:
         """Hold the tangent of the last contact while the gap is being crossed."""
         if self.form == 'reversal':
             return tangent
-        _, touched = self._contact(view.joint(view.robot.index(self.joint)))
+        _, touched = self._contact(self._theta(view))
         at = np.broadcast_to(np.maximum(touched, 0), tangent.shape)
         held = np.take_along_axis(tangent, at, -1)
         return held if self.form == 'play' else 2.0 * tangent - held
@@ -163,7 +159,6 @@ class Backlash(MemoryEffect):
             yield cls(str(joint), width)
 
     def atoms(self, view: View) -> list[Shift]:
-        """Return the displacement per unit of width."""
         return [{key: value / self.width for key, value in self.displace(view).items()}]
 
     def remedy(self, robot: Robot) -> str:

@@ -47,13 +47,11 @@ class _Search(SearchHooks):
         return [self.kind(str(joint))]
 
     def joined(self, other: BearingTilt) -> BearingTilt:
-        """Return the waves of both in one."""
         both = [one.second for one in (self.effect, other) if np.size(one.second)]
         lean = np.asarray(self.effect.lean) + np.asarray(other.lean)
         return replace(self.effect, lean=lean, second=sum(map(np.asarray, both)) if both else ())
 
     def fits(self, robot: Robot, joint: str | None) -> bool:
-        """Return whether the joint turns."""
         return joint is not None and not robot.prismatic[robot.index(joint)]
 
 
@@ -108,7 +106,6 @@ class BearingTilt(LinearEffect):
     search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
-        """Refuse what every effect does, and a second wave of other than four numbers."""
         super().check(robot)
         if np.shape(self.second)[-1:] not in ((0,), (4,)):
             raise ModelError(
@@ -136,7 +133,6 @@ class BearingTilt(LinearEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Any]:
-        """Yield the wave of once per turn, and both waves."""
         yield cls(str(joint))
         yield cls(str(joint), second=np.zeros(4))
 

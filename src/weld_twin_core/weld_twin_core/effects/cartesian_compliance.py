@@ -49,7 +49,6 @@ class CartesianCompliance(LinearEffect):
     needs = frozenset({'wrench'})
 
     def per_unit(self, view: View) -> list[Shift]:
-        """Return the force along each axis, as a vector of the world."""
         if view.wrench is None:
             still: Shift = {('pose', j): np.zeros(view.q.shape[:-1]) for j in range(3)}
             return [still] * 3

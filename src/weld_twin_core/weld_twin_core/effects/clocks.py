@@ -51,7 +51,6 @@ class TimeDelay(Effect):
         return single(('clock', 0), late, view)
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return minus the joint velocity on every joint."""
         return [{('q', i): -view.qd[..., i] for i in range(view.robot.n)}]
 
     def remedy(self, robot: Robot) -> str:

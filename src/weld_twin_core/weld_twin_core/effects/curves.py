@@ -206,7 +206,6 @@ class JointCurve(Effect):
     twin = Hooked(_Twin)
 
     def check(self, robot: Robot) -> None:
-        """Refuse an unknown joint, quantity or channel, and knots that do not increase."""
         super().check(robot)
         check_knots(self.name, self.over, self.knots, np.shape(self.values)[-1])
         if self.channel not in ('q', *ROW_CHANNELS):
@@ -217,7 +216,6 @@ class JointCurve(Effect):
 
     @property
     def on(self) -> str:
-        """Return what the curve runs over."""
         return self.over
 
     def _basis(self, view: View) -> Array:
@@ -228,7 +226,6 @@ class JointCurve(Effect):
         return self.channel, view.robot.index(self.joint)
 
     def displace(self, view: View) -> Shift:
-        """Return the curve on the channel."""
         values = np.asarray(self.values, dtype=np.float64)
         return {self._site(view): np.tensordot(values, self._basis(view), axes=(-1, 0))}
 
@@ -275,7 +272,6 @@ class FrameCurve(Effect):
     options = ('knots', 'over', 'frame')
 
     def check(self, robot: Robot) -> None:
-        """Refuse an unknown frame or quantity, and knots that do not increase."""
         super().check(robot)
         for part in (self.xyz, self.rotvec):
             count = np.shape(part)[-1]
@@ -288,16 +284,13 @@ class FrameCurve(Effect):
 
     @property
     def at(self) -> str:
-        """Return the frame."""
         return self.frame
 
     @property
     def on(self) -> str:
-        """Return what the curve runs over."""
         return self.over
 
     def displace(self, view: View) -> Shift:
-        """Return the curves on the six components of the frame."""
         weights = basis(self.knots, QUANTITIES[self.over](view, 0))
         out: dict[Channel, Array] = {}
         for at, part in enumerate((self.xyz, self.rotvec)):

@@ -53,13 +53,11 @@ class Timed(Effect):
         return replace(self, **{self.since: getattr(self, self.since) - later})
 
     def displace(self, view: View) -> Shift:
-        """Return the share of the constant displacement."""
         share = self.share(view)
         whole = super().displace(view)  # type: ignore[safe-super]
         return {channel: value * share for channel, value in whole.items()}
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return the share of the constant derivatives."""
         share = self.share(view)
         return [
             None if shift is None else {channel: value * share for channel, value in shift.items()}
@@ -79,7 +77,6 @@ class Sudden(Timed):
     traits = Traits(depends_on='time', dated=True, common=False)
 
     def share(self, view: View) -> Array:
-        """Return one from the instant on and zero before."""
         return (view.t >= self.time).astype(np.float64)
 
 
@@ -87,7 +84,6 @@ class _Twin(TwinHooks):
     effect: JointSlip
 
     def lasting(self) -> JointOffset:
-        """Return the offset that the joint keeps."""
         return JointOffset(self.effect.joint, self.effect.offset)
 
 
@@ -227,7 +223,6 @@ class SetupStep(_SetupMotion):
     )
 
     def share(self, view: View) -> Array:
-        """Return one before the step."""
         return (view.t < self.time).astype(np.float64)
 
     @classmethod
@@ -268,7 +263,6 @@ class SetupSettling(_SetupMotion):
     since = 'start'
 
     def share(self, view: View) -> Array:
-        """Return the share still to go."""
         return np.exp(-np.maximum(view.t - self.start, 0.0) / self.time_constant)
 
     @classmethod

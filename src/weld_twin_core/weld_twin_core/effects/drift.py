@@ -50,7 +50,6 @@ class Drift(LinearEffect):
     needs = frozenset({'time'})
 
     def per_unit(self, view: View) -> list[Shift]:
-        """Return elapsed time along each axis."""
         return [{('pose', k): view.elapsed} for k in range(3)]
 
     def remedy(self, robot: Robot) -> str:

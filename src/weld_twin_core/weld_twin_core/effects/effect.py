@@ -203,6 +203,14 @@ class Effect(Parametric, ABC):
         """Return how far its joint moves, in mm where that slides, in degrees where it turns."""
         return travel(value, sliding=self.on_slide(robot))
 
+    def _theta(self, view: View) -> Array:
+        """Return the position of its joint, shape (..., N)."""
+        return view.joint(view.robot.index(str(self.site)))
+
+    def _moves(self, view: View, by: Array) -> dict[Channel, Array]:
+        """Return its joint displaced, shape (..., N)."""
+        return {('q', view.robot.index(str(self.site))): by}
+
     def remedy(self, robot: Robot) -> str:
         """
         Return what to mend where it was found, as one sentence with its size.

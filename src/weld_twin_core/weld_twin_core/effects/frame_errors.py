@@ -39,7 +39,6 @@ class FrameError(Effect):
     stage = Stage.LINK
 
     def displace(self, view: View) -> Shift:
-        """Return xyz and rotvec on the six components of the frame."""
         out: dict[Channel, Array] = {}
         for k in range(3):
             out |= single((self.channel, k), self.number('xyz', k), view)
@@ -47,7 +46,6 @@ class FrameError(Effect):
         return out
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return one for each component."""
         return [single((self.channel, k), np.ones(()), view) for k in range(6)]
 
 
@@ -140,7 +138,6 @@ class ToolPose(FrameError):
 
 class _Search(SearchHooks):
     def fits(self, robot: Robot, joint: str | None) -> bool:
-        """Return whether there is a positioner."""
         return robot.behind > 0
 
 

@@ -154,7 +154,7 @@ class Friction(MemoryEffect):
 
     def _bent(self, view: View, state: Any) -> tuple[Array, Array, Array, Any]:
         """Return z and u stacked, shape (..., 2, N), the steps, what is lost, what to carry."""
-        q = view.joint(view.robot.index(self.joint))
+        q = self._theta(view)
         travel = np.asarray(self.travel, dtype=np.float64)[..., None, None]
         samples = np.broadcast_shapes(q.shape[:-1], travel.shape[:-2])
         start = (view.t[0], q[..., 0], np.zeros((*samples, 2)))
@@ -167,27 +167,24 @@ class Friction(MemoryEffect):
 
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
         """Return minus the wind-up, larger in the direction that rubs more."""
-        i = view.robot.index(self.joint)
         if view.static:
-            return {('q', i): np.zeros_like(view.joint(i))}, None
+            return self._moves(view, np.zeros_like(self._theta(view))), None
         z, _, _, state = self._bent(view, state)
-        return {('q', i): -self.number('windup') * self._mixed(z)}, state
+        return self._moves(view, -self.number('windup') * self._mixed(z)), state
 
     def _mixed(self, both: Array) -> Array:
         """Return the even part and the asymmetry's share of the uneven one, shape (..., N)."""
         return np.asarray(both[..., 0, :] + self.number('asymmetry') * both[..., 1, :])
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return d/d windup, d/d asymmetry and d/d travel."""
-        i = view.robot.index(self.joint)
         if view.static:
-            return [{('q', i): np.zeros_like(view.joint(i))}] * 3
+            return [self._moves(view, np.zeros_like(self._theta(view)))] * 3
         z, both, lost, _ = self._bent(view, None)
         travel = np.asarray(self.travel, dtype=np.float64)[..., None, None]
         slope = bristle_tangent(both, travel, lost, z, -np.abs(both) / travel**2)
         windup = self.number('windup')
         parts = (self._mixed(z), windup * z[..., 1, :], windup * self._mixed(slope))
-        return [{('q', i): -part} for part in parts]
+        return [self._moves(view, -part) for part in parts]
 
     def push(self, view: View, tangent: Array) -> Array:
         """Add how the bristles follow the tangent's own steps."""
@@ -214,13 +211,12 @@ class Friction(MemoryEffect):
 
     def atoms(self, view: View) -> list[Shift]:
         """Return the even part, and the uneven one where there is any: both are linear."""
-        i = view.robot.index(self.joint)
         parts = range(1 if self._even else 2)
         if view.static:
             # As many as in motion, so that stations and paths can be diagnosed together.
-            return [{('q', i): np.zeros_like(view.joint(i))} for _ in parts]
+            return [self._moves(view, np.zeros_like(self._theta(view))) for _ in parts]
         z = self._bent(view, None)[0]
-        return [{('q', i): -z[..., k, :]} for k in parts]
+        return [self._moves(view, -z[..., k, :]) for k in parts]
 
     def from_atoms(self, coefficients: Array) -> Friction:
         """Return the wind-up of the even part; what the uneven part is of it is the asymmetry."""

@@ -34,7 +34,6 @@ class _Twin(TwinHooks):
     effect: GearRatio
 
     def slope(self, view: View) -> Shift:
-        """Return the scale."""
         return single(
             ('q', view.robot.index(self.effect.joint)), self.effect.number('scale'), view
         )
@@ -76,9 +75,7 @@ class GearRatio(LinearEffect):
     twin = Hooked(_Twin)
 
     def per_unit(self, view: View) -> list[Shift]:
-        """Return theta."""
-        i = view.robot.index(self.joint)
-        return [{('q', i): view.joint(i)}]
+        return [self._moves(view, self._theta(view))]
 
     def remedy(self, robot: Robot) -> str:
         scale = self._plain('scale')
@@ -167,14 +164,12 @@ class GearRatioByDirection(MemoryEffect):
 
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
         """Return half the difference of the angle, up or down, and where the gear is as state."""
-        i = view.robot.index(self.joint)
-        way, _, state = self._way(view.joint(i), state)
-        return {('q', i): 0.5 * self.number('difference') * way * view.joint(i)}, state
+        way, _, state = self._way(self._theta(view), state)
+        return self._moves(view, 0.5 * self.number('difference') * way * self._theta(view)), state
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return half the angle, up or down, and how the change of flanks waits for the travel."""
-        i = view.robot.index(self.joint)
-        q = view.joint(i)
+        q = self._theta(view)
         way, touched, _ = self._way(q)
         remaining = np.where(
             touched >= 0, np.take_along_axis(way, np.maximum(touched, 0), -1), 0.0
@@ -182,13 +177,13 @@ class GearRatioByDirection(MemoryEffect):
         slow = (np.sign(remaining) - way) / self.number('travel')
         slow = np.where(np.arange(q.shape[-1]) == touched, 0.0, slow)
         return [
-            {('q', i): 0.5 * way * q},
-            {('q', i): 0.5 * self.number('difference') * slow * q},
+            self._moves(view, 0.5 * way * q),
+            self._moves(view, 0.5 * self.number('difference') * slow * q),
         ]
 
     def push(self, view: View, tangent: Array) -> Array:
         """Add the tangent's own part of the ratio, and what it hastens a change of flanks by."""
-        q = view.joint(view.robot.index(self.joint))
+        q = self._theta(view)
         way, touched, _ = self._way(q)
         at = np.broadcast_to(np.maximum(touched, 0), tangent.shape)
         since = tangent - np.take_along_axis(tangent, at, -1)
@@ -196,9 +191,7 @@ class GearRatioByDirection(MemoryEffect):
         return np.asarray(tangent + 0.5 * self.number('difference') * (way * tangent + turned))
 
     def atoms(self, view: View) -> list[Shift]:
-        """Return the ratio's part alone."""
-        i = view.robot.index(self.joint)
-        return [{('q', i): 0.5 * self._way(view.joint(i))[0] * view.joint(i)}]
+        return [self._moves(view, 0.5 * self._way(self._theta(view))[0] * self._theta(view))]
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:

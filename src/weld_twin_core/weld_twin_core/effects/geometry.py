@@ -52,12 +52,10 @@ class ChannelError(Effect):
         )
 
     def displace(self, view: View) -> Shift:
-        """Return the parameter on the channel."""
         channel = (self.channel, view.robot.index(str(self.site)))
         return single(channel, self.number(self.parameters[0].name), view)
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return one: the displacement is the parameter."""
         return [single((self.channel, view.robot.index(str(self.site))), np.ones(()), view)]
 
 
@@ -105,8 +103,6 @@ class JointOffset(ChannelError):
 
 
 class _LinkError(ChannelError):
-    """A constant error of one number of one DH row."""
-
     traits = replace(ChannelError.traits, entered='model', everywhere=True)
     of = 'link'
     stage = Stage.LINK

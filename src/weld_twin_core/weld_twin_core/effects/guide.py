@@ -27,7 +27,6 @@ from .wording import number, size
 
 class _Search(SearchHooks):
     def fits(self, robot: Robot, joint: str | None) -> bool:
-        """Return whether the joint slides."""
         return joint is not None and bool(robot.prismatic[robot.index(joint)])
 
 
@@ -99,7 +98,6 @@ class GuideTilt(GuideError):
     )
 
     def per_unit(self, view: View) -> list[Shift]:
-        """Return how the tool moves with the carriage."""
         i = view.robot.index(self.joint)
         axes = carriage_axes(view, i)
         return [carried(view, i, None, view.joint(i) * axis) for axis in axes]
@@ -144,7 +142,6 @@ class GuideBend(GuideError):
     )
 
     def per_unit(self, view: View) -> list[Shift]:
-        """Return how the tool moves with the carriage."""
         i = view.robot.index(self.joint)
         x, y, _ = carriage_axes(view, i)
         bow = 0.5 * view.joint(i) ** 2

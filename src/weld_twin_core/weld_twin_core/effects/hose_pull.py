@@ -80,7 +80,6 @@ class HosePull(Effect):
     )
 
     def displace(self, view: View) -> Shift:
-        """Return the torque of the pull on the 'tau' channel of every joint."""
         values = [*(self.number('force', k) for k in range(3)), self.number('stiffness')]
         flange, pulls = _pulls(view)
         pairs = zip(values, pulls, strict=True)
@@ -89,7 +88,6 @@ class HosePull(Effect):
         return {('tau', i): torque[i] for i in range(view.robot.n)}
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return d torque by each component of the force, and by the stiffness."""
         flange, pulls = _pulls(view)
         parts = [point_force_torque(view.robot, view.frames, flange, pull) for pull in pulls]
         return [{('tau', i): part[i] for i in range(view.robot.n)} for part in parts]

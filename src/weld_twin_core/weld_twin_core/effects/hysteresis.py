@@ -122,21 +122,18 @@ class Hysteresis(MemoryEffect):
 
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
         """Return minus amplitude times z on the joint, and where it and z were last."""
-        i = view.robot.index(self.joint)
-        z, _, state = self._loop(view.joint(i), state)
-        return {('q', i): -self.number('amplitude') * z}, state
+        z, _, state = self._loop(self._theta(view), state)
+        return self._moves(view, -self.number('amplitude') * z), state
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return d/d amplitude and d/d travel, by the recursion's own derivative."""
-        i = view.robot.index(self.joint)
-        z, step, _ = self._loop(view.joint(i), None)
+        z, step, _ = self._loop(self._theta(view), None)
         travel = self.number('travel')
         slope = bristle_tangent(step, travel, 0.0, z, -np.abs(step) / travel**2)
-        return [{('q', i): -z}, {('q', i): -self.number('amplitude') * slope}]
+        return [self._moves(view, -z), self._moves(view, -self.number('amplitude') * slope)]
 
     def push(self, view: View, tangent: Array) -> Array:
         """Add how the loop follows the tangent's own steps."""
-        z, step, _ = self._loop(view.joint(view.robot.index(self.joint)), None)
+        z, step, _ = self._loop(self._theta(view), None)
         travel = self.number('travel')
         own = np.diff(tangent, axis=-1, prepend=tangent[..., :1])
         change = np.where(step < 0.0, -own, own) / travel
@@ -151,15 +148,12 @@ class Hysteresis(MemoryEffect):
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
-        """Yield a short, a usual and a long loop."""
         unit = view.radian(view.robot.index(str(joint)))
         for travel in (0.01, 0.04, 0.16):
             yield cls(str(joint), 0.0, travel * unit)
 
     def atoms(self, view: View) -> list[Shift]:
-        """Return the loop of amplitude one."""
-        i = view.robot.index(self.joint)
-        return [{('q', i): -self._loop(view.joint(i), None)[0]}]
+        return [self._moves(view, -self._loop(self._theta(view), None)[0])]
 
     def remedy(self, robot: Robot) -> str:
         return (

@@ -38,12 +38,10 @@ class _Twin(TwinHooks):
 
     @property
     def settles(self) -> bool:
-        """Return whether the load is the one of the posture that the springs have sagged to."""
         return self.effect.statics == 'equilibrium'
 
     @property
     def by_effort(self) -> float:
-        """Return what load torque it takes for each N m of measured effort; 0 where statics tell."""
         return LOAD_OF_EFFORT.get(self.effect.statics, 0.0)
 
 
@@ -98,7 +96,6 @@ class JointCompliance(LinearEffect):
     search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown statics."""
         super().check(robot)
         if self.statics not in _STATICS:
             raise ModelError(
@@ -120,7 +117,6 @@ class JointCompliance(LinearEffect):
 
     @classmethod
     def applicable(cls, view: View, joint: str | None) -> str | None:
-        """Return why the data cannot show this effect at all, or None when they can."""
         return None if view.effort is not None else super().applicable(view, joint)
 
     @classmethod

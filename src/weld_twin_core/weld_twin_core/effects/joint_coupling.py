@@ -64,7 +64,6 @@ class JointCoupling(LinearEffect):
     search = Hooked(_Search)
 
     def check(self, robot: Robot) -> None:
-        """Refuse an unknown source, and a joint coupled with itself."""
         super().check(robot)
         if not self.source:
             raise ModelError('joint_coupling needs a source joint')
@@ -73,7 +72,6 @@ class JointCoupling(LinearEffect):
             raise ModelError('joint_coupling: source and joint are the same; use gear_ratio')
 
     def per_unit(self, view: View) -> list[Shift]:
-        """Return the source's angle."""
         return [{('q', view.robot.index(self.joint)): view.joint(view.robot.index(self.source))}]
 
     @classmethod

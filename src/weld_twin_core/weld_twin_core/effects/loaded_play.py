@@ -86,7 +86,6 @@ class LoadedPlay(LinearEffect):
             raise ModelError(f'loaded_play: torque must be above zero, got {self.torque!r}')
 
     def per_unit(self, view: View) -> list[Shift]:
-        """Return half of one, to the side that the load pulls to."""
         i = view.robot.index(self.joint)
         pull = load(view, i)
         return [{('q', i): 0.5 * pull / np.hypot(pull, self.torque)}]

@@ -56,7 +56,6 @@ class MeasurementScale(LinearEffect):
     )
 
     def per_unit(self, view: View) -> list[Shift]:
-        """Return the position."""
         position = view.frames.position
         return [{('pose', k): position[..., k] for k in range(3)}]
 

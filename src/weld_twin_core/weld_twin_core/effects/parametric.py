@@ -129,7 +129,6 @@ class Parametric:
         return replace(self, **values)
 
     def _plain(self, name: str) -> float:
-        """Return a parameter that is one plain number."""
         return float(np.asarray(getattr(self, name)))
 
     def number(self, name: str, k: int | None = None) -> Array:

@@ -40,7 +40,6 @@ class _Twin(TwinHooks):
     effect: Payload
 
     def load_slope(self, view: View) -> Array:
-        """Return how the extra torque changes with the joints, shape (n, n, ..., N)."""
         return payload_slope(
             view.robot, view.frames, self.effect.number('mass'), self.effect._centre()
         )
@@ -93,7 +92,6 @@ class Payload(Effect):
     twin = Hooked(_Twin)
 
     def displace(self, view: View) -> Shift:
-        """Return the extra torque on the 'tau' channel of every joint."""
         torque = payload_torque(view.robot, view.frames, self.number('mass'), self._centre())
         return _on_joints(torque)
 
@@ -102,7 +100,6 @@ class Payload(Effect):
         return com[..., None, :] if com.ndim > 1 else com
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return d torque by mass, and by each component of the centre."""
         robot, chain = view.robot, view.frames
         out: list[Shift | None] = [_on_joints(payload_torque(robot, chain, 1.0, self._centre()))]
         origin = payload_torque(robot, chain, 1.0, np.zeros(3))

@@ -103,12 +103,10 @@ class Quantization(Effect):
     fit = Hooked(_Fit)
 
     def displace(self, view: View) -> Shift:
-        """Return rounded minus exact position."""
-        i = view.robot.index(self.joint)
         step = self.number('step')
         safe = np.where(step > 0.0, step, 1.0)
-        error = safe * np.rint(view.joint(i) / safe) - view.joint(i)
-        return {('q', i): np.where(step > 0.0, error, 0.0)}
+        error = safe * np.rint(self._theta(view) / safe) - self._theta(view)
+        return self._moves(view, np.where(step > 0.0, error, 0.0))
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return None: the staircase jumps with its step."""

@@ -83,7 +83,6 @@ class Refraction(LinearEffect):
     options = ('instrument',)
 
     def check(self, robot: Robot) -> None:
-        """Refuse an instrument whose place is not three numbers."""
         super().check(robot)
         place = self.instrument
         if place is not None and (

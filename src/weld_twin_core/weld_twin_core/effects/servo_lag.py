@@ -121,19 +121,18 @@ class ServoLag(MemoryEffect):
 
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
         """Return output minus input: x_k = decay x_{k-1} - weight (theta_k - theta_{k-1})."""
-        i = view.robot.index(self.joint)
-        q = view.joint(i)
+        q = self._theta(view)
         if view.static:
-            return {('q', i): np.zeros_like(q)}, None
+            return self._moves(view, np.zeros_like(q)), None
         if self.damping is not None:
             trail, state = self._swing(view.t, q, state)
-            return {('q', i): trail}, state
+            return self._moves(view, trail), state
         t0, q0, x0 = (view.t[0], q[..., 0], np.zeros(q.shape[:-1])) if state is None else state
         dt = np.diff(view.t, prepend=t0)
         change = np.diff(q, axis=-1, prepend=np.asarray(q0)[..., None])
         decay, weight = self._coefficients(dt)
         x = linear(decay, -weight * change, x0)
-        return {('q', i): x}, (view.t[-1], q[..., -1], x[..., -1])
+        return self._moves(view, x), (view.t[-1], q[..., -1], x[..., -1])
 
     def check(self, robot: Robot) -> None:
         """Refuse a loop that does not come to rest."""
@@ -145,7 +144,6 @@ class ServoLag(MemoryEffect):
             )
 
     def _poles(self) -> tuple[Array, Array]:
-        """Return the two poles of the loop [1/s]."""
         zeta = float(self.damping or 1.0)
         zeta += _APART * (abs(zeta - 1.0) < _APART)
         w = 2.0 * zeta / np.maximum(self.number('time_constant'), _SHORTEST)
@@ -178,10 +176,9 @@ class ServoLag(MemoryEffect):
         """Return dx/dtau by the recursion's own derivative; of a loop, by differences."""
         if self.damping is not None and not view.static:
             return super().gradient(view)
-        i = view.robot.index(self.joint)
-        q = view.joint(i)
+        q = self._theta(view)
         if view.static:
-            return [{('q', i): np.zeros_like(q)}]
+            return [self._moves(view, np.zeros_like(q))]
         tau = np.maximum(self.number('time_constant'), 1e-12)
         dt = np.diff(view.t, prepend=view.t[0])
         change = np.diff(q, axis=-1, prepend=q[..., :1])
@@ -191,7 +188,7 @@ class ServoLag(MemoryEffect):
         d_decay = decay * dt / tau**2
         d_weight = np.where(dt > 0.0, weight / tau - decay / tau, 0.0)
         slope = linear(decay, d_decay * before - d_weight * change, np.zeros(x.shape[:-1]))
-        return [{('q', i): slope}]
+        return [self._moves(view, slope)]
 
     def push(self, view: View, tangent: Array) -> Array:
         """Filter the tangent like the motion itself; the lag is linear in its input."""
@@ -214,7 +211,6 @@ class ServoLag(MemoryEffect):
         return plain + [cls(str(joint), 1e-2, damping) for damping in _DAMPINGS]
 
     def atoms(self, view: View) -> list[Shift]:
-        """Return the displacement per second of time constant."""
         return [{key: value / self.time_constant for key, value in self.displace(view).items()}]
 
     def remedy(self, robot: Robot) -> str:

@@ -71,7 +71,6 @@ class ThermalGrowth(LinearEffect):
     needs = frozenset({'temperature'})
 
     def check(self, robot: Robot) -> None:
-        """Refuse unknown links, a reference that is no number and an unusable warm-up curve."""
         super().check(robot)
         if isinstance(self.links, str):
             raise ModelError(f'thermal_growth: links must be a list, got {self.links!r}')
@@ -92,7 +91,6 @@ class ThermalGrowth(LinearEffect):
 
     @property
     def on(self) -> str:
-        """Return temperature, or time where a warm-up curve stands in for it."""
         return 'temperature' if self.warmup is None else 'time'
 
     def rise(self, view: View) -> Array:
@@ -142,7 +140,6 @@ class _Fit(FitHooks):
     effect: LinkWarmUp
 
     def fitted(self) -> list[int]:
-        """Return strain and time constant, or the strain alone where it follows a temperature."""
         return [0, 1] if self.effect.follows is None else [0]
 
 
@@ -201,7 +198,6 @@ class LinkWarmUp(Effect):
     fit = Hooked(_Fit)
 
     def check(self, robot: Robot) -> None:
-        """Refuse a temperature to follow that is not two numbers, or does not rise."""
         super().check(robot)
         if self.follows is not None and not _is_pair(self.follows):
             raise ModelError(
@@ -211,7 +207,6 @@ class LinkWarmUp(Effect):
 
     @property
     def on(self) -> str:
-        """Return time, or the temperature that it follows."""
         return 'time' if self.follows is None else 'temperature'
 
     def _warmth(self, view: View) -> Array:
@@ -223,7 +218,6 @@ class LinkWarmUp(Effect):
         return np.asarray((view.temperature - self.follows[0]) / self.follows[1])
 
     def _grown(self, view: View, strain: Array) -> Shift:
-        """Return lengths times a strain, shape (..., N)."""
         i = view.robot.index(self.joint)
         lengths: list[tuple[Channel, float]] = [
             ((key, i), float(getattr(view.robot, key)[i])) for key in ('a', 'd')
@@ -235,7 +229,6 @@ class LinkWarmUp(Effect):
         return self._grown(view, self.number('strain') * self._warmth(view))
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return lengths times warmth, and times how it falls with the time constant."""
         slow = np.zeros_like(view.elapsed)
         if self.follows is None:
             constant = self.number('warming_time')
@@ -246,7 +239,6 @@ class LinkWarmUp(Effect):
         ]
 
     def atoms(self, view: View) -> list[Shift]:
-        """Return the growth for a strain of one."""
         return [self._grown(view, self._warmth(view))]
 
     @classmethod

@@ -38,7 +38,6 @@ class _Twin(TwinHooks):
     effect: TransmissionRipple
 
     def slope(self, view: View) -> Shift:
-        """Return sum A n cos(n theta + phase)."""
         total = _sum(a * n * np.cos(angle) for a, n, angle in self.effect._terms(view))
         return {('q', view.robot.index(self.effect.joint)): total}
 
@@ -48,7 +47,6 @@ class _Search(SearchHooks):
     kind: type[TransmissionRipple]
 
     def lines(self, joint: str, orders: Array) -> list[TransmissionRipple]:
-        """Return an instance of no size for each order, shape (K,) [1/rev]."""
         return [self.kind(joint, 0.0, float(order), 0.0) for order in orders]
 
     def small(self, view: View, joint: str | None, most: int) -> list[TransmissionRipple]:
@@ -58,18 +56,15 @@ class _Search(SearchHooks):
         return [self.kind(str(joint), zero, orders, zero)] if orders.size else []
 
     def orders(self) -> Array:
-        """Return the orders, in cycles per turn."""
         return np.atleast_1d(np.asarray(self.effect.order, dtype=np.float64))
 
     def with_orders(self, orders: Array) -> TransmissionRipple:
-        """Return the ripple of these orders and no others."""
         own, pairs = self.orders(), self.effect.fit.coordinates().reshape(-1, 2)
         wanted = [pairs[own == order].sum(axis=0) for order in orders]
         like = TransmissionRipple(self.effect.joint, np.zeros(len(wanted)), orders, 0.0)
         return like.from_atoms(np.array(wanted))
 
     def joined(self, other: TransmissionRipple) -> TransmissionRipple:
-        """Return the orders of both in one ripple."""
         parts: dict[str, Any] = {
             p.name: np.append(getattr(self.effect, p.name), getattr(other, p.name))
             for p in self.effect.parameters
@@ -101,15 +96,12 @@ class _Fit(FitHooks):
         return np.stack([amplitude * np.cos(phase), amplitude * np.sin(phase)], -1).ravel()
 
     def with_coordinates(self, values: Array) -> TransmissionRipple:
-        """Return the ripple with other sine and cosine coefficients."""
         return self.effect.from_atoms(values)
 
     def coordinate_shifts(self, view: View) -> list[Shift]:
-        """Return sine and cosine of every order."""
         return self.effect.atoms(view)
 
     def coordinate_scales(self) -> Array:
-        """Return the typical amplitude for every coefficient."""
         return np.full(2 * np.size(self.effect.order), self.effect.parameters[0].typical)
 
 
@@ -177,7 +169,7 @@ class TransmissionRipple(Effect):
                 object.__setattr__(self, name, every)
 
     def _terms(self, view: View) -> Iterable[tuple[Array, Array, Array]]:
-        theta = view.joint(view.robot.index(self.joint))
+        theta = self._theta(view)
         count = np.shape(self.order)[-1:]
         for index in range(*count) if count else (None,):
             phase = self.number('phase', index)
@@ -185,7 +177,6 @@ class TransmissionRipple(Effect):
             yield self.number('amplitude', index), order, order * theta + phase
 
     def displace(self, view: View) -> Shift:
-        """Return the sum of sines on the joint."""
         if self._dense():
             return {('q', view.robot.index(self.joint)): self._all_orders(view)}
         total = _sum(a * np.sin(angle) for a, _, angle in self._terms(view))
@@ -201,11 +192,10 @@ class TransmissionRipple(Effect):
         return bool(whole and orders.max() <= SPARSE * orders.size)
 
     def _all_orders(self, view: View) -> Array:
-        """Return the sum of sines as a polynomial in exp(i theta)."""
         orders = self.search.orders().astype(int)
         weights = np.zeros(int(orders.max()) + 1, complex)
         np.add.at(weights, orders, self.amplitude * np.exp(1j * np.asarray(self.phase)))
-        turn = np.exp(1j * view.joint(view.robot.index(self.joint)))
+        turn = np.exp(1j * self._theta(view))
         total = np.zeros_like(turn)
         for weight in weights[::-1]:
             total *= turn

@@ -135,7 +135,7 @@ class Vibration(MemoryEffect):
 
     def _response(self, view: View, state: Any) -> tuple[Array, Array, Array, Array, Any]:
         """Return the response z at gain 1, its decay, steps and kicks, and what to carry."""
-        q = view.joint(view.robot.index(self.joint))
+        q = self._theta(view)
         dt, kick, (t, last, rate, z0) = self._kicks(view, q, state)
         pole, damped = self._mode()
         decay = np.exp(pole * dt)
@@ -143,18 +143,14 @@ class Vibration(MemoryEffect):
         return z, decay, dt, kick, (t, last, rate, z[..., -1])
 
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
-        """Return the oscillation on the joint's channel."""
-        i = view.robot.index(self.joint)
         if view.static:
-            return {('q', i): np.zeros_like(view.joint(i))}, None
+            return self._moves(view, np.zeros_like(self._theta(view))), None
         z, _, _, _, state = self._response(view, state)
-        return {('q', i): self.number('gain') * z.imag}, state
+        return self._moves(view, self.number('gain') * z.imag), state
 
     def gradient(self, view: View) -> list[Shift | None]:
-        """Return d/d frequency, damping and gain, by the recursion's own derivative."""
-        i = view.robot.index(self.joint)
         if view.static:
-            zero: list[Shift | None] = [{('q', i): np.zeros_like(view.joint(i))}] * 3
+            zero: list[Shift | None] = [self._moves(view, np.zeros_like(self._theta(view)))] * 3
             return zero
         z, decay, dt, kick, _ = self._response(view, None)
         zeta, gain, turn = self.number('damping'), self.number('gain'), 2.0 * np.pi
@@ -166,11 +162,10 @@ class Vibration(MemoryEffect):
             (w * (-1.0 - 1j * zeta / root), -zeta / root**2),
         ):
             drive = decay * kick / damped * d_log_damped + dt * d_pole * z
-            out.append({('q', i): gain * linear(decay, drive, np.zeros(z.shape[:-1])).imag})
-        return [*out, {('q', i): z.imag}]
+            out.append(self._moves(view, gain * linear(decay, drive, np.zeros(z.shape[:-1])).imag))
+        return [*out, self._moves(view, z.imag)]
 
     def push(self, view: View, tangent: Array) -> Array:
-        """Add the oscillation that the tangent itself excites."""
         if view.static:
             return tangent
         dt, kick, _ = self._kicks(view, tangent, None)
@@ -192,9 +187,8 @@ class Vibration(MemoryEffect):
 
     def atoms(self, view: View) -> list[Shift]:
         """Return both quadratures of the response, so that frequency may be a little off."""
-        i = view.robot.index(self.joint)
         z = self._response(view, None)[0]
-        return [{('q', i): z.imag}, {('q', i): z.real}]
+        return [self._moves(view, z.imag), self._moves(view, z.real)]
 
     def from_atoms(self, coefficients: Array) -> Vibration:
         """Return the mode whose gain is the in-phase coefficient."""

@@ -87,7 +87,6 @@ class Wear(Effect):
         return [_shorter(view, t * share), _shorter(view, self.number('rate') * t**2 * falls)]
 
     def atoms(self, view: View) -> list[Shift]:
-        """Return what is worn off for a rate of one."""
         return [_shorter(view, view.elapsed * _slowed(self.number('slowing') * view.elapsed)[0])]
 
     @classmethod
@@ -115,6 +114,5 @@ def _slowed(x: Array) -> tuple[Array, Array]:
 
 
 def _shorter(view: View, worn: Array) -> Shift:
-    """Return the tool shorter by some lengths, shape (..., N) [m]."""
     along = view.robot.T_flange_tool[:3, 2]
     return {('tool', k): -float(along[k]) * worn for k in range(3)}

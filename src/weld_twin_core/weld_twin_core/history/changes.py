@@ -179,11 +179,7 @@ class _Look(NamedTuple):
 def value_and_rise(
     observations: Sequence[Observation], result: Sequence[Change], name: str
 ) -> tuple[Array, Array]:
-    """
-    Return value and rise in a day of a coordinate at the last diagnosis, (2,), and covariance, (2, 2).
-
-    result: what `changes` returned for them.
-    """
+    """Return a coordinate's value and rise in a day at the last diagnosis, and covariance."""
     series = series_of(observations)
     shapes = {(each.kind, float(series.days[each.begin])): each for each in _shapes(series.days)}
     taken = [Found(shapes[each.kind, each.day], series.names.index(each.name)) for each in result]

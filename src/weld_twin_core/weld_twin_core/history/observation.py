@@ -88,11 +88,7 @@ class Observation:
 
     @cached_property
     def whitening(self) -> Array:
-        """
-        Return directions the data show better than what was believed before, shape (P, L).
-
-        The precision of the data along each is 1, and they say nothing of one another.
-        """
+        """Return independent directions (P, L) that data show beyond the prior, precision 1."""
         _, axes, shown = self._shown
         live = shown > 1.0
         return np.asarray(axes[:, live] / np.sqrt(shown[live]) * self.prior_std[:, None])

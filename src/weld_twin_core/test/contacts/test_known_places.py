@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core.arm.reaching import reaching
 from weld_twin_core.arm.rotation import rotation_matrix
 from weld_twin_core.contacts import Artefact, Contacts, lengths, places
 from weld_twin_core.diagnosis.frames.aligned import aligned, other_causes
 from weld_twin_core.errors import DataError
+from weld_twin_core.motion.inverse.newton import reaching
 
 SIZE = [0.3, 0.24, 0.2]
 AT = [0.45, 0.1, 0.2]

@@ -6,13 +6,13 @@ import numpy as np
 
 import weld_twin_core as wt
 from weld_twin_core.arm.chain import forward
-from weld_twin_core.arm.reaching import reaching
 from weld_twin_core.contacts import Artefact, Contact, Contacts
 from weld_twin_core.diagnosis.advice.next_touches import next_touches
 from weld_twin_core.diagnosis.advice.touch_design import Design, again, chosen, scatter
 from weld_twin_core.diagnosis.algebra.problem import Scale
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.hypotheses.library import plain_causes
+from weld_twin_core.motion.inverse.newton import reaching
 
 PLACES = {'low': [0.45, 0.1, 0.2], 'left': [0.1, 0.5, 0.35], 'right': [0.35, -0.35, 0.3]}
 SIGMA = 1e-4

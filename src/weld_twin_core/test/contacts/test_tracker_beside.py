@@ -9,10 +9,10 @@ import pytest
 
 import weld_twin_core as wt
 from weld_twin_core.arm.chain import forward
-from weld_twin_core.arm.reaching import reaching
 from weld_twin_core.contacts import Artefact, Contact, Contacts
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.soundness.touches import touches
+from weld_twin_core.motion.inverse.newton import reaching
 
 PINS = {'low': [0.45, 0.1, 0.2], 'left': [0.1, 0.5, 0.35], 'right': [0.35, -0.35, 0.3]}
 EACH = 12

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core.arm.reaching import reaching
 from weld_twin_core.contacts import Artefact, Contact, Contacts
+from weld_twin_core.motion.inverse.newton import reaching
 from weld_twin_core.twin.domain import Domain
 
 ELBOW_UP = np.array([0.2, -1.0, 1.4, -1.9, -1.5, 0.0])

@@ -384,7 +384,11 @@ def jacobian(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array:
     [ 0.191 -0.817  0.   ] m/rad
 
     """
-    chain = frames(robot, positions(robot, q), shift)
+    return chain_jacobian(robot, frames(robot, positions(robot, q), shift), shift)
+
+
+def chain_jacobian(robot: Robot, chain: Frames, shift: Shift = NO_SHIFT) -> Array:
+    """Return the Jacobian, shape (..., 6, n), of frames already at hand."""
     columns = [column(robot, chain, ('q', i), shift) for i in range(robot.n)]
     return np.moveaxis(np.stack(np.broadcast_arrays(*columns), axis=1), (0, 1), (-2, -1))
 

@@ -152,3 +152,15 @@ def transform(rotation: Array, position: Array) -> Array:
 def angle_between(first: Array, second: Array) -> Array:
     """Return the rotation vectors, shape (..., 3) [rad], that turn ``second`` into ``first``."""
     return rotation_vector(first @ np.swapaxes(second, -1, -2))
+
+
+def missing(wanted: Array, real: Array) -> Array:
+    """Return what is missing to poses (..., 4, 4), (..., 6) [m, rad], in fixed axes, linear first."""
+    turn = angle_between(wanted[..., :3, :3], real[..., :3, :3])
+    return np.concatenate([wanted[..., :3, 3] - real[..., :3, 3], turn], axis=-1)
+
+
+def moved(pose: Array, twist: Array) -> Array:
+    """Return poses (..., 4, 4) moved by what `missing` returns of others, (..., 6) [m, rad]."""
+    turned = rotation_matrix(twist[..., 3:]) @ pose[..., :3, :3]
+    return transform(turned, pose[..., :3, 3] + twist[..., :3])

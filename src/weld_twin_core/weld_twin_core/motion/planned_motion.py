@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from ..arm.chain import frames
+from ..arm.chain import chain_jacobian, frames
 from ..arm.robot import Robot
-from ..arm.rotation import rotation_vector
+from ..arm.rotation import missing
 from ..arrays import Array
 from ..errors import PathError
 from ..recording import JointMotion
 from .inverse import CarriedArm, PathSolution, rest
-from .inverse.newton import chain_jacobian, least_step, polish, pose_error
+from .inverse.newton import least_step, polish, pose_error
 from .paths import Path, SeamFrames, Torch
 from .profiles import Profile, Timing, named
 from .sample_count import MOST_SAMPLES
@@ -204,8 +204,8 @@ class _JointLine:
         q, _ = polish(self.robot, self._spline(timing.s), poses)
         rate = self._spline(timing.s, 1)
         jacobian = chain_jacobian(self.robot, frames(self.robot, q))
-        missing = self._twist(timing.s) - (jacobian @ rate[..., None])[..., 0]
-        rate = rate + least_step(jacobian, missing)
+        lacking = self._twist(timing.s) - (jacobian @ rate[..., None])[..., 0]
+        rate = rate + least_step(jacobian, lacking)
         # Rounded, so that a joint at rest is at rest and not reversing within the last digit.
         q = q.round(12)
         residual = float(np.abs(pose_error(frames(self.robot, q), poses)).max())
@@ -216,9 +216,7 @@ class _JointLine:
     def _twist(self, s: Array) -> Array:
         """Return d(pose)/ds, shape (N, 6), by central differences."""
         before, after = self._seen(s - _DIFFERENCE), self._seen(s + _DIFFERENCE)
-        turn = rotation_vector(after[:, :3, :3] @ np.swapaxes(before[:, :3, :3], -1, -2))
-        change = np.concatenate([after[:, :3, 3] - before[:, :3, 3], turn], axis=1)
-        return change / (2.0 * _DIFFERENCE)
+        return missing(after, before) / (2.0 * _DIFFERENCE)
 
 
 def _along(reported: Array, length: float) -> Callable[..., Array]:

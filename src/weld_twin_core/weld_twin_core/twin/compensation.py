@@ -16,14 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arm.chain import frames
+from ..arm.chain import chain_jacobian, frames
 from ..arm.robot import Robot
-from ..arm.rotation import rotation_matrix, transform
+from ..arm.rotation import missing, moved
 from ..arrays import Array
 from ..effects.effect import Effect, MemoryEffect, Stage
-from ..motion.inverse.newton import chain_jacobian, least_step
+from ..motion.inverse.newton import least_step
 from ..recording import JointMotion, Recording
-from .poses import missing
 from .twin import Twin
 
 _CLOSED = 1e-12
@@ -112,7 +111,7 @@ def compensate(
     real = Twin(robot, acting)
     wanted, first = Twin(robot).poses(recording).matrices, real.poses(recording).matrices
     before = missing(wanted, first)
-    goal = wanted if trust is None else _part_way(first, before, trust)
+    goal = wanted if trust is None else moved(first, before * trust[:, None])
     q = _solved(real, recording, goal, rounds)
     motion = _commands(recording.joints, q)
     after = missing(wanted, real.poses(replace(recording, joints=motion)).matrices)
@@ -140,13 +139,6 @@ def _solved(real: Twin, recording: Recording, goal: Array, rounds: int) -> Array
         error = np.where(helps[:, None], remaining, error)
         share = np.where(helps[:, None], share, 0.5 * share)
     return np.asarray(q)
-
-
-def _part_way(start: Array, gap: Array, share: Array) -> Array:
-    """Return the poses a share of the way towards those that are wanted."""
-    step = gap * share[:, None]
-    turned = rotation_matrix(step[:, 3:]) @ start[:, :3, :3]
-    return transform(turned, start[:, :3, 3] + step[:, :3])
 
 
 def _commands(nominal: JointMotion, q: Array) -> JointMotion:

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arm.chain import forward
+from ..arm.rotation import missing
 from ..arrays import Array
 from ..effects.effect import Effect, Stage
 from ..errors import DataError
@@ -25,7 +26,6 @@ from ..recording import JointMotion, Recording
 from .compensation import commandable, compensate
 from .features import Features
 from .goal_motion import Course, Goal, course, fine_times
-from .poses import missing
 from .posterior import Drawn, pose_covariances
 from .program_accuracy import accuracy
 from .program_correction import BETTER, NOTHING

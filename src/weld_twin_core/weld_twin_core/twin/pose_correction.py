@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arm import rotation
 from ..arm.chain import forward
-from ..arm.rotation import rotation_matrix
 from ..arrays import Array
 from ..effects.effect import MemoryEffect
 from ..errors import DataError
@@ -23,7 +23,6 @@ from ..kernels.single_pose import SinglePose, turn_between, turn_matrix
 from ..motion.inverse.newton import least_step
 from ..recording import JointMotion
 from .goal_correction import GoalLimits, not_corrected, too_large
-from .poses import missing
 from .posterior import pose_covariances
 from .program_correction import SINGULAR
 from .program_model import ProgramModel
@@ -251,7 +250,7 @@ def between(start: Array, end: Array) -> Array:
     if start.ndim == end.ndim == 2:
         turned = turn_between(end[:3, :3], start[:3, :3])
         return np.array([*(end[:3, 3] - start[:3, 3]).tolist(), *turned])
-    return missing(end, start)
+    return rotation.missing(end, start)
 
 
 def moved(pose: Array, twist: Array) -> Array:
@@ -261,7 +260,4 @@ def moved(pose: Array, twist: Array) -> Array:
         one[:3, 3] += twist[:3]
         one[:3, :3] = turn_matrix(twist[3:]) @ pose[:3, :3]
         return one
-    out: Array = np.broadcast_to(pose, (*twist.shape[:-1], 4, 4)).copy()
-    out[..., :3, 3] += twist[..., :3]
-    out[..., :3, :3] = rotation_matrix(twist[..., 3:]) @ out[..., :3, :3]
-    return out
+    return rotation.moved(pose, twist)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..arm.rotation import angle_between, rotation_matrix, transform
+from ..arm.rotation import rotation_matrix, transform
 from ..arrays import Array
 
 if TYPE_CHECKING:
@@ -38,12 +38,6 @@ class Poses(NamedTuple):
     def matrices(self) -> Array:
         """Return ``T_world_tool``, shape (..., M, 4, 4)."""
         return transform(self.rotation, self.position)
-
-
-def missing(wanted: Array, real: Array) -> Array:
-    """Return what is missing to poses (..., 4, 4), shape (..., 6) [m, rad], linear part first."""
-    turn = angle_between(wanted[..., :3, :3], real[..., :3, :3])
-    return np.concatenate([wanted[..., :3, 3] - real[..., :3, 3], turn], axis=-1)
 
 
 def posed(view: View, chain: Poses | None = None) -> Poses:

@@ -21,15 +21,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arm.chain import forward, frames
-from ..arm.rotation import rotation_matrix, rotation_vector
+from ..arm.chain import chain_jacobian, forward, frames
+from ..arm.rotation import missing
+from ..arm.rotation import moved as displaced
 from ..arrays import Array
 from ..errors import DataError, PathError
-from ..motion.inverse.newton import chain_jacobian, least_step
+from ..motion.inverse.newton import least_step
 from ..motion.programs import MoveProgram, Piece, Travel, Use, travel
 from ..motion.programs.repeated import repeated, unrelenting
 from ..recording import JointMotion
-from .poses import missing
 from .posterior import Drawn, largest_sigma
 from .program_model import ProgramModel
 
@@ -355,21 +355,12 @@ def _collect(
 
 def _own(place: Array, use: Use, point: Array, gap: Array) -> Array:
     """Return the step of a point, shape (6,), that moves a place made of it by a gap."""
-    goal = np.array(place)
-    goal[:3, 3] += gap[:3]
-    goal[:3, :3] = rotation_matrix(gap[3:]) @ goal[:3, :3]
-    wanted = np.linalg.inv(use.before) @ goal @ np.linalg.inv(use.after)
-    turn = rotation_vector(wanted[:3, :3] @ point[:3, :3].T)
-    return np.concatenate([wanted[:3, 3] - point[:3, 3], turn])
+    wanted = np.linalg.inv(use.before) @ displaced(place, gap) @ np.linalg.inv(use.after)
+    return missing(wanted, point)
 
 
 def _stepped(point: Array, step: Array) -> Array:
-    if point.ndim == 1:
-        return np.asarray(point + step)
-    out = np.array(point)
-    out[:3, 3] += step[:3]
-    out[:3, :3] = rotation_matrix(step[3:]) @ out[:3, :3]
-    return out
+    return np.asarray(point + step) if point.ndim == 1 else displaced(point, step)
 
 
 def _held_seams(program: MoveProgram, held: dict[int, str]) -> dict[int, str]:

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_core.arm.reaching import least_step, reaching
+from weld_twin_core.arm.chain import jacobian
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie
+from weld_twin_core.motion.inverse.newton import STRETCHED, least_step, reaching
 from weld_twin_core.recording import JointMotion, Recording
 
 ROUNDS = 4
@@ -63,7 +64,7 @@ def touching(
     for _ in range(ROUNDS):
         command = Command(t, q, static=True)
         real = run(robot.to_mapping(), list(causes), command, Tracker(), rng)
-        q = q + least_step(robot, q, places - real.position)
+        q = q + least_step(jacobian(robot, q)[:, :3], places - real.position, STRETCHED)
     names = tuple(Contact(name) for name in dict.fromkeys(labels))
     motion = JointMotion(t, q, static=True)
     touched = Contacts(Artefact(names, tuple(ties)), tuple(labels))

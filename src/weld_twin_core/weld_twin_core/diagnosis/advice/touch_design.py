@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...arm.chain import forward
-from ...arm.reaching import reaching
 from ...arrays import Array
 from ...contacts import Artefact, Contact, Contacts, Places, places
 from ...effects.effect import Effect
+from ...motion.inverse.newton import reaching
 from ...recording import JointMotion, Measurements, Recording
 from ...sequences import halton
 from ...twin.features import Features

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from ...arm.bulk import kernel_of
-from ...arm.chain import Frames, forward, frames
+from ...arm.chain import Frames, chain_jacobian, forward, frames
 from ...arm.mounting import rising
 from ...arm.robot import Robot
-from ...arm.rotation import rotation_matrix, rotation_vector, transform
+from ...arm.rotation import missing, moved
 from ...arrays import Array
 from ...errors import ReachError
 from .all_branches import OTHER_POSTURE, gap, past_limit, where, why_not
@@ -23,7 +23,7 @@ from .closed_form import branches, family
 from .continuity import Mask, distances, joined, jumps, reach, travel
 from .following import follow
 from .multi_start import CLOSED, TURN, centring, null_space, search, turns_to_middle
-from .newton import chain_jacobian, polish
+from .newton import polish
 
 _KNOTS = 64
 """Samples a numerical solution is followed over; between them a spline is the start."""
@@ -160,15 +160,10 @@ def _determined(robot: Robot, q: Array, poses: Array) -> Array:
     if singular.size and len(poses) > 1:
         other = np.where(singular + 1 < len(poses), singular + 1, singular - 1)
         q = q.copy()
-        q[:, singular] = branches(robot, _between(poses[singular], poses[other], _NUDGE))
+        start = poses[singular]
+        beside = moved(start, _NUDGE * missing(poses[other], start))
+        q[:, singular] = branches(robot, beside)
     return q
-
-
-def _between(start: Array, end: Array, part: float) -> Array:
-    """Return poses (N, 4, 4) a part of the way from one to the other."""
-    turn = rotation_vector(end[:, :3, :3] @ np.swapaxes(start[:, :3, :3], -1, -2))
-    rotation = rotation_matrix(part * turn) @ start[:, :3, :3]
-    return transform(rotation, start[:, :3, 3] + part * (end[:, :3, 3] - start[:, :3, 3]))
 
 
 def _on_turn(robot: Robot, q: Array, seed: Array | None) -> Array:
@@ -185,11 +180,11 @@ def _on_turn(robot: Robot, q: Array, seed: Array | None) -> Array:
 
 def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     """Return tracks, shape (K, N, n), followed from every posture found at the first sample."""
-    starts, missing = search(robot, poses[0], seed)
+    starts, lacking = search(robot, poses[0], seed)
     if not len(starts):
         raise ReachError(
             f'{robot.name} cannot reach sample 0 at {where(poses[0])}: the nearest the tool gets '
-            f'is {gap(missing)}; move the seam or turn the torch'
+            f'is {gap(lacking)}; move the seam or turn the torch'
         )
     best = np.argsort(_ranks(robot, starts[:, None], seed), kind='stable')
     starts = starts[best[:_TRACKED]]

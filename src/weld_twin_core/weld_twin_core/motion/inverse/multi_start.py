@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arm.chain import frames
+from ...arm.chain import chain_jacobian, frames
 from ...arm.robot import Robot
 from ...arrays import Array
-from .newton import chain_jacobian, least_step, polish, pose_error
+from .newton import least_step, polish, pose_error
 
 CLOSED = 1e-9
 """Largest error [m, rad] of a solution."""

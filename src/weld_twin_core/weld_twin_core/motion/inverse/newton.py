@@ -1,40 +1,44 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Newton steps on the tool pose, over samples at once: no closed form needed, only a start."""
+"""Newton steps on tool pose or point, over samples at once: no closed form, only a start."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...arm.chain import Frames, column, frames
+from ...arm.chain import Frames, chain_jacobian, forward, frames, jacobian
 from ...arm.robot import Robot
-from ...arm.rotation import rotation_vector
+from ...arm.rotation import angle_between
 from ...arrays import Array
 
 _FLOOR = 1e-12
 """Damping that keeps a step finite exactly at a singularity and is invisible elsewhere."""
+_ROUNDS = 80
+"""Steps to a point at the most: from a start at random they reach one within some thirty."""
+_STRIDE = 0.2
+"""Longest step of a joint to a point [rad, m]: longer ones jump to and fro near the edge of reach."""
+STRETCHED = 1e-6
+"""Damping of steps to a point [m^2]: an arm that is stretched has no step that leads outwards."""
+_REACHED = 1e-9
+"""Distance [m] from which on a point counts as reached."""
 
 
 def pose_error(chain: Frames, poses: Array) -> Array:
     """Return what is missing to the poses, shape (..., 6) [m, rad], linear part first."""
-    turn = rotation_vector(poses[..., :3, :3] @ np.swapaxes(chain.rotation, -1, -2))
+    turn = angle_between(poses[..., :3, :3], chain.rotation)
     return np.concatenate([poses[..., :3, 3] - chain.position, turn], axis=-1)
 
 
-def chain_jacobian(robot: Robot, chain: Frames) -> Array:
-    """Return the Jacobian, shape (..., 6, n), of frames already at hand."""
-    columns = [column(robot, chain, ('q', i)) for i in range(robot.n)]
-    return np.moveaxis(np.stack(np.broadcast_arrays(*columns), axis=1), (0, 1), (-2, -1))
-
-
-def least_step(jacobian: Array, error: Array, damping: Array | float = _FLOOR) -> Array:
+def least_step(slope: Array, error: Array, damping: Array | float = _FLOOR) -> Array:
     """
     Return the smallest joint steps (..., n) that take pose errors (..., 6) [m, rad] away.
 
     The damping (...) [m^2] keeps them finite near a singularity.
     """
-    transposed = np.swapaxes(jacobian, -1, -2)
-    square = jacobian @ transposed + np.asarray(damping)[..., None, None] * np.eye(6)
+    transposed = np.swapaxes(slope, -1, -2)
+    some = np.asarray(damping)[..., None, None] * np.eye(slope.shape[-2])
+    square = slope @ transposed + some
     return (transposed @ np.linalg.solve(square, error[..., None]))[..., 0]
 
 
@@ -56,3 +60,20 @@ def polish(robot: Robot, q: Array, poses: Array, rounds: int = 12) -> tuple[Arra
         error = np.where(better[..., None], trial_error, error)
         chain = frames(robot, q)
     return q, error
+
+
+def reaching(robot: Robot, points: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """
+    Return postures (M, n) near starts with tool points at points (M, 3) [m], and which are there.
+
+    Limits of the joints are not looked at.
+    """
+    q = np.array(start)
+    for _ in range(_ROUNDS):
+        off = points - forward(robot, q)[:, :3, 3]
+        if np.abs(off).max(initial=0.0) < _REACHED:
+            break
+        step = least_step(jacobian(robot, q)[:, :3], off, STRETCHED)
+        q = q + np.clip(step, -_STRIDE, _STRIDE)
+    off = points - forward(robot, q)[:, :3, 3]
+    return q, np.linalg.norm(off, axis=1) < _REACHED

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...arm.chain import forward
 from ...arm.robot import Robot
-from ...arm.rotation import rotation_matrix, rotation_vector, transform
+from ...arm.rotation import angle_between, rotation_matrix, transform
 from ...arrays import Array
 from ...errors import DataError, PathError, ReachError
 from ...recording import JointMotion
@@ -158,7 +158,7 @@ def _followed(course: _Course, move: Move, q: Array | None) -> _Reached:
     )
     arm.check_positions(way)
     length = float(np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1).sum())
-    turn = float(np.linalg.norm(rotation_vector(poses[-1, :3, :3] @ poses[0, :3, :3].T)))
+    turn = float(np.linalg.norm(angle_between(poses[-1, :3, :3], poses[0, :3, :3])))
     # A move that only turns the tool takes as long as one on which its end 0.2 m away travels.
     duration = max(max(length, 0.2 * turn) / max(move.speed, 1e-3), _LEAST_TIME)
     return _Reached(way, np.linspace(0.0, move.duration or duration, len(way)), via)
@@ -282,7 +282,7 @@ def _count(length: float) -> int:
 
 def _turning(begin: Array, end: Array, share: Array) -> Array:
     """Return rotations on the shortest way from one to the other, shape (K, 3, 3)."""
-    turn = rotation_vector(end[:3, :3] @ begin[:3, :3].T)
+    turn = angle_between(end[:3, :3], begin[:3, :3])
     return rotation_matrix(share[:, None] * turn) @ begin[:3, :3]
 
 

@@ -22,9 +22,9 @@ from weld_twin_core.diagnosis.algebra.fit import fit, robust_scale
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, usable
 from weld_twin_core.diagnosis.frames.alignment import initial_frames
 from weld_twin_core.effects import REGISTRY
+from weld_twin_core.effects.dated import seen_from
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.plausible import spreads
-from weld_twin_core.effects.setup_motion import seen_from
 from weld_twin_core.recording import Recording
 from weld_twin_core.twin.posterior import Posterior
 

@@ -156,7 +156,9 @@ def chromium():
         'playwright.sync_api', reason='Playwright is missing: tools/setup test'
     )
     with api.sync_playwright() as playwright:
-        made = playwright.chromium.launch(executable_path=program, args=['--no-sandbox'])
+        made = playwright.chromium.launch(
+            executable_path=program, args=['--no-sandbox', '--disable-gpu']
+        )
         yield made
         made.close()
 
@@ -194,25 +196,28 @@ EMPTY = """() => [...document.querySelectorAll('canvas')].filter((item) => {
 
 
 class Browser:
-    """Opens pages given as text, and notes what they say on the console."""
+    """Opens pages given as text one after the other in a tab, and notes what they say on the console."""
 
-    def __init__(self, chromium, folder):
-        self.chromium, self.folder, self.console = chromium, folder, []
-        self.contexts = []
+    def __init__(self, tab, folder):
+        self.tab, self.folder, self.console = tab, folder, []
+        self._listeners = {
+            'console': lambda message: self.console.append(message.text),
+            'pageerror': lambda error: self.console.append(str(error)),
+            'request': lambda request: self._only_files(request.url),
+        }
+        for event, listener in self._listeners.items():
+            tab.on(event, listener)
 
-    def open(self, text, *, width=1100, height=900, **how):
-        """Return the open page; ``how`` is for the context, such as ``color_scheme='dark'``."""
-        place = self.folder / f'page{len(self.contexts)}.html'
+    def open(self, text):
+        """Return the open page, as wide as a screen, in light colours."""
+        place = self.folder / 'page.html'
         place.write_text(text, encoding='utf-8')
-        context = self.chromium.new_context(viewport={'width': width, 'height': height}, **how)
-        self.contexts.append(context)
-        page = context.new_page()
+        self.tab.mouse.move(0, 0)
+        self.tab.set_viewport_size({'width': 1100, 'height': 900})
+        self.tab.emulate_media(media='null', color_scheme='light')
         self.console = []
-        page.on('console', lambda message: self.console.append(message.text))
-        page.on('pageerror', lambda error: self.console.append(str(error)))
-        page.on('request', lambda request: self._only_files(request.url))
-        page.goto(place.as_uri())
-        return page
+        self.tab.goto(place.as_uri())
+        return self.tab
 
     def hindrances(self, text):
         """Return what hinders reading a page: light, dark, on a phone, in print; or on its console."""
@@ -237,14 +242,20 @@ class Browser:
             self.console.append(f'fetched {url}')
 
     def close(self):
-        """Close all pages."""
-        for context in self.contexts:
-            context.close()
+        """Hear no more of the tab."""
+        for event, listener in self._listeners.items():
+            self.tab.remove_listener(event, listener)
+
+
+@pytest.fixture(scope='session')
+def tab(chromium):
+    """Return one tab for all pages; a window for each costs as much as what is drawn in it."""
+    return chromium.new_context().new_page()
 
 
 @pytest.fixture
-def browser(chromium, tmp_path):
+def browser(tab, tmp_path):
     """Return a browser that opens pages given as text."""
-    made = Browser(chromium, tmp_path)
+    made = Browser(tab, tmp_path)
     yield made
     made.close()

@@ -10,6 +10,7 @@ from pathlib import Path
 import nbformat
 import pytest
 from jupyter_client.manager import AsyncKernelManager
+from jupyter_core.utils import run_sync
 from nbclient import NotebookClient
 
 FOLDER = Path(__file__).parents[2] / 'examples'
@@ -25,11 +26,18 @@ LARGEST = 10_000
 """Bytes of a notebook without outputs; one with them is ten times that."""
 
 
-@pytest.fixture
-def sockets():
-    """Return the start of the paths of a kernel's sockets; the system allows 107 letters."""
-    with tempfile.TemporaryDirectory() as folder:
-        yield f'{folder}/socket'
+@pytest.fixture(scope='module')
+def kernel(tmp_path_factory):
+    """Return a kernel that runs one notebook after the other: what they load, it loads once."""
+    place = tmp_path_factory.mktemp('kernel')
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setenv('JUPYTER_RUNTIME_DIR', str(place / 'run'))
+        patch.setenv('IPYTHONDIR', str(place))
+        patch.setenv('MPLBACKEND', 'module://matplotlib_inline.backend_inline')
+        # On sockets, not on TCP; of the paths of sockets the system allows 107 letters.
+        manager = AsyncKernelManager(kernel_name='python3', transport='ipc', ip=f'{folder}/socket')
+        yield manager
+        run_sync(manager.shutdown_kernel)(now=True)
 
 
 def test_every_notebook_is_run_here():
@@ -45,18 +53,13 @@ def test_a_notebook_is_kept_without_outputs(name):
 
 
 @pytest.mark.parametrize('name', SHOWN)
-def test_a_notebook_runs_and_shows_what_it_promises(name, tmp_path, monkeypatch, sockets):
+def test_a_notebook_runs_and_shows_what_it_promises(name, tmp_path, kernel):
     if name == 'live_nodes':
         pytest.importorskip('rclpy', reason='needs ROS 2')
-    # A cell works in a folder of its own; the kernel listens on sockets there, not on TCP.
-    monkeypatch.setenv('JUPYTER_RUNTIME_DIR', str(tmp_path / 'run'))
-    monkeypatch.setenv('IPYTHONDIR', str(tmp_path))
-    monkeypatch.setenv('MPLBACKEND', 'module://matplotlib_inline.backend_inline')
     book = nbformat.read(FOLDER / f'{name}.ipynb', as_version=4)
-    manager = AsyncKernelManager(kernel_name='python3', transport='ipc', ip=sockets)
-    NotebookClient(
-        book, km=manager, timeout=120, resources={'metadata': {'path': str(tmp_path)}}
-    ).execute()
+    # With names of its own, in a folder of its own.
+    book.cells.insert(0, nbformat.v4.new_code_cell(f'%reset -f\n%cd -q {tmp_path}'))
+    NotebookClient(book, km=kernel, timeout=120).execute()
     outputs = [out for cell in book.cells for out in cell.get('outputs', ())]
     assert any('image/png' in out.get('data', {}) for out in outputs), 'no picture'
     printed = ''.join(out.get('text', '') for out in outputs)

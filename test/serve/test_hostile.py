@@ -10,7 +10,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from served import Person, Server, drop, fill, small_disk
+from served import Person, Server, drop, fill, form, small_disk
 
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.main import parser_of
@@ -128,18 +128,33 @@ def test_a_key_lasts_a_year_and_leads_to_ones_own_from_elsewhere(server):
     assert next(iter(made_up.jar)).value[:8] != cookie.value[:8] or made_up.get(address)[0] == 404
 
 
-def test_a_token_does_not_stay_in_the_address_and_a_wrong_one_harms_nobody(tmp_path):
-    made = Server(tmp_path, '--host', '127.0.0.2')
-    try:
-        person = Person(made)
-        assert person.get('/recordings?token=wrong')[0] == 401
-        token = made.address.partition('token=')[2]
-        assert person.get(f'/recordings?token={token}&x=1')[:2] == (200, '/recordings?x=1')
-        assert person.get('/recordings?token=wrong')[:2] == (200, '/recordings')
-        assert person.get('/')[0] == 200
-        assert _without_token('//evil.example/', f'token={token}') == '/evil.example/'
-    finally:
-        made.kill()
+@pytest.fixture(scope='module')
+def guarded(tmp_path_factory):
+    """A server that others can reach, and that takes small files alone."""
+    place = tmp_path_factory.mktemp('guarded')
+    made = Server(place, '--host', '127.0.0.2', '--upload', '0.0001')
+    made.place, made.token = place, made.address.partition('?token=')[2]
+    yield made
+    made.kill()
+
+
+def test_a_token_is_needed_where_others_can_come_and_uploads_are_bounded(guarded):
+    assert guarded.token
+    assert guarded.get('/')[0] == guarded.get('/?token=wrong')[0] == 401
+    told = {'Authorization': f'Bearer {guarded.token}'}
+    assert guarded.get('/', **told)[0] == 200
+    body, kind = form(files=[('big.mcap', bytes(200_000))])
+    assert guarded.get('/recordings', data=body, Content_Type=kind, **told)[0] == 413
+    assert list((guarded.place / 'jobs').iterdir()) == []
+
+
+def test_a_token_does_not_stay_in_the_address_and_a_wrong_one_harms_nobody(guarded):
+    person, token = Person(guarded), guarded.token
+    assert person.get('/recordings?token=wrong')[0] == 401
+    assert person.get(f'/recordings?token={token}&x=1')[:2] == (200, '/recordings?x=1')
+    assert person.get('/recordings?token=wrong')[:2] == (200, '/recordings')
+    assert person.get('/')[0] == 200
+    assert _without_token('//evil.example/', f'token={token}') == '/evil.example/'
 
 
 def test_a_full_disk_and_damaged_jobs_cost_nothing_that_was_there(tmp_path):

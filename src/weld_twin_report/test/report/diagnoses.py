@@ -1,8 +1,9 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Made-up diagnoses for the report: their pictures come from the twin, their words are given."""
+"""Made-up diagnoses for the report: each once, its pictures from the twin, its words given."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -213,6 +214,7 @@ def _candidates(robot, found, before, after):
     return (*out, Candidate(last, 0.004, 0.7 * before, 0.3))
 
 
+@cache
 def backlash():
     robot = load('ur5')
     effect = {'effect': 'backlash', 'joint': 'elbow_joint', 'width': 1.2e-3}
@@ -226,6 +228,7 @@ def backlash():
     )
 
 
+@cache
 def ambiguous():
     robot = load('kuka_kr6_r900')
     first = robot.joint_names[0]
@@ -252,6 +255,7 @@ def ambiguous():
     )
 
 
+@cache
 def unknown():
     robot = load('abb_irb120')
     j = robot.joint_names
@@ -272,6 +276,7 @@ def unknown():
     )
 
 
+@cache
 def calibration():
     robot = load('fanuc_m10ia')
     rng = np.random.default_rng(7)
@@ -299,6 +304,7 @@ def calibration():
     return diagnosis('identified', robot, true, true, [stations(robot)])
 
 
+@cache
 def circle():
     robot = load('kuka_kr6_r900')
     effects = [
@@ -309,6 +315,7 @@ def circle():
     return diagnosis('identified', robot, effects, effects, [moving(robot, 'circle')])
 
 
+@cache
 def nothing():
     robot = load('franka_panda')
     return diagnosis('none', robot, [], [], [moving(robot, 'circle', 'smooth')])

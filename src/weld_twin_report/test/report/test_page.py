@@ -51,13 +51,6 @@ def test_both_seams_are_drawn_and_the_one_before_is_redder(browser):
     assert blue(seam('after')) > 200
 
 
-@pytest.mark.parametrize('width', [360, 768])
-def test_nothing_sticks_out_at_the_width_of_a_phone(browser, width):
-    for name in ('backlash', 'calibration'):
-        page = browser.open(report_page(diagnoses.ALL[name]()), width=width)
-        assert page.evaluate('document.documentElement.scrollWidth') == width
-
-
 def test_the_page_needs_no_other_file(case):
     page = report_page(case)
     assert not re.search(

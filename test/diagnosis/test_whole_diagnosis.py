@@ -68,7 +68,7 @@ def test_a_large_wobble_with_a_high_spot_is_one_cause():
     moved = Recording('run', JointMotion(t, q))
     seen = Twin(robot, [wobble]).poses(moved)
     position = seen.position + SIGMA * rng.normal(size=seen.position.shape)
-    answer = diagnose(moved.with_measured(Measurements(t, position)), robot)
+    answer = diagnose(moved.with_measured(Measurements(t, position)), robot, experiment=False)
     assert sites(answer) == [{('bearing_tilt', 'shoulder_pan_joint')}], answer.reasons
     assert answer.effects[0].effect.second == pytest.approx([4e-5, -3e-5, 0.0, 2e-5], abs=6e-6)
 
@@ -167,7 +167,7 @@ def test_what_stands_in_for_two_causes_gives_way_once_one_of_them_is_found():
     position = real.position + rng.normal(scale=3e-5, size=real.position.shape)
     turned = shaken(real.rotation, 3e-5, rng)
     measured = Measurements(seam.motion.t, position, turned)
-    answer = diagnose(commanded.with_measured(measured), robot)
+    answer = diagnose(commanded.with_measured(measured), robot, experiment=False)
     assert {(e.effect.name, e.effect.site) for e in answer.effects} == {
         ('servo_lag', 'joint_a2'), ('joint_offset', 'joint_a5')
     }  # fmt: skip

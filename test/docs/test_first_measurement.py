@@ -19,8 +19,8 @@ from weld_twin_nodes.cli.main import parser_of
 
 DOCS = Path(__file__).parents[2] / 'docs'
 PAGES = ('ur', 'kuka', 'abb', 'fanuc', 'yaskawa')
-DIAGNOSED = ('kuka', 'fanuc')
-"""Of whose arms the table is diagnosed: one as most are, one that counts its third axis otherwise."""
+DIAGNOSED = 'fanuc'
+"""Of whose arm the table is diagnosed: the one that counts its third axis otherwise."""
 MINUTES, WORDS_A_MINUTE = 5, 200
 """What a page may take to read."""
 TURNED = 2.5e-3
@@ -72,7 +72,7 @@ def test_a_beginner_comes_to_a_verdict(page, tmp_path, monkeypatch, capsys):
     assert main(shlex.split(plan)[1:]) == 0, capsys.readouterr().err
     measure(Path('plan/measurements.csv'), robot, third_from_ground=page == 'fanuc')
     assert main(shlex.split(read)[1:]) == 0, capsys.readouterr().err
-    if page not in DIAGNOSED:
+    if page != DIAGNOSED:
         parser_of(shlex.split(ask)[1:]).parse_args(shlex.split(ask)[1:])
         return
     assert main(shlex.split(ask)[1:]) == 0, capsys.readouterr().out

@@ -82,11 +82,6 @@ def at_once(work, count):
     return [out[k] for k in range(count)]
 
 
-def tables(file):
-    with sqlite3.connect(file) as connection:
-        return [row[0] for row in connection.execute('select name from sqlite_master order by 1')]
-
-
 def test_all_who_add_at_once_to_a_database_that_is_new_are_heard(url, diagnosed, tmp_path):
     files = copies(diagnosed, tmp_path, WRITERS)
 

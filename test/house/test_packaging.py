@@ -175,7 +175,7 @@ def test_everything_imported_is_declared(package):
 @pytest.mark.parametrize(
     ('package', 'forbidden'),
     [
-        ('weld_twin_core', {'rclpy', 'rosbags', 'yaml'}),
+        ('weld_twin_core', {'rclpy', 'rosbags', 'yaml', 'matplotlib', 'SALib', 'pandas'}),
         ('weld_twin_nodes', {'fastapi', 'sqlalchemy'}),
     ],
 )

@@ -269,13 +269,6 @@ def test_a_corrected_program_takes_the_real_tool_to_the_place_on_the_real_workpi
     assert re.sub(r'[-\d.]', '', after) == re.sub(r'[-\d.]', '', text)
 
 
-def changed(text, *pairs):
-    for old, new in pairs:
-        assert old in text
-        text = text.replace(old, new)
-    return text
-
-
 def swung(text):
     """Let the base stand still while the table turns."""
     return re.sub(r'\$BASE = EK.*', '$BASE = {X 0,Y 0,Z 0,A 0,B 0,C 0}', text)

@@ -72,22 +72,6 @@ def test_a_loop_stays_within_its_amplitude_and_does_not_care_how_finely_it_is_sa
     np.testing.assert_allclose(under(arm, effect, swung(fine))[::4], coarse, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    'effect',
-    [
-        Hysteresis('j2', amplitude=2e-3, travel=0.05),
-        Friction('j2', windup=2e-3, asymmetry=0.2, travel=0.05),
-    ],
-)
-def test_step_by_step_as_over_the_whole_motion(arm, make_recording, effect):
-    recording = make_recording(arm, 60)
-    live = Twin(arm, (effect,)).live()
-    motion = recording.joints
-    steps = zip(motion.t, motion.q, motion.velocity, strict=True)
-    found = [live.step(t, q, qd)[0] for t, q, qd in steps]
-    np.testing.assert_allclose(found, Twin(arm, (effect,)).joints(recording), atol=1e-14)
-
-
 def test_friction_solves_its_differential_equation(arm):
     path = np.r_[np.linspace(0.0, 0.05, 20), np.full(10, 0.05), np.linspace(0.05, -0.02, 20)]
     both, expected = np.zeros(2), [0.0]

@@ -18,7 +18,6 @@ from weld_twin_core.effects import (
     Parameter,
     Stage,
     View,
-    associative_scan,
     effect_from_mapping,
     effects_from_list,
     register,
@@ -36,7 +35,10 @@ def everything():
     """Return every kind of effect that acts without the measurement clock, some twice."""
     return (
         effect('servo_lag', joint='j1', time_constant=0.02),
+        effect('servo_lag', joint='j2', time_constant=0.05, damping=0.4),
         effect('vibration', joint='j1', frequency=5.0, damping=0.1, gain=0.4),
+        effect('hysteresis', joint='j3', amplitude=2e-3, travel=0.05),
+        effect('friction', joint='j3', windup=2e-3, asymmetry=0.2, travel=0.05),
         effect('backlash', joint='j1', width=2e-3),
         effect('backlash', joint='j2', width=1e-3),
         effect('backlash', joint='j2', width=3e-2),
@@ -102,30 +104,6 @@ def test_a_motion_in_pieces_is_the_motion_in_one(name, samples, cuts):
 
 def _six_joints():
     return Robot.from_mapping({'joints': [{'name': f'j{i}'} for i in range(6)]})
-
-
-@settings(max_examples=50, deadline=None)
-@given(st.lists(st.floats(-1, 1), min_size=1, max_size=50), st.floats(0, 1), st.floats(-1, 1))
-def test_play_scan_is_the_loop(q, width, start):
-    expected, w = [], start
-    for value in q:
-        w = min(value + width / 2, max(value - width / 2, w))
-        expected.append(w)
-    np.testing.assert_allclose(
-        associative_scan.play(np.array(q), width, np.array(start)), expected
-    )
-
-
-@settings(max_examples=50, deadline=None)
-@given(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)), min_size=1, max_size=50))
-def test_linear_scan_is_the_loop(pairs):
-    gain, drive = np.array(pairs).T
-    expected, y = [], 0.7
-    for g, d in pairs:
-        y = g * y + d
-        expected.append(y)
-    found = associative_scan.linear(gain + 0j, drive + 0j, np.array(0.7 + 0j))
-    np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
 DRAWN = usual()

@@ -256,7 +256,7 @@ class _System:
     def _against(self, shape: _Shape, places: NDArray[np.int_]) -> tuple[Array, Array, Array]:
         """Return a shape on some coordinates: against the first state, itself, and the data."""
         x, series = shape.columns, self._series
-        cross = np.tensordot(x, series.precision[:, :, places], axes=(0, 0))
+        cross = np.tensordot(x, series.precision, axes=(0, 0))[..., places]
         own = np.einsum('wm,wn,wj->jmn', x, x, series.precision[:, places, places])
         return cross, own, x.T @ series.told[:, places]
 
@@ -285,7 +285,10 @@ class _System:
     def _fitted(self, shape: _Shape) -> tuple[Array, Array]:
         series = self._series
         places = series.changing
-        cross, own, reported = self._against(shape, places)
+        key = shape.kind, shape.begin
+        if key not in series.shapes:
+            series.shapes[key] = self._against(shape, places)
+        cross, own, reported = series.shapes[key]
         rows = [np.moveaxis(cross, 0, -1)]  # (P first, C, m)
         for each in self._found:
             between = series.precision[:, each.place, places]

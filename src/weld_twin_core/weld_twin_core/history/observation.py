@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -111,6 +111,9 @@ class Series:
     """Places of the coordinates that may change, shape (C,)."""
     whitening: tuple[tuple[NDArray[np.int_], Array], ...]
     """Of every observation, the places of its coordinates and its `Observation.whitening`."""
+    shapes: dict[tuple[str, int], tuple[Array, Array, Array]] = field(default_factory=dict)
+    """Of every shape in time that was tried, its sums over the observations: they are large, and the
+    same whatever else was found."""
 
 
 def series_of(observations: Sequence[Observation]) -> Series:

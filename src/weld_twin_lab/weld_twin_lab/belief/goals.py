@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
 from ..blind.judging import NOT_IN_LIBRARY
-from ..blind.measures import Measure
-from ..blind.statistics import Estimate, bootstrap, share
+from ..blind.measures import Measure, Question, measured
+from ..blind.statistics import bootstrap
 
 Kept = Mapping[str, Any]
 SEEN, PLAIN = 1.0, 3.0
@@ -26,98 +27,100 @@ def goal_measures(rows: Sequence[Kept]) -> list[Measure]:
 
     rows: as `judged.kept` gives them; none of them was learned from.
     """
-    return [*_of_causes(rows), *_of_foreign(rows)]
-
-
-def _of_causes(rows: Sequence[Kept]) -> list[Measure]:
-    """Return the measures of causes that the library has."""
-    single = [r for r in rows if r['kind'] == 'single' and min(r['sizes']) >= SEEN]
-    lone = [r for r in rows if len(r['sizes']) == 1 and min(r['sizes']) >= SEEN]
-    lone = [r for r in lone if r['kind'] not in NOT_IN_LIBRARY]
-    known = [r for r in rows if r['kind'] in ('single', 'double', 'triple', 'several')]
-    known = [r for r in known if min(r['sizes']) >= SEEN]
+    single = _of('single')
+    family = [float(r['family']) for r in rows if single(r) and r['status'] != 'none']
+    seconds = [float(r['seconds']) for r in rows]
     return [
-        _measure('sure_wrong', 'sure and wrong', rows, _sure_and_wrong, 0.002, least=False),
-        _measure(
-            'single_sure',
-            'one cause in the library, 1 noise or more: right and sure',
-            lone,
-            lambda r: r['right'] and r['sure'],
-            0.70,
+        *measured(CAUSES, rows),
+        # The mean belief in the true family, as fault isolation benchmarks have it.
+        Measure(
+            'fia', 'mean belief in the true family, one cause', bootstrap(family, np.mean), 0.92
         ),
-        _measure('single_right', 'the same: right', lone, lambda r: r['right']),
-        _measure(
-            'oracle_sure',
-            'one or two causes of which an oracle is sure: right and sure',
-            [r for r in known if (r.get('oracle') or 0.0) >= ORACLE],
-            lambda r: r['right'] and r['sure'],
-            0.95,
-        ),
-        _measure('double_named', 'two causes, each 3 noise: both named', *_several(rows, 2, 0.90)),
-        _measure(
-            'triple_named', 'three causes, each 3 noise: all named', *_several(rows, 3, 0.85)
-        ),
-        _measure(
-            'needless_unknown',
-            'causes in the library, 1 noise or more: needlessly unknown',
-            known,
-            lambda r: r['status'] == 'unknown',
-            0.03,
-            least=False,
-        ),
-        Measure('fia', 'mean belief in the true family, one cause', _fia(single), 0.92),
-        Measure('seconds', 'processor seconds of a diagnosis, median', _seconds(rows)),
+        Measure('seconds', 'processor seconds of a diagnosis, median', bootstrap(seconds)),
+        *measured(FOREIGN, rows),
     ]
 
 
-def _of_foreign(rows: Sequence[Kept]) -> list[Measure]:
-    """Return the measures of causes that the library does not have."""
-    foreign = [r for r in rows if r['kind'] in NOT_IN_LIBRARY]
-    return [
-        _measure(
-            'honest',
-            'withheld or outside: unknown, a set that holds it, or as good on sealed data',
-            foreign,
-            lambda r: r['honest'] or r['status'] == 'unknown',
-            0.95,
-        ),
-        _measure(
-            'place', 'the same: place right, first answer', foreign, lambda r: r['place'], 0.90
-        ),
-        _measure(
-            'dependence', 'the same: dependence right', foreign, lambda r: r['dependence'], 0.87
-        ),
-    ]
+def _of(*kinds: str) -> Callable[[Kept], bool]:
+    """Return what tells cases of some kinds whose causes can all be seen."""
+    return lambda row: row['kind'] in kinds and min(row['sizes']) >= SEEN
 
 
-def _measure(
-    key: str,
-    title: str,
-    rows: Sequence[Kept],
-    hit: Callable[[Kept], bool],
-    goal: float | None = None,
-    *,
-    least: bool = True,
-) -> Measure:
-    return Measure(key, title, share([bool(hit(row)) for row in rows]), goal, least)
+_known = _of('single', 'double', 'triple', 'several')
 
 
-def _sure_and_wrong(row: Kept) -> bool:
-    return bool(row['sure'] and not row['right'])
+def _causes(count: int, least: float, *but: str) -> Callable[[Kept], bool]:
+    """Return what tells cases with so many causes of the library, each as large as the least."""
+    others = {*NOT_IN_LIBRARY, *but}
+
+    def asked(row: Kept) -> bool:
+        sizes = row['sizes']
+        return len(sizes) == count and min(sizes) >= least and row['kind'] not in others
+
+    return asked
 
 
-def _several(
-    rows: Sequence[Kept], count: int, goal: float
-) -> tuple[list[Kept], Callable[[Kept], bool], float]:
-    own = [r for r in rows if len(r['sizes']) == count and min(r['sizes']) >= PLAIN]
-    own = [r for r in own if r['kind'] not in (*NOT_IN_LIBRARY, 'ambiguous')]
-    return own, lambda row: row['named'], goal
+def _foreign(row: Kept) -> bool:
+    return row['kind'] in NOT_IN_LIBRARY
 
 
-def _fia(rows: Sequence[Kept]) -> Estimate:
-    """Return the mean belief in the true family, as fault isolation benchmarks have it."""
-    return bootstrap([float(r['family']) for r in rows if r['status'] != 'none'], np.mean)
-
-
-def _seconds(rows: Sequence[Kept]) -> Estimate:
-    return bootstrap([float(r['seconds']) for r in rows])
+CAUSES = (
+    Question(
+        'sure_wrong',
+        'sure and wrong',
+        lambda row: True,
+        lambda row: row['sure'] and not row['right'],
+        0.002,
+        False,
+    ),
+    Question(
+        'single_sure',
+        'one cause in the library, 1 noise or more: right and sure',
+        _causes(1, SEEN),
+        lambda row: row['right'] and row['sure'],
+        0.70,
+    ),
+    Question('single_right', 'the same: right', _causes(1, SEEN), itemgetter('right')),
+    Question(
+        'oracle_sure',
+        'one or two causes of which an oracle is sure: right and sure',
+        lambda row: _known(row) and (row.get('oracle') or 0.0) >= ORACLE,
+        lambda row: row['right'] and row['sure'],
+        0.95,
+    ),
+    Question(
+        'double_named',
+        'two causes, each 3 noise: both named',
+        _causes(2, PLAIN, 'ambiguous'),
+        itemgetter('named'),
+        0.90,
+    ),
+    Question(
+        'triple_named',
+        'three causes, each 3 noise: all named',
+        _causes(3, PLAIN, 'ambiguous'),
+        itemgetter('named'),
+        0.85,
+    ),
+    Question(
+        'needless_unknown',
+        'causes in the library, 1 noise or more: needlessly unknown',
+        _known,
+        lambda row: row['status'] == 'unknown',
+        0.03,
+        False,
+    ),
+)
+"""What is asked of causes that the library has."""
+FOREIGN = (
+    Question(
+        'honest',
+        'withheld or outside: unknown, a set that holds it, or as good on sealed data',
+        _foreign,
+        lambda row: row['honest'] or row['status'] == 'unknown',
+        0.95,
+    ),
+    Question('place', 'the same: place right, first answer', _foreign, itemgetter('place'), 0.90),
+    Question('dependence', 'the same: dependence right', _foreign, itemgetter('dependence'), 0.87),
+)
+"""The same of causes that it does not have."""

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from weld_twin_msgs_py.files import markdown
@@ -80,13 +81,23 @@ class Question(NamedTuple):
 
     key: str
     title: str
-    asked: Callable[[Judged], bool]
+    asked: Callable[[Any], bool]
     """Tells which cases are asked."""
-    told: Callable[[Judged], bool | None]
+    told: Callable[[Any], Any]
     """Tells whether the answer to a case is right; None where it cannot be said."""
     goal: float | None = None
     at_least: bool = True
     """Whether the goal is a least or a most."""
+
+
+def measured(questions: Sequence[Question], cases: Sequence[Any]) -> list[Measure]:
+    """Return the share of cases that each question is asked of and that answer it rightly."""
+    out = []
+    for q in questions:
+        told = [q.told(case) for case in cases if q.asked(case)]
+        hits = [bool(one) for one in told if one is not None]
+        out.append(Measure(q.key, q.title, share(hits), q.goal, q.at_least))
+    return out
 
 
 def _clear(kind: str) -> Callable[[Judged], bool]:
@@ -107,16 +118,13 @@ def _status(*statuses: str) -> Callable[[Judged], bool]:
 
 def alias_measure(cases: Sequence[Judged], left: Mapping[str, float]) -> Measure:
     """Return how often a cause no library knows is unknown, or what is named does as well."""
-
-    def told(case: Judged) -> bool:
-        return case.status == 'unknown' or left.get(case.name, AS_GOOD) < AS_GOOD
-
-    foreign = [case for case in cases if case.kind in NOT_IN_LIBRARY]
-    return Measure(
+    question = Question(
         'alias',
         "withheld or outside: 'unknown', or as good on the sealed recording",
-        _of(foreign, told),
+        _kind(*NOT_IN_LIBRARY),
+        lambda case: case.status == 'unknown' or left.get(case.name, AS_GOOD) < AS_GOOD,
     )
+    return measured([question], cases)[0]
 
 
 def calibration_measures(cases: Sequence[Judged]) -> list[Measure]:
@@ -132,31 +140,6 @@ def calibration_measures(cases: Sequence[Judged]) -> list[Measure]:
     ]
 
 
-def _of(cases: Sequence[Judged], test: Callable[[Judged], bool | None]) -> Estimate:
-    """Return the share of the cases that the test applies to and that pass it."""
-    return share([told for told in map(test, cases) if told is not None])
-
-
-def _family(case: Judged) -> bool | None:
-    return case.family
-
-
-def _joint(case: Judged) -> bool | None:
-    return case.joint
-
-
-def _exact(case: Judged) -> bool:
-    return case.set == 'exact'
-
-
-def _named(case: Judged) -> bool:
-    return case.named
-
-
-def _unknown(case: Judged) -> bool:
-    return case.status == 'unknown'
-
-
 def _calibrated(cases: Sequence[Judged]) -> Estimate:
     return calibration_error([c.confidence for c in cases], [c.right for c in cases])
 
@@ -166,33 +149,42 @@ QUESTIONS = (
         'single_family',
         'one cause, 3 sigma or more: family named',
         _clear('single'),
-        _family,
+        attrgetter('family'),
         0.98,
     ),
-    Question('single_joint', 'the same: joint named', _clear('single'), _joint, 0.98),
-    Question('single_exact', 'the same: nothing else named', _clear('single'), _exact),
+    Question('single_joint', 'the same: joint named', _clear('single'), attrgetter('joint'), 0.98),
     Question(
-        'faint_named', 'one cause, 1-3 sigma: named, or in the set that is', _faint, _named, 0.85
+        'single_exact',
+        'the same: nothing else named',
+        _clear('single'),
+        lambda case: case.set == 'exact',
+    ),
+    Question(
+        'faint_named',
+        'one cause, 1-3 sigma: named, or in the set that is',
+        _faint,
+        attrgetter('named'),
+        0.85,
     ),
     Question(
         'double_named',
         'two causes, both 3 sigma or more: both named',
         _clear('double'),
-        _named,
+        attrgetter('named'),
         0.90,
     ),
     Question(
         'triple_named',
         'three causes, all 3 sigma or more: all named',
         _clear('triple'),
-        _named,
+        attrgetter('named'),
         0.80,
     ),
     Question(
         'ambiguous_named',
         'ambiguous by construction: truth or its like named',
         _kind('ambiguous'),
-        _named,
+        attrgetter('named'),
     ),
     Question(
         'ambiguous_said',
@@ -215,15 +207,18 @@ QUESTIONS = (
         _status('unknown', 'ambiguous'),
         0.90,
     ),
-    Question('withheld_unknown', "the same: 'unknown'", _kind('withheld'), _unknown),
+    Question('withheld_unknown', "the same: 'unknown'", _kind('withheld'), _status('unknown')),
     Question(
-        'outside_unknown', "cause outside the library: 'unknown'", _kind('outside'), _unknown
+        'outside_unknown',
+        "cause outside the library: 'unknown'",
+        _kind('outside'),
+        _status('unknown'),
     ),
     Question(
         'false_unknown',
         "cause in the library, or none: 'unknown' all the same",
         lambda case: case.in_library or case.kind == 'none',
-        _unknown,
+        _status('unknown'),
         0.03,
         False,
     ),
@@ -241,13 +236,4 @@ QUESTIONS = (
 
 def verdict_measures(cases: Sequence[Judged]) -> list[Measure]:
     """Return how often which kind of case was answered rightly."""
-    return [
-        Measure(
-            q.key,
-            q.title,
-            _of([case for case in cases if q.asked(case)], q.told),
-            q.goal,
-            q.at_least,
-        )
-        for q in QUESTIONS
-    ]
+    return measured(QUESTIONS, cases)

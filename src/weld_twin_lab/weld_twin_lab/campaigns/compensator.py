@@ -11,18 +11,16 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
-from multiprocessing import get_context
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
 
+from ..study import option, options
+from . import write_result
 from .compensating import NOTHING
 from .latency import pose_table
 
@@ -53,66 +51,53 @@ LARGEST = ('worst_m', 'bound_m')
 """Its largest distance when it is corrected [m], and what was told of that."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument(
-        '--goals', type=int, default=500, metavar='N', help='goals of all arms (default: 500)'
-    )
-    parser.add_argument(
+add_arguments = options(
+    option('--goals', 500, 'N', 'goals of all arms (default: 500)'),
+    option(
         '--without-cell',
-        type=int,
-        default=500,
-        metavar='N',
-        help='goals of all arms that are judged without nodes, 0 for none (default: 500)',
-    )
-    parser.add_argument('--seed', type=int, default=7, metavar='N', help='decides what is drawn')
-    parser.add_argument(
-        '--go-on',
-        action='store_true',
-        help='keep the goals and changes that the file has, and try the others',
-    )
-    parser.add_argument(
-        '--turns', type=int, default=20, metavar='N', help='turns of the race of poses, 0 for none'
-    )
+        500,
+        'N',
+        'goals of all arms that are judged without nodes, 0 for none (default: 500)',
+    ),
+    option('--seed', 7, 'N', 'decides what is drawn'),
+    option(
+        '--go-on', False, None, 'keep the goals and changes that the file has, and try the others'
+    ),
+    option('--turns', 20, 'N', 'turns of the race of poses, 0 for none'),
+    out='',
+)
 
 
 def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]:
     """Return what became of every goal and of every change, and the race."""
     from .building.message_packages import messages_importable
 
-    with messages_importable(), _beside() as beside:
-        from .compensating.trial import other_arm
+    begun = time.monotonic()
+    with messages_importable():
+        from .compensating.drawn_cells import arms_of, right_and_wrong
+        from .compensating.trial import other_arm, tried
+        from .compensating.without_cell import judged
 
         known = _before(args)
-        without = _Without(args, known, beside)
-        _in_cells(args, known, without, tell)
+
+        def keep(said: str) -> None:
+            tell(said)
+            found = _made(args, known, '', None)
+            write_result(args.out, 'compensator', time.monotonic() - begun, found)
+
+        for arm in unfinished(known, args.goals, args.seed):
+            for said in tried(arm, IN_A_CELL, right_and_wrong(arm), known):
+                keep(f'{arm.name} {arm.seed}: {said}')
+            keep(f'{arm.name} {arm.seed}: {_told(arm.of(known.rows))}')
         other = other_arm(args.seed)
         tell(other)
         poses = race(args, tell)
-        while without.look(patience=None):
-            tell(f'{len(known.without)} goals without a cell: {_told(known.without)}')
-            _keep(args, known, 0.0)
+        done = {row['arm'] for row in known.without}
+        for arm in arms_of(args.without_cell, WITHOUT, args.seed + APART):
+            if arm.seed not in done:
+                known.without.extend(judged(arm.name, arm.seed, WITHOUT))
+                keep(f'{len(known.without)} goals without a cell: {_told(known.without)}')
     return _made(args, known, other, poses)
-
-
-def _in_cells(
-    args: argparse.Namespace, known: Known, without: _Without, tell: Callable[[str], None]
-) -> None:
-    """Try every arm that is not through yet; what the next one needs is learned meanwhile."""
-    from .compensating.drawn_cells import right_and_wrong
-    from .compensating.trial import tried
-
-    begun, arms = time.monotonic(), unfinished(known, args.goals, args.seed)
-    models = [without.beside.submit(right_and_wrong, arm) for arm in arms[:1]]
-    for k, arm in enumerate(arms):
-        model = models[k].result()
-        models += [without.beside.submit(right_and_wrong, later) for later in arms[k + 1 : k + 2]]
-        for said in tried(arm, IN_A_CELL, model, known):
-            tell(f'{arm.name} {arm.seed}: {said}')
-            without.look()
-            _keep(args, known, time.monotonic() - begun)
-        tell(f'{arm.name} {arm.seed}: {_told(arm.of(known.rows))}')
-        _keep(args, known, time.monotonic() - begun)
 
 
 def _made(
@@ -121,13 +106,6 @@ def _made(
     """Return what goes into the file."""
     found = summary(known.rows, known.changes, other, poses, known.without)
     return {**found, 'seed': args.seed, 'goals': known.rows, 'goals_without': known.without}
-
-
-def _keep(args: argparse.Namespace, known: Known, seconds: float) -> None:
-    """Write what is known so far, for `--go-on`."""
-    from .keeping.result_file import write_result
-
-    write_result(args.out, 'compensator', seconds, _made(args, known, '', None))
 
 
 def unfinished(known: Known, goals: int, seed: int) -> list[Arm]:
@@ -149,42 +127,6 @@ def race(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any
     from .compensating.pose_race import race as raced
 
     return raced(args.turns, POSES, tell) if args.turns else None
-
-
-@contextmanager
-def _beside() -> Iterator[Executor]:
-    """Give a process that computes whenever the cell leaves it time."""
-    pool = ProcessPoolExecutor(1, get_context('spawn'), initializer=os.nice, initargs=(5,))
-    try:
-        yield pool
-    finally:
-        pool.shutdown(wait=False, cancel_futures=True)
-
-
-class _Without:
-    """Goals judged without nodes, an arm at a time, whenever the cell leaves a process beside time."""
-
-    def __init__(self, args: argparse.Namespace, known: Known, beside: Executor) -> None:
-        from .compensating.drawn_cells import arms_of
-
-        self.beside, self._known = beside, known
-        done = {row['arm'] for row in known.without}
-        arms = arms_of(args.without_cell, WITHOUT, args.seed + APART)
-        self._left = [arm for arm in arms if arm.seed not in done]
-        self._now: list[Future[list[dict[str, Any]]]] = []
-
-    def look(self, patience: float | None = 0.0) -> bool:
-        """Take over what is judged, and go on; return whether there was anything to wait for."""
-        from .compensating.without_cell import judged
-
-        waited = wait(self._now, patience)
-        for own in waited.done:
-            self._now.remove(own)
-            self._known.without.extend(own.result())
-        if not self._now and self._left:
-            arm = self._left.pop(0)
-            self._now.append(self.beside.submit(judged, arm.name, arm.seed, WITHOUT))
-        return bool(waited.done or self._now)
 
 
 def _before(args: argparse.Namespace) -> Known:

@@ -80,8 +80,8 @@ def _on_bench(faults: Sequence[Any], folder: Path, tell: Callable[[str], None]) 
     """Return what each node of one cell did under each fault, and whether its bag is whole."""
     from weld_twin_nodes.harness import Cell
 
-    from .faulting.bad_parameters import abuse
     from .faulting.bench import Bench
+    from .faulting.outcomes import abuse
 
     rows: list[dict[str, Any]] = []
     if not faults:

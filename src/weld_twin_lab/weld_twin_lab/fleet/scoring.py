@@ -98,25 +98,23 @@ def _reached(
     if one.name not in names:
         return None
     others = [event for event in events if event is not one and event.name in names]
-    precision = [_widened(each, names) for each in observations]
+    rows = [(names.index(event.name), event.columns(weeks)) for event in (*others, one)]
     width = {
         n: w for each in observations for n, w in zip(each.names, each.prior_std, strict=True)
     }
-    prior = np.diag([width[name] ** -2.0 for name in names])
-    for k in range(2, len(observations) + 1):
-        rows = []
-        for event in (*others, one):
-            place = names.index(event.name)
-            columns = event.columns(weeks[:k])
-            rows.append((place, columns))
-        whole = _normal(precision[:k], prior, rows)
-        width = rows[-1][1].shape[1]
-        rest = whole[:-width, :-width] + 1e-12 * np.diag(np.diag(whole[:-width, :-width]) + 1e-300)
-        side = whole[:-width, -width:]
-        left = whole[-width:, -width:] - side.T @ np.linalg.solve(rest, side)
-        size = one.sizes()
-        if size @ left @ size >= ERRORS**2:
-            return k - 1
+    count, size = len(names), one.sizes()
+    whole = np.zeros((count + sum(columns.shape[1] for _, columns in rows),) * 2)
+    whole[:count, :count] = np.diag([width[name] ** -2.0 for name in names])
+    for k, each in enumerate(observations):
+        places = [np.eye(count)[:, [place]] * columns[k] for place, columns in rows]
+        wide = np.concatenate([np.eye(count), *places], axis=1)
+        whole += wide.T @ _widened(each, names) @ wide
+        free = whole[: -size.size, : -size.size]
+        side = whole[: -size.size, -size.size :]
+        rest = free + 1e-12 * np.diag(np.diag(free) + 1e-300)
+        left = whole[-size.size :, -size.size :] - side.T @ np.linalg.solve(rest, side)
+        if k and size @ left @ size >= ERRORS**2:
+            return k
     return None
 
 
@@ -126,22 +124,6 @@ def _widened(observation: Observation, names: Sequence[str]) -> Array:
     at = [names.index(name) for name in observation.names]
     out[np.ix_(at, at)] = observation.information()[0]
     return out
-
-
-def _normal(precision: Sequence[Array], prior: Array, rows: Sequence[tuple[int, Array]]) -> Array:
-    """Return the normal matrix of the first state and of shapes on coordinates."""
-    count = prior.shape[0]
-    wide = [
-        np.concatenate(
-            [np.eye(count)]
-            + [np.eye(count)[:, [place]] * columns[w][None, :] for place, columns in rows],
-            axis=1,
-        )
-        for w in range(len(precision))
-    ]
-    total = sum(x.T @ p @ x for x, p in zip(wide, precision, strict=True))
-    total[:count, :count] += prior
-    return np.asarray(total)
 
 
 def _same(event: Event, change: Change, joints: Sequence[str]) -> bool:

@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the campaign, write its result, and say whether it passed."""
-    from ...campaigns.keeping.result_file import refuse_foreign, write_result
+    from ...campaigns import refuse_foreign, write_result
 
     refuse_foreign(args.out, args.campaign)
     module = import_module(f'weld_twin_lab.campaigns.{args.campaign}')

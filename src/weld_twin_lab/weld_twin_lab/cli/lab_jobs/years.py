@@ -24,14 +24,13 @@ add_arguments = options(
 @study
 def run(study: Study) -> bool:
     """Run what is not done yet, write the results, print the table."""
-    from ...fleet.years import GOALS, run_years
-    from ...fleet.years_page import page
+    from ...fleet.years import GOALS, page, run_years
 
     require_simulator()
     args = study.args
     with study.runner('living through years') as runner:
         result = run_years(args.seed, args.years, args.cells, args.full, engine_digest(), runner)
-    study.write('years', result, page(result, args.seed))
+    study.write('years', result, page(result, args.seed, args.cells))
     kept = {name: result['drawn'][name] for name in GOALS}
     return all(
         value is not None and GOALS[name][0] <= value <= GOALS[name][1]

@@ -20,7 +20,7 @@ import argparse
 import hashlib
 import json
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from importlib.util import find_spec
@@ -31,6 +31,7 @@ from typing import TYPE_CHECKING, Any
 import weld_twin_core
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_nodes.cli.options import POOL
 from weld_twin_nodes.cli.parsing import Options, add_options
@@ -219,6 +220,16 @@ def require_simulator() -> None:
         raise DataError(
             "cases are simulated with MuJoCo; install it with: pip install 'weld-twin[bench]'"
         )
+
+
+def tabled(columns: Mapping[str, Callable[[Any], object]], rows: Iterable[Any]) -> str:
+    """
+    Return rows as a table in Markdown.
+
+    columns: by the head of each, what it says of a row.
+    """
+    told = [[tell(row) for tell in columns.values()] for row in rows]
+    return markdown.table(tuple(columns), *told)
 
 
 def head(schema: str, **more: Any) -> dict[str, Any]:

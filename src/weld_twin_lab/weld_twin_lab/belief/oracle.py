@@ -21,6 +21,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 from scipy.special import logsumexp
 
+from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array
 
 from ..blind.blind_cell import BlindCell, Take, deviation, exact, record
@@ -31,7 +32,7 @@ from ..blind.displacement import rms
 from ..blind.making import SealedCase
 from .levels_of_truth import alike_by_structure
 from .mix import COMMON, OFTEN, SEVERAL, drawn
-from .visible import STEP, TURNING, changed, turned
+from .visible import STEP, TURNING, changed
 
 DRAWS = 2
 """Causes drawn of each family at each joint: phases and instants differ; sizes are fitted."""
@@ -229,7 +230,7 @@ def _frames(cell: BlindCell, takes: Sequence[Take], align: Sequence[str]) -> lis
             for frame in align:
                 parts = []
                 for own in seen:
-                    rotation = turned(own.quaternion)
+                    rotation = matrix_from_quaternion(np.asarray(own.quaternion))
                     arm = own.position if frame == 'base' else np.zeros_like(own.position)
                     along, about = (
                         (

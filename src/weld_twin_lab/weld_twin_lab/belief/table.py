@@ -4,23 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
 from typing import Any
 
-from weld_twin_msgs_py.files import markdown
-
 from ..blind.measures import measure_table
-
-HEAD = (
-    'statements',
-    'number',
-    'right',
-    'calibration error',
-    'log loss',
-    'sure',
-    'sure and wrong',
-    'wrong among the surest 70 %',
-)
+from ..study import tabled
 
 
 def page(result: Mapping[str, Any]) -> str:
@@ -33,7 +22,7 @@ def page(result: Mapping[str, Any]) -> str:
         [
             *_bounds(result['learned_from'], result['judged_on']),
             '',
-            markdown.table(HEAD, *(_row(*item) for item in result['statements'].items())),
+            tabled(STATEMENTS, result['statements'].items()),
             *(_beside_goals(result) if result['goals'] else ()),
         ]
     )
@@ -61,54 +50,14 @@ def _bounds(taught: Mapping[str, Any], tried: Mapping[str, Any]) -> list[str]:
         f'{taught["weights"]} weights, learned from {taught["cases"]} cases of seed '
         f'{_listed(taught["seeds"])}; {by}. From where a statement is told as sure:',
         '',
-        markdown.table(
-            ('statement', 'number', 'sure from', 'sure', 'of these wrong'),
-            *(_bound(name, bound) for name, bound in taught['bounds'].items()),
-        ),
+        tabled(BOUNDS, taught['bounds'].items()),
     ]
-
-
-def _bound(name: str, bound: Mapping[str, Any]) -> tuple[str, ...]:
-    never = bound['sure_from'] > 1.0
-    return (
-        name,
-        f'{bound["cases"]:.0f}',
-        'never: too few cases' if never else f'{bound["sure_from"]:.3f}',
-        _percent(bound['sure']),
-        f'{bound["wrong"]:.0f}',
-    )
-
-
-def _row(name: str, row: Mapping[str, Any]) -> tuple[str, ...]:
-    return (
-        name,
-        str(row['statements']),
-        _percent(row['right'] / row['statements']),
-        f'{row["ece"]["value"]:.3f}',
-        f'{row["log_loss"]:.3f}',
-        _percent(row['sure']['value']),
-        str(row['sure_and_wrong']),
-        _percent(row['wrong_at_70']),
-    )
 
 
 def _failures(listed: Sequence[Mapping[str, Any]]) -> list[str]:
     if not listed:
         return ['No case was sure and wrong.', '']
-    rows = [
-        (
-            item['name'],
-            item['kind'],
-            item['robot'],
-            item['motion'],
-            item['truth'],
-            ', '.join(f'{size:.1f}' for size in item['sizes']),
-            item['said'],
-        )
-        for item in listed
-    ]
-    head = ('case', 'kind', 'robot', 'motion', 'truth', 'sizes [noise]', 'said')
-    return ['Sure and wrong:', '', markdown.table(head, *rows)]
+    return ['Sure and wrong:', '', tabled(FAILURES, listed)]
 
 
 def _percent(value: float) -> str:
@@ -117,3 +66,33 @@ def _percent(value: float) -> str:
 
 def _listed(values: Sequence[object]) -> str:
     return ', '.join(map(str, values))
+
+
+BOUNDS: dict[str, Callable[[Any], object]] = {
+    'statement': lambda row: row[0],
+    'number': lambda row: f'{row[1]["cases"]:.0f}',
+    'sure from': lambda row: (
+        'never: too few cases' if row[1]['sure_from'] > 1.0 else f'{row[1]["sure_from"]:.3f}'
+    ),
+    'sure': lambda row: _percent(row[1]['sure']),
+    'of these wrong': lambda row: f'{row[1]["wrong"]:.0f}',
+}
+"""Columns of the table of bounds, each a name and its bound."""
+STATEMENTS: dict[str, Callable[[Any], object]] = {
+    'statements': lambda row: row[0],
+    'number': lambda row: row[1]['statements'],
+    'right': lambda row: _percent(row[1]['right'] / row[1]['statements']),
+    'calibration error': lambda row: f'{row[1]["ece"]["value"]:.3f}',
+    'log loss': lambda row: f'{row[1]["log_loss"]:.3f}',
+    'sure': lambda row: _percent(row[1]['sure']['value']),
+    'sure and wrong': lambda row: row[1]['sure_and_wrong'],
+    'wrong among the surest 70 %': lambda row: _percent(row[1]['wrong_at_70']),
+}
+"""The same of kinds of statements."""
+FAILURES: dict[str, Callable[[Any], object]] = {
+    'case': itemgetter('name'),
+    **{key: itemgetter(key) for key in ('kind', 'robot', 'motion', 'truth')},
+    'sizes [noise]': lambda item: ', '.join(f'{size:.1f}' for size in item['sizes']),
+    'said': itemgetter('said'),
+}
+"""Columns of the table of cases that were sure and wrong."""

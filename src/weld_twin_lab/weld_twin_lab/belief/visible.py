@@ -12,10 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array
 
 from ..blind.blind_cell import BlindCell, Take, deviation, exact, floor, record
@@ -78,19 +78,9 @@ def _frames(cell: BlindCell, takes: Sequence[Take], align: Sequence[str]) -> lis
             out.append(np.concatenate([np.cross(axis, own.position).ravel() for own in seen]))
             out.append(np.concatenate([np.tile(axis, len(own.position)) for own in seen]))
         if 'tool' in align:
-            out.append(np.concatenate([(turned(own.quaternion) @ axis).ravel() for own in seen]))
+            turns = [matrix_from_quaternion(np.asarray(own.quaternion)) for own in seen]
+            out.append(np.concatenate([(turn @ axis).ravel() for turn in turns]))
     return out
-
-
-def turned(quaternion: Any) -> Array:
-    """Return rotations, shape (M, 3, 3), of quaternions x y z w."""
-    x, y, z, w = np.asarray(quaternion, dtype=float).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
 
 
 def changed(causes: Sequence[Cause], k: int) -> Iterator[list[Cause]]:

@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.files.markdown import table
 
-from ..study import engine_digest
+from ..study import engine_digest, tabled
 from . import waiting_data as data
 from .costs import Cost, cost_of
 
@@ -226,29 +225,21 @@ def page(entries: Sequence[Entry]) -> str:
 
 def summary(entries: Sequence[Entry]) -> str:
     """Return the table in Markdown."""
-    rows: list[Sequence[object]] = [
-        ('job', 'wall [s]', 'processor [s]', 'memory [MB]', 'before: wall, processor, memory')
-        + ('times as fast: wall, processor', 'share of the memory', 'measured')
-    ]
-    for entry in entries:
-        now, before, ratio = entry['here'], entry.get('base'), entry.get('ratio')
-        rows.append(
-            (
-                entry['job'],
-                f'{now["wall"]:.3g}',
-                f'{now["cpu"]:.3g}',
-                _megabytes(now['peak']),
-                '' if before is None else _told(before),
-                '' if ratio is None else f'{1 / ratio["wall"]:.2f}, {1 / ratio["cpu"]:.2f}',
-                '' if ratio is None or ratio['peak'] is None else f'{ratio["peak"]:.2f}',
-                _when(entry),
-            )
-        )
-    return table(*rows)
+    return tabled(COLUMNS, entries)
 
 
-def _told(cost: dict[str, Any]) -> str:
+def _costs(cost: dict[str, Any] | None) -> str:
+    if cost is None:
+        return ''
     return f'{cost["wall"]:.3g}, {cost["cpu"]:.3g}, {_megabytes(cost["peak"])}'
+
+
+def _faster(ratio: dict[str, Any] | None) -> str:
+    return '' if ratio is None else f'{1 / ratio["wall"]:.2f}, {1 / ratio["cpu"]:.2f}'
+
+
+def _smaller(ratio: dict[str, Any] | None) -> str:
+    return '' if ratio is None or ratio['peak'] is None else f'{ratio["peak"]:.2f}'
 
 
 def _megabytes(peak: float | None) -> str:
@@ -263,3 +254,16 @@ def _when(entry: Entry) -> str:
     beside = f' beside {about["base"]}' if about.get('base') else ''
     load = '' if about.get('load') is None else f', load {about["load"]:.1f}'
     return f'{about["on"]}, {about["commit"]}{beside}{load}'
+
+
+COLUMNS: dict[str, Callable[[Entry], object]] = {
+    'job': lambda entry: entry['job'],
+    'wall [s]': lambda entry: f'{entry["here"]["wall"]:.3g}',
+    'processor [s]': lambda entry: f'{entry["here"]["cpu"]:.3g}',
+    'memory [MB]': lambda entry: _megabytes(entry['here']['peak']),
+    'before: wall, processor, memory': lambda entry: _costs(entry.get('base')),
+    'times as fast: wall, processor': lambda entry: _faster(entry.get('ratio')),
+    'share of the memory': lambda entry: _smaller(entry.get('ratio')),
+    'measured': _when,
+}
+"""Columns of the table."""

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,9 @@ import numpy as np
 
 from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.errors import DataError
-from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.diagnosis_model import read_diagnosis
 
+from ..study import tabled
 from . import layout, seal
 from .achieved import over_floor
 from .judging import NOT_IN_LIBRARY, Judged, judge
@@ -27,7 +27,6 @@ from .measures import (
     verdict_measures,
 )
 
-MISSED = ('case', 'kind', 'truth (RMS over noise)', 'verdict', 'confidence', 'why there is none')
 MIB = 1 << 20
 """Bytes."""
 
@@ -129,18 +128,15 @@ def page(score: Score) -> str:
     """Return measures, cases that were missed, and what a diagnosis costs."""
     made, costs = score.made, score.costs
     seen = 'could be read' if made['truths_readable'] else 'could not be read'
-    missed = [
-        (
-            case.name,
-            f'{case.kind}, {case.robot}, {case.motion}',
-            f'{case.truth} ({case.stratum:.1f})',
-            f'{case.status}: {case.said or "-"}',
-            f'{case.confidence:.2f}',
-            score.errors.get(case.name, ''),
-        )
-        for case in score.cases
-        if not case.right
-    ]
+    missed = [case for case in score.cases if not case.right]
+    columns: dict[str, Callable[[Judged], str]] = {
+        'case': lambda case: case.name,
+        'kind': lambda case: f'{case.kind}, {case.robot}, {case.motion}',
+        'truth (RMS over noise)': lambda case: f'{case.truth} ({case.stratum:.1f})',
+        'verdict': lambda case: f'{case.status}: {case.said or "-"}',
+        'confidence': lambda case: f'{case.confidence:.2f}',
+        'why there is none': lambda case: score.errors.get(case.name, ''),
+    }
     return '\n'.join(
         [
             f'# {len(score.cases) - len(missed)} of {len(score.cases)} cases answered rightly\n',
@@ -149,6 +145,6 @@ def page(score: Score) -> str:
             measure_table([measure.as_dict() for measure in score.measures]),
             f'A diagnosis took {costs["median_seconds"]:.1f} s in the median, '
             f'{costs["most_seconds"]:.1f} s at most, and {costs["most_memory_mib"]:.0f} MiB.\n',
-            *([markdown.table(MISSED, *missed)] if missed else []),
+            *([tabled(columns, missed)] if missed else []),
         ]
     )

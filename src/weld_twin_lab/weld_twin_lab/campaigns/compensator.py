@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
 
-from ..study import option, options
+from ..study import option, options, tabled
 from . import write_result
 from .compensating import NOTHING
 from .latency import pose_table
@@ -254,30 +254,14 @@ def _counted_by(key: str, rows: Sequence[dict[str, Any]]) -> dict[str, dict[str,
     return {name: counted([row for row in rows if row[key] == name]) for name in names}
 
 
-HEAD = (
-    'arm',
-    'goals',
-    'corrected',
-    'of those that gain half',
-    'refused of those outside',
-    'worse',
-    'before, mm',
-    'after',
-    'true causes',
-    'at most',
-    'bound reported',
-    'within it',
-)
-
-
 def table(result: dict[str, Any]) -> str:
     """Return the tables of the page: the arms, the changes, the race of poses."""
     arms = [*result['robots'].items(), ('all', result['totals'])]
-    lines = [markdown.table(HEAD, *(_row(name, one) for name, one in arms)), _changes(result)]
+    lines = [tabled(COLUMNS, arms), _changes(result)]
     more = result['without_cell']
     if more and more['robots']:
         arms = [*more['robots'].items(), ('all', more['totals'])]
-        lines.append(markdown.table(HEAD, *(_row(name, one) for name, one in arms)))
+        lines.append(tabled(COLUMNS, arms))
     lines.append(_spread(result))
     poses = result['poses']
     if poses is not None:
@@ -297,19 +281,35 @@ def _spread(result: dict[str, Any]) -> str:
     )
 
 
-def _row(name: str, one: dict[str, Any]) -> tuple[str, ...]:
-    """Return a row of an arm."""
-    middle = [one['median'][key] for key in (*SIZES, *LARGEST)]
-    return (
-        name,
-        str(one['goals']),
-        str(one['corrected']),
-        f'{one["of_them_corrected"]} of {one["to_correct"]}',
-        f'{one["outside"] - one["outside_corrected"]} of {one["outside"]}',
-        str(one['worse']),
-        *('' if value is None else f'{value * 1e3:.4f}' for value in middle),
-        f'{one["held"]} of {one["bounds"]}',
-    )
+def _millimetres(key: str) -> Callable[[Any], str]:
+    """Return what tells the median of a distance [mm]; nothing where there is none."""
+
+    def told(row: Any) -> str:
+        value = row[1]['median'][key]
+        return '' if value is None else f'{value * 1e3:.4f}'
+
+    return told
+
+
+COLUMNS: dict[str, Callable[[Any], object]] = {
+    'arm': lambda row: row[0],
+    'goals': lambda row: row[1]['goals'],
+    'corrected': lambda row: row[1]['corrected'],
+    'of those that gain half': lambda row: (
+        f'{row[1]["of_them_corrected"]} of {row[1]["to_correct"]}'
+    ),
+    'refused of those outside': lambda row: (
+        f'{row[1]["outside"] - row[1]["outside_corrected"]} of {row[1]["outside"]}'
+    ),
+    'worse': lambda row: row[1]['worse'],
+    'before, mm': _millimetres('before_m'),
+    'after': _millimetres('after_m'),
+    'true causes': _millimetres('best_m'),
+    'at most': _millimetres('worst_m'),
+    'bound reported': _millimetres('bound_m'),
+    'within it': lambda row: f'{row[1]["held"]} of {row[1]["bounds"]}',
+}
+"""Columns of the tables of arms, each a name and what its goals come to."""
 
 
 def _changes(result: dict[str, Any]) -> str:

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_msgs_py.files import markdown
 from weld_twin_nodes.offline.investigation import SAID
+
+from ..study import tabled
 
 Case = dict[str, Any]
 
@@ -66,37 +67,13 @@ def page(result: dict[str, Any]) -> str:
     told, cases = result['summary'], result['cases']
     if not cases:
         return 'No cell was left open.\n'
-    heads = (
-        'cell',
-        'robot',
-        'first motion',
-        'causes',
-        'first',
-        'asked',
-        'loop',
-        'ended',
-    )
     return '\n'.join(
         [
             *(f'- {key}: {told[key]}' for key in told if not isinstance(told[key], dict)),
             '',
-            markdown.table(heads, *(_row(case) for case in cases)),
+            tabled(COLUMNS, cases),
             '',
         ]
-    )
-
-
-def _row(case: Case) -> tuple[str, ...]:
-    truth = case['truth']
-    return (
-        str(case['name']),
-        str(truth['robot']),
-        f'{truth["motion"]}, {case["poor"]}',
-        ' + '.join(' of '.join(filter(None, site)) for site in truth['sites']),
-        _told(case['first']),
-        ', '.join(f'{s["kind"]} {s["robot_minutes"]:.1f} min' for s in case['rounds']),
-        _told(case['loop']),
-        str(case['end']),
     )
 
 
@@ -104,3 +81,20 @@ def _told(found: dict[str, Any]) -> str:
     right = 'right' if found['right'] else 'wrong'
     sure = 'sure' if found['sure'] else 'open'
     return f'{found["status"]}, {right}, {sure}'
+
+
+COLUMNS: dict[str, Callable[[Case], object]] = {
+    'cell': lambda case: case['name'],
+    'robot': lambda case: case['truth']['robot'],
+    'first motion': lambda case: f'{case["truth"]["motion"]}, {case["poor"]}',
+    'causes': lambda case: ' + '.join(
+        ' of '.join(filter(None, site)) for site in case['truth']['sites']
+    ),
+    'first': lambda case: _told(case['first']),
+    'asked': lambda case: ', '.join(
+        f'{s["kind"]} {s["robot_minutes"]:.1f} min' for s in case['rounds']
+    ),
+    'loop': lambda case: _told(case['loop']),
+    'ended': lambda case: case['end'],
+}
+"""Columns of the table of cells."""

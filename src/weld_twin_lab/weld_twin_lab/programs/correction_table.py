@@ -6,45 +6,19 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 
 from weld_twin_msgs_py.files import markdown
 
+from ..study import tabled
+
 NOISE = 1e-6
 """Change of a path's accuracy [m] that is none: programs are written to about a micrometre."""
 OUTCOMES = ('corrected', 'left', 'refused')
-HEADS = (
-    'language',
-    'cases',
-    'corrected',
-    'left',
-    'refused',
-    'AT before, mm',
-    'after',
-    'true causes',
-    'after over true, median',
-    '90 of 100',
-    'worst',
-    'before over true, median',
-    'worse than before',
-)
-"""Heads of the table a language."""
-SEAM_HEADS = (
-    'language',
-    'robot',
-    'causes',
-    'seam',
-    'verdict',
-    'outcome',
-    'AT before, mm',
-    'after',
-    'true causes',
-    'over true',
-)
-"""Heads of the table of seams."""
 
 
 def worse(entry: dict[str, Any]) -> bool:
@@ -102,7 +76,7 @@ def totals(cases: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
 
 def page(result: dict[str, Any]) -> str:
     """Return the results as tables in Markdown."""
-    rows = [_row(name, total) for name, total in result['totals'].items() if total['cases']]
+    rows = [item for item in result['totals'].items() if item[1]['cases']]
     drawn = [case for case in result['cases'] if 'undrawn' not in case]
     why = Counter(_plain(case['why']) for case in drawn if case['why'])
     return '\n'.join(
@@ -112,7 +86,7 @@ def page(result: dict[str, Any]) -> str:
             f'Seed {result["seed"]}. AT is the path accuracy of ISO 9283; where no number of',
             'a language is told apart it is the median of its seams.',
             '',
-            markdown.table(HEADS, *rows),
+            tabled(LANGUAGES, rows),
             '',
             '## Why seams were left as they were',
             '',
@@ -120,22 +94,9 @@ def page(result: dict[str, Any]) -> str:
             '',
             '## Every seam',
             '',
-            markdown.table(SEAM_HEADS, *(_seam_row(case) for case in drawn)),
+            tabled(SEAMS, drawn),
             '',
         ]
-    )
-
-
-def _row(name: str, total: dict[str, Any]) -> tuple[str, ...]:
-    at, spread = total['at_m'], total['ratio']
-    return (
-        name,
-        str(total['cases']),
-        *(str(total[outcome]) for outcome in OUTCOMES),
-        *(f'{1e3 * at[key]:.3f}' for key in ('before', 'after', 'true')),
-        *(f'{spread[key]:.2f}' for key in ('median', 'p90', 'worst')),
-        f'{total["ratio_before"]:.2f}',
-        str(total['worse']),
     )
 
 
@@ -144,18 +105,39 @@ def _plain(why: str) -> str:
     return re.sub(r'\d+\.\d+', '...', why.rpartition(': ')[2])
 
 
-def _seam_row(case: dict[str, Any]) -> tuple[str, ...]:
-    causes = ', '.join(
+def _accuracies(at: Callable[[Any], dict[str, float]]) -> dict[str, Callable[[Any], str]]:
+    """Return the columns of path accuracies [mm], which `at` finds in a row."""
+    keys = {'AT before, mm': 'before', 'after': 'after', 'true causes': 'true'}
+    return {
+        head: lambda row, key=key: f'{1e3 * at(row)[key]:.3f}'  # type: ignore[misc]
+        for head, key in keys.items()
+    }
+
+
+LANGUAGES: dict[str, Callable[[Any], object]] = {
+    'language': lambda row: row[0],
+    'cases': lambda row: row[1]['cases'],
+    'corrected': lambda row: row[1]['corrected'],
+    'left': lambda row: row[1]['left'],
+    'refused': lambda row: row[1]['refused'],
+    **_accuracies(lambda row: row[1]['at_m']),
+    'after over true, median': lambda row: f'{row[1]["ratio"]["median"]:.2f}',
+    '90 of 100': lambda row: f'{row[1]["ratio"]["p90"]:.2f}',
+    'worst': lambda row: f'{row[1]["ratio"]["worst"]:.2f}',
+    'before over true, median': lambda row: f'{row[1]["ratio_before"]:.2f}',
+    'worse than before': lambda row: row[1]['worse'],
+}
+"""Columns of the table of languages, each a name and its totals."""
+SEAMS: dict[str, Callable[[Any], object]] = {
+    'language': itemgetter('language'),
+    'robot': itemgetter('robot'),
+    'causes': lambda case: ', '.join(
         ' of '.join(filter(None, (c['effect'], c.get('joint')))) for c in case['causes']
-    )
-    outcome = case['outcome'] + (', worse than before' if worse(case) else '')
-    return (
-        case['language'],
-        case['robot'],
-        causes,
-        case['seam'],
-        case['status'],
-        outcome,
-        *(f'{1e3 * case["at_m"][key]:.3f}' for key in ('before', 'after', 'true')),
-        f'{ratio(case):.2f}',
-    )
+    ),
+    'seam': itemgetter('seam'),
+    'verdict': itemgetter('status'),
+    'outcome': lambda case: case['outcome'] + (', worse than before' if worse(case) else ''),
+    **_accuracies(itemgetter('at_m')),
+    'over true': lambda case: f'{ratio(case):.2f}',
+}
+"""Columns of the table of seams."""

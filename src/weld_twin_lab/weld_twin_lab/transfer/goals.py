@@ -11,6 +11,7 @@ import numpy as np
 
 from weld_twin_msgs_py.files import markdown
 
+from ..study import tabled
 from .splits import TUNED_ON
 
 Entry = dict[str, Any]
@@ -19,20 +20,6 @@ MANY = 120
 WORSE = 1.05
 """Mean error over another from which on it counts as worse."""
 REACHED = {True: 'reached', False: '**missed**', None: 'not measured'}
-HEADS = (
-    'split',
-    'stations',
-    'frames',
-    'geometry',
-    'gravity',
-    'product',
-    'over best (95 %)',
-    'outside: frames',
-    'product',
-    'over frames',
-    'flagged',
-    'verdict',
-)
 
 
 class Measure(NamedTuple):
@@ -198,9 +185,7 @@ def goal_table(measures: Sequence[Measure]) -> str:
 
 def split_table(entries: Sequence[Entry]) -> str:
     """Return one line per split: mean errors in mm."""
-    return markdown.table(
-        HEADS, *[_row(entry) for entry in entries if entry['kind'] != 'servo_axis']
-    )
+    return tabled(SPLITS, [entry for entry in entries if entry['kind'] != 'servo_axis'])
 
 
 def axis_table(entry: Entry) -> str:
@@ -209,39 +194,55 @@ def axis_table(entry: Entry) -> str:
     return markdown.table(('model', 'left [µm RMS]'), *rows)
 
 
-def _row(entry: Entry) -> tuple[str, ...]:
+def _name(entry: Entry) -> str:
     mark = ' *' if entry['robot'] == 'ur5' and entry['kind'] in TUNED_ON else ''
-    head = (entry['name'] + mark, str(entry['stations']))
-    if entry['traceback']:
-        last = entry['traceback'].strip().splitlines()[-1]
-        return (*head, *[''] * 9, f'traceback: {last}')
-    inside, outside = entry['inside'], entry['outside']
-    return (
-        *head,
-        *[_mm(inside, name) for name in ('frames', 'geometry', 'gravity', 'product')],
-        _ratio(inside, 'over_best'),
-        _mm(outside, 'frames'),
-        _mm(outside, 'product'),
-        _ratio(outside, 'over_frames'),
-        '' if outside is None or 'flagged' not in outside else f'{100 * outside["flagged"]:.0f} %',
-        _verdict(entry),
-    )
+    return str(entry['name'] + mark)
 
 
-def _mm(region: Entry | None, name: str) -> str:
-    if region is None or name not in region['mean_m']:
-        return ''
-    return f'{1e3 * region["mean_m"][name]:.3f}'
+def _mm(region: str, name: str) -> Callable[[Entry], str]:
+    """Return what tells the mean error of a model in a region [mm]."""
+
+    def told(entry: Entry) -> str:
+        mean = _of(entry, region, 'mean_m', {}).get(name)
+        return '' if mean is None else f'{1e3 * mean:.3f}'
+
+    return told
 
 
-def _ratio(region: Entry | None, key: str) -> str:
-    if region is None or region.get(key) is None:
-        return ''
-    found = region[key]
-    return f'{found["ratio"]:.2f} ({found["low"]:.2f} to {found["high"]:.2f})'
+def _ratio(region: str, key: str) -> Callable[[Entry], str]:
+    """Return what tells a ratio in a region, with its interval."""
+
+    def told(entry: Entry) -> str:
+        found = _of(entry, region, key)
+        if found is None:
+            return ''
+        return f'{found["ratio"]:.2f} ({found["low"]:.2f} to {found["high"]:.2f})'
+
+    return told
+
+
+def _share_flagged(entry: Entry) -> str:
+    share = _of(entry, 'outside', 'flagged')
+    return '' if share is None else f'{100 * share:.0f} %'
 
 
 def _verdict(entry: Entry) -> str:
+    if entry['traceback']:
+        return f'traceback: {entry["traceback"].strip().splitlines()[-1]}'
     sure = '' if entry['confidence'] is None else f', {100 * entry["confidence"]:.0f} %'
     names = ', '.join(entry['families']) or 'nothing named'
     return f'{entry["status"]}{sure}: {names}'
+
+
+SPLITS: dict[str, Callable[[Entry], object]] = {
+    'split': _name,
+    'stations': lambda entry: entry['stations'],
+    **{name: _mm('inside', name) for name in ('frames', 'geometry', 'gravity', 'product')},
+    'over best (95 %)': _ratio('inside', 'over_best'),
+    'outside: frames': _mm('outside', 'frames'),
+    'outside: product': _mm('outside', 'product'),
+    'over frames': _ratio('outside', 'over_frames'),
+    'flagged': _share_flagged,
+    'verdict': _verdict,
+}
+"""Columns of the table of splits."""

@@ -16,14 +16,13 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects.plausible import beyond
 from weld_twin_core.recording import Recording
 
+from ..blind.statistics import bootstrap
 from .splits import Split, halves
 from .unseen import ALIGN, PLAIN, flagged, plain_fit, residual, tried
 
 PRODUCT, FRAMES = 'product', 'frames'
 HALVES = 60
 """Stations from which on the two halves of a split are diagnosed as well."""
-DRAWS = 2000
-"""Draws of the bootstrap; its 95 % limits then repeat to some per cent of their width."""
 
 
 def judge(split: Split) -> dict[str, Any]:
@@ -103,17 +102,15 @@ def _region(
     return out
 
 
-def paired(mine: Array, other: Array) -> dict[str, float]:
-    """
-    Return the ratio of two mean errors on the same stations, with its 95 % interval.
+def paired(mine: Array, other: Array) -> dict[str, Any]:
+    """Return the ratio of two mean errors on the same stations, with its 95 % interval."""
 
-    Percentile bootstrap over stations, drawn for both at once; always the same draws.
-    """
-    ratio = float(mine.mean() / max(other.mean(), 1e-300))
-    pick = np.random.default_rng(0).integers(0, mine.size, (DRAWS, mine.size))
-    draws = mine[pick].mean(axis=1) / np.maximum(other[pick].mean(axis=1), 1e-300)
-    low, high = np.percentile(draws, [2.5, 97.5])
-    return {'ratio': ratio, 'low': float(low), 'high': float(high)}
+    def ratio(rows: Array, axis: int) -> Array:
+        means = rows.mean(axis=axis)
+        return np.asarray(means[..., 0] / np.maximum(means[..., 1], 1e-300))
+
+    found = bootstrap(np.stack([mine, other], axis=1), ratio)
+    return {'ratio': found.value, 'low': found.low, 'high': found.high}
 
 
 def _sizes(parts: Array) -> Array:

@@ -56,6 +56,11 @@ seeds than those that are judged, this gave fewer than one false alarm in two ye
 """
 
 
+_TRIED = 2 * 52
+"""Shapes that a year of weekly diagnoses has at the end. Each of its looks is a new chance for a false
+alarm, so the first ones, which try few shapes, are held to as much as the last."""
+
+
 class _Shape(NamedTuple):
     """A kind of change, its instant (the first diagnosis after it) and its columns (W, m)."""
 
@@ -114,7 +119,7 @@ def changes(
     if series.days.size < 2:
         return ()
     shapes = _shapes(series.days)
-    tests = len(shapes) * series.changing.size
+    tests = max(len(shapes), _TRIED) * series.changing.size
     sooner = np.array(
         [_NAMED * (name in named) + _LIKELY * (name in likely) for name in series.names]
     )

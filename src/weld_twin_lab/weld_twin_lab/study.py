@@ -5,7 +5,7 @@ One way to run a study: its options, its parts and tasks, what is kept of them, 
 
 A study is a subcommand: a module with a docstring, whose first line is the short help, and::
 
-    add_arguments = options(option('--cases', 40, 'N', 'how many (default: 40)'))
+    OPTIONS = options('--cases N  how many [default: 40]')
 
     @study
     def run(study: Study) -> bool | None: ...
@@ -34,7 +34,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_nodes.cli.options import POOL
-from weld_twin_nodes.cli.parsing import Options, add_options
+from weld_twin_nodes.cli.parsing import Options
 from weld_twin_nodes.offline.output_directory import write_owned
 from weld_twin_nodes.offline.owned_files import LIST
 
@@ -51,50 +51,21 @@ MISSED = 1
 """Exit code where a goal was not met."""
 DONE = 'done'
 """Folder of what is kept of the tasks of a study."""
-REQUIRED: Any = ...
-"""Default of an option that must be given."""
 Tell = Callable[[str], None]
 """Told what is being done."""
-Add = Callable[[argparse.ArgumentParser], None]
-
-
-def option(flag: str, default: Any, metavar: Any, text: str, **more: Any) -> Add:
-    """Return what adds an option; numbers are read as their default is, a False is a switch."""
-    keywords: dict[str, Any] = {'help': text, **more}
-    if default is False:
-        keywords['action'] = 'store_true'
-    else:
-        keywords['metavar'] = metavar
-    if default is REQUIRED:
-        keywords |= {'required': True} if flag.startswith('-') else {}
-    elif default is not False:
-        keywords['default'] = default
-        if isinstance(default, int | float):
-            keywords['type'] = type(default)
-
-    def add(parser: argparse.ArgumentParser) -> None:
-        parser.add_argument(flag, **keywords)
-
-    return add
 
 
 def options(
     *rows: Options, out: str = 'where results go', of: str = 'DIR', pool: bool = False
-) -> Add:
+) -> tuple[Options, ...]:
     """
-    Return what adds the options of a study.
+    Return the options of a study.
 
-    *rows: tables as `add_options` reads them, or what `option` returns.
+    *rows: tables as `add_options` reads them.
     out, of: what ``--out`` says; it must be given. An empty text adds none.
     pool: whether tasks run on several cores or on a cluster.
     """
-    last = option('--out', REQUIRED, of, out)
-    every: list[Options] = [*rows, *([POOL] * pool), *([last] * bool(out))]
-
-    def add_arguments(parser: argparse.ArgumentParser) -> None:
-        add_options(parser, *every)
-
-    return add_arguments
+    return *rows, *([POOL] * pool), *([f'--out {of}, required  {out}'] * bool(out))
 
 
 def listed(text: str) -> list[str]:
@@ -247,6 +218,6 @@ def study(run: Callable[[Study], bool | None]) -> Callable[[argparse.Namespace],
     return command
 
 
-def job(text: str | None, add_arguments: Add) -> SimpleNamespace:
+def job(text: str | None, own: tuple[Options, ...]) -> SimpleNamespace:
     """Return a job of a proof, as `add_command` takes it: what its help says, and its options."""
-    return SimpleNamespace(__doc__=text, add_arguments=add_arguments)
+    return SimpleNamespace(__doc__=text, OPTIONS=own)

@@ -4,9 +4,9 @@
 Long trials of robustness whose results are kept under version control.
 
 Each module of this package is a campaign; what a campaign needs beside it lies in a sub-package.
-A campaign has a docstring, whose first line is the help text, and three functions::
+A campaign has a docstring, whose first line is the help text, and::
 
-    def add_arguments(parser: argparse.ArgumentParser) -> None: ...
+    OPTIONS = options(..., out='')
     def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]: ...
     def table(result: dict[str, Any]) -> str: ...
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files import markdown
 
-from ..study import option, options, tabled
+from ..study import options, tabled
 from . import write_result
 from .compensating import NOTHING
 from .latency import pose_table
@@ -51,19 +51,14 @@ LARGEST = ('worst_m', 'bound_m')
 """Its largest distance when it is corrected [m], and what was told of that."""
 
 
-add_arguments = options(
-    option('--goals', 500, 'N', 'goals of all arms (default: 500)'),
-    option(
-        '--without-cell',
-        500,
-        'N',
-        'goals of all arms that are judged without nodes, 0 for none (default: 500)',
-    ),
-    option('--seed', 7, 'N', 'decides what is drawn'),
-    option(
-        '--go-on', False, None, 'keep the goals and changes that the file has, and try the others'
-    ),
-    option('--turns', 20, 'N', 'turns of the race of poses, 0 for none'),
+OPTIONS = options(
+    """
+--goals N         goals of all arms [default: 500]
+--without-cell N  goals of all arms that are judged without nodes, 0 for none [default: 500]
+--seed N          decides what is drawn [default: 7]
+--go-on           keep the goals and changes that the file has, and try the others
+--turns N         turns of the race of poses, 0 for none [default: 20]
+""",
     out='',
 )
 

@@ -17,13 +17,13 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
-from ..study import option, options
+from ..study import options
 
-add_arguments = options(
-    option('--only', '', None, 'faults whose names contain this'),
-    option(
-        '--part', '1/1', 'K/N', 'the K-th of N parts; what the file has of other faults is kept'
-    ),
+OPTIONS = options(
+    """
+--only TEXT  faults whose names contain this
+--part K/N   the K-th of N parts; what the file has of other faults is kept [default: 1/1]
+""",
     out='',
 )
 

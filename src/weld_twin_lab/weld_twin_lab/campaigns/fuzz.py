@@ -16,13 +16,15 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
-from ..study import option, options
+from ..study import options
 
-add_arguments = options(
-    option('--cases', 5000, 'N', 'broken files of each kind (default: 5000)'),
-    option('--seed', 1, 'S', 'decides how they are broken'),
-    option('--only', '', 'LIST', 'kinds, comma-separated'),
-    option('--recordings', 0, 'N', 'recordings that hardly say anything, from --seed on'),
+OPTIONS = options(
+    """
+--cases N       broken files of each kind [default: 5000]
+--seed N        decides how they are broken [default: 1]
+--only LIST     kinds, comma-separated
+--recordings N  recordings that hardly say anything, from --seed on [default: 0]
+""",
     out='',
 )
 

@@ -16,16 +16,18 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
-from ..study import option, options
+from ..study import options
 
 ALLOWED = 1.0
 """Seconds of messages that a kill may cost."""
 
 
-add_arguments = options(
-    option('--times', 200, 'N', 'kills of the recorder (default: 200)'),
-    option('--seed', 1, 'S', 'decides the moments'),
-    option('--longest', 3.0, 'SECONDS', 'latest moment of a kill of the recorder (default: 3)'),
+OPTIONS = options(
+    """
+--times N    kills of the recorder [default: 200]
+--seed N     decides the moments [default: 1]
+--longest S  latest moment of a kill of the recorder [default: 3]
+""",
     out='',
 )
 

@@ -18,7 +18,7 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
-from ..study import option, options
+from ..study import options
 
 RATES = (125.0, 500.0, 1000.0)
 """Rates [Hz] of joint states: common controllers, and twice the fastest of them."""
@@ -50,9 +50,11 @@ processor time that the relay has no like of, so that only the latency counts th
 """
 
 
-add_arguments = options(
-    option('--turns', 20, 'N', 'turns of each, at each rate (default: 20)'),
-    option('--seconds', 1.0, 'S', 'length of a turn'),
+OPTIONS = options(
+    """
+--turns N    turns of each, at each rate [default: 20]
+--seconds S  length of a turn [default: 1]
+""",
     out='',
 )
 

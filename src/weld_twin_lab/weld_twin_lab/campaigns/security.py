@@ -18,19 +18,16 @@ from typing import Any
 from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.messages.topics import DIAGNOSIS
 
-from ..study import option, options
+from ..study import options
 
 WAYS = ('open', 'enforced')
 
 
-add_arguments = options(
-    option(
-        '--source',
-        None,
-        'DIR',
-        'folder with rmw_cyclonedds and sros2 (branch jazzy), to be built and used',
-    ),
-    option('--work', None, 'DIR', 'where to build it; kept, and used again next time'),
+OPTIONS = options(
+    """
+--source DIR  folder with rmw_cyclonedds and sros2 (branch jazzy), to be built and used
+--work DIR    where to build it; kept, and used again next time
+""",
     out='',
 )
 

@@ -14,7 +14,7 @@ from typing import Any
 
 from weld_twin_msgs_py.files import markdown
 
-from ..study import option, options
+from ..study import options
 
 EVERY = 5.0
 """Seconds between two looks at the processes."""
@@ -29,10 +29,12 @@ EFFECTS = """
 """
 
 
-add_arguments = options(
-    option('--minutes', 30.0, None, 'length of the trial (default: 30)'),
-    option('--rate', 500.0, None, 'joint states a second'),
-    option('--cores', 2, None, 'cores all nodes share'),
+OPTIONS = options(
+    """
+--minutes M  length of the trial [default: 30]
+--rate HZ    joint states a second [default: 500]
+--cores N    cores all nodes share [default: 2]
+""",
     out='',
 )
 

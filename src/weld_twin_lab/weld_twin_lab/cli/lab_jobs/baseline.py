@@ -12,29 +12,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...study import DONE, Study, engine_digest, option, options, require_simulator, study
+from ...study import DONE, Study, engine_digest, options, require_simulator, study
 
 TABLE, GROWING = 'answers.jsonl', 'growing'
 
-add_arguments = options(
-    option('--cases', 0, 'N', 'diagnose the first N cells of a seed'),
-    option('--seed', 1, 'S', 'their seed'),
-    option(
-        '--beside', [], 'NAME=TABLE', 'tables that other engines made of the same cells', nargs='*'
-    ),
-    option(
-        '--growing',
-        False,
-        None,
-        'diagnose every cell with one to four recordings, and in reverse: does more data hurt?',
-    ),
-    option(
-        '--without',
-        [],
-        'NAME',
-        'take mechanisms of the diagnosis out: what are they worth?',
-        nargs='*',
-    ),
+OPTIONS = options(
+    """
+--cases N                diagnose the first N cells of a seed [default: 0]
+--seed N                 their seed [default: 1]
+--beside NAME=TABLE ...  tables that other engines made of the same cells
+--growing                diagnose every cell with one to four recordings, and in reverse: does more
+  data hurt?
+--without NAME ...       take mechanisms of the diagnosis out: what are they worth?
+""",
     out='where everything goes',
     pool=True,
 )

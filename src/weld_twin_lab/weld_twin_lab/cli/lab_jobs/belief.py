@@ -15,33 +15,21 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...belief.terms import RISK
-from ...study import Study, option, options, require_simulator, study
+from ...study import Study, options, require_simulator, study
 
 LEARNED, JUDGED = 'cases.jsonl.gz', 'held_out.jsonl.gz'
 
-add_arguments = options(
-    option('--cases', 0, 'N', 'cases to learn from (default: 0)'),
-    option('--seed', 1, 'S', 'their seed'),
-    option('--held-out', 0, 'N', 'cases to judge on (default: 0)'),
-    option('--held-out-seed', 2, 'S', 'their seed'),
-    option(
-        '--mix',
-        'usual',
-        None,
-        'cases of the usual mix, or cells with one to six causes (default: usual)',
-        choices=('usual', 'several'),
-    ),
-    option('--learn-from', [], 'TABLE', 'tables kept from other runs', nargs='*'),
-    option('--judge-on', [], 'TABLE', 'tables kept from other runs', nargs='*'),
-    option(
-        '--oracle',
-        False,
-        None,
-        'ask of cases with one and two causes what one who knows the plant could be sure of',
-    ),
-    option(
-        '--risk', RISK, 'P', f'probability that an answer may be sure and wrong (default: {RISK})'
-    ),
+OPTIONS = options(
+    f"""
+--cases N               cases to learn from [default: 0]
+--seed N                their seed [default: 1]
+--held-out N            cases to judge on [default: 0]
+--held-out-seed N       their seed [default: 2]
+--mix {{usual,several}}   cases of the usual mix, or cells with one to six causes [default: usual]
+--learn-from TABLE ...  tables kept from other runs
+--judge-on TABLE ...    tables kept from other runs
+--risk X                probability that an answer may be sure and wrong [default: {RISK}]
+""",
     out='where everything goes',
     pool=True,
 )

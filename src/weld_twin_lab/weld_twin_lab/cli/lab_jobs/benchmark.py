@@ -13,13 +13,10 @@ import os
 from weld_twin_nodes.cli.options import folder_output, output
 from weld_twin_nodes.offline.environment import THREADS
 
-from ...study import Study, option, options, study
+from ...study import Study, options, study
 
-add_arguments = options(
-    folder_output('where results go'),
-    option('--quick', False, None, 'small sizes, to see that it runs'),
-    out='',
-)
+QUICK = '--quick  small sizes, to see that it runs'
+OPTIONS = options(folder_output('where results go'), QUICK, out='')
 
 
 @study
@@ -27,8 +24,8 @@ def run(study: Study) -> None:
     """Run the benchmark; print results as they come."""
     os.environ.update(dict.fromkeys(THREADS, '1'))  # read by libraries when they are imported
 
-    from ...benchmark.all_races import FULL, QUICK, benchmark
+    from ...benchmark import all_races
 
-    sizes = QUICK if study.args.quick else FULL
+    sizes = all_races.QUICK if study.args.quick else all_races.FULL
     with output(study.args, 'benchmark.json') as folder:
-        benchmark(folder, sizes, lambda line: print(line, flush=True))
+        all_races.benchmark(folder, sizes, lambda line: print(line, flush=True))

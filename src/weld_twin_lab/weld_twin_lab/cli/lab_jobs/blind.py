@@ -14,27 +14,27 @@ from pathlib import Path
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.options import add_command
 
-from ...study import DONE, REQUIRED, Study, job, listed, option, options, require_simulator, study
+from ...study import DONE, Study, job, listed, options, require_simulator, study
 from ..retired import BLIND, add_retired
 
-DRAW = (
-    option('--cases', 400, 'N', 'how many (default: 400)', dest='count'),
-    option('--seed', REQUIRED, 'S', 'decides the cases', type=int),
-    option(
-        '--kinds',
-        '',
-        'LIST',
-        'only these, comma-separated: single, double, triple, none, outside, withheld, ambiguous',
-    ),
-    option(
-        '--leave-one-out',
-        False,
-        None,
-        'each family of effects in turn at work and taken out of the library',
-    ),
-    option('--seconds', '20,60', 'MIN,MAX', 'duration of a recording'),
-)
-CASES = option('cases', REQUIRED, 'DIR', 'cases made by blind make')
+DRAW = """
+--cases N         how many [default: 400]
+--seed N, required  decides the cases
+--kinds LIST      only these, comma-separated: single, double, triple, none, outside, withheld, ambiguous
+--leave-one-out   each family of effects in turn at work and taken out of the library
+--seconds MIN,MAX  duration of a recording [default: 20,60]
+"""
+CASES = 'CASES  cases made by blind make'
+TRUTHS = '--truths DIR, required  where the truths go; keep it where a diagnosis cannot read'
+DIAGNOSE = """
+--allow-readable   go on although truths lie within reach; the score tells
+--without-holdout  judge the shrink on stretches of the training recording
+"""
+SCORE = """
+--truths DIR, required   their truths
+--results DIR, required  verdicts of blind diagnose
+--seal HASH              the seal as it was printed before the diagnosis
+"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -106,51 +106,10 @@ def whole(study: Study) -> None:
 
 
 JOBS = {
-    'make': (
-        options(
-            *DRAW,
-            option(
-                '--truths',
-                REQUIRED,
-                'DIR',
-                'where the truths go; keep it where a diagnosis cannot read',
-            ),
-            out='where the recordings go',
-            pool=True,
-        ),
-        make,
-    ),
-    'diagnose': (
-        options(
-            CASES,
-            option(
-                '--allow-readable',
-                False,
-                None,
-                'go on although truths lie within reach; the score tells',
-            ),
-            option(
-                '--without-holdout',
-                False,
-                None,
-                'judge the shrink on stretches of the training recording',
-            ),
-            out='where the verdicts go',
-            pool=True,
-        ),
-        diagnose,
-    ),
-    'score': (
-        options(
-            CASES,
-            option('--truths', REQUIRED, 'DIR', 'their truths'),
-            option('--results', REQUIRED, 'DIR', 'verdicts of blind diagnose'),
-            option('--seal', '', 'HASH', 'the seal as it was printed before the diagnosis'),
-            out='where score.json and score.md go',
-        ),
-        score,
-    ),
-    'run': (options(*DRAW, out='where everything goes', pool=True), whole),
+    'make': (options(DRAW, TRUTHS, out='where the recordings go', pool=True), make),
+    'diagnose': (options(CASES, DIAGNOSE, out='where the verdicts go', pool=True), diagnose),
+    'score': (options(CASES, SCORE, out='where score.json and score.md go'), score),
+    'run': (options(DRAW, out='where everything goes', pool=True), whole),
 }
 """The jobs: their options, and what runs them."""
 
@@ -164,7 +123,7 @@ def _made(study: Study, cases: Path, truths: Path) -> None:
     kinds = ('withheld',) if args.leave_one_out else tuple(listed(args.kinds))
     spans = _spans(args.seconds)
     with study.runner('making cases', truths / DONE) as runner:
-        sealed = make(cases, truths, args.seed, args.count, runner, kinds, spans)
+        sealed = make(cases, truths, args.seed, args.cases, runner, kinds, spans)
     print(f'seal {sealed}', flush=True)
 
 

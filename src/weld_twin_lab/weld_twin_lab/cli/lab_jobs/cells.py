@@ -9,13 +9,15 @@ tracker. Writes cells.json and cells.md; a run that was interrupted goes on wher
 
 from __future__ import annotations
 
-from ...study import Study, engine_digest, option, options, require_simulator, study
+from ...study import Study, engine_digest, options, require_simulator, study
 
-add_arguments = options(
-    option('--cells', 14, 'N', 'sealed cells of every kind (default: 14)'),
-    option('--cameras', 40, 'N', 'sealed arms before cameras (default: 40)'),
-    option('--seed', 0, 'S', 'the first that is drawn (default: 0)'),
-    option('--data', None, 'DIR', 'published recordings: holds motoman_left'),
+OPTIONS = options(
+    """
+--cells N    sealed cells of every kind [default: 14]
+--cameras N  sealed arms before cameras [default: 40]
+--seed N     the first that is drawn [default: 0]
+--data DIR   published recordings: holds motoman_left
+""",
     pool=True,
 )
 

@@ -11,12 +11,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from ...study import REQUIRED, Study, option, options, study
+from ...study import Study, options, study
 
-add_arguments = options(
-    option('tables', REQUIRED, 'TABLE', 'investigate.json of cells to learn from', nargs='+'),
-    out='',
-)
+OPTIONS = options('TABLES ...  investigate.json of cells to learn from', out='')
 
 
 @study

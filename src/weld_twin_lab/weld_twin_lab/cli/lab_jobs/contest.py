@@ -13,22 +13,22 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...study import REQUIRED, Study, listed, option, options, study
+from ...study import Study, listed, options, study
 
 if TYPE_CHECKING:
     from weld_twin_core.arrays import Array
 
     from ...contest.arms import Errors
 
-add_arguments = options(
-    option('--cases', REQUIRED, 'DIR', 'as blind make wrote them'),
-    option('--truths', REQUIRED, 'DIR', 'their truths'),
-    option('--first', 0, 'N', 'only so many cases'),
-    option('--entrants', '', 'LIST', 'comma-separated (default: all)'),
-    option('--enter', [], 'NAME=COMMAND', 'a further method', action='append'),
-    option('--ur5', None, 'DIR', 'holds grid.csv, random.csv'),
-    option('--ur10', None, 'DIR', 'holds series_c_random_poses.csv'),
-)
+OPTIONS = options("""
+--cases DIR, required   as blind make wrote them
+--truths DIR, required  their truths
+--first N               only so many cases [default: 0]
+--entrants LIST         comma-separated; left out, all
+--enter NAME=COMMAND    a further method; may be given again
+--ur5 DIR               holds grid.csv, random.csv
+--ur10 DIR              holds series_c_random_poses.csv
+""")
 
 
 @study

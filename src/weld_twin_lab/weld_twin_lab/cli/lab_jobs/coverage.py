@@ -12,18 +12,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...study import Study, option, options, study
+from ...study import Study, options, study
 
-add_arguments = options(
-    option('--ur5', None, 'DIR', 'holds grid.csv; with --ur10'),
-    option('--ur10', None, 'DIR', 'holds series_c_random_poses.csv'),
-    option('--cases', 0, 'N', 'the first N sealed cases of a seed (default: none)'),
-    option('--seams', 0, 'N', 'seams of every language of programs'),
-    option('--touches', 0, 'N', 'arms that touch things'),
-    option('--cells', 0, 'N', 'cells that live through ten years each'),
-    option('--plans', 0, 'N', 'plans of a first measurement'),
-    option('--seed', 1, 'S', 'of all that is drawn (default: 1)'),
-)
+OPTIONS = options("""
+--ur5 DIR    holds grid.csv; with --ur10
+--ur10 DIR   holds series_c_random_poses.csv
+--cases N    the first N sealed cases of a seed [default: 0]
+--seams N    seams of every language of programs [default: 0]
+--touches N  arms that touch things [default: 0]
+--cells N    cells that live through ten years each [default: 0]
+--plans N    plans of a first measurement [default: 0]
+--seed N     of all that is drawn [default: 1]
+""")
 
 
 @study
@@ -38,8 +38,8 @@ def run(study: Study) -> None:
     args = study.args
     study.refuse_foreign(f'{NAME}.json', f'{NAME}.md', PARTS)
     drawn = args.cases, args.seams, args.touches, args.cells, args.plans
-    if (args.ur5 is None) is not (args.ur10 is None) or not (args.ur5 or any(drawn)):
+    if bool(args.ur5) is not bool(args.ur10) or not (args.ur5 or any(drawn)):
         raise DataError('give --ur5 and --ur10, or how many of what is to be drawn, or both')
-    arms = None if args.ur5 is None else (Path(args.ur5), Path(args.ur10))
+    arms = (Path(args.ur5), Path(args.ur10)) if args.ur5 else None
     entries = entries_of(Wanted(arms, args.seed, *drawn), study.parts(PARTS))
     study.write(NAME, head('coverage/3', entries=entries), page(entries))

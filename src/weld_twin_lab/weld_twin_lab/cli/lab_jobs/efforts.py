@@ -11,15 +11,15 @@ from __future__ import annotations
 
 from weld_twin_nodes.cli.options import ROBOT, folder_output
 
-from ...study import REQUIRED, Study, option, options, study
+from ...study import Study, options, study
 
 PAGE = 'efforts.md'
 
 
-add_arguments = options(
-    option('table', REQUIRED, 'TABLE', 'stations with measured poses and efforts'),
+OPTIONS = options(
+    'TABLE  stations with measured poses and efforts',
     ROBOT,
-    option('--folds', 5, 'N', 'stretches (default: 5)'),
+    '--folds N  stretches [default: 5]',
     folder_output('where table and page go'),
     out='',
 )

@@ -9,13 +9,15 @@ A run that was interrupted goes on where it stopped.
 
 from __future__ import annotations
 
-from ...study import Study, engine_digest, listed, option, options, require_simulator, study
+from ...study import Study, engine_digest, listed, options, require_simulator, study
 
-add_arguments = options(
-    option('--seed', 20, 'S', 'decides what is drawn (default: 20)'),
-    option('--draws', 10, 'N', 'of every kind, as bag and as table'),
-    option('--sound', 300, 'N', 'sound recordings'),
-    option('--kinds', '', 'LIST', 'only these mistakes, comma-separated'),
+OPTIONS = options(
+    """
+--seed N      decides what is drawn [default: 20]
+--draws N     of every kind, as bag and as table [default: 10]
+--sound N     sound recordings [default: 300]
+--kinds LIST  only these mistakes, comma-separated
+""",
     out='directory for gate.json and gate.md',
     of='OUT',
     pool=True,

@@ -10,17 +10,14 @@ and one with --minutes writes what there is after so long.
 
 from __future__ import annotations
 
-from ...study import Study, option, options, study
+from ...study import Study, options, study
 
-add_arguments = options(
-    option('--seed', 1, 'N', 'decides the cells'),
-    option('--cells', 120, 'N', 'cells that are left open at first'),
-    option(
-        '--minutes',
-        float('inf'),
-        'M',
-        'begin no further cells after so many minutes, and write what there is',
-    ),
+OPTIONS = options(
+    """
+--seed N     decides the cells [default: 1]
+--cells N    cells that are left open at first [default: 120]
+--minutes M  begin no further cells after so many minutes, and write what there is [default: inf]
+""",
     pool=True,
 )
 

@@ -9,11 +9,13 @@ where it stopped.
 
 from __future__ import annotations
 
-from ...study import Study, engine_digest, head, option, options, require_simulator, study
+from ...study import Study, engine_digest, head, options, require_simulator, study
 
-add_arguments = options(
-    option('--seams', 1, 'N', 'sealed seams a language (default: 1)'),
-    option('--seed', 1, 'N', 'decides the seams'),
+OPTIONS = options(
+    """
+--seams N  sealed seams a language [default: 1]
+--seed N   decides the seams [default: 1]
+""",
     pool=True,
 )
 

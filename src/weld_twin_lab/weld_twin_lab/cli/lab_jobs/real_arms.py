@@ -11,11 +11,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...study import DONE, REQUIRED, Study, engine_digest, option, options, study
+from ...study import DONE, Study, engine_digest, options, study
 
-add_arguments = options(
-    option('--data', REQUIRED, 'DIR', 'holds ur5_laser_tracker, emps, mukca, ...'),
-    option('--only', '', 'TEXT', 'only rows whose names contain this'),
+OPTIONS = options(
+    """
+--data DIR, required  holds ur5_laser_tracker, emps, mukca, ...
+--only TEXT           only rows whose names contain this
+""",
     pool=True,
 )
 

@@ -16,7 +16,7 @@ from ...study import options
 
 CAMPAIGN = 'security'
 
-add_arguments = options(security.add_arguments, out='JSON file to write', of='FILE')
+OPTIONS = options(*security.OPTIONS, out='JSON file to write', of='FILE')
 
 
 def run(args: argparse.Namespace) -> int:

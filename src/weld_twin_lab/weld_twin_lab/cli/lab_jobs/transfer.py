@@ -12,14 +12,14 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from ...study import REQUIRED, Study, option, options, study
+from ...study import Study, options, study
 
-add_arguments = options(
-    option('--ur5', REQUIRED, 'DIR', 'holds grid.csv, random.csv'),
-    option('--ur10', REQUIRED, 'DIR', 'holds series_c_random_poses.csv'),
-    option('--emps', REQUIRED, 'DIR', 'holds DATA_EMPS.mat'),
-    option('--only', '', 'TEXT', 'only splits whose names contain this'),
-)
+OPTIONS = options("""
+--ur5 DIR, required   holds grid.csv, random.csv
+--ur10 DIR, required  holds series_c_random_poses.csv
+--emps DIR, required  holds DATA_EMPS.mat
+--only TEXT           only splits whose names contain this
+""")
 
 
 @study

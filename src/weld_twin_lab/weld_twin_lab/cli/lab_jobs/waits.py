@@ -13,16 +13,16 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...study import Study, option, options, study
+from ...study import Study, options, study
 
 if TYPE_CHECKING:
     from ...benchmark.waiting import Entry
 
-add_arguments = options(
-    option('--base', None, 'DIR', 'another checkout, after make setup; left out, only this'),
-    option('--runs', 3, 'N', 'pairs of runs (default: 3)'),
-    option('--only', [], 'TEXT', 'jobs whose name has one of these', nargs='+'),
-)
+OPTIONS = options("""
+--base DIR       another checkout, after make setup; left out, only this
+--runs N         pairs of runs [default: 3]
+--only TEXT ...  jobs whose name has one of these
+""")
 
 
 @study
@@ -34,7 +34,7 @@ def run(study: Study) -> None:
 
     args = study.args
     kept = _kept(study.out / 'waits.json') if args.only else []
-    base = None if args.base is None else Path(args.base)
+    base = Path(args.base) if args.base else None
 
     def keep(entry: Entry) -> None:
         nonlocal kept

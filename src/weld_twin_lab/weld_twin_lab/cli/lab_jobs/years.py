@@ -8,13 +8,15 @@ and diagnosed in full. A run that was interrupted goes on where it stopped.
 
 from __future__ import annotations
 
-from ...study import Study, engine_digest, option, options, require_simulator, study
+from ...study import Study, engine_digest, options, require_simulator, study
 
-add_arguments = options(
-    option('--seed', 26, 'S', 'decides the cells and the years (default: 26)'),
-    option('--years', 200, 'N', 'drawn years'),
-    option('--cells', 12, 'N', 'cells they are of'),
-    option('--full', 2, 'N', 'years diagnosed in full'),
+OPTIONS = options(
+    """
+--seed N   decides the cells and the years [default: 26]
+--years N  drawn years [default: 200]
+--cells N  cells they are of [default: 12]
+--full N   years diagnosed in full [default: 2]
+""",
     out='directory for the results',
     of='OUT',
     pool=True,

@@ -54,8 +54,6 @@ False alarms allowed in one look, were all that is tried independent. It is not:
 are nearly one, and next week's look sees the same diagnoses again. In simulated years, of other
 seeds than those that are judged, this gave fewer than one false alarm in two years.
 """
-
-
 _TRIED = 2 * 52
 """Shapes that a year of weekly diagnoses has at the end. Each of its looks is a new chance for a false
 alarm, so the first ones, which try few shapes, are held to as much as the last."""

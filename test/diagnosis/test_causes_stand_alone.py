@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from diagnosis_cells import SIGMA, recorded, sites
+from diagnosis_cells import SIGMA, recorded, sites, solved
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis import diagnose
@@ -115,3 +115,23 @@ def test_no_part_left_out_takes_a_recording_with_it():
             assert np.bincount(own.astype(int)).max() <= 0.5 * own.size + problem.rows[0]
     alone = replace(problem, align=frozenset())
     assert len(set(alone.block_labels(8))) == 8
+
+
+def test_the_place_of_a_cause_that_was_taken_out_is_where_its_formula_fits():
+    # Curves of the tool over the time stood in for a wrist that follows its neighbour.
+    coupled = (
+        'joint_coupling',
+        'joint',
+        'elbow_joint',
+        'source',
+        'shoulder_lift_joint',
+        'ratio',
+        1e-3,
+    )
+    answer = solved(coupled, exclude=('joint_coupling',))
+    assert answer.status == 'unknown'
+    first, *others = answer.causes
+    assert first.place[0][0] == 'elbow_joint'
+    assert first.dependence[0][0] == 'angle'
+    assert 'joint_coupling' not in {site.effect for site, _ in first.name}
+    assert not any(cause.place[0][1] > 0.5 for cause in others if cause.place)

@@ -26,6 +26,7 @@ from ..result import Cause, Contributions, Shares, Site
 from ..unseen.folds import jackknife
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
+from ..verdict.evidence import lacking
 from ..verdict.table import Row, marginal
 from .curved import Curved
 from .free_form import FreeForm, Part
@@ -177,6 +178,10 @@ def _nameless(
     held = _carried_by(places, curved) if places else {}
     claims, remaining = list(reported), list[Part]()
     taken = {at for claim in reported for at in claim.members}
+    if taken_out := lacking(result):
+        beside = tuple(k for k in range(len(model)) if k not in taken and curved is not None)
+        stand_in = _stand_in(taken_out[0], beside, model)
+        return ([*claims, stand_in], _rest([], beliefs)) if beside else (claims, stand_in)
     for k, effect in enumerate(model if curved is not None else ()):
         if k not in taken and not effect.traits.bends:
             claims.append(_cause((k,), {effect.at: 1.0}, {effect.on: 1.0}, {Site.of(effect): 1.0}))
@@ -189,6 +194,18 @@ def _nameless(
         share = float(sum(part.share for part in own))
         claims.append(_cause(held[place], *levels, share=share))
     return claims, _rest(remaining, beliefs)
+
+
+def _stand_in(taken_out: Effect, members: Members, model: Sequence[Effect]) -> Cause:
+    """
+    Return what has no name where something that was taken out of the library fits clearly better.
+
+    Its formula says more of the place, and of what it depends on, than curves do.
+
+    members: the effects of the model that stand in for it; none where nothing could.
+    """
+    curves = {Site.of(model[k]): 1.0 for k in members if model[k].traits.bends}
+    return _cause(members, {taken_out.at: 1.0}, {taken_out.on: 1.0}, curves)
 
 
 def _rest(remaining: list[Part], beliefs: Beliefs) -> Cause:

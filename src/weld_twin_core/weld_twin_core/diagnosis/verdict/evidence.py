@@ -84,13 +84,17 @@ def gathered(
         parts=tuple(float(part @ part) / whole for part in parts),
         refused=tuple(_refused(robot, e) for e in result.refused if beyond(robot, e)),
         lacking=tuple(
-            f'{Site.of(e)}, which was taken out of the library'
-            for e in result.refused
-            if not beyond(robot, e)
+            f'{Site.of(e)}, which was taken out of the library' for e in lacking(result)
         ),
         families=families,
         leverage=_leverage(unseen, floor),
     )
+
+
+def lacking(result: Search) -> tuple[Effect, ...]:
+    """Return what was taken out of the library and fits clearly better than what was found."""
+    robot = result.final.model.robot
+    return tuple(effect for effect in result.refused if not beyond(robot, effect))
 
 
 def _leverage(unseen: Unseen, floor: NoiseFloor) -> float:

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The twin in bulk, live and over draws: three roads to the same poses."""
 
-from dataclasses import dataclass
+from dataclasses import FrozenInstanceError, dataclass
 
 import numpy as np
 import pytest
@@ -247,6 +247,21 @@ def test_an_effect_of_the_users_own_works_like_a_bundled_one(
     )
     np.testing.assert_allclose(found[:, 2, 0], -(nominal[:, 2] ** 2), atol=1e-9)
     assert mine.to_mapping() == {'effect': 'sagging_test', 'depth': 1e-2}
+
+
+def test_registering_makes_the_frozen_dataclass_that_an_effect_is(registered):
+    @registered
+    class Sinking(Sagging):
+        depth: float = 2e-3
+        name = 'sinking_test'
+
+    assert Sinking(1e-3).depth == 1e-3
+    assert Sinking().depth == 2e-3
+    with pytest.raises(FrozenInstanceError):
+        Sinking().depth = 0.0
+    before = vars(Sagging)['__init__']
+    assert registered(Sagging) is Sagging
+    assert vars(Sagging)['__init__'] is before
 
 
 def test_registering_what_breaks_the_contract_is_refused(registered):

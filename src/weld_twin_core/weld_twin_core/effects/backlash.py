@@ -18,7 +18,7 @@ of its command, instead of behind. That is ``form: coast``, play mirrored about 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -63,7 +63,6 @@ class _Fit(FitHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class Backlash(MemoryEffect):
     """A gap in the drive of one joint; before the first sample the gap is centred."""
 

@@ -21,7 +21,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -56,7 +56,6 @@ class _Search(SearchHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class BearingTilt(LinearEffect):
     """
     The axis turns about x by lean[0] cos q + lean[1] sin q, and about y by the other two.

@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..arm.channels import Shift
@@ -19,7 +17,6 @@ from .wording import number
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class CartesianCompliance(LinearEffect):
     """One compliance along each axis of the tool frame, whatever frame the wrench comes in."""
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The clock of the measurements against that of the joints: late, or running fast or slow."""
 
-from dataclasses import dataclass
-
 from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
@@ -14,7 +12,6 @@ from .wording import size
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class TimeDelay(Effect):
     """A measurement stamped t shows the robot as it was at t - delay; stations do not move."""
 
@@ -63,7 +60,6 @@ class TimeDelay(Effect):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class ClockRate(Effect):
     """
     A measurement stamped t shows the robot at t - rate (t - t_first); stations do not move.

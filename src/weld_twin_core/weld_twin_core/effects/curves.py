@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from numbers import Real
 
@@ -176,7 +175,6 @@ class _Twin(TwinHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class JointCurve(Effect):
     """
     A spline over ``over``, through ``values`` at ``knots``, added to ``channel`` of a joint.
@@ -245,7 +243,6 @@ _OVER = ('constant', 'temperature', 'time')
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class FrameCurve(Effect):
     """
     A spline over temperature or time, through ``xyz`` [m] and ``rotvec`` [rad] at ``knots``.

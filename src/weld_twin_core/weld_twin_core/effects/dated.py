@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar, TypeVar
 
 import numpy as np
@@ -88,7 +88,6 @@ class _Twin(TwinHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class JointSlip(Sudden, ChannelError):
     """The joint stands ``offset`` further than its reading from ``time`` [s] on."""
 
@@ -138,7 +137,6 @@ class _SuddenFrame(Sudden, FrameError):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class ToolSlip(_SuddenFrame):
     """The tool is displaced by xyz of the flange and turned by rotvec from ``time`` [s] on."""
 
@@ -169,7 +167,6 @@ class ToolSlip(_SuddenFrame):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class InstrumentKnock(_SuddenFrame):
     """The base is displaced by xyz in the world and turned by rotvec from ``time`` [s] on."""
 
@@ -206,7 +203,6 @@ class _SetupMotion(Timed, FrameError):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class SetupStep(_SetupMotion):
     """Displacement and turn of the base before the instant ``time`` [s]; then it is as aligned."""
 
@@ -241,7 +237,6 @@ class SetupStep(_SetupMotion):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class SetupSettling(_SetupMotion):
     """Displacement and turn of the base at ``start`` [s], gone with ``time_constant`` [s]."""
 

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drift: the frame creeps at a constant rate from the recording's first stamp on."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..arm.channels import Shift
@@ -16,7 +14,6 @@ from .wording import number
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class Drift(LinearEffect):
     """A creeping fixture, instrument or pedestal."""
 

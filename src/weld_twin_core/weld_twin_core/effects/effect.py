@@ -3,9 +3,9 @@
 """
 The contract of an effect: parameters that displace channels of the kinematic chain.
 
-A new effect is one file: a frozen dataclass with `displace`, and `gradient` where a closed form
-is at hand; `register` makes it known to the injector, the twin, the sensitivity study and the
-diagnosis alike. What else it may tell of itself are the traits and groups of `hooks`.
+A new effect is one file: a class with `displace`, and `gradient` where a closed form is at hand;
+`register` makes it a frozen dataclass, and known to the injector, the twin, the sensitivity study
+and the diagnosis alike. What else it may tell of itself are the traits and groups of `hooks`.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -50,7 +50,6 @@ class FrameError(Effect):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class BasePose(FrameError):
     """The base is displaced by xyz in the world and turned by rotvec about its own origin."""
 
@@ -101,7 +100,6 @@ def _of_the_origin(step: Array, robot: Robot) -> Array:
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class ToolPose(FrameError):
     """The tool point is displaced by xyz of the flange; the tool turns by rotvec of itself."""
 
@@ -142,7 +140,6 @@ class _Search(SearchHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class RootPose(FrameError):
     """The positioner is displaced by xyz along the robot's base axes, and turned about its root."""
 

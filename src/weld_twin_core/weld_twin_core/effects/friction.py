@@ -17,7 +17,6 @@ A loop that never lets go trails as play does, and is told as `backlash`.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -63,7 +62,6 @@ class _Fit(FitHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class Friction(MemoryEffect):
     """
     Lost motion that is there while the joint moves and goes when it rests.

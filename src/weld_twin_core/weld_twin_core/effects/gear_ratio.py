@@ -13,7 +13,6 @@ rest they stay.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -40,7 +39,6 @@ class _Twin(TwinHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class GearRatio(LinearEffect):
     """A wrong transmission or encoder scale: the error grows with the joint's angle."""
 
@@ -103,7 +101,6 @@ As far as a joint has to move for its gear ratio to be looked for.
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class GearRatioByDirection(MemoryEffect):
     """The gear ratio is ``difference`` larger on the way up than on the way down."""
 

@@ -10,7 +10,7 @@ nearly parallel (IEEE CDC 1983).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -60,7 +60,6 @@ class ChannelError(Effect):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class JointOffset(ChannelError):
     """A constant encoder or mastering error of one joint."""
 
@@ -109,7 +108,6 @@ class _LinkError(ChannelError):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class LinkLength(_LinkError):
     """A wrong length of the common normal of one DH row."""
 
@@ -139,7 +137,6 @@ class LinkLength(_LinkError):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class LinkOffset(_LinkError):
     """A wrong offset along the axis of one DH row."""
 
@@ -168,7 +165,6 @@ class LinkOffset(_LinkError):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class LinkTwist(_LinkError):
     """A wrong angle between the axes of one DH row."""
 
@@ -194,7 +190,6 @@ class LinkTwist(_LinkError):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class AxisParallelism(_LinkError):
     """The tilt that alpha cannot express where two axes are nearly parallel."""
 

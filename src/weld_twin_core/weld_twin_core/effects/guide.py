@@ -10,7 +10,7 @@ it by 0.2 mm, and its mean over the travel is an error of links.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -70,7 +70,6 @@ def carried(view: View, i: int, slide: Array | None, turn: Array | None) -> Shif
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class GuideTilt(GuideError):
     """The carriage turns by rate * q about the x, y and z of its row; z is along the travel."""
 
@@ -111,7 +110,6 @@ class GuideTilt(GuideError):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class GuideBend(GuideError):
     """The carriage is off by curvature * q^2 / 2 along the x and the y of its row."""
 

@@ -19,8 +19,6 @@ one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..arm.channels import Shift
@@ -36,7 +34,6 @@ from .wording import number
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class HosePull(Effect):
     """The flange is pulled by ``force`` less ``stiffness`` times its place, in the base frame."""
 

@@ -21,7 +21,6 @@ References
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -53,7 +52,6 @@ class _Fit(FitHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class Hysteresis(MemoryEffect):
     """The joint trails by ``amplitude`` once it has moved far one way; at first it does not."""
 

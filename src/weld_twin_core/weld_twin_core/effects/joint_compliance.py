@@ -16,7 +16,6 @@ declared: both are in what was measured.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
@@ -55,7 +54,6 @@ class _Search(SearchHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class JointCompliance(LinearEffect):
     """The joint yields to the load torque of links, payload and tool wrench; above zero it sags."""
 

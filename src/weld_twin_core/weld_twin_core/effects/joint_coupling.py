@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from ..arm.channels import Shift
 from ..arm.robot import Robot
@@ -28,7 +27,6 @@ class _Search(SearchHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class JointCoupling(LinearEffect):
     """Motion of one joint leaks into another."""
 

@@ -10,7 +10,6 @@ moves; it changes over where the load changes sign, within the torque T that fri
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -44,7 +43,6 @@ class _Search(SearchHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class LoadedPlay(LinearEffect):
     """Play of full ``width`` whose side the load decides; ``torque`` [N m] is what friction holds."""
 

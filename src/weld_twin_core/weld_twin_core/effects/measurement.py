@@ -9,7 +9,6 @@ A wrong unit reads (1 + scale) times the position in the instrument's own frame.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,7 +23,6 @@ from .wording import number
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class MeasurementScale(LinearEffect):
     """A wrong unit of length of the measuring system, about the origin of its frame."""
 
@@ -67,7 +65,6 @@ class MeasurementScale(LinearEffect):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class MeasurementNoise(Effect):
     """Independent errors of ``sigma`` on each coordinate; drawn by the injector only."""
 

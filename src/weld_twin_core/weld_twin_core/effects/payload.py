@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..arm.channels import Shift
@@ -46,7 +44,6 @@ class _Twin(TwinHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class Payload(Effect):
     """``mass`` is added to the declared payload, its centre at ``com`` of the tool frame."""
 

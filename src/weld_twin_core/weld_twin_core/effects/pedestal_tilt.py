@@ -13,8 +13,6 @@ below it and both ways. Makers ask for a stiff foundation because of it: manual 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..arm.channels import Channel, Shift
@@ -33,7 +31,6 @@ _CHANGED = 0.2
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class PedestalTilt(LinearEffect):
     """The base leans about its x and its y by ``compliance`` times the moment about each."""
 

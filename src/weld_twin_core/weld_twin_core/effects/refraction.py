@@ -18,7 +18,6 @@ could stand is not the instrument's own, and with the place unknown nothing is c
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
@@ -42,7 +41,6 @@ the origin is not the instrument's. The bundled arms reach 0.5 to 3 m from their
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class Refraction(LinearEffect):
     """
     Air that warms by ``warming`` [K/m] along each axis of the measuring frame bends the sight.

@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
-from typing import Any, TypeVar
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -15,11 +15,20 @@ from ..errors import DataError, ModelError
 from .effect import Effect, MemoryEffect
 from .view import Stage
 
+if TYPE_CHECKING:
+    from typing_extensions import dataclass_transform
+else:  # what tools see; at run time `register` makes the dataclass
+
+    def dataclass_transform(**_: bool) -> Any:
+        return lambda function: function
+
+
 E = TypeVar('E', bound=Effect)
 REGISTRY: dict[str, type[Effect]] = {}
 """By name, in the order of names."""
 
 
+@dataclass_transform(frozen_default=True, eq_default=False)
 def register(effect: type[E]) -> type[E]:
     """
     Make an effect known by its name, from this package or from user code.
@@ -27,7 +36,7 @@ def register(effect: type[E]) -> type[E]:
     Parameters
     ----------
     effect : subclass of Effect
-        A frozen dataclass; its ``name`` is how effects files call it.
+        Its fields become those of a frozen dataclass; its ``name`` is how effects files call it.
 
     Returns
     -------
@@ -45,6 +54,8 @@ def register(effect: type[E]) -> type[E]:
     True
 
     """
+    if '__dataclass_fields__' not in vars(effect):
+        effect = dataclass(frozen=True, eq=False)(effect)
     known = REGISTRY.get(effect.name)
     if known is not None and known.__qualname__ != effect.__qualname__:
         raise ModelError(f'an effect named {effect.name!r} is registered already')

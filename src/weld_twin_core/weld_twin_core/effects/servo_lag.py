@@ -13,7 +13,6 @@ whose two poles run as one linear recursion each.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -72,7 +71,6 @@ class _Fit(FitHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class ServoLag(MemoryEffect):
     """
     The joint trails its command; exact for a command that is straight between samples.

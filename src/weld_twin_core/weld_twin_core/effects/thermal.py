@@ -12,7 +12,6 @@ sits in, from the recording's first stamp on. Where a temperature was recorded, 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from numbers import Real
 
 import numpy as np
@@ -29,7 +28,6 @@ from .wording import number
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class ThermalGrowth(LinearEffect):
     """
     Links grow with temperature against ``reference`` [degC].
@@ -144,7 +142,6 @@ class _Fit(FitHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class LinkWarmUp(Effect):
     """One link grows by ``strain`` of its lengths; ``follows``: [temperature degC, rise K]."""
 

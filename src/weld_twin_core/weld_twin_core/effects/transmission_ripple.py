@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -106,7 +106,6 @@ class _Fit(FitHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class TransmissionRipple(Effect):
     """
     Periodic error of the gear, one or several orders at once.

@@ -10,7 +10,6 @@ response is a free decay between kicks: one complex number z per joint, x = Im z
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -58,7 +57,6 @@ class _Fit(FitHooks):
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class Vibration(MemoryEffect):
     """Damped oscillation of one joint, excited by its acceleration; gain 1 is a free end."""
 

@@ -8,7 +8,6 @@ t). With no slowing it draws back evenly.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,7 +28,6 @@ _SMALL = 1e-4
 
 
 @register
-@dataclass(frozen=True, eq=False)
 class Wear(Effect):
     """The tool centre point draws back along the tool's z axis, from each recording's start on."""
 

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .arm.rotation import rotation_matrix, skew
+from .arm.rotation import moved, skew
 from .arrays import Array
 from .cameras.bodies import Bodies, bodies
 from .cameras.lens import UNKNOWNS, Lens
@@ -186,7 +186,7 @@ class _State:
         at = UNKNOWNS * count
         poses = self.poses.copy()
         for body in self.start.free:
-            poses[body] = _stepped(poses[body], sized[at : at + 6])
+            poses[body] = moved(poses[body], sized[at : at + 6])
             at += 6
         points = []
         for old in self.points:
@@ -197,7 +197,7 @@ class _State:
             lenses=lenses,
             poses=poses,
             points=tuple(points),
-            tool=_stepped(self.tool, tool),
+            tool=moved(self.tool, tool),
             unknowns=self.unknowns + step,
         )
 
@@ -432,11 +432,11 @@ def _told(point: _Point, noise: float) -> _Adjusted:
     size, ways = np.linalg.eigh(own.normal + np.eye(len(own.normal)))
     unit = ways / np.sqrt(size)
     mean = unit.T @ (own.rest - state.unknowns)
-    moved = own.shared @ unit
-    _, strength, kept = np.linalg.svd(moved.reshape(-1, moved.shape[2]), full_matrices=False)
+    seen = own.shared @ unit
+    _, strength, kept = np.linalg.svd(seen.reshape(-1, seen.shape[2]), full_matrices=False)
     kept = kept[strength > _SHOWN]
-    pose = _stepped(state.tool, _solved(own.roots, own.right))
-    change = np.linalg.solve(own.roots, moved @ kept.T)
+    pose = moved(state.tool, _solved(own.roots, own.right))
+    change = np.linalg.solve(own.roots, seen @ kept.T)
     said = PoseNoise.of(np.asarray(np.linalg.inv(_swap(own.roots) @ own.roots), dtype=float))
     measured = Measurements(
         state.seen.t,
@@ -471,11 +471,3 @@ def _solved(matrix: Array, right: Array) -> Array:
 
 def _swap(matrix: Array) -> Array:
     return np.swapaxes(matrix, -1, -2)
-
-
-def _stepped(pose: Array, step: Array) -> Array:
-    """Return poses (..., 4, 4) after steps (..., 6): shift, and turn about the axes outside."""
-    out = np.array(pose)
-    out[..., :3, :3] = rotation_matrix(step[..., 3:]) @ pose[..., :3, :3]
-    out[..., :3, 3] += step[..., :3]
-    return out

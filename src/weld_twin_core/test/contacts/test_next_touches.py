@@ -7,8 +7,13 @@ import numpy as np
 import weld_twin_core as wt
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.contacts import Artefact, Contact, Contacts
-from weld_twin_core.diagnosis.advice.next_touches import next_touches
-from weld_twin_core.diagnosis.advice.touch_design import Design, again, chosen, scatter
+from weld_twin_core.diagnosis.advice.next_touches import (
+    Design,
+    again,
+    chosen,
+    next_touches,
+    scatter,
+)
 from weld_twin_core.diagnosis.algebra.problem import Scale
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.hypotheses.library import plain_causes

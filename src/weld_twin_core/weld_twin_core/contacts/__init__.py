@@ -5,8 +5,7 @@
 from .artefact import Artefact
 from .contact import KINDS, Contact, Tie
 from .contacts import Contacts
-from .places import Places, places
-from .spreads import Length, lengths, spreads
+from .places import Length, Places, lengths, places, spreads
 from .unknowns import Unknowns, unknowns
 
 __all__ = [

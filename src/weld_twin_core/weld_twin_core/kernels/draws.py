@@ -68,11 +68,10 @@ class SeamDraws:
     """
     A robot of revolute joints at samples (N, n) [rad] of a seam, ready for draws of its DH values.
 
-    The samples that determine the others are looked for where it is ``smooth``. Raises ModelError:
-    the robot has modified rows, Hayati angles, joints that slide or a positioner.
+    Raises ModelError: it has modified rows, Hayati angles, joints that slide or a positioner.
     """
 
-    def __init__(self, robot: Robot, q: Array, *, smooth: bool = True) -> None:
+    def __init__(self, robot: Robot, q: Array) -> None:
         plain = robot.convention == 'standard' and not robot.behind
         if not plain or robot.prismatic.any() or robot.beta.any():
             raise ModelError(
@@ -91,12 +90,11 @@ class SeamDraws:
         """What the other samples' features differ from those that these determine, relative to the
         largest; 0 when all samples are worked on."""
         self._of_squares: _Determining | None = None
-        if smooth:
-            both = (features[0][:, None] * features[1][None]).reshape(-1, len(q))
-            result = _determining(both)
-            if result is not None:
-                self.samples, self.spread, self.remainder = result
-                self._of_squares = _determining(_products(both))
+        both = (features[0][:, None] * features[1][None]).reshape(-1, len(q))
+        result = _determining(both)
+        if result is not None:
+            self.samples, self.spread, self.remainder = result
+            self._of_squares = _determining(_products(both))
         self._near, self._far = (np.ascontiguousarray(f[:, self.samples]) for f in features)
         self._phases = np.exp(1j * q[self.samples].T)[..., None]
         nominal = DhDraws(*(getattr(robot, key)[None] for key in DhDraws._fields))

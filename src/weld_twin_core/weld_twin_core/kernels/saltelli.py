@@ -3,7 +3,7 @@
 """
 Saltelli's design, the estimators of Sobol indices and their intervals as whole-array operations.
 
-The same as SALib's, which builds the design run by run, and resamples input by input; with a model
+The same as SALib's, which builds the design run by run, and _RESAMPLES input by input; with a model
 as fast as `draws` that would be most of the time. The tests hold them against SALib.
 
 References
@@ -24,6 +24,8 @@ from scipy.special import ndtri
 
 from ..arrays import Array
 
+_RESAMPLES = 100
+"""Of the bootstrap."""
 _CONSTANT = np.finfo(np.float64).eps
 """Variance of standardised results that counts as none."""
 
@@ -63,12 +65,12 @@ def sobol_estimates(results: Array) -> tuple[Array, Array]:
 
 
 def sobol_half_widths(
-    results: Array, confidence: float, rng: np.random.Generator, resamples: int = 100
+    results: Array, confidence: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """Return half-widths of both indices' intervals, (G,), by the bootstrap [2]_."""
     base = len(results)
-    picks = rng.integers(base, size=(base, resamples)) + base * np.arange(resamples)
-    counts = np.bincount(picks.ravel(), minlength=base * resamples).reshape(resamples, base)
+    picks = rng.integers(base, size=(base, _RESAMPLES)) + base * np.arange(_RESAMPLES)
+    counts = np.bincount(picks.ravel(), minlength=base * _RESAMPLES).reshape(_RESAMPLES, base)
     width = float(ndtri(0.5 + confidence / 2.0))
     first, total = _indices(counts / base, *_terms(results))
     return width * first.std(axis=0, ddof=1), width * total.std(axis=0, ddof=1)

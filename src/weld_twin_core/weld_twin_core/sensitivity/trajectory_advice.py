@@ -60,10 +60,10 @@ def expected_rms(study: Study, tolerances: Sequence[Tolerance]) -> float:
     tolerances : sequence of Tolerance
 
     """
-    return _rms(study, expected_deviation(study, tolerances))
+    return rms_over_arc(study, expected_deviation(study, tolerances))
 
 
-def _rms(study: Study, deviation: Array) -> float:
+def rms_over_arc(study: Study, deviation: Array) -> float:
     """Return the root mean square over the arc length of deviations (N,) [m]."""
     return float(np.sqrt((deviation**2 * arc_weights(study.s)).sum()))
 
@@ -311,7 +311,7 @@ class _Search:
             return np.inf
         if solution.condition.max() > self.room.condition:
             return np.inf
-        return _rms(study, self.scatter.deviation(study))
+        return rms_over_arc(study, self.scatter.deviation(study))
 
     def result(self, label: str, values: Array) -> PlacementResult:
         """Return the placement with its numbers."""
@@ -319,7 +319,7 @@ class _Search:
         return PlacementResult(
             label,
             Placement(*map(float, values)),
-            _rms(study, self.scatter.deviation(study)),
+            rms_over_arc(study, self.scatter.deviation(study)),
             float(solution.limit_margin.min()),
             float(solution.condition.max()),
         )

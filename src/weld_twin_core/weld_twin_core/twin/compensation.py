@@ -60,7 +60,7 @@ class Compensation:
     @property
     def rms(self) -> tuple[float, float]:
         """Return the RMS distance of the tool from where it is wanted, before and after [m]."""
-        return _rms(self.before), _rms(self.after)
+        return rms_of(self.before), rms_of(self.after)
 
 
 def compensate(
@@ -134,7 +134,7 @@ def _solved(real: Twin, recording: Recording, goal: Array, rounds: int) -> Array
         remaining = missing(goal, real.poses(trial).matrices)
         helps = np.linalg.norm(remaining, axis=1) < np.linalg.norm(error, axis=1)
         if coupled:
-            helps[:] = _rms(remaining) < _rms(error)
+            helps[:] = rms_of(remaining) < rms_of(error)
         q = np.where(helps[:, None], trial.joints.q, q)
         error = np.where(helps[:, None], remaining, error)
         share = np.where(helps[:, None], share, 0.5 * share)
@@ -148,7 +148,8 @@ def _commands(nominal: JointMotion, q: Array) -> JointMotion:
     return JointMotion(nominal.t, q, nominal.qd + np.gradient(q - nominal.q, nominal.t, axis=0))
 
 
-def _rms(error: Array) -> float:
+def rms_of(error: Array) -> float:
+    """Return the RMS length of what is missing to positions, (N, 3) or (N, 6) [m]."""
     return float(np.sqrt((error[:, :3] ** 2).sum(axis=1).mean()))
 
 

@@ -23,7 +23,7 @@ from ..arrays import Array
 from ..effects.effect import Effect, Stage
 from ..errors import DataError
 from ..recording import JointMotion, Recording
-from .compensation import commandable, compensate
+from .compensation import commandable, compensate, rms_of
 from .features import Features
 from .goal_motion import Course, Goal, course, fine_times
 from .posterior import Drawn, pose_covariances
@@ -186,8 +186,8 @@ class _Work:
         return CorrectedGoal(
             result.later(waits),
             added,
-            _rms(before),
-            _rms(after),
+            rms_of(before),
+            rms_of(after),
             self._bound(after, course(result, self.meant.t)),
             waits,
             (*notes, *more),
@@ -224,10 +224,10 @@ class _Work:
             after = self._missing(course(result, self.meant.t))
             worst = float(np.linalg.norm(after[:, :3], axis=1).max())
             # How the arm comes to where a goal begins is one place; most of the way must gain.
-            if _rms(after) > BETTER * _rms(before) + NOTHING or worst > size.max() + NOTHING:
+            if rms_of(after) > BETTER * rms_of(before) + NOTHING or worst > size.max() + NOTHING:
                 reasons.append(
-                    f'too little is gained: {_rms(after) * 1e3:.3f} mm (at worst {worst * 1e3:.3f}) '
-                    f'would be left of {_rms(before) * 1e3:.3f} mm (at worst {size.max() * 1e3:.3f})'
+                    f'too little is gained: {rms_of(after) * 1e3:.3f} mm (at worst {worst * 1e3:.3f}) '
+                    f'would be left of {rms_of(before) * 1e3:.3f} mm (at worst {size.max() * 1e3:.3f})'
                 )
                 continue
             remaining = [f'play is not corrected: {reasons[0]}'] if self.plays and not play else []
@@ -388,10 +388,10 @@ class _Work:
         size = before[self._places, :3]
         doubt = float(np.sqrt(np.trace(sure[:, :3, :3], axis1=1, axis2=2).mean()))
         self.largest = _largest(before)
-        if _rms(size) < doubt:
+        if rms_of(size) < doubt:
             raise _RefusedError(
                 f'the model is less sure of this goal ({doubt * 1e3:.3f} mm) than the correction is '
-                f'large ({_rms(size) * 1e3:.3f} mm)'
+                f'large ({rms_of(size) * 1e3:.3f} mm)'
             )
 
     def _refuse_large(self, added: Array) -> None:
@@ -450,7 +450,3 @@ def _largest(twists: Array) -> tuple[float, float]:
         float(np.linalg.norm(twists[:, :3], axis=1).max()),
         float(np.linalg.norm(twists[:, 3:], axis=1).max()),
     )
-
-
-def _rms(gap: Array) -> float:
-    return float(np.sqrt((gap[:, :3] ** 2).sum(axis=1).mean()))

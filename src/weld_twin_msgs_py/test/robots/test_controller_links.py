@@ -9,7 +9,7 @@ import pytest
 
 from weld_twin_core.arm.chain import forward, frames
 from weld_twin_core.arm.dynamics import payload_torque, wrench_torque
-from weld_twin_core.diagnosis.advice.actions import actions
+from weld_twin_core.diagnosis.advice import actions
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.errors import ModelError
 from weld_twin_core.motion.paths import default_seam

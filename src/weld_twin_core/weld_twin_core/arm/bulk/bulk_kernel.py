@@ -43,7 +43,6 @@ class BulkKernel:
     channels: DH values whose screws `screws` gives: 'theta', 'alpha', 'beta' and 'a' are turns
     about the axis that 'theta' and 'd', 'alpha', 'beta' and 'a' act on. Quickest in the order in
     which they come along the chain.
-    block: poses worked on at once; a multiple of 8 is best.
 
     Notes
     -----
@@ -51,12 +50,9 @@ class BulkKernel:
 
     """
 
-    def __init__(
-        self, robot: Robot, channels: Sequence[Channel] = (), block: int = _BLOCK
-    ) -> None:
+    def __init__(self, robot: Robot, channels: Sequence[Channel] = ()) -> None:
         self.robot = robot
         self.channels = tuple(channels)
-        self.block = block
         division = Division(robot, self.channels)
         outer = division.outer()
         self.sizes, self.turned = division.sizes, len(outer)
@@ -131,7 +127,7 @@ class BulkKernel:
 
     def _blocks(self, count: int) -> list[slice]:
         """Return blocks of one length; the last overlaps the one before rather than be short."""
-        size = min(self.block, count)
+        size = min(_BLOCK, count)
         starts = [*range(0, count - size + 1, size)] if count else []
         if count % max(size, 1):
             starts.append(count - size)
@@ -146,7 +142,7 @@ class BulkKernel:
         n = len(q)
         if n not in self._memory:
             if len(self._memory) == LENGTHS:
-                self._memory.pop(next(k for k in self._memory if k != self.block))
+                self._memory.pop(next(k for k in self._memory if k != _BLOCK))
             self._memory[n] = _Memory(self, n)
         memory = self._memory[n]
         memory.fill(q)

@@ -1,19 +1,290 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The touches to make next: in which postures, of what, and how many."""
+"""
+The touches to make next: in which postures, of what, and how many; chosen one by one.
+
+Around what was found everything is linear: errors of the arm, the tool point where it is not
+known, and where each contact is. The touch taken next is the one that most lowers the variance of
+what is asked for [1]_: of predicted tool points, or of the sizes that part explanations.
+
+References
+----------
+.. [1] V. V. Fedorov, "Theory of optimal experiments", Academic Press 1972.
+
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ...arm.chain import forward
 from ...arrays import Array
+from ...contacts import Artefact, Contact, Contacts, Places, places
 from ...effects.effect import Effect
+from ...motion.inverse.newton import reaching
+from ...recording import JointMotion, Measurements, Recording
+from ...sequences import halton
+from ...twin.features import Features
+from ..algebra.prior import effect_precision, frame_prior
 from ..algebra.problem import PLACES, Model, Problem, Scale
 from ..hypotheses.library import plain_causes
-from .touch_design import SECONDS, Design, Touchable, again, beside, chosen, scatter
+from .postures import widened
+
+_ANYWHERE = 0.1
+"""Spread [m] of where a contact may be: as good as not known."""
+_SLACK = 5e-6
+"""Noise [m] of a touch at the least: a few touches may be fitted without any rest, and no ball rests
+better than that."""
+_DETERMINED = 1e-14
+"""Share of the strongest direction below which information is rounding."""
+_TRIED = 160
+"""Postures that are started from at every place; a third of them reach it within the limits."""
+_ENOUGH = 40
+"""Postures that are weighed at every place."""
+SECONDS = 60.0
+"""Time from one touch to the next [s], by hand."""
+_NEW = 'new place'
+"""Label of what is touched where nothing has been touched yet."""
+_NEW_PLACES = 4
+"""New places that are weighed."""
+_APART = 0.2
+"""Distance [m] of a new place from the others at the least."""
+_BELOW = 0.05
+"""How far a new place may lie below the lowest one [m]: there is a table."""
+
+
+@dataclass(frozen=True, eq=False)
+class Touchable:
+    """
+    Touches that could be made, and what each sees of all unknowns, whitened, shape (N, 3, P).
+
+    Rows that a kind of contact does not have are zero.
+    """
+
+    recording: Recording
+    rows: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """What is known of the unknowns: errors of the arm first, then places."""
+
+    model: Model
+    """With every error that takes part."""
+    tool: bool
+    """Whether the tool point is among the unknowns."""
+    sigma: float
+    """Noise of a touch [m]."""
+    errors: int
+    """Number of unknowns that are no place."""
+    starts: tuple[int, ...]
+    """First unknown of every place."""
+    surfaces: tuple[Places, ...]
+    """Where contacts are."""
+    root: Array
+    """Its product with its transpose is the covariance of the unknowns, shape (P, P). Kept instead
+    of it: with errors of micrometres and places that may be anywhere, rounding would make it
+    negative."""
+
+    @property
+    def covariance(self) -> Array:
+        """Return the covariance of the unknowns, shape (P, P)."""
+        return np.asarray(self.root @ self.root.T)
+
+    @classmethod
+    def of(cls, problem: Problem, model: Model, effects: Sequence[Effect], scale: Scale) -> Design:
+        """Return what the touches at hand tell of errors as large as they were found."""
+        # A base that is fitted along counts as known: another touch tells more of it anyway.
+        problem = replace(problem, align=problem.align & {'tool'})
+        model, tool = model.with_found(tuple(effects)), 'tool' in problem.align
+        taken = [unknown for unknown in problem.touched if unknown is not None]
+        sigma = max(scale.position, _SLACK)
+        prior = np.concatenate([frame_prior(problem, model)[0], effect_precision(model)])
+        freedom = [unknown.freedom for unknown in taken]
+        starts = prior.size + np.cumsum([0, *freedom])
+        information = np.diag(np.append(prior, np.full(sum(freedom), _ANYWHERE**-2.0)))
+        surfaces = []
+        for k, recording in enumerate(problem.recordings):
+            points = model.twin(k).poses(recording, recording.joints.t).position
+            surfaces.append(places(recording.touched, points))
+            rows = _rows(model, k, recording, surfaces[k], points, tool) / sigma
+            rows = rows * np.sqrt(scale.weights[k])[:, None, None]
+            own = np.concatenate([np.arange(prior.size), np.arange(starts[k], starts[k + 1])])
+            information[np.ix_(own, own)] += np.einsum('mcp,mcq->pq', rows, rows)
+            ties, at = taken[k].ties, slice(starts[k], starts[k + 1])
+            information[at, at] += ties.T @ ties
+        return cls(
+            model,
+            tool,
+            sigma,
+            prior.size,
+            tuple(starts[:-1].tolist()),
+            tuple(surfaces),
+            _root(information),
+        )
+
+    def with_place(self) -> Design:
+        """Return the same with one more point somewhere."""
+        size = len(self.root)
+        wider = np.zeros((size + 3, size + 3))
+        wider[:size, :size] = self.root
+        wider[size:, size:] = _ANYWHERE * np.eye(3)
+        return replace(self, starts=(*self.starts, size), root=wider)
+
+    def touchable(self, k: int, recording: Recording) -> Touchable:
+        """Return touches of place k, or of a new one behind the last, as this sees them."""
+        twin = min(k, len(self.surfaces) - 1)
+        points = self.model.twin(twin).poses(recording, recording.joints.t).position
+        if k < len(self.surfaces):
+            where = Places(recording.touched, self.surfaces[k].surfaces)
+        else:
+            where = places(recording.touched, points)
+        own = _rows(self.model, twin, recording, where, points, self.tool) / self.sigma
+        rows = np.zeros((len(points), 3, len(self.root)))
+        count, at = own.shape[1], self.starts[k]
+        rows[:, :count, : self.errors] = own[..., : self.errors]
+        rows[:, :count, at : at + own.shape[2] - self.errors] = own[..., self.errors :]
+        return Touchable(recording, rows)
+
+    def after(self, rows: Array) -> Design:
+        """Return what is known after one more touch, rows of shape (3, P)."""
+        _, size, ways = np.linalg.svd(rows @ self.root, full_matrices=False)
+        less = 1.0 - 1.0 / np.sqrt(1.0 + size**2)
+        return replace(self, root=self.root - (self.root @ ways.T) * less @ ways)
+
+    def open(self, weight: Array) -> float:
+        """Return how much of what is asked for is not known: the weighed sum of variances."""
+        own = self.root[: self.errors]
+        return float(np.einsum('pi,pi->', own, weight @ own))
+
+    def told(self, rows: Array, weight: Array) -> Array:
+        """Return by how much each touch, (N, 3, P), lowers what is `open`, shape (N,)."""
+        half = rows @ self.root
+        seen = np.eye(3) + half @ np.swapaxes(half, 1, 2)
+        own = half @ self.root[: self.errors].T
+        wanted = own @ weight @ np.swapaxes(own, 1, 2)
+        return np.asarray(np.trace(np.linalg.solve(seen, wanted), axis1=1, axis2=2))
+
+
+def scatter(touches: Sequence[Touchable], errors: int) -> Array:
+    """Return the weight of errors in how far tool points scatter, in noise squared, (E, E)."""
+    each = [t.rows[..., :errors] - t.rows[..., :errors].mean(axis=0) for t in touches]
+    count = sum(len(rows) for rows in each)
+    return np.asarray(sum(np.einsum('mcp,mcq->pq', rows, rows) for rows in each) / count)
+
+
+def chosen(
+    design: Design, rows: Array, weight: Array, count: int
+) -> tuple[list[int], list[Design]]:
+    """
+    Return which touches to make, in order, and what is known after each.
+
+    Of the rows (N, 3, P) of all that could be made; the weight (E, E) is how much variances count.
+    """
+    free = np.ones(len(rows), dtype=bool)
+    order: list[int] = []
+    after: list[Design] = []
+    for _ in range(min(count, len(rows))):
+        reported = np.where(free, design.told(rows, weight), -np.inf)
+        best = int(np.argmax(reported))
+        free[best] = False
+        design = design.after(rows[best])
+        order.append(best)
+        after.append(design)
+    return order, after
+
+
+def _rows(
+    model: Model, k: int, recording: Recording, where: Places, points: Array, tool: bool
+) -> Array:
+    """Return what touches see of the errors and of their own place, shape (M, c, E + Z)."""
+    maker = Features(model.twin(k), recording, recording.joints.t)
+    columns = [maker.columns(effect, False) for effect in model.found]
+    if tool:
+        columns.insert(0, np.stack([maker.column(('tool', j)) for j in range(6)]))
+    _, seen, free = where.rows(points)
+    moved = np.einsum('mci,pim->mcp', seen, np.concatenate(columns)[:, :3])
+    return np.concatenate([-moved, free], axis=2)
+
+
+def _root(information: Array) -> Array:
+    """Return a root of the inverse of a normal matrix."""
+    size = np.sqrt(np.diag(information))
+    strength, ways = np.linalg.eigh(information / np.outer(size, size))
+    strength = np.maximum(strength, _DETERMINED * strength[-1])
+    return np.asarray(ways / np.sqrt(strength) / size[:, None])
+
+
+def again(problem: Problem, model: Model) -> Iterator[tuple[int, Recording]]:
+    """
+    Yield further touches of every place that can be reached: its number, and a recording.
+
+    The joints stay within the recorded range, a little widened, and the tool leans no further than
+    it has
+    leaned there: what holds the artefact is not known.
+    """
+    for k, recording in enumerate(problem.recordings):
+        contacts, measured = recording.touched, recording.seen
+        rows = np.arange(_TRIED) % contacts.size
+        q, good = _reached(problem, model, [recording], measured.position[rows])
+        kept = np.flatnonzero(good)[:_ENOUGH]
+        if kept.size:
+            rows = rows[kept]
+            labels = tuple(contacts.labels[row] for row in rows)
+            value = None if contacts.value is None else contacts.value[rows]
+            touched = Contacts(contacts.artefact, labels, value)
+            yield k, _touching(recording, q[kept], measured.position[rows], touched)
+
+
+def beside(problem: Problem, model: Model) -> Iterator[Recording]:
+    """Yield touches of places where nothing was touched, each far from all others."""
+    low, high = widened(problem, model.robot)
+    known = [recording.seen.position.mean(axis=0) for recording in problem.recordings]
+    lowest = min(float(point[2]) for point in known) - _BELOW
+    free = forward(model.robot, low + halton(model.robot.n, _TRIED) * (high - low))[:, :3, 3]
+    free = free[free[:, 2] > lowest]
+    for _ in range(_NEW_PLACES):
+        if not free.size:
+            return
+        away = np.min([np.linalg.norm(free - point, axis=1) for point in known], axis=0)
+        point = free[int(np.argmax(away))]
+        if away.max() < _APART:
+            return
+        known.append(point)
+        targets = np.tile(point, (_TRIED, 1))
+        q, good = _reached(problem, model, problem.recordings, targets)
+        kept = np.flatnonzero(good)[:_ENOUGH]
+        if not kept.size:
+            continue
+        contacts = Contacts(Artefact((Contact(_NEW),)), (_NEW,) * kept.size)
+        yield _touching(problem.recordings[0], q[kept], targets[kept], contacts)
+
+
+def _reached(
+    problem: Problem, model: Model, recordings: Sequence[Recording], to: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Return postures at targets, and which may be taken: as the tool has leaned in recordings."""
+    robot = model.robot
+    low, high = widened(problem, robot)
+    start = low + halton(robot.n, len(to)) * (high - low)
+    q, good = reaching(robot, to, start)
+    good &= ((q >= low) & (q <= high)).all(axis=1)
+    leaned = np.concatenate([forward(robot, r.joints.q)[:, :3, 2] for r in recordings])
+    middle = leaned.mean(axis=0) / max(float(np.linalg.norm(leaned.mean(axis=0))), 1e-9)
+    good &= forward(robot, q)[:, :3, 2] @ middle >= (leaned @ middle).min()
+    return q, good
+
+
+def _touching(recording: Recording, q: Array, points: Array, contacts: Contacts) -> Recording:
+    t = SECONDS * np.arange(float(len(q)))
+    motion = JointMotion(t, q, static=True)
+    return replace(recording, joints=motion, measured=Measurements(t, points), contacts=contacts)
+
 
 _COUNT = 12
 """Touches that are proposed: a quarter of an hour by hand."""
@@ -32,8 +303,6 @@ def next_touches(
     model: Model,
     alternatives: Sequence[tuple[Effect, ...]],
     scale: Scale,
-    *,
-    elsewhere: bool = True,
 ) -> dict[str, Any] | None:
     """
     Return the touches to make next, as plain numbers and strings; None where none can be reached.
@@ -43,7 +312,6 @@ def next_touches(
     alternatives: explanations that fit alike; with fewer than two, whatever narrows the arm's
     errors most is proposed.
     scale: the noise of a touch.
-    elsewhere: whether what is touched can be moved.
 
     Returns
     -------
@@ -55,7 +323,7 @@ def next_touches(
     """
     effects, disputed = _unknowns(problem, model, alternatives)
     design = Design.of(problem, model, effects, scale)
-    groups = list(_touchable(problem, model, design, elsewhere))
+    groups = list(_touchable(problem, model, design))
     if not groups:
         return None
     spread = scatter([each for _, touches, _ in groups for each in touches], design.errors)
@@ -104,14 +372,14 @@ class _Option(NamedTuple):
 
 
 def _touchable(
-    problem: Problem, model: Model, design: Design, elsewhere: bool
+    problem: Problem, model: Model, design: Design
 ) -> Iterator[tuple[Design, list[Touchable], Array | None]]:
     """Yield further touches of all that is there, and of every new place."""
     same = [design.touchable(k, recording) for k, recording in again(problem, model)]
     if same:
         yield design, same, None
     wider, last = design.with_place(), len(problem.recordings)
-    for recording in beside(problem, model) if elsewhere else ():
+    for recording in beside(problem, model):
         there = wider.touchable(last, recording)
         yield wider, [there], recording.seen.position[0]
 

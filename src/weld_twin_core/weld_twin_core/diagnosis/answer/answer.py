@@ -31,7 +31,6 @@ from ..result import (
     Changed,
     Check,
     Diagnosis,
-    Found,
     Gap,
     Shares,
     Shrink,
@@ -88,7 +87,11 @@ def answer(
         shrink=shrink,
         unexplained=_unexplained(result.work.beliefs, evidence, verdict, shrink, placing),
         next_experiment=step,
-        actions=_mended(result, effects),
+        actions=actions(
+            [each.effect for each in effects],
+            result.baseline.model.robot,
+            result.final.model.mends,
+        ),
         model=result.final.model,
         families=verdict.families,
         evidence=evidence,
@@ -98,12 +101,6 @@ def answer(
         contacts=contact_spreads(result, unseen),
         **_compared(result, examined, verdict),
     )
-
-
-def _mended(result: Search, effects: Sequence[Found]) -> tuple[str, ...]:
-    """Return what to do about every effect, in their order."""
-    robot = result.baseline.model.robot
-    return actions([each.effect for each in effects], robot, result.final.model.mends)
 
 
 def _parted(

@@ -14,6 +14,8 @@ from ...arrays import Array
 
 _FLOOR = 1e-12
 """Damping that keeps a step finite exactly at a singularity and is invisible elsewhere."""
+_CLOSING = 12
+"""Steps onto a pose at the most; convergence is quadratic."""
 _ROUNDS = 80
 """Steps to a point at the most: from a start at random they reach one within some thirty."""
 _STRIDE = 0.2
@@ -42,11 +44,11 @@ def least_step(slope: Array, error: Array, damping: Array | float = _FLOOR) -> A
     return (transposed @ np.linalg.solve(square, error[..., None]))[..., 0]
 
 
-def polish(robot: Robot, q: Array, poses: Array, rounds: int = 12) -> tuple[Array, Array]:
+def polish(robot: Robot, q: Array, poses: Array) -> tuple[Array, Array]:
     """Return positions (N, n) closed onto poses (N, 4, 4) from near them, and the error (N, 6)."""
     chain = frames(robot, q)
     error = pose_error(chain, poses)
-    for _ in range(rounds):
+    for _ in range(_CLOSING):
         if np.abs(error).max(initial=0.0) < 1e-13:
             break
         step = least_step(chain_jacobian(robot, chain), error)

@@ -27,7 +27,7 @@ BENT_TORCH = transform(rotation_matrix([0.0, 0.6, 0.0]), np.array([0.1, 0.0, 0.3
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A robot, a seam and the motions on it; see `every_measure`."""
+    """A robot, a seam and the motions on it; see `measure_case`."""
 
     robot: Robot
     path: Path

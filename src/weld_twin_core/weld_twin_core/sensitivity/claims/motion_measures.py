@@ -13,11 +13,10 @@ from ...effects import Effect
 from ...effects.backlash import Backlash
 from ...effects.geometry import JointOffset
 from ...effects.servo_lag import ServoLag
-from ..local import arc_weights
 from ..seam_study import Study
 from ..sweep import DEGREE, spread_of_passes
 from ..tolerance import default_tolerances
-from ..trajectory_advice import compare_profiles
+from ..trajectory_advice import compare_profiles, rms_over_arc
 from .claim_case import POINTS, Case, Measure
 
 _WIDTH = 0.03 * DEGREE
@@ -30,10 +29,6 @@ _NEAR = 2
 
 def _distance(study: Study, effects: Sequence[Effect]) -> Array:
     return np.asarray(np.linalg.norm(study.deviations(tuple(effects)), axis=-1))
-
-
-def _rms(study: Study, distance: Array) -> float:
-    return float(np.sqrt((distance**2 * arc_weights(study.s)).sum()))
 
 
 def _offset(case: Case) -> dict[str, float]:
@@ -66,7 +61,8 @@ def _play(case: Case) -> dict[str, float]:
         'play_spread_smooth_m': spread[0],
         'play_spread_aggressive_m': spread[1],
         'play_peak_ratio': aggressive.max() / smooth.max(),
-        'play_rms_ratio': _rms(case.aggressive, aggressive) / _rms(case.smooth, smooth),
+        'play_rms_ratio': rms_over_arc(case.aggressive, aggressive)
+        / rms_over_arc(case.smooth, smooth),
         'play_smooth_m': smooth.max(),
         'play_aggressive_m': aggressive.max(),
         'play_mean_ratio': aggressive.mean() / smooth.mean(),

@@ -100,7 +100,7 @@ class Artefact:
             Something in it cannot be understood; the message says what.
 
         """
-        return cls(*described(entry))
+        return cls(*_described(entry))
 
     def as_mapping(self) -> dict[str, Any]:
         """Return what `from_mapping` reads."""
@@ -142,7 +142,7 @@ _SQUARE = 5e-4
 what a milled block from any shop has."""
 
 
-def described(entry: Mapping[str, Any]) -> tuple[tuple[Contact, ...], tuple[Tie, ...]]:
+def _described(entry: Mapping[str, Any]) -> tuple[tuple[Contact, ...], tuple[Tie, ...]]:
     """Return the contacts and ties of an artefact file; see `Artefact.from_mapping`."""
     if not isinstance(entry, Mapping) or not set(entry) <= set(_ENTRIES):
         result = ', '.join(map(str, entry)) if isinstance(entry, Mapping) else 'no mapping'

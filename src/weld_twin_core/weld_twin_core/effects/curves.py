@@ -95,7 +95,7 @@ def basis(knots: Sequence[float], x: Array) -> Array:
     return np.asarray(np.moveaxis(values, -1, 0))
 
 
-def basis_slope(knots: Sequence[float], x: Array) -> Array:
+def _basis_slope(knots: Sequence[float], x: Array) -> Array:
     """Return the derivative of `basis` by x, shape (K, ...); 0 beyond the knots."""
     _, rates = _cardinal(tuple(float(k) for k in knots), np.clip(x, knots[0], knots[-1]))
     inside = (x >= knots[0]) & (x <= knots[-1])
@@ -112,7 +112,7 @@ def _slopes(knots: tuple[float, ...]) -> Array:
     return spline_slopes(np.array(knots), np.eye(len(knots)), natural=True)
 
 
-def check_knots(name: str, over: str, knots: Sequence[float], count: int) -> None:
+def _check_knots(name: str, over: str, knots: Sequence[float], count: int) -> None:
     """Raise ModelError unless knots over a known quantity increase, and each has its value."""
     if over not in QUANTITIES:
         raise ModelError(f'{name}: over must be one of {", ".join(QUANTITIES)}, got {over!r}')
@@ -169,7 +169,7 @@ class _Twin(TwinHooks):
         if (self.effect.over, self.effect.channel) != ('angle', 'q'):
             return {}
         index = view.robot.index(self.effect.joint)
-        rise = basis_slope(self.effect.knots, view.joint(index))
+        rise = _basis_slope(self.effect.knots, view.joint(index))
         values = np.asarray(self.effect.values, dtype=np.float64)
         return {self.effect._site(view): np.tensordot(values, rise, axes=(-1, 0))}
 
@@ -205,7 +205,7 @@ class JointCurve(Effect):
 
     def check(self, robot: Robot) -> None:
         super().check(robot)
-        check_knots(self.name, self.over, self.knots, np.shape(self.values)[-1])
+        _check_knots(self.name, self.over, self.knots, np.shape(self.values)[-1])
         if self.channel not in ('q', *ROW_CHANNELS):
             raise ModelError(
                 f'{self.name}: channel must be one of q, {", ".join(ROW_CHANNELS)}, '
@@ -272,7 +272,7 @@ class FrameCurve(Effect):
         super().check(robot)
         for part in (self.xyz, self.rotvec):
             count = np.shape(part)[-1]
-            check_knots(self.name, self.over, self.knots, count // 3 if count % 3 == 0 else -1)
+            _check_knots(self.name, self.over, self.knots, count // 3 if count % 3 == 0 else -1)
         if self.frame not in _FRAMES or self.over not in _OVER:
             raise ModelError(
                 f'{self.name}: frame must be base or tool and over constant, temperature or time, '

@@ -33,10 +33,10 @@ from .wording import base_frame, frame, radians
 _TIMES = 40
 """Instants of a moved set-up that a search tries, evenly over the recording."""
 
-T = TypeVar('T', bound='Timed')
+T = TypeVar('T', bound='_Timed')
 
 
-class Timed(Effect):
+class _Timed(Effect):
     """A constant error times a share that hangs on the time, counted from the recording's epoch."""
 
     since: ClassVar[str] = 'time'
@@ -65,7 +65,7 @@ class Timed(Effect):
         ]
 
 
-class Sudden(Timed):
+class Sudden(_Timed):
     """
     What sets in at ``time`` [s].
 
@@ -195,7 +195,7 @@ class InstrumentKnock(_SuddenFrame):
         )
 
 
-class _SetupMotion(Timed, FrameError):
+class _SetupMotion(_Timed, FrameError):
     """The set-up's own motion: nuisance, never a cause."""
 
     traits = Traits(depends_on='time', place='base', cause=False, of_setup=True)
@@ -293,4 +293,4 @@ def seen_from(
     if last < span_ns[0] or first > span_ns[1]:
         return of_the_robot(effects)
     later = (other.epoch_ns - epoch_ns) * 1e-9
-    return tuple(e.recounted(later) if isinstance(e, Timed) else e for e in effects)
+    return tuple(e.recounted(later) if isinstance(e, _Timed) else e for e in effects)

@@ -30,7 +30,7 @@ class _Search(SearchHooks):
         return joint is not None and bool(robot.prismatic[robot.index(joint)])
 
 
-class GuideError(LinearEffect):
+class _GuideError(LinearEffect):
     """An error of a guide; its carriage leaves the straight line by the posture of one joint."""
 
     of = 'joint'
@@ -43,7 +43,7 @@ class GuideError(LinearEffect):
     search = Hooked(_Search)
 
 
-def carriage_axes(view: View, i: int) -> tuple[Array, Array, Array]:
+def _carriage_axes(view: View, i: int) -> tuple[Array, Array, Array]:
     """Return the x, y and z of a guide in the world at the samples, each (3, ...); z is along it."""
     row, width = view.frames.rows[i], view.frames.position.ndim - 1
     z = pad(row.z, width)
@@ -51,7 +51,7 @@ def carriage_axes(view: View, i: int) -> tuple[Array, Array, Array]:
     return x, cross(z, x), z
 
 
-def carried(view: View, i: int, slide: Array | None, turn: Array | None) -> Shift:
+def _carried(view: View, i: int, slide: Array | None, turn: Array | None) -> Shift:
     """
     Return how the pose moves where the carriage of joint i is slid or turned against its guide.
 
@@ -70,7 +70,7 @@ def carried(view: View, i: int, slide: Array | None, turn: Array | None) -> Shif
 
 
 @register
-class GuideTilt(GuideError):
+class GuideTilt(_GuideError):
     """The carriage turns by rate * q about the x, y and z of its row; z is along the travel."""
 
     joint: str
@@ -78,7 +78,7 @@ class GuideTilt(GuideError):
 
     name = 'guide_tilt'
     traits = replace(
-        GuideError.traits,
+        _GuideError.traits,
         title='tilting carriage',
         meaning='the carriage of a joint that slides turns on its way',
         entered='program',
@@ -98,8 +98,8 @@ class GuideTilt(GuideError):
 
     def per_unit(self, view: View) -> list[Shift]:
         i = view.robot.index(self.joint)
-        axes = carriage_axes(view, i)
-        return [carried(view, i, None, view.joint(i) * axis) for axis in axes]
+        axes = _carriage_axes(view, i)
+        return [_carried(view, i, None, view.joint(i) * axis) for axis in axes]
 
     def remedy(self, robot: Robot) -> str:
         each = ', '.join(number(float(np.degrees(v))) for v in np.asarray(self.rate))
@@ -110,7 +110,7 @@ class GuideTilt(GuideError):
 
 
 @register
-class GuideBend(GuideError):
+class GuideBend(_GuideError):
     """The carriage is off by curvature * q^2 / 2 along the x and the y of its row."""
 
     joint: str
@@ -118,7 +118,7 @@ class GuideBend(GuideError):
 
     name = 'guide_bend'
     traits = replace(
-        GuideError.traits,
+        _GuideError.traits,
         title='bent guide',
         meaning='the guide of a joint that slides is no straight line',
         entered='program',
@@ -141,9 +141,9 @@ class GuideBend(GuideError):
 
     def per_unit(self, view: View) -> list[Shift]:
         i = view.robot.index(self.joint)
-        x, y, _ = carriage_axes(view, i)
+        x, y, _ = _carriage_axes(view, i)
         bow = 0.5 * view.joint(i) ** 2
-        return [carried(view, i, bow * axis, None) for axis in (x, y)]
+        return [_carried(view, i, bow * axis, None) for axis in (x, y)]
 
     def remedy(self, robot: Robot) -> str:
         x, y = np.asarray(self.curvature) * 0.125e3

@@ -27,7 +27,7 @@ _VALUES = {
 
 
 @dataclass(frozen=True, eq=False)
-class DhStudy:
+class _DhStudy:
     """A study whose tolerances are all of DH values."""
 
     study: Study
@@ -49,14 +49,14 @@ class DhStudy:
         return np.moveaxis(self.study.on_seam(away), -1, 0)
 
 
-def dh_study(study: Study, tolerances: Sequence[Tolerance]) -> DhStudy | None:
+def _dh_study(study: Study, tolerances: Sequence[Tolerance]) -> _DhStudy | None:
     """Return the fast form of a study, or None where something else than DH values counts."""
     if study.known or any((t.effect, t.parameter) not in _VALUES for t in tolerances):
         return None
     joints = study.recording.joints
     q = joints.q if study.at is None else joints.at(study.at)[0]
     try:
-        return DhStudy(study, tuple(tolerances), SeamDraws(study.robot, q))
+        return _DhStudy(study, tuple(tolerances), SeamDraws(study.robot, q))
     except ModelError:  # modified rows, or joints that slide
         return None
 
@@ -78,7 +78,7 @@ class Model:
     error: float
     """Largest difference of a deviation to the exact twin, relative to the largest deviation of
     its run, over the runs compared; 0 for exact runs."""
-    fast: DhStudy | None = None
+    fast: _DhStudy | None = None
     """Runs draws of nothing but DH values exactly."""
 
     def __call__(self, draws: Array) -> Outcomes:
@@ -128,11 +128,11 @@ def model(
     if not tolerances:
         raise ModelError('a study needs at least one tolerance')
     if exact or not expandable(tolerances):
-        return Model(study, tuple(tolerances), None, 0.0, dh_study(study, tolerances))
+        return Model(study, tuple(tolerances), None, 0.0, _dh_study(study, tolerances))
     expansion = expand(study, tolerances)
     error = _disagreement(expansion, np.random.default_rng(seed))
     if error > _AGREED:
-        return Model(study, tuple(tolerances), None, 0.0, dh_study(study, tolerances))
+        return Model(study, tuple(tolerances), None, 0.0, _dh_study(study, tolerances))
     return Model(study, tuple(tolerances), expansion, error)
 
 

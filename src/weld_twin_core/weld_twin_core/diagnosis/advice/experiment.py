@@ -226,11 +226,12 @@ def _entry(
         'stations': stations,
         'between': between,
         'changes': option.changed,
-        'motion': _motion(joints, model.robot.joint_names),
+        'motion': motion_entry(joints, model.robot.joint_names),
     }
 
 
-def _motion(joints: JointMotion, names: Sequence[str]) -> dict[str, Any]:
+def motion_entry(joints: JointMotion, names: Sequence[str]) -> dict[str, Any]:
+    """Return a motion as plain numbers and strings."""
     t, q = joints.t, joints.q
     if not joints.static:
         t = np.linspace(0.0, t[-1], int(np.ceil(t[-1] / _PACE)) + 1)

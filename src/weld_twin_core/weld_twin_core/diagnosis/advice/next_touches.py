@@ -33,6 +33,7 @@ from ...twin.features import Features
 from ..algebra.prior import effect_precision, frame_prior
 from ..algebra.problem import PLACES, Model, Problem, Scale
 from ..hypotheses.library import plain_causes
+from .experiment import motion_entry
 from .postures import widened
 
 _ANYWHERE = 0.1
@@ -59,7 +60,7 @@ _BELOW = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Touchable:
+class _Touchable:
     """
     Touches that could be made, and what each sees of all unknowns, whitened, shape (N, 3, P).
 
@@ -136,7 +137,7 @@ class Design:
         wider[size:, size:] = _ANYWHERE * np.eye(3)
         return replace(self, starts=(*self.starts, size), root=wider)
 
-    def touchable(self, k: int, recording: Recording) -> Touchable:
+    def touchable(self, k: int, recording: Recording) -> _Touchable:
         """Return touches of place k, or of a new one behind the last, as this sees them."""
         twin = min(k, len(self.surfaces) - 1)
         points = self.model.twin(twin).poses(recording, recording.joints.t).position
@@ -149,7 +150,7 @@ class Design:
         count, at = own.shape[1], self.starts[k]
         rows[:, :count, : self.errors] = own[..., : self.errors]
         rows[:, :count, at : at + own.shape[2] - self.errors] = own[..., self.errors :]
-        return Touchable(recording, rows)
+        return _Touchable(recording, rows)
 
     def after(self, rows: Array) -> Design:
         """Return what is known after one more touch, rows of shape (3, P)."""
@@ -171,7 +172,7 @@ class Design:
         return np.asarray(np.trace(np.linalg.solve(seen, wanted), axis1=1, axis2=2))
 
 
-def scatter(touches: Sequence[Touchable], errors: int) -> Array:
+def scatter(touches: Sequence[_Touchable], errors: int) -> Array:
     """Return the weight of errors in how far tool points scatter, in noise squared, (E, E)."""
     each = [t.rows[..., :errors] - t.rows[..., :errors].mean(axis=0) for t in touches]
     count = sum(len(rows) for rows in each)
@@ -241,7 +242,7 @@ def again(problem: Problem, model: Model) -> Iterator[tuple[int, Recording]]:
             yield k, _touching(recording, q[kept], measured.position[rows], touched)
 
 
-def beside(problem: Problem, model: Model) -> Iterator[Recording]:
+def _beside(problem: Problem, model: Model) -> Iterator[Recording]:
     """Yield touches of places where nothing was touched, each far from all others."""
     low, high = widened(problem, model.robot)
     known = [recording.seen.position.mean(axis=0) for recording in problem.recordings]
@@ -344,14 +345,14 @@ class _Option(NamedTuple):
     ``known`` is what is known before, and after each.
     """
 
-    touches: list[Touchable]
+    touches: list[_Touchable]
     place: Array | None
     order: list[int]
     known: list[Design]
 
     @classmethod
     def of(
-        cls, before: Design, touches: list[Touchable], place: Array | None, weight: Array
+        cls, before: Design, touches: list[_Touchable], place: Array | None, weight: Array
     ) -> _Option:
         """Return touches put in order by what they tell of weighed errors."""
         order, after = chosen(before, np.concatenate([t.rows for t in touches]), weight, MOST)
@@ -373,13 +374,13 @@ class _Option(NamedTuple):
 
 def _touchable(
     problem: Problem, model: Model, design: Design
-) -> Iterator[tuple[Design, list[Touchable], Array | None]]:
+) -> Iterator[tuple[Design, list[_Touchable], Array | None]]:
     """Yield further touches of all that is there, and of every new place."""
     same = [design.touchable(k, recording) for k, recording in again(problem, model)]
     if same:
         yield design, same, None
     wider, last = design.with_place(), len(problem.recordings)
-    for recording in beside(problem, model):
+    for recording in _beside(problem, model):
         there = wider.touchable(last, recording)
         yield wider, [there], recording.seen.position[0]
 
@@ -427,6 +428,8 @@ def _entry(best: _Option, spread: Array, model: Model, parted: float | None) -> 
             f'Move what is touched to about ({x:.2f}, {y:.2f}, {z:.2f}) m from the base, and touch '
             f'it there near these {len(rows)} postures.'
         )
+    t = SECONDS * np.arange(float(len(rows)))
+    motion = motion_entry(JointMotion(t, q, static=True), model.robot.joint_names)
     needed = best.needed(spread)
     enough = '' if needed is None else f' {needed} touches reach nine tenths of what more can.'
     return {
@@ -438,11 +441,5 @@ def _entry(best: _Option, spread: Array, model: Model, parted: float | None) -> 
         'cost': len(rows) * SECONDS / 60.0 + (0.0 if place is None else _MOVING),
         'between': None,
         'needed': needed,
-        'motion': {
-            'static': True,
-            'joint_names': list(model.robot.joint_names),
-            't': (SECONDS * np.arange(float(len(rows)))).tolist(),
-            'q': q.round(7).tolist(),
-            'contact': [labels[k] for k in rows],
-        },
+        'motion': motion | {'contact': [labels[k] for k in rows]},
     }

@@ -31,6 +31,7 @@ from ..result import (
     Changed,
     Check,
     Diagnosis,
+    Found,
     Gap,
     Shares,
     Shrink,
@@ -87,11 +88,7 @@ def answer(
         shrink=shrink,
         unexplained=_unexplained(result.work.beliefs, evidence, verdict, shrink, placing),
         next_experiment=step,
-        actions=actions(
-            [each.effect for each in effects],
-            result.baseline.model.robot,
-            result.final.model.mends,
-        ),
+        actions=_mended(result, effects),
         model=result.final.model,
         families=verdict.families,
         evidence=evidence,
@@ -101,6 +98,11 @@ def answer(
         contacts=contact_spreads(result, unseen),
         **_compared(result, examined, verdict),
     )
+
+
+def _mended(result: Search, effects: Sequence[Found]) -> tuple[str, ...]:
+    robot = result.baseline.model.robot
+    return actions([each.effect for each in effects], robot, result.final.model.mends)
 
 
 def _parted(

@@ -93,9 +93,9 @@ def _spherical(arm: _Screws, rotation: Array, point: Array) -> Array:
     length = np.linalg.norm(reach, axis=-1)
     q3 = _two_ways(angle_to_distance(p[2] - p[1], h[2], centre - p[2], length), 1)
     bent = p[2] - p[1] + turn(h[2], q3, np.broadcast_to(centre - p[2], (*q3.shape, 3)))
-    q2 = angle_onto(h[1], bent, reach[:, None])
-    shoulder = turn_matrix(h[0], q1)[:, None]
-    arm_turn = shoulder @ turn_matrix(h[1], q2) @ turn_matrix(h[2], q3)
+    q2 = _angle_onto(h[1], bent, reach[:, None])
+    shoulder = _turn_matrix(h[0], q1)[:, None]
+    arm_turn = shoulder @ _turn_matrix(h[1], q2) @ _turn_matrix(h[2], q3)
     wrist = np.swapaxes(arm_turn, -1, -2) @ rotation
     angles = _wrist(h[3], h[4], h[5], wrist)
     return _listed(q1[:, None, None], q2[:, :, None], q3[:, :, None], *angles)
@@ -116,8 +116,8 @@ def _wrist(h4: Array, h5: Array, h6: Array, rotation: Array) -> tuple[Array, Arr
     """Return both (q4, q5, q6), each (2, 2, 2, N), of wrists' rotations (2, 2, N, 3, 3)."""
     last = rotation @ h6
     q5 = _two_ways(angle_to_height(h4, h5, np.broadcast_to(h6, last.shape), last @ h4), 2)
-    q4 = angle_onto(h4, turn(h5, q5, np.broadcast_to(h6, (*q5.shape, 3))), last[:, :, None])
-    before = turn_matrix(h4, q4) @ turn_matrix(h5, q5)
+    q4 = _angle_onto(h4, turn(h5, q5, np.broadcast_to(h6, (*q5.shape, 3))), last[:, :, None])
+    before = _turn_matrix(h4, q4) @ _turn_matrix(h5, q5)
     return q4, q5, _rest(h6, np.swapaxes(before, -1, -2) @ rotation[:, :, None])
 
 
@@ -126,15 +126,15 @@ def _three_parallel(arm: _Screws, rotation: Array, point: Array) -> Array:
     h, p = arm.axis, arm.point
     centre = np.asarray(_meeting(arm, 4, 5))
     q1 = -angle_to_height(h[1], h[0], point - p[0], h[1] @ (centre - p[0]))
-    turned = turn_matrix(h[0], -q1) @ rotation
+    turned = _turn_matrix(h[0], -q1) @ rotation
     last = turned @ h[5]
     straight = np.broadcast_to(h[5], last.shape)
     q5 = _two_ways(angle_to_height(h[1], h[4], straight, last @ h[1]), 1)
     turned = turned[:, None]
     # Turns about the parallel axes leave h2 alone, so h2 shows the wrist's turn.
     seen = turn(h[4], -q5, np.broadcast_to(h[1], (*q5.shape, 3)))
-    q6 = -angle_onto(h[5], seen, np.swapaxes(turned, -1, -2) @ h[1])
-    after = turn_matrix(h[4], q5) @ turn_matrix(h[5], q6)
+    q6 = -_angle_onto(h[5], seen, np.swapaxes(turned, -1, -2) @ h[1])
+    after = _turn_matrix(h[4], q5) @ _turn_matrix(h[5], q6)
     total = _rest(h[1], turned @ np.swapaxes(after, -1, -2))
     foot = turn(h[0], -q1, point - p[0])[:, None] - (p[1] - p[0])
     foot = foot - turn(h[1], total, np.broadcast_to(centre - p[3], foot.shape))
@@ -147,7 +147,7 @@ def _planar(arm: _Screws, foot: Array, total: Array) -> tuple[Array, Array, Arra
     h, upper, fore = arm.axis, arm.point[2] - arm.point[1], arm.point[3] - arm.point[2]
     q3 = _two_ways(angle_to_distance(upper, h[2], fore, np.linalg.norm(foot, axis=-1)), 2)
     bent = upper + turn(h[2], q3, np.broadcast_to(fore, (*q3.shape, 3)))
-    q2 = angle_onto(h[1], bent, foot[:, :, None])
+    q2 = _angle_onto(h[1], bent, foot[:, :, None])
     signs = h[1] @ h[2], h[1] @ h[3]
     return q2, q3, signs[1] * (total[:, :, None] - q2 - signs[0] * q3)
 
@@ -155,7 +155,7 @@ def _planar(arm: _Screws, foot: Array, total: Array) -> tuple[Array, Array, Arra
 def _rest(axis: Array, rotation: Array) -> Array:
     """Return the angle of rotations (..., 3, 3) known to be about the axis."""
     aside = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    return angle_onto(axis, np.broadcast_to(aside, rotation.shape[:-1]), rotation @ aside)
+    return _angle_onto(axis, np.broadcast_to(aside, rotation.shape[:-1]), rotation @ aside)
 
 
 def _parallel(arm: _Screws, i: int, j: int) -> bool:
@@ -189,14 +189,14 @@ def turn(axis: Array, angle: Array, vector: Array) -> Array:
     return along + cosine * (vector - along) + sine * _cross(axis, vector)
 
 
-def turn_matrix(axis: Array, angle: Array) -> Array:
+def _turn_matrix(axis: Array, angle: Array) -> Array:
     """Return rotation matrices (..., 3, 3) by angles (...) about a fixed unit axis (3,)."""
     along, around = np.outer(axis, axis), skew(axis)
     cosine, sine = np.cos(angle)[..., None, None], np.sin(angle)[..., None, None]
     return along + cosine * (np.eye(3) - along) + sine * around
 
 
-def angle_onto(axis: Array, start: Array, end: Array) -> Array:
+def _angle_onto(axis: Array, start: Array, end: Array) -> Array:
     """Return the angle about an axis that turns one vector onto, or nearest to, another, (...)."""
     sine = _cross(start, end) @ axis
     cosine = (start * end).sum(axis=-1) - (start @ axis) * (end @ axis)

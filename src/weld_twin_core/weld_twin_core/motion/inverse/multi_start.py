@@ -55,7 +55,7 @@ def search(robot: Robot, pose: Array, seed: Array | None = None) -> tuple[Array,
 def _range(robot: Robot) -> tuple[Array, Array]:
     """Return where to look: the limits, cut to one turn about their middle."""
     half = np.where(robot.prismatic, 2.0, np.pi)
-    centre = middle(robot)
+    centre = _middle(robot)
     return np.maximum(robot.lower, centre - half), np.minimum(robot.upper, centre + half)
 
 
@@ -104,7 +104,7 @@ TURN = 2.0 * np.pi
 """A whole turn [rad]."""
 
 
-def middle(robot: Robot) -> Array:
+def _middle(robot: Robot) -> Array:
     """Return the middle of each joint's range, shape (n,); 0 where it has no limits."""
     finite = np.isfinite(robot.lower) & np.isfinite(robot.upper)
     total = np.where(finite, robot.lower, 0.0) + np.where(finite, robot.upper, 0.0)
@@ -118,5 +118,5 @@ def centred(robot: Robot, q: Array) -> Array:
 
 def turns_to_middle(robot: Robot, low: Array, high: Array) -> Array:
     """Return how many turns bring ranges (..., n) to the middle of limits; 0 for slides."""
-    turns = np.round((middle(robot) - 0.5 * (low + high)) / TURN)
+    turns = np.round((_middle(robot) - 0.5 * (low + high)) / TURN)
     return np.where(robot.prismatic, 0.0, turns)

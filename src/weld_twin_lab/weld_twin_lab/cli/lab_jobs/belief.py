@@ -26,6 +26,7 @@ OPTIONS = options(
 --held-out N            cases to judge on [default: 0]
 --held-out-seed N       their seed [default: 2]
 --mix {{usual,several}}   cases of the usual mix, or cells with one to six causes [default: usual]
+--oracle N              of so many of these an oracle that knows the plant is asked, too [default: 0]
 --learn-from TABLE ...  tables kept from other runs
 --judge-on TABLE ...    tables kept from other runs
 --risk X                probability that an answer may be sure and wrong [default: {RISK}]
@@ -55,7 +56,7 @@ def run(study: Study) -> None:
     with study.runner('diagnosing') as runner:
         taught += rows_of(args.seed, args.cases, runner, args.mix)
         asked = rows_of(args.held_out_seed, args.held_out, runner, args.mix)
-        tried += with_oracle(asked, runner) if args.oracle else asked
+        tried += [*with_oracle(asked[: args.oracle], runner), *asked[args.oracle :]]
     _refuse_shared(taught, tried)
     write_rows(study.out / LEARNED, taught)
     if tried:

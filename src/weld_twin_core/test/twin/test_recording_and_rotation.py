@@ -85,6 +85,17 @@ def test_left_jacobian_is_the_derivative_of_the_rotation(vector, size):
         np.testing.assert_allclose(found[:, k], spin, atol=1e-8)
 
 
+def test_a_pose_moved_by_what_is_missing_is_the_one_that_is_wanted():
+    rng = np.random.default_rng(0)
+    turns = Rotation.random(6, random_state=1).as_matrix()
+    wanted, real = rotation.transform(turns, rng.normal(size=(6, 3))).reshape(2, 3, 4, 4)
+    step = rotation.missing(wanted, real)
+    np.testing.assert_allclose(rotation.moved(real, step), wanted, atol=1e-12)
+    between = Rotation.from_matrix(wanted[:, :3, :3]) * Rotation.from_matrix(real[:, :3, :3]).inv()
+    np.testing.assert_allclose(step[:, 3:], between.as_rotvec(), atol=1e-12)
+    np.testing.assert_allclose(step[:, :3], wanted[:, :3, 3] - real[:, :3, 3])
+
+
 def test_quaternions_are_x_y_z_w_and_turn_back():
     quarter = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
     matrix = rotation.matrix_from_quaternion(quarter)

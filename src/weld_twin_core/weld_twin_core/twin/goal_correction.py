@@ -28,7 +28,7 @@ from .features import Features
 from .goal_motion import Course, Goal, course, fine_times
 from .posterior import Drawn, pose_covariances
 from .program_accuracy import accuracy
-from .program_correction import BETTER, NOTHING
+from .program_correction import BETTER, NOTHING, too_large
 from .program_model import ProgramModel
 from .reversals import approached, is_play, just_turned, play_steps, spread
 from .twin import Twin
@@ -132,14 +132,6 @@ def not_corrected(model: ProgramModel) -> list[str]:
     """Return the names of the effects that no point of a goal mends, each once."""
     remaining = [e for e in model.effects if e.stage != Stage.NOISE and not _mended(e)]
     return list(dict.fromkeys(e.name for e in remaining))
-
-
-def too_large(length: float, turn: float, limits: GoalLimits) -> str:
-    """Return that a point would move by more than is allowed [m, rad]."""
-    return (
-        f'a point would move by {length * 1e3:.3f} mm and {np.degrees(turn):.3f} degrees, at most '
-        f'{limits.length * 1e3:g} mm and {np.degrees(limits.turn):g} degrees are allowed'
-    )
 
 
 def _mended(effect: Effect) -> bool:
@@ -368,16 +360,7 @@ class _Work:
     # Reasons to refuse -----------------------------------------------------------------------
 
     def _refuse_outside(self) -> None:
-        if self.model.posterior is None:
-            return
-        count = self.meant.t.size
-        pull, warm = self.model.wrench, self.model.temperature
-        result = self.model.posterior.domain.outside(
-            self.meant.q,
-            None,
-            None if pull is None else np.repeat(pull[None], count, axis=0),
-            None if warm is None else np.full(count, warm),
-        )
+        result = self.model.postures_outside(self.meant.q)
         if result:
             at = self.meant.t[result[0].first]
             raise _RefusedError(f'outside what was recorded from {at:.2f} s on: {result[0].why}')
@@ -397,7 +380,7 @@ class _Work:
     def _refuse_large(self, added: Array) -> None:
         length, turn = _largest(added)
         if length > self.limits.length or turn > self.limits.turn:
-            raise _RefusedError(too_large(length, turn, self.limits))
+            raise _RefusedError(too_large(length, turn, self.limits[:2]))
 
     def _refuse_quick(self, result: Goal) -> None:
         if self.meant.t.size < 2:

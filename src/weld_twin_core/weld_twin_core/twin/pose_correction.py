@@ -22,9 +22,9 @@ from ..errors import DataError
 from ..kernels.single_pose import SinglePose, turn_between, turn_matrix
 from ..motion.inverse.newton import least_step
 from ..recording import JointMotion
-from .goal_correction import GoalLimits, not_corrected, too_large
+from .goal_correction import GoalLimits, not_corrected
 from .posterior import pose_covariances
-from .program_correction import SINGULAR
+from .program_correction import SINGULAR, too_large
 from .program_model import ProgramModel
 
 ROUNDS = 12
@@ -175,22 +175,13 @@ class PoseCorrection:
         """Return why a pose must not be corrected; empty where it may."""
         length, turn = (float(np.linalg.norm(part)) for part in np.split(looked.added, 2))
         if length > limits.length or turn > limits.turn:
-            return too_large(length, turn, limits)
+            return too_large(length, turn, limits[:2])
         robot = self.model.robot
         try:
             robot.check_positions(looked.q)
         except DataError as error:
             return str(error)
-        posterior = self.model.posterior
-        if posterior is None:
-            return ''
-        pull, warm = self.model.wrench, self.model.temperature
-        result = posterior.domain.outside(
-            looked.q[None],
-            None,
-            None if pull is None else pull[None],
-            None if warm is None else np.array([warm]),
-        )
+        result = self.model.postures_outside(looked.q[None])
         return f'outside what was recorded: {result[0].why}' if result else ''
 
     def doubt(self, looked: Looked) -> float:

@@ -59,6 +59,14 @@ class Caps(NamedTuple):
     turn: float = np.pi / 180.0
 
 
+def too_large(length: float, turn: float, most: tuple[float, float]) -> str:
+    """Return that a point would move by more than is allowed [m, rad]."""
+    return (
+        f'a point would move by {length * 1e3:.3f} mm and {np.degrees(turn):.3f} degrees, at most '
+        f'{most[0] * 1e3:g} mm and {np.degrees(most[1]):g} degrees are allowed'
+    )
+
+
 class _MoveResult(NamedTuple):
     """What a correction does to one move."""
 
@@ -205,11 +213,7 @@ class _Work(NamedTuple):
         for use in move.uses:
             length, turn = self.moved_by(moved, use, move.tool)
             if length > self.caps.length or turn > self.caps.turn:
-                return (
-                    f'the point would move by {length * 1e3:.3f} mm and {np.degrees(turn):.3f} '
-                    f'degrees, at most {self.caps.length * 1e3:g} mm and '
-                    f'{np.degrees(self.caps.turn):g} degrees are allowed'
-                )
+                return too_large(length, turn, self.caps)
         if shares is not None and shares[piece.ends[k]] < _WORTH:
             return 'the model is less sure of this place than the correction is large'
         return ''

@@ -134,6 +134,14 @@ class ProgramModel:
         domain: Domain = self.posterior.domain
         return domain.outside(motion.q, motion.velocity, None, warm)
 
+    def postures_outside(self, q: Array) -> list[Outside]:
+        """Return which of postures (K, n), loaded and warm, are outside what was recorded."""
+        if self.posterior is None:
+            return []
+        pull = None if self.wrench is None else np.repeat(self.wrench[None], len(q), axis=0)
+        warm = None if self.temperature is None else np.full(len(q), self.temperature)
+        return self.posterior.domain.outside(q, None, pull, warm)
+
     def recorded(self, q: Array) -> Array:
         """Tell which postures, shape (K, n), are among those recorded, shape (K,)."""
         if self.posterior is None:

@@ -113,8 +113,14 @@ class LiveTwin:
             qd = self._command.since_before(t, q)
         else:
             self._command.remember(t, q)
-        view = self._remembered(t, self._view(t, q, qd, wrench, temperature, wrench_frame, effort))
-        view = self.twin.displaced(view)
+        pull, warm, measured = (
+            None if side is None else np.asarray(side, dtype=np.float64)[None]
+            for side in (wrench, temperature, effort)
+        )
+        now = np.array([t])
+        motion = self.twin.robot, now, now - self._start, q[None], qd[None], False
+        view = View(*motion, pull, wrench_frame, warm, measured)
+        view = self.twin.displaced(self._remembered(t, view))
         joints = view.q[0].copy()
         others = {}
         for (name, i), value in view.shift.items():
@@ -158,30 +164,6 @@ class LiveTwin:
             self._single = SinglePose(self._twin.robot)
         pose = self._single(q)
         return Poses(pose[:3, 3], pose[:3, :3])
-
-    def _view(
-        self,
-        t: float,
-        q: Array,
-        qd: Array,
-        wrench: Array | None,
-        temperature: float | None,
-        wrench_frame: str,
-        effort: Array | None,
-    ) -> View:
-        stamp = np.array([t])
-        return View(
-            robot=self.twin.robot,
-            t=stamp,
-            elapsed=stamp - self._start,
-            q=q[None],
-            qd=qd[None],
-            static=False,
-            wrench=None if wrench is None else np.asarray(wrench)[None],
-            wrench_frame=wrench_frame,
-            temperature=None if temperature is None else np.array([temperature]),
-            effort=None if effort is None else np.asarray(effort)[None],
-        )
 
     def _remembered(self, t: float, view: View) -> View:
         """Run the effects with memory, each on what the one before left, and keep their states."""

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
@@ -13,7 +13,6 @@ import numpy as np
 
 from ..arm.chain import column, forward
 from ..arm.channels import Channel, Shift
-from ..arm.robot import Robot
 from ..arrays import Array
 from ..effects.effect import Parameter, Stage, View
 from ..recording import Recording
@@ -216,9 +215,15 @@ class Twin(EffectStages):
     def joint_view(self, recording: Recording) -> View:
         """Return what effects with memory see: the commanded motion on its own stamps."""
         motion = recording.joints
-        return _view(
-            self.robot, recording, motion.t, motion.q, motion.causal_velocity, *_sides(recording)
-        )
+        return self._seen(recording, motion.t, motion.q, motion.causal_velocity, _sides(recording))
+
+    def _seen(
+        self, recording: Recording, t: Array, q: Array, qd: Array, sides: Sequence[Array | None]
+    ) -> View:
+        """Return a motion at stamps with wrench, temperature and effort there."""
+        motion, (wrench, temperature, effort) = recording.joints, sides
+        seen = self.robot, t, t - motion.t[0], q, qd, motion.static, wrench
+        return View(*seen, recording.wrench_frame, temperature, effort, recording.effort_holds)
 
     def _evaluate(self, recording: Recording, at: Array | None, want: bool) -> Evaluation:
         view, tangents = self._sampled(recording, at, want)
@@ -242,7 +247,7 @@ class Twin(EffectStages):
         if moved is not None:
             q = q + (moved if picker is None else picker.take(moved))
             qd = qd + (rates(motion, moved) if picker is None else picker.rates(moved))
-        view = _view(self.robot, recording, t, q, qd, *sides)
+        view = self._seen(recording, t, q, qd, sides)
         if not want:
             return view, []
         picked: list[Tangent] = [
@@ -259,31 +264,6 @@ class Twin(EffectStages):
     def live(self) -> LiveTwin:
         """Return a stepper that gives the same poses one joint state at a time."""
         return LiveTwin(self)
-
-
-def _view(
-    robot: Robot,
-    recording: Recording,
-    t: Array,
-    q: Array,
-    qd: Array,
-    wrench: Array | None,
-    temperature: Array | None,
-    effort: Array | None,
-) -> View:
-    return View(
-        robot=robot,
-        t=t,
-        elapsed=t - recording.joints.t[0],
-        q=q,
-        qd=qd,
-        static=recording.joints.static,
-        wrench=wrench,
-        wrench_frame=recording.wrench_frame,
-        temperature=temperature,
-        effort=effort,
-        effort_holds=recording.effort_holds,
-    )
 
 
 def _sides(recording: Recording) -> list[Array | None]:

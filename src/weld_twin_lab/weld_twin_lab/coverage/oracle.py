@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.algebra.fit import Fit, robust_fit
 from weld_twin_core.diagnosis.algebra.problem import Problem, Scale
-from weld_twin_core.diagnosis.frames.aligned import posed
+from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
@@ -65,7 +65,7 @@ def oracle_sigma(
         )
     except TwinError:
         return {}
-    problem, start = posed([train], cell.robot, frozenset(cell.align), known)
+    problem, start = aligned([train], cell.robot, frozenset(cell.align), known)
     found, scale = robust_fit(problem, start.with_found(causes), problem.unit_scale())
     own = replace(scale, position=cell.tracker.sigma)
     posterior = _posterior(problem, found, own, train)

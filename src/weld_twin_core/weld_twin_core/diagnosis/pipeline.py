@@ -196,7 +196,7 @@ def _told(
     evidence = gathered(result, unseen, leftover, shrink, floor, families)
     remaining = missed(result, unseen, beliefs)
     table = tuple(Row.of(slot, beliefs) for slot in result.slots)
-    statements = stated(result, unseen, evidence, table)
+    statements = stated(evidence, table, beliefs)
     evidence = statements.put_to(replace(evidence, missed=remaining.in_words))
     verdict = decide(evidence, beliefs)
     alternative = curved(result, verdict, beliefs)

@@ -138,7 +138,7 @@ def fit(
     """
     prior = effect_precision(model) if precision is None else precision
     here = _descended(_Point.at(problem, model, scale, prior), iterations, tolerance)
-    if problem.at_rest and here.strained and scale.position > LEAST_NOISE:
+    if problem.at_rest and here.believed > STRAINED and scale.position > LEAST_NOISE:
         # What a cause that is not fitted yet leaves was taken for noise, beside which few stations
         # weigh less than a belief.
         share = (LEAST_NOISE / scale.position) ** 2
@@ -219,11 +219,6 @@ class _Point:
         return float(self.ridge @ self.x**2) / self.share
 
     @property
-    def strained(self) -> bool:
-        """Return whether the fit is held back by what is believed of it."""
-        return self.believed > STRAINED
-
-    @property
     def surprise(self) -> float:
         """Return twice the negative log probability of the fit, whatever the noise."""
         size, freedom = self.residual.size, max(self.residual.size - self.ridge.size, 1)
@@ -268,7 +263,11 @@ def robust_scale(
     reported = problem.told_weights
     residuals = [part * np.sqrt(own) for part, own in zip(residuals, reported, strict=True)]
     lost = np.sqrt(max(1.0 - freedom / max(problem.size, 1), 0.05))
-    residuals = problem.as_sure(residuals)
+    # Shifts and turns as sure as usual ones.
+    residuals = [
+        part if root is None else np.einsum('mij,jm->im', root, part)
+        for root, part in zip(problem.roots, residuals, strict=True)
+    ]
     position = np.concatenate([measured_axes(part[:3]).ravel() for part in residuals])
     turn = np.concatenate([part[3:].ravel() for part in residuals])
     sigma = robust_spread(position) / lost

@@ -337,11 +337,6 @@ class Problem:
             out.append(rows if root is None else np.linalg.solve(root, rows[..., None])[..., 0])
         return out
 
-    def as_sure(self, parts: list[Array]) -> list[Array]:
-        """Return residual-like parts, (c, M), with shifts and turns as sure as a usual one."""
-        pairs = zip(self.roots, parts, strict=True)
-        return [p if root is None else np.einsum('mij,jm->im', root, p) for root, p in pairs]
-
     def by_sample(self, values: Array) -> list[Array]:
         """Return what `whitened` has laid out in rows as one array per recording, (M, c, ...)."""
         return by_sample(values, self.rows, self.samples)

@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from ..hypotheses.search import Search
+from ..beliefs import Beliefs
 from ..levels.free_form import FreeForm
 from ..result import NAMING, Cause
-from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence
 from ..verdict.table import Row
@@ -69,16 +68,16 @@ class Stated:
         return replace(evidence, believed=believed, nameless=nameless)
 
 
-def stated(result: Search, unseen: Unseen, evidence: Evidence, table: tuple[Row, ...]) -> Stated:
+def stated(evidence: Evidence, table: tuple[Row, ...], beliefs: Beliefs) -> Stated:
     """Return how probable it is of every effect found that a name is right, or that none can be."""
     learned = usual_calibration()
-    situation = of_situation(result, evidence)
-    if result.dense:
+    situation = of_situation(evidence, beliefs)
+    if evidence.families is not None:
         return Stated(table, (Statement('name of many', 0, situation, KIND),), None, situation)
-    sizes = [unseen.rms(part) / max(evidence.floor, 1e-12) for part in unseen.targets[1:]]
-    each = zip(table, sizes, unseen.wandered(), strict=False)
+    sizes = [size / max(evidence.floor, 1e-12) for size in evidence.sizes]
+    each = zip(table, sizes, evidence.wandered, strict=False)
     on = evidence.structure.depends_on
-    every = [of_name(row, size, float(wandered), on) for row, size, wandered in each]
+    every = [of_name(row, size, wandered, on) for row, size, wandered in each]
     names = tuple(_told('name', k, {**situation, **own}, learned) for k, own in enumerate(every))
     if not names:
         return Stated(table, (), None, situation)

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..hypotheses.search import Search
+from ..beliefs import Beliefs
 from ..levels.free_form import FreeForm
 from ..result import Cause
 from ..verdict.decision import Left
@@ -49,21 +49,20 @@ KINDS = {
 """Every kind of statement, and what it says."""
 
 
-def of_situation(result: Search, evidence: Evidence) -> Numbers:
+def of_situation(evidence: Evidence, beliefs: Beliefs) -> Numbers:
     """Return the features that all statements of a diagnosis share."""
     floor = max(evidence.floor, 1e-12)
-    travel = np.max([np.ptp(r.joints.q, axis=0) for r in result.problem.recordings], axis=0)
     return plain(
         {
             'gap': log(evidence.gap / floor),
             'left': log(evidence.after / floor),
-            'left unexplained': Left(evidence, result.work.beliefs).share,
+            'left unexplained': Left(evidence, beliefs).share,
             'structure': evidence.structure.gain,
-            'rows': log(result.effective(result.small)),
-            'joints moving': float((travel > MOVES).mean()),
+            'rows': log(evidence.rows),
+            'joints moving': float((np.array(evidence.travel) > MOVES).mean()),
             'lacking': float(bool(evidence.lacking)),
             'cancelling': log(sum(evidence.parts)) if evidence.parts else 0.0,
-            'stations': float(result.problem.recordings[0].joints.static),
+            'stations': float(evidence.stations),
         }
     )
 
@@ -73,8 +72,7 @@ def of_name(row: Row, size: float, wandered: float, left_at: Sequence[str] = ())
     Return the features of the name of an effect found, from its row of the table of answers.
 
     size: how far the effect moves the tool, RMS in units of noise.
-    wandered: how far its values move from stretch to stretch, over what noise makes them: a
-    formula that stands in for another wants other values on every stretch.
+    wandered: how far its values move from stretch to stretch, over what noise makes them.
     left_at: what the most of what is left depends on, in words.
     """
     on = row.leader.dependence

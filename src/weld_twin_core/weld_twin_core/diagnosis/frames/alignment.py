@@ -65,7 +65,7 @@ def initial_frames(problem: Problem, model: Model) -> Model:
         return model
     best, attempts = model, [_base_only if 'base' in align else _tool_only]
     if len(align) > 1:
-        attempts.append(_base_and_tool)
+        attempts.append(lambda tracks, model: rough_frames([(tracks, model)], thorough=True)[0])
     for attempt in attempts:
         result = attempt(own, model)
         if _gap(own, result) < _gap(own, best):
@@ -133,38 +133,27 @@ def _tool_only(tracks: list[Track], model: Model) -> Model:
     start = model.robot.T_flange_tool
     tool, weights = start, [np.ones(len(track.position)) for track in tracks]
     for _ in range(ROUNDS):
-        moment = np.zeros((3, 3))
+        moment, normal, right = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros(3)
         for track, base, weight in zip(tracks, model.bases, weights, strict=True):
+            turn = base[:3, :3] @ track.turn
             if track.rotation is not None:
-                turn = base[:3, :3] @ track.turn
                 moment += np.einsum('m,mki,mkj', weight, turn, track.rotation)
+            left = (
+                track.position - track.point @ base[:3, :3].T - turn @ start[:3, 3] - base[:3, 3]
+            )
+            normal += np.einsum('m,mki,mkj', weight, turn, turn)
+            right += np.einsum('m,mki,mk', weight, turn, left)
         tie = max(TIE * np.linalg.norm(moment), 1e-12)
         rotation = nearest_rotation(moment + tie * start[:3, :3])
-        vector = _tool_vector(tracks, model.bases, weights, start[:3, 3])
+        total = sum(float(weight.sum()) for weight in weights)
+        vector = start[:3, 3] + np.linalg.solve(normal + TIE * total * np.eye(3), right)
         tool = transform(rotation, vector)
-        weights = _weights(tracks, model.bases, tool)
+        pairs = zip(tracks, model.bases, strict=True)
+        weights = [1.0 / np.maximum(track.gap(base, tool), FLOOR) for track, base in pairs]
     return replace(model, robot=model.robot.with_frames(tool=tool))
 
 
-def _tool_vector(
-    tracks: list[Track], bases: tuple[Array, ...], weights: list[Array], start: Array
-) -> Array:
-    """Return the tool vector for given bases."""
-    normal, right = np.zeros((3, 3)), np.zeros(3)
-    for track, base, weight in zip(tracks, bases, weights, strict=True):
-        columns = base[:3, :3] @ track.turn
-        left = track.position - track.point @ base[:3, :3].T - columns @ start - base[:3, 3]
-        normal += np.einsum('m,mki,mkj', weight, columns, columns)
-        right += np.einsum('m,mki,mk', weight, columns, left)
-    total = sum(float(weight.sum()) for weight in weights)
-    return start + np.linalg.solve(normal + TIE * total * np.eye(3), right)
-
-
 # Both ------------------------------------------------------------------------------------------
-
-
-def _base_and_tool(tracks: list[Track], model: Model) -> Model:
-    return rough_frames([(tracks, model)], thorough=True)[0]
 
 
 def _bases_and_tools(
@@ -232,12 +221,6 @@ def _turn_weight(track: Track, tool: Array) -> Array:
         base = nearest_rotation(moment)
         weight = 1.0 / np.maximum(chord(track.turns, base[:, None] @ turned), FLOOR / LEVER)
     return weight
-
-
-def _weights(tracks: list[Track], bases: tuple[Array, ...], tool: Array) -> list[Array]:
-    """Return the weights that turn least squares into least absolute deviations."""
-    pairs = zip(tracks, bases, strict=True)
-    return [1.0 / np.maximum(track.gap(base, tool), FLOOR) for track, base in pairs]
 
 
 # In turn ---------------------------------------------------------------------------------------

@@ -25,13 +25,15 @@ from ...errors import ModelError
 from ...twin.features import joints_of
 from ..algebra.columns import Columns, designed
 from ..algebra.definite import unit_diagonal
-from ..algebra.fit import coordinates, design, fit, robust_fit, robust_scale
+from ..algebra.fit import coordinates, design, fit, robust_fit, robust_scale, with_weights
 from ..algebra.independent_rows import effective_share
 from ..algebra.prior import effect_precision, frame_offset, frame_prior
 from ..algebra.problem import Change, Model, Problem, Scale
 from ..algebra.spread import BLOCKS, covariance, unit_inverse
 from ..beliefs import Beliefs
+from ..hypotheses.any_motion import of_no_size
 from ..hypotheses.search import Search
+from ..result import Site
 
 ROWS = 9000
 """Rows on which changes are chosen."""
@@ -141,7 +143,7 @@ def _candidates(problem: Problem, robot: Robot, families: Sequence[str]) -> tupl
             if 'base' in problem.align and kind.traits.fitted_with == 'base':
                 continue
             for joint in joints_of(kind, robot):
-                out.append(Change(k, kind(**({} if joint is None else {'joint': joint}))))
+                out.append(Change(k, of_no_size(Site(name, joint))))
     return tuple(out)
 
 
@@ -156,8 +158,7 @@ def _freed(
     later fit; one of 10 mm would else make the noise of all.
     """
     scale = robust_scale(problem, problem.residuals(model))
-    even = replace(scale, weights=tuple(np.ones(m) for m in problem.samples))
-    model = fit(problem, model, even, precision, iterations=8).model
+    model = fit(problem, model, with_weights(scale, problem), precision, iterations=8).model
     for _ in range(REWEIGHTED):
         scale = robust_scale(problem, problem.residuals(model), freedom=freedom)
         model = fit(problem, model, scale, precision, iterations=4).model

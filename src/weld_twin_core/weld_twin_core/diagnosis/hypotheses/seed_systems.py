@@ -68,13 +68,6 @@ class Alike(NamedTuple):
     """Squared norm of every column before anything was projected out, shape (S, K)."""
 
 
-class Grown(NamedTuple):
-    """The columns of every seed that are worth it, bool (S, K), and their evidence, (S,)."""
-
-    chosen: NDArray[np.bool_]
-    nats: Array
-
-
 @dataclass(frozen=True, eq=False)
 class SeedSystems:
     """Normal equations of all seeds."""
@@ -124,9 +117,9 @@ class SeedSystems:
         return SeedSystems(tuple(alike), rss)
 
 
-def grown(alike: Alike, rss: float, effective: float) -> Grown:
+def grown(alike: Alike, rss: float, effective: float) -> tuple[NDArray[np.bool_], Array]:
     """
-    Return which columns of every seed are worth it.
+    Return which columns of every seed are worth it, bool (S, K), and their evidence [nats], (S,).
 
     Columns enter one at a time, the one that explains most first, as long as the evidence
     grows; all together where that is worth more.
@@ -161,7 +154,7 @@ def grown(alike: Alike, rss: float, effective: float) -> Grown:
         gain[growing] += more[better]
         remaining, pull = _projected(remaining[better], pull[better], k)
     all_of_them = together > worth
-    return Grown(np.where(all_of_them[:, None], live, chosen), np.maximum(together, worth))
+    return np.where(all_of_them[:, None], live, chosen), np.maximum(together, worth)
 
 
 def _projected(remaining: Array, pull: Array, k: Index) -> tuple[Array, Array]:
@@ -252,8 +245,8 @@ def ranking(
     first = np.cumsum([0, *(len(unit.seeds) for unit in units)])
     log_bayes_factor, group = np.full(first[-1], -np.inf), np.zeros(first[-1], int)
     row = np.zeros(first[-1], int)
-    for k, (alike, own) in enumerate(zip(systems.alike, each, strict=True)):
-        log_bayes_factor[alike.seeds], group[alike.seeds] = own.nats, k
+    for k, (alike, (_, own)) in enumerate(zip(systems.alike, each, strict=True)):
+        log_bayes_factor[alike.seeds], group[alike.seeds] = own, k
         row[alike.seeds] = np.arange(alike.seeds.size)
     worth = np.maximum.reduceat(log_bayes_factor, first[:-1]) if units else log_bayes_factor
     worth = worth - np.log([unit.trials for unit in units])
@@ -262,6 +255,6 @@ def ranking(
     for u in np.flatnonzero(asked & (worth > least)).tolist():
         seed = int(np.argmax(log_bayes_factor[first[u] : first[u + 1]]))
         k, r = group[first[u] + seed], row[first[u] + seed]
-        chosen = np.flatnonzero(each[k].chosen[r])
+        chosen = np.flatnonzero(each[k][0][r])
         result.append(Choice(units[u], seed, float(worth[u]), systems.alike[k], int(r), chosen))
     return sorted(result, key=lambda choice: -choice.nats)

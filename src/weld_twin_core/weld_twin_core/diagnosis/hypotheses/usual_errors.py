@@ -21,7 +21,6 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...twin.features import Features
 from ..algebra.definite import EMPTY
 from ..algebra.fit import Fit, design, solve_scaled
 from ..algebra.learned_sizes import learned_precision, projected
@@ -55,7 +54,12 @@ class UsualErrors:
         effective: number of independent rows of a fit.
         """
         features = problem.features(now.model)
-        every = [problem.effect_columns(features, e, atoms=False) for e in _small(features, now)]
+        have = {effect.key for effect in now.model.found}
+        view = features[moved_most(features, None)].view
+        # All at zero, but for those in the model and those that the data cannot show.
+        small = [e for e in plain_causes(now.model.robot, view, ON) if e.key not in have]
+        shown = [e for e in small if not hardly_moves(features, e)]
+        every = (problem.effect_columns(features, e, atoms=False) for e in shown)
         rows = [problem.whitened(each, scale) for each in every]
         columns = np.concatenate([np.zeros((0, now.residual.size)), *rows])
         free = cls(problem, scale, _sized(problem, scale, columns, now), 0.0)
@@ -105,10 +109,3 @@ def _sized(problem: Problem, scale: Scale, columns: Array, now: Fit) -> Array:
 def usual(kinds: Iterable[Effect | type[Effect]]) -> bool:
     """Return whether effects are all of kinds that every arm has a little of."""
     return all(kind.traits.depends_on in ON for kind in kinds)
-
-
-def _small(features: list[Features], now: Fit) -> list[Effect]:
-    """Return them at zero, but for those in the model and those that the data cannot show."""
-    have = {effect.key for effect in now.model.found}
-    every = plain_causes(now.model.robot, features[moved_most(features, None)].view, ON)
-    return [e for e in every if e.key not in have and not hardly_moves(features, e)]

@@ -341,7 +341,13 @@ def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | No
     """
     if not any(cause.members for cause in causes):
         return None
-    fields = _fields(unseen)
+    # What each effect adds once the frames are fitted anew.
+    fields, count = unseen.targets[1:], unseen.frames
+    if count:
+        columns = unseen.columns.chosen(np.arange(count)).written_out()
+        normal = columns @ columns.T + np.diag(unseen.precision[:count])
+        step = np.linalg.lstsq(normal, columns @ fields.T, rcond=None)[0]
+        fields = fields - step.T @ columns
     named = {k for cause in causes for k in cause.members}
     others = tuple(k for k in range(len(fields)) if k not in named)
     groups = [cause.members for cause in causes] + [others] * bool(others)
@@ -356,14 +362,3 @@ def contributions(unseen: Unseen, causes: Sequence[Cause]) -> Contributions | No
         left=tuple(split[0]),
         parts=tuple(np.array(each) for each in zip(*split[1:], strict=True)),
     )
-
-
-def _fields(unseen: Unseen) -> Array:
-    """Return what each effect adds once the frames are fitted anew, (K, rows), whitened."""
-    fields, count = unseen.targets[1:], unseen.frames
-    if not count:
-        return fields
-    columns = unseen.columns.chosen(np.arange(count)).written_out()
-    normal = columns @ columns.T + np.diag(unseen.precision[:count])
-    step = np.linalg.lstsq(normal, columns @ fields.T, rcond=None)[0]
-    return np.asarray(fields - step.T @ columns)

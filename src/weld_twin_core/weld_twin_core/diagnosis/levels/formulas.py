@@ -60,7 +60,14 @@ class Missed(NamedTuple):
         for one in self.forms:
             if one.at not in best or one.gain > best[one.at].gain:
                 best[one.at] = one
-        return tuple((at, _misses(one)) for at, one in best.items())
+        return tuple(
+            (
+                at,
+                f'a free curve at {at}, depending on {one.on}, still predicts {100.0 * one.gain:.0f} % '
+                'of what is left on unseen stretches: the formula of what was found does not hold',
+            )
+            for at, one in best.items()
+        )
 
 
 def missed(result: Search, unseen: Unseen, beliefs: Beliefs) -> Missed:
@@ -116,14 +123,6 @@ def _fails(one: Beside, beliefs: Beliefs) -> bool:
         return clear and one.share >= beliefs.field_misses
     clear = one.gain >= beliefs.group_share and one.steady >= beliefs.structure_sure
     return clear and one.share >= beliefs.misfit_share
-
-
-def _misses(one: Beside) -> str:
-    return (
-        f'a free curve at {one.at}, depending on {one.on}, still predicts '
-        f'{100.0 * one.gain:.0f} % of what is left on unseen stretches: the formula of what was '
-        'found does not hold'
-    )
 
 
 def beside_names(result: Search, unseen: Unseen) -> list[Beside]:

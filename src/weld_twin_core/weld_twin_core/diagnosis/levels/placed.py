@@ -113,7 +113,11 @@ def arm_first(result: Search, form: FreeForm) -> FreeForm:
         return form
     rest = tuple(part for part in form.parts if part not in fields)
     sizes = {name: (1.0 - FIELD) * gain / whole for name, gain in gains.items()}
-    part = _shared(fields, joints, sizes)
+    # One part of all the joints and, last, the instrument.
+    ordered = sorted(sizes, key=lambda name: -sizes[name])
+    every_one = (*((joints[name][0], sizes[name]) for name in ordered), (fields[0].group, FIELD))
+    share = sum(part.share for part in fields)
+    part = Part(joints[ordered[0]][0], fields[0].ridge, every_one, share)
     return replace(form, parts=tuple(sorted((part, *rest), key=lambda each: -each.share)))
 
 
@@ -124,17 +128,6 @@ def _tilt(problem: Problem, model: Model) -> float:
     vectors = (turns * turns.mean().inv()).as_rotvec()
     about = np.linalg.svd(vectors, compute_uv=False)
     return float(np.linalg.norm(about[1:]) / np.sqrt(len(vectors)))
-
-
-def _shared(
-    fields: Sequence[Part], joints: dict[str, list[Group]], sizes: dict[str, float]
-) -> Part:
-    """Return one part of all the joints and, last, the instrument."""
-    ordered = sorted(sizes, key=lambda name: -sizes[name])
-    rivals = ((joints[name][0], sizes[name]) for name in ordered)
-    share = sum(part.share for part in fields)
-    every = (*rivals, (fields[0].group, FIELD))
-    return Part(joints[ordered[0]][0], fields[0].ridge, every, share)
 
 
 def _gain(bases: Sequence[Base], groups: Sequence[Group]) -> float:

@@ -109,16 +109,20 @@ class Sizes:
         and of all coordinates.
         """
         frames = len(right) - self.now.size
+        # What the coordinates explain already is put back.
+        now = np.concatenate([np.zeros(frames), self.now])
+        shift = normal @ now
+        explained = float(2.0 * now @ right + now @ shift)
         precision, freedom = learned_precision(
-            *projected(*_target(normal, right, rss, self.now), frames),
+            *projected(normal, right + shift, rss + explained, frames),
             rows - frames,
             self.labels,
             self.scales,
             self.believed,
         )
         ridge = np.concatenate([np.zeros(frames), precision])
-        pull = ridge * np.concatenate([np.zeros(frames), self.now])
-        return precision, freedom, solve_scaled(normal + np.diag(ridge), right - pull, 1e-9)
+        step = solve_scaled(normal + np.diag(ridge), right - ridge * now, 1e-9)
+        return precision, freedom, step
 
 
 def predicted(unseen: Unseen, model: Model, beliefs: Beliefs) -> Array:
@@ -149,10 +153,3 @@ def believed(model: Model) -> Array:
             unknown = part == 0.0
             part[unknown] = effect.fit.coordinate_scales()[unknown] ** -2.0
     return np.concatenate([np.zeros(0), *parts])
-
-
-def _target(normal: Array, right: Array, rss: float, x: Array) -> tuple[Array, Array, float]:
-    """Return the normal equations with what the coordinates explain already put back."""
-    now = np.concatenate([np.zeros(right.size - x.size), x])
-    shift = normal @ now
-    return normal, right + shift, rss + float(2.0 * now @ right + now @ shift)

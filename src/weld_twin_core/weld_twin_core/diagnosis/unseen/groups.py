@@ -231,8 +231,12 @@ def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
     if all(m.view.wrench is not None for m in features):
         yield 'tool', 'load', [_yielding(maker) for maker in features], ()
     if any(maker.view.effort is None for maker in features):  # else what hangs there was measured
-        yield 'load', 'load', [_weighed_down(maker) for maker in features], ()
-        yield 'load', 'load', [_carried(maker) for maker in features], ()
+        weighed = [(maker, _torque(maker)) for maker in features]
+        # Every joint bent by a mass at the tool; and what that does through the springs that are known.
+        bent = [np.array([m.column(('q', i)) * t for i, t in enumerate(ts)]) for m, ts in weighed]
+        yield 'load', 'load', bent, ()
+        sprung = [m.changes([{('tau', i): t for i, t in enumerate(ts)}]) for m, ts in weighed]
+        yield 'load', 'load', sprung, ()
     if all(maker.view.temperature is not None for maker in features):
         warmth = [np.asarray(maker.view.temperature) for maker in features]
         knots = _spaced(warmth, WARM, LEAST['temperature'])
@@ -301,18 +305,8 @@ def _sighted(maker: Features, knots: tuple[float, ...] | None) -> Array:
     return out if knots is None else out * basis(knots, _distance(maker))[:, None]
 
 
-def _weighed_down(maker: Features) -> Array:
-    """Return every joint bent by the torque of a mass at the tool, (n, 6, M)."""
-    torque = _torque(maker)
-    return np.array([maker.column(('q', i)) * t for i, t in enumerate(torque)])
-
-
-def _carried(maker: Features) -> Array:
-    """Return what a mass at the tool does through the springs that are known, (1, 6, M)."""
-    return maker.changes([{('tau', i): t for i, t in enumerate(_torque(maker))}])
-
-
 def _torque(maker: Features) -> Array:
+    """Return what a mass at the tool weighs on every joint, (n, M)."""
     view = maker.view
     return payload_torque(view.robot, view.frames, 1.0, np.zeros(3))
 

@@ -189,12 +189,11 @@ class Unseen:
         if self.columns.count <= MANY:
             return self.base(kept).residual
         # With hundreds of columns an inverse per stretch serves every choice of effects.
-        index = self._index(kept)
+        index, mix, target = self._asked(kept)
         gone = np.setdiff1d(np.arange(self.columns.count), index)
         if gone.size > index.size:
             return self.base(kept).residual
-        mix = self._mix(kept)
-        residual: Array = np.array(self._explained(mix))
+        residual: Array = np.array(target)
         for b, rows in enumerate(self.spans):
             inverse = self._inverses[b]
             step = inverse @ self._right(b, mix)
@@ -216,8 +215,7 @@ class Unseen:
 
     def base(self, kept: Sequence[int]) -> Base:
         """Return a model of some effects, fitted with each stretch left out in turn."""
-        index, mix = self._index(kept), self._mix(kept)
-        target = self._explained(mix)
+        index, mix, target = self._asked(kept)
         solvers, residual = list[Solver](), target.copy()
         for b, rows in enumerate(self.spans if index.size else ()):
             solver = self._solver(b, index)
@@ -240,20 +238,19 @@ class Unseen:
 
         return solved
 
-    def _mix(self, kept: Sequence[int]) -> Array:
-        """Return which targets a model of some effects is to explain, shape (1 + K,)."""
+    def _asked(self, kept: Sequence[int]) -> tuple[Index, Array, Array]:
+        """
+        Return the columns of the frames and of some effects, and what a model of them is to explain.
+
+        That is the final residual with what the other effects take off it: which of the targets, (1 +
+        K,), and their sum, (rows,).
+        """
+        parts = [np.arange(self.parts[k].start, self.parts[k].stop) for k in sorted(kept)]
+        index = np.concatenate([np.arange(self.frames), *parts]).astype(int)
         mix = np.ones(1 + len(self.parts))
         mix[[1 + k for k in kept]] = 0.0
-        return mix
-
-    def _explained(self, mix: Array) -> Array:
-        """Return what such a model is to explain, shape (rows,)."""
-        return np.asarray(mix @ self.targets) if mix[1:].any() else self.residual
-
-    def _index(self, kept: Sequence[int]) -> Index:
-        """Return the columns of the frames and of some effects."""
-        parts = [np.arange(self.parts[k].start, self.parts[k].stop) for k in sorted(kept)]
-        return np.concatenate([np.arange(self.frames), *parts]).astype(int)
+        target = mix @ self.targets if mix[1:].any() else self.residual
+        return index, mix, np.asarray(target)
 
     @cached_property
     def spans(self) -> list[Rows]:

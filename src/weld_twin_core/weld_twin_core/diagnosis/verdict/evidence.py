@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
@@ -53,6 +55,17 @@ class Evidence:
     missed: tuple[tuple[str, str], ...] = ()
     """Places at which something free predicts beyond doubt what the formula of a name should, and
     that in words; at 'instrument' it speaks against every name."""
+    sizes: tuple[float, ...] = ()
+    """RMS by which every effect moves the tool [m]."""
+    wandered: tuple[float, ...] = ()
+    """How far the values of every effect move from stretch to stretch, over what noise makes them: a
+    formula that stands in for another wants other values on every stretch."""
+    rows: float = 1.0
+    """Number of independent rows that the effects were chosen on."""
+    travel: tuple[float, ...] = ()
+    """How far every joint moves [rad, m]."""
+    stations: bool = False
+    """Whether the arm stood still where it was measured."""
 
 
 def gathered(
@@ -74,6 +87,7 @@ def gathered(
     robot, parts = result.final.model.robot, unseen.targets[1:]
     total = parts.sum(axis=0)
     whole = max(float(total @ total), 1e-300)
+    recordings = result.problem.recordings
     return Evidence(
         slots=result.slots,
         structure=leftover,
@@ -88,6 +102,11 @@ def gathered(
         ),
         families=families,
         leverage=_leverage(unseen, floor),
+        sizes=tuple(unseen.rms(part) for part in parts),
+        wandered=() if result.dense else tuple(unseen.wandered().tolist()),
+        rows=result.effective(result.small),
+        travel=tuple(np.max([np.ptp(r.joints.q, axis=0) for r in recordings], axis=0).tolist()),
+        stations=recordings[0].joints.static,
     )
 
 

@@ -137,3 +137,5 @@ class Anchor:
     """Shape (4, 4)."""
     tool: Array
     """Shape (4, 4)."""
+    of: frozenset[str] = frozenset({'base', 'tool'})
+    """Frames of which that is believed."""

@@ -43,12 +43,14 @@ def frame_prior(problem: Problem, model: Model) -> tuple[Array, Array]:
     if anchor is not None:
         # Nothing is believed of frames without an anchor.
         sizes = np.repeat([FRAME_SHIFT, FRAME_TURN], 3)
-        precision = np.tile(sizes**-2.0, problem.frame_count // 6)
         first = [group[0] for group in problem.stands] if 'base' in problem.align else []
         frames = [frame_offset(model.bases[k], anchor.bases[k], left=True) for k in first]
         if 'tool' in problem.align:
             tool = model.robot.T_flange_tool
             frames.append(frame_offset(tool, anchor.tool, left=False))
+        names = [*('base' for _ in first), *(problem.align & {'tool'})]
+        believed = np.repeat([name in anchor.of for name in names], 6)
+        precision = believed * np.tile(sizes**-2.0, len(names))
     off = np.concatenate(frames) if frames else np.zeros(problem.frame_count)
     beside = [model.shared(k, own.mean.size) - own.mean for k, own in problem.common]
     precision = np.concatenate([precision, *(np.ones(part.size) for part in beside)])

@@ -139,12 +139,12 @@ class Change:
         remaining = outside(rest.residual.reshape(1, -1), new).reshape(rest.residual.shape)
         return replace(rest, residual=remaining, basis=np.concatenate([rest.basis, new]))
 
-    def nats(self, shape: Array) -> float:
+    def log_bayes_factor(self, shape: Array) -> float:
         """
         Return the evidence for a change.
 
-        Noise of positions and of turns, and how many rows are independent, are those the change
-        leaves: a step by itself makes residuals that hang together.
+        Noise of positions and of turns, strays among them, and how many rows are independent, are
+        those the change leaves: a step makes residuals that hang together, and hides strays.
         """
         rest, after = self.rest, self.taken_out(shape)
         # Of few stations frames and arm take most rows up; those tell nothing for a change.
@@ -152,7 +152,9 @@ class Change:
         free = max(1.0 - len(after.basis) / size, 0.0)
         total, fall = 0.0, 0.0
         for part in (slice(0, 3), slice(3, 6)):
-            before, remaining = (float((c.residual[:, part] ** 2).sum()) for c in (rest, after))
+            weight = _of_strays(after.residual[:, part])
+            each = ((c.residual[:, part] ** 2).sum(axis=1) for c in (rest, after))
+            before, remaining = (float(weight @ square) for square in each)
             if before > 0.0:
                 count = max(after.share * free * after.residual[:, part].size, FEWEST)
                 fall += count * float(np.log(before / max(remaining, TINY**2 * before)))
@@ -226,6 +228,12 @@ def _scale(parts: list[Array]) -> Scale:
     off = [np.linalg.norm(p[:3], axis=0) / (np.sqrt(3) * position) for p in parts]
     weights = tuple(np.minimum(1.0, (HUBER / np.maximum(o, TINY)) ** 2) for o in off)
     return Scale(position, turn, weights)
+
+
+def _of_strays(residual: Array) -> Array:
+    """Return the weight of every sample (M, c) beside the size of most, (M,)."""
+    off = np.maximum(np.linalg.norm(residual, axis=1), TINY)
+    return np.asarray(np.minimum(1.0, (HUBER * np.median(off) / off) ** 2))
 
 
 def _whitened(problem: Problem, parts: Sequence[Array], scale: Scale) -> Array:

@@ -14,9 +14,9 @@ from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from ...effects.dated import InstrumentKnock
 from ...effects.frame_errors import ToolPose
-from ..algebra.problem import Change, Model
+from ..algebra.problem import Change
 from .evidence import Case, Finding, mistake, note, warning
-from .lengths import falls, instant, length, listed
+from .lengths import falls, length, listed
 from .limits import FEW, HALVED, NOISE, PARTED, WRONG
 from .mending import differing
 from .orientation import disagreement
@@ -42,15 +42,11 @@ def setup(case: Case) -> Sequence[Finding]:
 
 def _moved(case: Case, step: Slip) -> str:
     recording = case.recordings[step.recording]
-    if step.time == recording.seen.t[0]:
-        return (
-            f'The set-up moved by {length(step.size)} before {recording.name}; have the base '
-            'aligned, so that each recording gets its own.'
-        )
+    if step.time > recording.seen.t[0]:
+        return f'{step.sentence(recording)} {step.remedy}.'
     return (
-        f'The set-up of {recording.name} moved by {length(step.size)} at '
-        f'{instant(recording, step.time)}; split the '
-        'recording there and have the base aligned, so that each part gets its own.'
+        f'The set-up moved by {length(step.size)} before {recording.name}; have the base '
+        'aligned, so that each recording gets its own.'
     )
 
 
@@ -71,12 +67,12 @@ def parted(case: Case) -> Sequence[Finding]:
     if len(case.recordings) < 2 or reported:
         return ()
     shot = case.snapshot
-    before = shot.arm()
+    before = shot.arm
     turn = disagreement(shot, before.model)
     if before.gap < NOISE and turn < PARTED:
         return ()
     apart = _with_tools(shot)
-    own = apart.arm()
+    own = apart.arm
     after = disagreement(apart, own.model)
     fallen = []
     if before.gap > NOISE and HALVED * own.gap < before.gap:
@@ -102,13 +98,13 @@ def _with_tools(shot: Snapshot) -> Snapshot:
     bases: list[Array] = []
     for k, recording in enumerate(shot.recordings):
         alone = replace(shot.model, bases=(shot.model.bases[k],), changes=(), common=())
-        framed = Snapshot((recording,), alone).framed()
+        framed = replace(shot, recordings=(recording,), model=alone).framed
         tools.append(framed.robot.T_flange_tool)
         bases.append(framed.bases[0])
     changes = tuple(Change(k, _step(tools[0], tool)) for k, tool in enumerate(tools) if k)
     robot = shot.robot.with_frames(tool=tools[0])
-    model: Model = replace(shot.model, robot=robot, bases=tuple(bases), changes=changes)
-    return Snapshot(shot.recordings, model)
+    model = replace(shot.model, robot=robot, bases=tuple(bases), changes=changes)
+    return replace(shot, model=model)
 
 
 def _step(first: Array, other: Array) -> ToolPose:

@@ -23,7 +23,7 @@ from ..algebra.prior import effect_precision
 from ..algebra.problem import FRAMES, Model, Problem, Scale
 from ..frames.changes import constant_errors
 from .evidence import Case, Finding, mistake, note
-from .lengths import length
+from .lengths import length, middle
 from .limits import CLEAR, COMPUTED, ENOUGH, MOVED, NOISE, SAMPLES, STEPS, UNEXPLAINED, WORTH
 from .stamps import written
 
@@ -115,9 +115,8 @@ def _fitted(problem: Problem, model: Model, iterations: int) -> Model:
 
 def _gap(problem: Problem, model: Model) -> float:
     """Return the median distance that is left [m], made up for what the fit took."""
-    (part,) = problem.residuals(model)
     taken = _count(problem, model) / problem.size
-    return float(np.median(np.linalg.norm(part[:3], axis=0))) / float(np.sqrt(1.0 - taken))
+    return middle(problem.residuals(model)) / float(np.sqrt(1.0 - taken))
 
 
 def _rounding(problem: Problem, model: Model) -> float:

@@ -18,6 +18,7 @@ from ..frames.alignment import refined
 from ..result import Unsound
 from .base_change import Rest, rest_of, thinned
 from .lag import Lag, lag
+from .lengths import distance, middle
 from .limits import ENOUGH, FAR, FEW, HALVED, SOUND, TINY, UNEXPLAINED, WORTH
 from .mending import Mend, as_entry
 from .slips import Settling, Slip, changes
@@ -74,7 +75,7 @@ class Case:
     @cached_property
     def gap(self) -> float:
         """Return the median distance between measured and twin [m]."""
-        return float(np.median(np.concatenate([distance(part) for part in self.residuals])))
+        return middle(self.residuals)
 
     @cached_property
     def held(self) -> bool:
@@ -172,8 +173,3 @@ def _believed(before: Lag | None, after: Lag | None) -> bool:
 
 
 Checker = Callable[[Case], Iterable[Finding]]
-
-
-def distance(part: Array) -> Array:
-    """Return the length of the position part of a residual, shape (M,) [m]."""
-    return np.asarray(np.linalg.norm(part[:3], axis=0))

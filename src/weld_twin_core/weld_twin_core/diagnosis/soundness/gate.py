@@ -189,24 +189,19 @@ class _Look(NamedTuple):
 
 
 def _looked(problem: Problem, model: Model) -> _Look:
-    if problem.touched:
-        touched = touches(problem, model)
-        said = tuple(Check('contacts', 'warning', item.sentence) for item in touched.told)
-        result = list(touched.mistakes)
-        if not problem.untracked:
-            checks, more = _checked_beside(touched.problem, touched.model)
-            said, result = (*said, *checks), [*result, *more]
-        return _Look(touched[:2], said, result, (), touched.told)
-    checks, result, dated = _checked(problem, model)
-    return _Look((problem, model), tuple(checks), result, dated)
-
-
-def _checked_beside(problem: Problem, model: Model) -> tuple[list[Check], list[Finding]]:
-    """Return the same of an instrument's recordings beside contacts; nothing is mended there."""
-    part = tracked_part(problem, model)
-    checks, result, dated = _checked(*part)
-    mistakes = [*result, *(_gave_way(slip, part[0]) for slip in dated)]
-    return checks, [each._replace(mend=None) for each in mistakes]
+    if not problem.touched:
+        return _checked(problem, model)
+    touched = touches(problem, model)
+    said = tuple(Check('contacts', 'warning', item.sentence) for item in touched.told)
+    look = _Look(touched[:2], said, list(touched.mistakes), (), touched.told)
+    if problem.untracked:
+        return look
+    # Of an instrument's recordings beside contacts nothing is mended.
+    part = tracked_part(touched.problem, touched.model)
+    beside = _checked(*part)
+    mistakes = [*beside.found, *(_gave_way(slip, part[0]) for slip in beside.dated)]
+    found = [*look.found, *(each._replace(mend=None) for each in mistakes)]
+    return look._replace(checks=(*said, *beside.checks), found=found)
 
 
 def _kept(known: Sequence[Effect], given: Given, trial: Given) -> tuple[Effect, ...]:
@@ -214,21 +209,17 @@ def _kept(known: Sequence[Effect], given: Given, trial: Given) -> tuple[Effect, 
     return tuple(known) if trial.robot.joint_names == given.robot.joint_names else ()
 
 
-def _checked(
-    problem: Problem, model: Model
-) -> tuple[list[Check], list[Finding], tuple[Slip, ...]]:
+def _checked(problem: Problem, model: Model) -> _Look:
     """Return what the checks say, the mistakes among it, and what gave way; a mistake ends it."""
-    if problem.align:
-        model = refined(problem.thinned(ROWS), model)
-    case = Case(problem, model)
+    case = Case(problem, refined(problem.thinned(ROWS), model) if problem.align else model)
     out: list[Check] = []
     for name, (look, passed) in CHECKS.items():
         result = list(look(case))
         mistakes = [each for each in result if each.level == 'unsound']
         if mistakes:
-            return out, mistakes, ()
+            return _Look((problem, model), tuple(out), mistakes)
         out += [Check(name, f.level, f.sentence) for f in result] or [Check(name, 'ok', passed)]
-    return out, [], tuple(case.slips)
+    return _Look((problem, model), tuple(out), [], tuple(case.slips))
 
 
 def _same(slip: Slip, other: Slip, problem: Problem) -> bool:

@@ -133,6 +133,5 @@ def _off(seen: Array, path: Array, turn: Array, keep: NDArray[np.bool_]) -> Arra
 
 def _centred(points: Array, keep: NDArray[np.bool_]) -> Array:
     """Return points (..., M, 3) about the mean of those kept, (..., M)."""
-    some = keep[..., None]
-    middle = (points * some).sum(axis=-2, keepdims=True) / some.sum(axis=-2, keepdims=True)
-    return np.asarray(points - middle)
+    share = keep / keep.sum(axis=-1, keepdims=True)
+    return np.asarray(points - share[..., None, :] @ points)

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Lengths, instants and lists in the sentences of the checks."""
+"""Lengths as they are counted, and lengths, instants and lists in the sentences of the checks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...arrays import Array
 from ...recording import Recording
+
+
+def distance(part: Array) -> Array:
+    """Return the length of the position part of a residual (c, M), shape (M,) [m]."""
+    return np.asarray(np.linalg.norm(part[:3], axis=0))
+
+
+def middle(parts: Sequence[Array]) -> float:
+    """Return the median length of the position part of residuals (c, M) [m]."""
+    return float(np.median(np.concatenate([distance(part) for part in parts])))
 
 
 def length(value: float) -> str:

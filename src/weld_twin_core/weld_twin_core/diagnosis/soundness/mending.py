@@ -51,17 +51,28 @@ def joints_as(given: Given, matrix: Array, offset: Array) -> Given:
     Efforts go with the joints that they are of, in the sense that these are counted in; they keep
     their size where only the unit of the positions was wrong.
     """
-    matrix, out = np.asarray(matrix), []
-    for r in given.recordings:
-        qd = None if r.joints.qd is None else r.joints.qd @ matrix.T
-        joints = replace(r.joints, q=r.joints.q @ matrix.T + np.asarray(offset), qd=qd)
-        effort = r.effort
+    matrix = np.asarray(matrix)
+
+    def counted(own: Recording) -> Recording:
+        qd = None if own.joints.qd is None else own.joints.qd @ matrix.T
+        joints = replace(own.joints, q=own.joints.q @ matrix.T + np.asarray(offset), qd=qd)
+        effort = own.effort
         if effort is not None:
             working = np.linalg.inv(matrix).T
             working /= np.abs(working).max(axis=1, keepdims=True)
             effort = replace(effort, value=effort.value @ working.T)
-        out.append(replace(r, joints=joints, effort=effort))
-    return replace(given, recordings=tuple(out))
+        return replace(own, joints=joints, effort=effort)
+
+    return _with(given, counted)
+
+
+def _with(
+    given: Given, change: Callable[[Recording], Recording], only: int | None = None
+) -> Given:
+    """Return what was given with all recordings changed, or one."""
+    pairs = enumerate(given.recordings)
+    made = (change(own) if only in (None, k) else own for k, own in pairs)
+    return replace(given, recordings=tuple(made))
 
 
 def positions_as(given: Given, factor: Array) -> Given:
@@ -83,11 +94,11 @@ def _seen_as(
     given: Given, change: Callable[[Measurements], Measurements], only: int | None = None
 ) -> Given:
     """Return what was given with other measurements, of one recording or of all that have some."""
-    out = list(given.recordings)
-    for k, recording in enumerate(out):
-        if recording.measured is not None and only in (None, k):
-            out[k] = recording.with_measured(change(recording.measured))
-    return replace(given, recordings=tuple(out))
+
+    def seen(own: Recording) -> Recording:
+        return own if own.measured is None else own.with_measured(change(own.measured))
+
+    return _with(given, seen, only)
 
 
 WAYS: dict[str, tuple[str, Callable[[Array], Array]]] = {
@@ -105,13 +116,6 @@ WAYS: dict[str, tuple[str, Callable[[Array], Array]]] = {
     ),
 }
 """Ways to write orientations that get mixed up: in words, and what undoes it."""
-
-
-def _with(given: Given, k: int, recording: Recording) -> Given:
-    """Return what was given with another recording in the place of one."""
-    return replace(
-        given, recordings=(*given.recordings[:k], recording, *given.recordings[k + 1 :])
-    )
 
 
 def _rolled(turn: Array, places: int) -> Array:
@@ -168,7 +172,6 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     rate: how much later they get with every second of theirs [s/s].
     middle: the instant that ``late`` belongs to, on the clock of the measurements [s].
     """
-    own = given.recordings[k]
 
     def moved(t: Array) -> Array:
         return np.asarray((t + late - rate * middle) / (1.0 - rate))
@@ -176,15 +179,17 @@ def stamps_as(given: Given, k: int, late: float, rate: float, middle: float) -> 
     def signal(of: Sampled | None) -> Sampled | None:
         return None if of is None else replace(of, t=moved(of.t))
 
-    qd = None if own.joints.qd is None else own.joints.qd * (1.0 - rate)
-    stamped = replace(
-        own,
-        joints=replace(own.joints, t=moved(own.joints.t), qd=qd),
-        wrench=signal(own.wrench),
-        temperature=signal(own.temperature),
-        effort=signal(own.effort),
-    )
-    return _with(given, k, stamped)
+    def stamped(own: Recording) -> Recording:
+        qd = None if own.joints.qd is None else own.joints.qd * (1.0 - rate)
+        return replace(
+            own,
+            joints=replace(own.joints, t=moved(own.joints.t), qd=qd),
+            wrench=signal(own.wrench),
+            temperature=signal(own.temperature),
+            effort=signal(own.effort),
+        )
+
+    return _with(given, stamped, k)
 
 
 def stamped_evenly(
@@ -213,8 +218,7 @@ def stamped_evenly(
 
 def velocities_left_out(given: Given, k: int) -> Given:
     """Return what was given without the joint velocities of recording k."""
-    own = given.recordings[k]
-    return _with(given, k, replace(own, joints=replace(own.joints, qd=None)))
+    return _with(given, lambda own: replace(own, joints=replace(own.joints, qd=None)), k)
 
 
 MENDS: dict[str, Callable[..., Given]] = {
@@ -249,16 +253,6 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def _from_entry(entry: Mapping[str, Any]) -> Mend:
-    """Return a correction from plain values, as `as_entry` gives them."""
-    try:
-        values = {key: value for key, value in entry.items() if key != 'do'}
-        made = MENDS[entry['do']]
-    except (KeyError, TypeError, AttributeError):
-        raise ModelError(f'no correction of data is known that is {entry!r}') from None
-    return partial(made, **values)
-
-
 def replayed(entries: Sequence[Mapping[str, Any]], given: Given, which: int = 0) -> Given:
     """
     Return what is given after the corrections of a diagnosis.
@@ -271,12 +265,15 @@ def replayed(entries: Sequence[Mapping[str, Any]], given: Given, which: int = 0)
     """
     for entry in entries:
         own = dict(entry)
+        made = MENDS.get(own.pop('do', ''))
+        if made is None:
+            raise ModelError(f'no correction of data is known that is {entry!r}')
         if _ONE in own:
             if own[_ONE] != which or not given.recordings:
                 continue
             own[_ONE] = 0
         try:
-            given = _from_entry(own)(given)
+            given = made(given, **own)
         except (TypeError, ValueError, KeyError, IndexError, DataError) as error:
             raise ModelError(f'a correction of data cannot be made again: {error}') from None
     return given

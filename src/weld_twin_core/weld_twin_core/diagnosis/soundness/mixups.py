@@ -1,11 +1,15 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Is a gap that no plausible arm leaves a mix-up of units, signs, joints, robots or frames?"""
+"""
+Is a gap that no plausible arm leaves a mix-up of units, signs, joints, robots or frames?
+
+There is one judge. It undoes a suspicion and asks whether frames within reach of those given, and a
+plausible arm, then leave much less.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -15,17 +19,15 @@ from ...arm.robot import Robot
 from ...arm.rotation import quaternion_from_matrix, rotation_vector
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...effects.frame_errors import BasePose, RootPose, ToolPose
+from ...effects.frame_errors import RootPose
 from ...effects.geometry import ChannelError, JointOffset, LinkLength, LinkOffset, LinkTwist
 from ...effects.joint_compliance import JointCompliance
-from ...effects.plausible import beyond
-from ..algebra.prior import effect_precision
-from ..algebra.problem import Model, Problem
+from ..algebra.problem import Model
 from .evidence import Case, Finding, mistake
 from .lengths import falls, length, listed
 from .limits import (
     CLEAR,
-    FAR,
+    FEW,
     HALVED,
     LARGE,
     MOST,
@@ -36,8 +38,13 @@ from .limits import (
     WORTH,
 )
 from .mending import frames_fitted
-from .snapshot import FRAMES, LENGTHS, Arm, Snapshot, bent, gap, rough_models
+from .snapshot import LENGTHS, Arm, Snapshot, of_joints, rough_models
 from .suspicions import doubles, robots, suspicions, turned_bases
+
+GIVE_ITS_MODEL = (
+    'Give the model of the arm that was measured (siblings differ by as much); if it is this one, '
+    'and less precisely built than industrial arms are, put its own lengths into the robot file'
+)
 
 
 def mixups(case: Case) -> Sequence[Finding]:
@@ -45,16 +52,15 @@ def mixups(case: Case) -> Sequence[Finding]:
     if case.gap < LARGE:
         return ()
     shot = case.snapshot
-    arm = shot.arm()
-    if arm.off < 1.0:
-        return _frames(case, shot.gap(shot.model)) or _links(case, shot, arm)
-    result, rest = _unravelled(shot, arm, case.problem.align)
-    if result:
-        return [_told(each, arm.gap, rest.gap) for each in result]
-    return _beyond(case, shot, arm) or _frames(case, shot.gap(shot.model))
-
-
-# Mix-ups ---------------------------------------------------------------------------------------
+    arm = shot.arm
+    if arm.off > 1.0 and (result := _unravelled(shot, arm)):
+        after = result[-1].undone.left
+        return [_told(each, shot, after) for each in result]
+    if arm.bent > 1.0 and (other := _beyond(case, shot, arm)):
+        return other
+    return (_frames(shot) if arm.displaced > 1.0 else ()) or (
+        _links(case, shot, arm) if arm.bent <= 1.0 else ()
+    )
 
 
 class _Tried(NamedTuple):
@@ -71,62 +77,53 @@ class _Tried(NamedTuple):
         return self.arm.off * self.undone.collapsed
 
 
-def _told(tried: _Tried, before: float, after: float) -> Finding:
+def _told(tried: _Tried, shot: Snapshot, after: float) -> Finding:
     """Return the mistake that a suspicion is, with the gap [m] before and after it is undone."""
     one, others = tried.suspicion, tried.alike
     words = f'{one.sentence[0].upper()}{one.sentence[1:]}'
-    if after < before:
-        words += f'; undone, {falls(before, after)}'
+    if after < shot.left:
+        words += f'; undone, {falls(shot.left, after)}'
     if others:
         words += f'. As well it may be that {" or that ".join(o.sentence for o in others)}'
-    alike = (*one.alike, *((o.kind, o.at) for o in others))
-    return one._replace(sentence=f'{words}.', alike=alike)
+    alike = [*one.alike, *((o.kind, o.at) for o in others)]
+    if shot.robot.behind and one.at == shot.robot.joint_names[:1] and 'base' not in shot.align:
+        # A fixture that is turned about the positioner's last axis is one with its zero.
+        alike.append(('wrong_fixture', ('base',)))
+    return one._replace(sentence=f'{words}.', alike=tuple(dict.fromkeys(alike)))
 
 
-def _unravelled(shot: Snapshot, start: Arm, align: frozenset[str]) -> tuple[list[_Tried], Arm]:
-    """Return the fewest mix-ups that explain the gap, and the arm without them."""
+def _unravelled(shot: Snapshot, start: Arm) -> list[_Tried]:
+    """Return the fewest mix-ups that explain what is wrong."""
+    if start.bent < 1.0:  # only frames are off the given ones
+        free = 'base' in shot.align or shot.robot.behind
+        tries = [*(() if free else turned_bases()), *suspicions(shot.robot)]
+        best = _best(shot, start, tries)
+        return [best] if best and best.off < 1.0 else []
     for first in (suspicions, doubles):
         result: list[_Tried] = []
         arm, trial, look = start, shot, first
         while arm.off > 1.0 and len(result) < MOST:
-            best = _best(trial, arm, look(trial.robot), align)
+            best = _best(trial, arm, look(trial.robot))
             if best is None:
                 break
             result.append(best)
             trial, arm, look = best.undone, best.arm, suspicions
-        factor = CLEAR if shot.possible or not trial.possible else HALVED
-        reported = arm.off < start.off / factor or _as_given(shot, trial, start, align)
-        # What is shrunk leaves less of everything; it must leave less for its size as well.
-        size = trial.shrunk(shot)
-        reported = reported and arm.gap < UNDONE and not _moves_frames(shot, trial, align)
-        if result and reported and (size == 1.0 or arm.gap * size < start.gap / factor):
-            return result, arm
-    return [], start
+        if result and _explains(shot, start, trial, arm):
+            return result
+    return []
 
 
-def _moves_frames(shot: Snapshot, trial: Snapshot, align: frozenset[str]) -> bool:
-    """
-    Return whether a trial throws out frames that were as given.
-
-    What is right within centimetres in the frames given leaves no room for a mix-up that has them
-    elsewhere. Few stations bear one: frames and a bent arm take up whatever it does.
-    """
-    return shot.gap_with(align) < FAR <= trial.gap_with(align)
-
-
-def _as_given(shot: Snapshot, trial: Snapshot, start: Arm, align: frozenset[str]) -> bool:
-    """
-    Return whether a trial leaves less in the frames as given than all freedom does without it.
-
-    On short motions free frames and a bent arm take up much of any mistake.
-    """
-    remaining = trial.gap_with(align)
-    return remaining < WORTH * start.gap and remaining < shot.gap_with(align) / CLEAR
+def _explains(shot: Snapshot, start: Arm, trial: Snapshot, arm: Arm) -> bool:
+    """Return whether a trial leaves much less than the start, and no frame that was as given off."""
+    factor = CLEAR if shot.possible or not trial.possible else HALVED
+    less = factor * arm.off < start.off or factor * arm.bent < start.bent
+    # What is shrunk leaves less of everything; it must leave less for its size as well.
+    size = trial.shrunk(shot)
+    less = less and (size == 1.0 or factor * arm.gap * size < start.gap)
+    return less and arm.gap < UNDONE and arm.displaced < max(1.0, start.displaced)
 
 
-def _best(
-    shot: Snapshot, before: Arm, tries: Iterable[Finding], align: frozenset[str]
-) -> _Tried | None:
+def _best(shot: Snapshot, before: Arm, tries: Iterable[Finding]) -> _Tried | None:
     """
     Return the mix-up whose undoing leaves least, from a rough ranking and a fit of the best.
 
@@ -140,84 +137,49 @@ def _best(
     shots = [trial for _, trial in tried]
     # Without orientations a quick fit may end beside the tool vector: then from many starts.
     for thorough in (False,) if shot.turned else (False, True):
-        models = rough_models(shots, thorough=thorough)
-        rough = [s.gap(m) * s.collapsed for s, m in zip(shots, models, strict=True)]
-        for k in np.argsort(rough, kind='stable')[:SHORTLIST]:
+        for k in np.argsort(_rough(shots, before, thorough), kind='stable')[:SHORTLIST].tolist():
             if k not in fitted:
-                fitted[k] = _Tried(tried[k][0], shots[k], shots[k].arm())
+                fitted[k] = _Tried(tried[k][0], shots[k], shots[k].arm)
         least = min(each.off for each in fitted.values())
         if least < before.off / CLEAR:
             break
     if least > WORTH * before.off:
         return None
-    alike = [each for each in fitted.values() if WORTH * each.off <= least]
-    gaps = [each.undone.gap_with(align) for each in alike] if len(alike) > 1 else [0.0]
-    best = alike[int(np.argmin(gaps))]
+    alike = [each for _, each in sorted(fitted.items()) if WORTH * each.off <= least]
+    gaps = [each.undone.left for each in alike] if len(alike) > 1 else [0.0]
+    best = next(e for e, gap in zip(alike, gaps, strict=True) if (1.0 - FEW) * gap <= min(gaps))
     near = (each for each, gap in zip(alike, gaps, strict=True) if WORTH * gap <= min(gaps))
     others = {each.suspicion.sentence: each.suspicion for each in near}
     others.pop(best.suspicion.sentence, None)
     return best._replace(alike=tuple(others.values()))
 
 
+def _rough(shots: Sequence[Snapshot], before: Arm, thorough: bool) -> list[float]:
+    """Return the gap [m] that is left of trials for their size; as given, where only frames are off."""
+    if before.bent < 1.0:
+        return [shot.left * shot.collapsed for shot in shots]
+    models = rough_models(shots, thorough=thorough)
+    return [shot.gap(m) * shot.collapsed for shot, m in zip(shots, models, strict=True)]
+
+
 # Frames ----------------------------------------------------------------------------------------
 
 
-def _frames(case: Case, before: float) -> Sequence[Finding]:
-    """Frames that were not to be fitted may be to blame, or what looks like it; name them."""
-    if before < FAR:
-        return ()
-    given, shot = case.problem.align, case.snapshot
+def _frames(shot: Snapshot) -> Sequence[Finding]:
+    """Return that frames were given which are elsewhere, where fitting them leaves little."""
     for more in ({'base'}, {'tool'}, {'base', 'tool'}):
-        if not more - given:
-            continue
-        model = shot.aligned(given | more)
-        remaining = shot.gap(model)
-        if remaining < UNEXPLAINED:
-            if _plausible(shot.robot, model):
-                return ()
-            own = _within(shot, before, remaining, given, more - given)
-            return [own or _framed(shot, model, more - given, before, remaining)]
+        model = shot.aligned(shot.align | more)
+        if more - shot.align and (remaining := shot.gap(model)) < UNEXPLAINED:
+            return (_framed(shot, model, more - shot.align, remaining),)
     return ()
 
 
-def _within(
-    shot: Snapshot, before: float, remaining: float, align: frozenset[str], more: set[str]
-) -> Finding | None:
-    """Return the mix-up that explains as much as more frames would, with those that are aligned."""
-    # Beside a turn a base may stand elsewhere as well, within what nobody looks at.
-    fixture = shot.robot.behind and more == {'base'}
-    turned = turned_bases(shot.robot) if more == {'base'} and not fixture else ()
-    most = min(max(LARGE, 2.0 * remaining), UNDONE)
-    every = [*((each, FAR) for each in turned), *((each, most) for each in suspicions(shot.robot))]
-    for suspicion, limit in every:
-        assert suspicion.mend is not None
-        undone = shot.mended(suspicion.mend)
-        gap = undone.gap_with(align)
-        if gap < min(limit, before / CLEAR):
-            if fixture and suspicion.at == shot.robot.joint_names[:1]:
-                # A fixture that is turned about the positioner's last axis is one with its zero.
-                suspicion = suspicion._replace(alike=(('wrong_fixture', ('base',)),))
-            return _told(_Tried(suspicion, undone, Arm(shot.model, gap, np.zeros(0))), before, gap)
-    return None
-
-
-def _plausible(robot: Robot, model: Model) -> bool:
-    """Return whether fitted frames are off the given ones by no more than a cause may be."""
-    bases = [np.linalg.inv(robot.T_world_base) @ base for base in model.bases]
-    tool = np.linalg.inv(robot.T_flange_tool) @ model.robot.T_flange_tool
-    pairs = [(BasePose, off) for off in bases] + [(ToolPose, tool)]
-    errors = (kind(tuple(off[:3, 3]), tuple(rotation_vector(off[:3, :3]))) for kind, off in pairs)
-    return not any(beyond(robot, error) for error in errors)
-
-
-def _framed(
-    shot: Snapshot, model: Model, more: set[str], before: float, remaining: float
-) -> Finding:
+def _framed(shot: Snapshot, model: Model, more: set[str], remaining: float) -> Finding:
     if more == {'base'} and shot.robot.behind:
-        return _fixture(shot.robot, model.bases, falls(before, remaining))
+        return _fixture(shot.robot, model.bases, falls(shot.left, remaining))
     names = listed(sorted(more))
     return mistake(
-        f'The gap of {length(before)} is almost only one of frames: with the {names} fitted '
+        f'The gap of {length(shot.left)} is almost only one of frames: with the {names} fitted '
         f'{length(remaining)} remain.',
         'other',
         tuple(sorted(more)),
@@ -237,17 +199,16 @@ def _fixture(robot: Robot, bases: Sequence[Array], reported: str) -> Finding:
     at = ', '.join(f'{value:.4f}' for value in seen[k][:3, 3])
     turn = ', '.join(f'{value:.5f}' for value in quaternion_from_matrix(seen[k][:3, :3]))
     which = f' of recording {k + 1}' if len(bases) > 1 else ''
-    words = (
+    return mistake(
         f'The poses{which} were measured in the frame of another fixture than was given: on the '
         f'positioner it lies {length(far[k])} from there, turned by {angle:.1f} degrees; with it, '
-        f'{reported}.'
-    )
-    remedy = (
+        f'{reported}.',
+        'wrong_fixture',
+        ('base',),
         "Give the frame of the fixture that was measured on (of a robot file 'tool' of the "
-        f'workpiece: xyz [{at}], quat_xyzw [{turn}]), or have it aligned (--align base)'
+        f'workpiece: xyz [{at}], quat_xyzw [{turn}]), or have it aligned (--align base)',
+        partial(frames_fitted, frames=('base',)),
     )
-    mend = partial(frames_fitted, frames=('base',))
-    return mistake(words, 'wrong_fixture', ('base',), remedy, mend)
 
 
 # Nothing known ---------------------------------------------------------------------------------
@@ -255,14 +216,12 @@ def _fixture(robot: Robot, bases: Sequence[Array], reported: str) -> Finding:
 
 def _links(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
     """Return that free frames and a bent arm took up what are the links of another one."""
-    align = case.problem.align
-    result = _other_links(shot, align) if case.gap >= UNDONE else None
-    if result is None:
+    reported = _other_links(shot) if case.gap >= UNDONE else None
+    if reported is None:
         return ()
-    reported, remaining = result
-    bundled = _best(shot, arm, robots(shot.robot), align)
-    if bundled and bundled.arm.off < 1.0 and _other_links(bundled.undone, align) is None:
-        return (_told(bundled, remaining, bundled.arm.gap),)
+    bundled = _best(shot, arm, robots(shot.robot))
+    if bundled and bundled.arm.off < 1.0 and _other_links(bundled.undone) is None:
+        return (_told(bundled, shot, bundled.undone.left),)
     return (reported,)
 
 
@@ -283,7 +242,7 @@ def _beyond(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
         )
         return (mistake(words, 'other', (), remedy),)
     # Links and zeros bend to whatever else is wrong; only what explains the gap is believed.
-    if arm.gap > LARGE or arm.gap > shot.gap(shot.framed()) / CLEAR or case.slips:
+    if arm.gap > LARGE or CLEAR * arm.gap > shot.gap(shot.framed) or case.slips:
         return ()
     worst = arm.model.found[int(arm.strain.argmax())]
     if isinstance(worst, RootPose):
@@ -317,58 +276,35 @@ def _foreign(robot: Robot, worst: Effect, why: str) -> Finding:
     return mistake(words, 'other_robot', ('robot',), GIVE_ITS_MODEL)
 
 
-def _other_links(shot: Snapshot, align: frozenset[str]) -> tuple[Finding, float] | None:
-    """
-    Return that the lengths of the links are those of another arm; None where they are not.
-
-    With it comes the median gap [m] that every other error of an arm leaves. Frames that are not
-    aligned stay within what they can be off by, as all errors do.
-    """
-    problem = replace(shot.problem, align=align)
-    start = shot.framed() if align == FRAMES else shot.aligned(align)
-    given = [
-        kind() for frame, kind in (('base', BasePose), ('tool', ToolPose)) if frame not in align
-    ]
-    own = [*given, *_of_joints(shot, (JointOffset, LinkTwist))]
-    own += [RootPose()] if shot.robot.behind else []
-
-    def fitted(errors: Sequence[Effect], wider: float = 1.0) -> tuple[Model, float]:
-        """Return the fit of errors by their priors, those of lengths so much wider, and its gap."""
-        model = start.with_found(tuple(errors))
-        own = [np.full(e.fit.coordinates().size, e.name in LENGTHS) for e in errors]
-        precision = effect_precision(model) / np.where(np.concatenate(own), wider**2, 1.0)
-        # What an arm can have leaves less: more is no noise that would excuse anything.
-        model = bent(problem, model, precision, LARGE)
-        return model, gap(problem, model)
-
-    remaining = fitted([*own, *_of_joints(shot, (JointCompliance,))])[1]
+def _other_links(shot: Snapshot) -> Finding | None:
+    """Return that the lengths of the links are those of another arm; None where they are not."""
+    # What an arm can have leaves less than LARGE: more is no noise that would excuse anything.
+    own = (JointOffset, LinkTwist)
+    remaining = shot.gap(shot.bent(of_joints(shot.robot, (*own, JointCompliance)), 1.0, LARGE))
     if remaining < LARGE:
         return None
+    errors = of_joints(shot.robot, (*own, LinkLength, LinkOffset))
+    lengths = np.repeat(
+        [e.name in LENGTHS for e in errors], [e.fit.coordinates().size for e in errors]
+    )
     for wider in (WIDER, WIDER**3):  # within a family, and of an arm of another size
-        arm, after = fitted([*own, *_of_joints(shot, (LinkLength, LinkOffset))], wider)
+        arm = shot.bent(errors, np.where(lengths, wider, 1.0), LARGE)
+        after = shot.gap(arm)
         if HALVED * after < remaining:
-            if _moved(problem, arm) <= UNDONE:
+            if _moved(shot, arm) <= UNDONE:
                 return None
-            lengths = [e for e in arm.found if e.name in LENGTHS]
-            worst = max(lengths, key=lambda e: abs(float(e.vector()[0])))
+            worst = max(
+                (e for e in arm.found if e.name in LENGTHS),
+                key=lambda e: abs(float(e.vector()[0])),
+            )
             why = f'; with other lengths {falls(remaining, after)}'
-            return _foreign(arm.robot, worst, why), remaining
+            return _foreign(arm.robot, worst, why)
     return None
 
 
-def _of_joints(shot: Snapshot, kinds: Sequence[type[Effect]]) -> list[Effect]:
-    return [kind(name) for kind in kinds for name in shot.robot.joint_names]  # type: ignore[call-arg]
-
-
-def _moved(problem: Problem, arm: Model) -> float:
+def _moved(shot: Snapshot, arm: Model) -> float:
     """Return how far the lengths that were fitted move the tool, RMS [m]."""
     rest = arm.with_found(tuple(e for e in arm.found if e.name not in LENGTHS))
-    pairs = zip(problem.residuals(rest), problem.residuals(arm), strict=True)
+    pairs = zip(shot.problem.residuals(rest), shot.problem.residuals(arm), strict=True)
     way: Array = np.concatenate([(a - b)[:3] for a, b in pairs], axis=1)
     return float(np.sqrt((way**2).sum(axis=0).mean()))
-
-
-GIVE_ITS_MODEL = (
-    'Give the model of the arm that was measured (siblings differ by as much); if it is this one, '
-    'and less precisely built than industrial arms are, put its own lengths into the robot file'
-)

@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays import Array
 from ..algebra.problem import Model
 from .evidence import Case, Finding, warning
-from .limits import CLEAR, TILTED, UNEXPLAINED, WRONG
+from .limits import CLEAR, TILTED, WRONG
 from .snapshot import Snapshot
 from .suspicions import conventions
 
@@ -21,14 +21,13 @@ def orientation(case: Case) -> Sequence[Finding]:
     if _angle(case.residuals) < WRONG:
         return ()
     shot = case.snapshot
-    turned = disagreement(shot, shot.framed())
-    points = shot.pointed()
-    if turned < WRONG or points.gap(points.framed()) > UNEXPLAINED:
+    turned = disagreement(shot, shot.framed)
+    if turned < WRONG:
         return ()
     for suspicion in conventions():
         assert suspicion.mend is not None
         trial = shot.mended(suspicion.mend)
-        if CLEAR * disagreement(trial, trial.framed()) < turned:
+        if CLEAR * disagreement(trial, trial.framed) < turned:
             sentence = f'{suspicion.sentence}; undone, they agree with the joints.'
             return (suspicion._replace(sentence=sentence),)
     return (

@@ -217,7 +217,7 @@ class _Seen:
         for _, change in self._kinds:
             best = int(change.gains(np.array([shape for _, shape in shapes])).argmax())
             constant, shape = shapes[best]
-            yield _Trial(change.nats(shape), change, shape, k, constant=constant)
+            yield _Trial(change.log_bayes_factor(shape), change, shape, k, constant=constant)
 
     def _steps(self, k: int) -> Iterator[_Trial]:
         t = self.problem.recordings[k].seen.t
@@ -232,7 +232,7 @@ class _Seen:
             at = int(np.where(allowed, change.step_gains(k), -np.inf).argmax())
             shape = self._placed((np.arange(t.size) >= at).astype(np.float64), k)
             # Every instant was asked; the best of many is better than it should be.
-            log_bayes_factor = change.nats(shape) - float(np.log(t.size))
+            log_bayes_factor = change.log_bayes_factor(shape) - float(np.log(t.size))
             slip = replace(effect, time=float(t[at - 1] + t[at]) / 2.0)  # type: ignore[call-arg]
             yield _Trial(log_bayes_factor, change, shape, k, slip, at)
 
@@ -249,10 +249,9 @@ class _Seen:
         slow = recording.joints.static or late > SLOW
         if smooth.change is not base or smooth.constant == 0.0 or not slow:
             return
-        alternative = max(
-            base.nats(base.best(others)), self.rest.change('joints').nats(smooth.shape)
-        )
-        if smooth.sure < MARGIN + alternative:
+        steady = base.log_bayes_factor(base.best(others))
+        of_joints = self.rest.change('joints').log_bayes_factor(smooth.shape)
+        if smooth.sure < MARGIN + max(steady, of_joints):
             return
         if smooth.constant == MOVED_BEFORE:  # of the first recording: before the second
             start = float(self.problem.recordings[max(k, 1)].seen.t[0])

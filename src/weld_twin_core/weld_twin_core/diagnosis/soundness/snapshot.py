@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -12,17 +12,19 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arm.robot import Robot
+from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from ...effects.effect import Effect
-from ...effects.frame_errors import RootPose
+from ...effects.frame_errors import BasePose, RootPose, ToolPose
 from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
 from ...effects.plausible import ranges
-from ...recording import JointMotion, Measurements, Recording
+from ...recording import JointMotion, Recording
 from ..algebra.fit import fit, robust_scale
 from ..algebra.prior import effect_precision
-from ..algebra.problem import Model, Problem, Scale
+from ..algebra.problem import Anchor, Model, Problem, Scale
 from ..frames.alignment import initial_frames, refined, rough_frames, tracks
-from .limits import CLEAR, ENOUGH, LARGE, MOST, SAMPLES, STEPS, TINY, WIDER
+from .lengths import middle
+from .limits import CLEAR, ENOUGH, FAR, LARGE, MOST, SAMPLES, STEPS, TINY, WIDER
 from .mending import Given, Mend
 
 FRAMES = frozenset({'base', 'tool'})
@@ -42,6 +44,8 @@ class Snapshot:
 
     recordings: tuple[Recording, ...]
     model: Model
+    align: frozenset[str] = FRAMES
+    """Frames that may be anywhere; the others are off by what a frame can be off by."""
 
     @property
     def problem(self) -> Problem:
@@ -55,7 +59,7 @@ class Snapshot:
 
     def mended(self, mend: Mend) -> Snapshot:
         """Return the snapshot after a correction."""
-        out = mend(Given(self.recordings, self.robot, FRAMES))
+        out = mend(Given(self.recordings, self.robot, self.align))
         model = replace(self.model, robot=out.robot)
         if (out.robot.T_world_base != self.robot.T_world_base).any():
             model = replace(model, bases=(out.robot.T_world_base,) * len(model.bases))
@@ -63,15 +67,7 @@ class Snapshot:
             # What is known of a joint, or differs at it, means nothing on another robot.
             frames = tuple(c for c in model.changes if c.effect.site is None)
             model = replace(model, known=(), changes=frames)
-        return Snapshot(out.recordings, model)
-
-    def pointed(self) -> Snapshot:
-        """Return the snapshot without measured rotations."""
-        seen = [
-            Measurements(r.seen.t, r.seen.position, None, r.seen.sigma) for r in self.recordings
-        ]
-        out = [r.with_measured(m) for r, m in zip(self.recordings, seen, strict=True)]
-        return replace(self, recordings=tuple(out))
+        return Snapshot(out.recordings, model, out.align)
 
     @cached_property
     def spread(self) -> float:
@@ -109,7 +105,7 @@ class Snapshot:
 
     def gap(self, model: Model) -> float:
         """Return the median gap [m] that a model leaves."""
-        return gap(self.problem, model)
+        return middle(self.problem.residuals(model))
 
     def rough(self, *, thorough: bool = False) -> Model:
         """Return the model after a quick fit of both frames; thorough: from many starts."""
@@ -119,55 +115,117 @@ class Snapshot:
     def _roughly(self) -> dict[bool, Model]:
         return {}
 
-    def refined(self, align: frozenset[str], start: Model) -> Model:
-        """Return the model after a robust fit of some frames."""
-        return refined(replace(self.problem, align=align), start)
-
     def aligned(self, align: frozenset[str]) -> Model:
-        """Return the model with only these frames fitted."""
+        """Return the model with only these frames fitted, wherever they are."""
         if not align:
             return self.model
         problem = replace(self.problem, align=align)
         return refined(problem, initial_frames(problem, self.model))
 
-    def gap_with(self, align: frozenset[str]) -> float:
-        """Return the median gap [m] with only these frames fitted."""
-        return self.gap(self.aligned(align))
+    @cached_property
+    def given(self) -> Model:
+        """Return the model with the frames fitted that may be anywhere, and the others as given."""
+        return self.aligned(self.align)
 
+    @cached_property
+    def left(self) -> float:
+        """Return the median gap [m] that those frames leave."""
+        return self.gap(self.given)
+
+    @cached_property
     def framed(self) -> Model:
-        """Return the model with both frames fitted."""
+        """Return the model with both frames fitted, wherever they are."""
         starts = (self.model, self.rough(thorough=True))
-        return min((self.refined(FRAMES, start) for start in starts), key=self.gap)
+        return min((refined(self.problem, start) for start in starts), key=self.gap)
 
+    def bent(
+        self,
+        errors: Sequence[Effect],
+        wider: Array | float,
+        noise: float = np.inf,
+        *,
+        near: bool = True,
+    ) -> Model:
+        """
+        Return the model after a robust fit of its frames and of errors.
+
+        wider: how many times as large as those of machines at large they may be, shape (K,) or ().
+        noise: at most so much of what is left counts as noise [m].
+        near: frames that were given are believed to be near.
+        """
+        # What is open to free frames, on few stations, is as it was given.
+        as_given = near and self.align != FRAMES and self.left < FAR
+        model = (self.given if as_given else self.framed).with_found(tuple(errors))
+        problem = self.problem
+        if near:
+            believed = Anchor(self.model.bases, self.robot.T_flange_tool, FRAMES - self.align)
+            problem = replace(problem, anchor=believed)
+        precision = effect_precision(model) / np.square(wider)
+        least = Scale(SOFT, SOFT, problem.unit_scale().weights)
+        for _ in range(MOST):
+            scale = robust_scale(problem, problem.residuals(model), least)
+            scale = replace(scale, position=min(scale.position, noise))
+            model = fit(problem, model, scale, precision, iterations=STEPS).model
+        return model
+
+    @cached_property
     def arm(self) -> Arm:
         """Return the frames and a plausible arm that fit best, and how far off they leave it."""
-        errors: list[Effect] = [kind(name) for kind in KINDS for name in self.robot.joint_names]
-        errors += [RootPose()] if self.robot.behind else []
-        start = self.framed().with_found(tuple(errors))
-        trial = bent(self.problem, start, effect_precision(start) / WIDER**2)
-        most = [ranges(self.robot, error)[1] for error in trial.found]
-        pairs = zip(trial.found, most, strict=True)
-        strain = np.array([np.abs(error.vector() / high).max() for error, high in pairs])
-        return Arm(trial, self.gap(trial), strain)
+        errors = of_joints(self.robot, KINDS)
+        trial = self.bent(errors, WIDER)
+        if self._displaced(trial) > 1.0:  # a frame that is elsewhere may be anywhere
+            trial = self.bent(errors, WIDER, near=False)
+        strain = _strain(self.robot, trial.found)
+        return Arm(trial, self.gap(trial), strain, self._displaced(trial))
+
+    def _displaced(self, model: Model) -> float:
+        """Return how far frames are off those that were given, in units of the most they can be."""
+        steps: list[tuple[type[BasePose | ToolPose], Array]] = []
+        if 'base' not in self.align:
+            pairs = zip(self.model.bases, model.bases, strict=True)
+            steps += [(BasePose, np.linalg.inv(given) @ fitted) for given, fitted in pairs]
+        if 'tool' not in self.align:
+            tool = np.linalg.inv(self.robot.T_flange_tool) @ model.robot.T_flange_tool
+            steps.append((ToolPose, tool))
+        errors = [kind(tuple(s[:3, 3]), tuple(rotation_vector(s[:3, :3]))) for kind, s in steps]
+        return float(_strain(self.robot, errors).max(initial=0.0))
 
 
 class Arm(NamedTuple):
     """
     A plausible arm fitted to a snapshot, and the median distance [m] that it leaves.
 
-    ``strain``, (K,), is every error of the arm in units of the most that an arm can have.
+    ``strain``, (K,), is every error of the arm in units of the most that an arm can have;
+    ``displaced`` how far the frames are off those that were given, in the same units.
     """
 
     model: Model
     gap: float
     strain: Array
+    displaced: float
 
     @property
-    def off(self) -> float:
-        """Return how much is wrong: the gap or the strain in units of their limits, the worst."""
+    def bent(self) -> float:
+        """Return how much is wrong with the arm: gap or strain in units of their limits."""
         lengths = np.array([error.name in LENGTHS for error in self.model.found])
         together = float(np.sqrt((self.strain[lengths] ** 2).sum()))
         return max(self.gap / LARGE, together, float(self.strain.max()))
+
+    @property
+    def off(self) -> float:
+        """Return how much is wrong in all."""
+        return max(self.bent, self.displaced)
+
+
+def of_joints(robot: Robot, kinds: Iterable[type[Effect]]) -> tuple[Effect, ...]:
+    """Return errors of no size yet: these kinds of every joint, and where a positioner stands."""
+    own = [kind(name) for kind in kinds for name in robot.joint_names]  # type: ignore[call-arg]
+    return (*own, *([RootPose()] if robot.behind else []))
+
+
+def _strain(robot: Robot, errors: Sequence[Effect]) -> Array:
+    """Return every error in units of the most that a machine has, shape (K,)."""
+    return np.array([np.abs(e.vector() / ranges(robot, e)[1]).max() for e in errors])
 
 
 def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
@@ -183,28 +241,7 @@ def snapshot(problem: Problem, model: Model, motions: list[Array]) -> Snapshot:
         index = np.unique(np.linspace(0, seen.t.size - 1, share).round().astype(int))
         joints = JointMotion(seen.t[index], q[index], static=True)
         out.append(replace(recording, joints=joints, measured=seen.take(index)))
-    return Snapshot(tuple(out), replace(model, found=()))
-
-
-def bent(problem: Problem, start: Model, precision: Array, noise: float = np.inf) -> Model:
-    """
-    Return the model after a robust fit of its frames and the errors that it has.
-
-    ``precision``, (K,), is the prior precision of every coordinate of the errors; at most
-    ``noise`` [m] of what is left counts as noise.
-    """
-    least, model = Scale(SOFT, SOFT, problem.unit_scale().weights), start
-    for _ in range(MOST):
-        scale = robust_scale(problem, problem.residuals(model), least)
-        scale = replace(scale, position=min(scale.position, noise))
-        model = fit(problem, model, scale, precision, iterations=STEPS).model
-    return model
-
-
-def gap(problem: Problem, model: Model) -> float:
-    """Return the median distance between measured and twin [m]."""
-    parts = problem.residuals(model)
-    return float(np.median(np.concatenate([np.linalg.norm(p[:3], axis=0) for p in parts])))
+    return Snapshot(tuple(out), replace(model, found=()), problem.align)
 
 
 def rough_models(shots: Sequence[Snapshot], *, thorough: bool = False) -> list[Model]:

@@ -15,8 +15,8 @@ from ...recording import JointMotion, Recording
 from ...twin.features import Features
 from ..algebra.problem import Model
 from ..frames.alignment import refined
-from .evidence import Case, Finding, distance, mistake
-from .lengths import length
+from .evidence import Case, Finding, mistake
+from .lengths import distance, length
 from .limits import CLEAR, ENOUGH, FEW, LATE, MOST, ROWS, RUN, SOUND
 
 REMEDY = 'See to the driver that publishes the joint states, and measure again'

@@ -79,34 +79,27 @@ def robots(robot: Robot) -> Iterator[Finding]:
             )
 
 
-def turned_bases(robot: Robot) -> Iterator[Finding]:
-    """Yield every base that stands turned axis onto axis."""
+def turned_bases() -> Iterator[Finding]:
+    """Yield every base that stands turned axis onto axis, by axis and angle."""
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
         turn = np.diag(signs)[list(order)]
-        if np.linalg.det(turn) > 0.0 and not np.array_equal(turn, np.eye(3)):
-            yield turned_base(robot, turn)
-
-
-def turned_base(robot: Robot, turn: Array) -> Finding:
-    """Return the suspicion that a base stands turned, rotation shape (3, 3), by axis and angle."""
-    vector = np.degrees(rotation_vector(turn))
-    angle, k = float(np.linalg.norm(vector)), int(np.abs(vector).argmax())
-    about = f'axis ({", ".join(f"{part:+.0f}" for part in vector / abs(vector[k]))})'
-    if abs(vector[k]) > angle - 1.0:
-        about, angle = f'{AXES[k]} axis', angle if np.isclose(angle, 180.0) else float(vector[k])
-    # About its own first axis an arm cannot tell its base from the zero of its first joint.
-    first, either = robot.joint_names[0], about == 'z axis' and not robot.prismatic[0]
-    words = f'; a joint {first} whose zero is off by as much would look the same'
-    return mistake(
-        f'the base of the robot stands turned by {angle:.0f} degrees about its {about} against the '
-        'frame that was given',
-        'base_turned',
-        ('base',),
-        'Use the axes of the robot base that the controller counts in (for a UR: base or '
-        f'base_link), or add the turn to the base frame{words if either else ""}',
-        partial(base_turned, turn=turn),
-        alike=(('constant_angle', (first,)),) if either else (),
-    )
+        if np.linalg.det(turn) < 0.0 or np.array_equal(turn, np.eye(3)):
+            continue
+        vector = np.degrees(rotation_vector(turn))
+        angle, k = float(np.linalg.norm(vector)), int(np.abs(vector).argmax())
+        about = f'axis ({", ".join(f"{part:+.0f}" for part in vector / abs(vector[k]))})'
+        if abs(vector[k]) > angle - 1.0:
+            about = f'{AXES[k]} axis'
+            angle = angle if np.isclose(angle, 180.0) else float(vector[k])
+        yield mistake(
+            f'the base of the robot stands turned by {angle:.0f} degrees about its {about} '
+            'against the frame that was given',
+            'base_turned',
+            ('base',),
+            'Use the axes of the robot base that the controller counts in (for a UR: base or '
+            'base_link), or add the turn to the base frame',
+            partial(base_turned, turn=turn),
+        )
 
 
 def conventions() -> Iterator[Finding]:
@@ -198,12 +191,10 @@ def _positions() -> Iterator[tuple[str, str, str, Array]]:
             yield 'units', f'{what} {words}', remedy, _with(np.ones(3), k, factor)
         apart = _with(np.full(3, 1.0 / MILLIMETRE), k, 1.0)
         yield 'units', f'{what} in millimetres, the others were read as if', remedy, apart
-    yield (
-        'sign',
-        'the measuring frame is left-handed: one axis of the positions has the wrong sign',
-        'Turn the sign of one axis where the positions are exported',
-        np.array([1.0, -1.0, 1.0]),
-    )
+    for k in (1, 0, 2):
+        words = 'the measuring frame is left-handed: one axis of the positions has the wrong sign'
+        remedy = 'Turn the sign of one axis where the positions are exported'
+        yield 'sign', words, remedy, _with(np.ones(3), k, -1.0)
 
 
 def _with(values: Array, at: int | list[int] | tuple[int, int], value: float) -> Array:

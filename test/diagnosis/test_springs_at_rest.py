@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from weld_twin_core import JointMotion, Recording, Twin, load
-from weld_twin_core.arm.controller_lookup import fingerprint
+from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.effects import JointCompliance, Payload
 from weld_twin_lab.plant.plant import run
 from weld_twin_lab.plant.plant_recording import Command

@@ -10,7 +10,7 @@ from measured_cells import anywhere, moving, recorded, rejointed, remeasured, st
 from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.catalog import load
-from weld_twin_core.arm.controller_lookup import fingerprint
+from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.arm.rotation import transform
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.soundness.gate import examine

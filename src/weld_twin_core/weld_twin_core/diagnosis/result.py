@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arm.controller_lookup import fingerprint
+from ..arm.known_arms import fingerprint
 from ..arrays import Array
 from ..effects.effect import Effect
 from ..recording import Recording

@@ -20,7 +20,7 @@ Examples
 from importlib import import_module
 from pkgutil import iter_modules
 
-from .backlash import Backlash
+from .backlash import Backlash, LoadedPlay
 from .bearing_tilt import BearingTilt
 from .cartesian_compliance import CartesianCompliance
 from .clocks import ClockRate, TimeDelay
@@ -37,7 +37,6 @@ from .hose_pull import HosePull
 from .hysteresis import Hysteresis
 from .joint_compliance import JointCompliance
 from .joint_coupling import JointCoupling
-from .loaded_play import LoadedPlay
 from .measurement import MeasurementNoise, MeasurementScale
 from .payload import Payload
 from .pedestal_tilt import PedestalTilt

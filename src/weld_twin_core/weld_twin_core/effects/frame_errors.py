@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..arm.channels import Channel, Shift
-from ..arm.controller_lookup import controller_frames
+from ..arm.known_arms import controller_frames
 from ..arm.robot import Robot
 from ..arm.rotation import rotation_matrix, transform
 from ..arrays import Array

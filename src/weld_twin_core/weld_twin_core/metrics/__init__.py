@@ -18,6 +18,7 @@ The tool is 0.3 mm and then 0.4 mm off along a seam of 100 mm.
 
 from .deviation import (
     DeviationMetrics,
+    RunningMetrics,
     deviation_metrics,
     normalized_deviation,
     orientation_error,
@@ -32,7 +33,6 @@ from .iso9283 import (
     path_performance,
     pose_performance,
 )
-from .running import RunningMetrics
 
 __all__ = [
     'DeviationMetrics',

@@ -28,7 +28,7 @@ from ..arrays import Array
 from ..errors import DataError, PathError
 from ..motion.inverse.newton import least_step
 from ..motion.programs import MoveProgram, Piece, Travel, Use, travel
-from ..motion.programs.repeated import repeated, unrelenting
+from ..motion.programs.travel import repeated, unrelenting
 from ..recording import JointMotion
 from .posterior import Drawn, largest_sigma
 from .program_model import ProgramModel

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_core.arm.controller_lookup import fingerprint
+from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.diagnosis.algebra.model import Alone

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from weld_twin_core.arm.controller_frames import ControllerFrames
-from weld_twin_core.arm.controller_lookup import bundled_name, controller_frames
+from weld_twin_core.arm.known_arms import bundled_name, controller_frames
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.arm.lent_masses import with_lent_masses
+from weld_twin_core.arm.known_arms import with_lent_masses
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import ModelError
 

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
 import numpy as np
 
-from weld_twin_core.arm.controller_lookup import controller_frames
+from weld_twin_core.arm.known_arms import controller_frames
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import rotation_matrix, transform
 from weld_twin_core.arrays import Array

@@ -18,7 +18,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.errors import DataError, ModelError
-from weld_twin_core.motion.programs.repeated import repeated
+from weld_twin_core.motion.programs.travel import repeated
 from weld_twin_core.twin.program_accuracy import Accuracy, along_seams
 from weld_twin_core.twin.program_correction import Caps, ProgramCorrection, correct_program
 from weld_twin_core.twin.program_model import ProgramModel

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.metrics.running import RunningMetrics
+from weld_twin_core.metrics.deviation import RunningMetrics
 
 from .clock_watch import ClockWatch
 from .pairing import Pair, Pairing

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
+from weld_twin_core.diagnosis.calibration.calibrated import stated
 from weld_twin_core.diagnosis.calibration.features import KINDS, odds, of_whole
 from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
@@ -122,6 +123,10 @@ def test_what_stands_in_for_another_cause_is_believed_less(play):
     (own,) = (s for s in right.statements if s.kind == 'name')
     imitating = [s for s in other.statements if s.kind == 'name']
     assert right.causes[0].probability == own.probability > 0.6
+    # It is drawn from the evidence alone, and can be drawn anew.
+    table = tuple(Row.of(slot, wt.Beliefs()) for slot in right.evidence.slots)
+    (again,) = stated(right.evidence, table, wt.Beliefs()).names
+    assert again.probability == own.probability
     assert right.confidence == right.as_dict()['verdict']['learned'] > 0.5
     assert all(s.features['wander'] > own.features['wander'] for s in imitating)
     assert all(s.probability < own.probability for s in imitating)

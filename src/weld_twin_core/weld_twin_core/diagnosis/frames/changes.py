@@ -31,7 +31,7 @@ from ..algebra.prior import effect_precision, frame_offset, frame_prior
 from ..algebra.problem import Change, Model, Problem, Scale
 from ..algebra.spread import BLOCKS, covariance, unit_inverse
 from ..beliefs import Beliefs
-from ..hypotheses.any_motion import of_no_size
+from ..hypotheses.any_motion import constant, of_no_size
 from ..hypotheses.search import Search
 from ..result import Site
 
@@ -72,18 +72,18 @@ def families_named(given: str | Iterable[str], what: str = 'may_change') -> tupl
     """
     parts = given.split(',') if isinstance(given, str) else given
     names = tuple(dict.fromkeys(name for part in parts if (name := str(part).strip())))
-    constant = sorted(n for n, kind in REGISTRY.items() if kind.traits.cause and _constant(kind))
+    lasting = sorted(name for name, kind in REGISTRY.items() if _lasting(kind))
     for name in names:
-        if name not in constant:
+        if name not in lasting:
             raise ModelError(
                 f'{what}: {name!r} is no error that stays the same during a recording; those are '
-                + ', '.join(constant)
+                + ', '.join(lasting)
             )
     return names
 
 
-def _constant(kind: type[Effect]) -> bool:
-    return kind.traits.depends_on == 'constant' and not kind.traits.dated
+def _lasting(kind: type[Effect]) -> bool:
+    return constant(kind) and not kind.traits.dated
 
 
 def with_changes(
@@ -125,11 +125,7 @@ def with_changes(
 
 def constant_errors(robot: Robot) -> tuple[Effect, ...]:
     """Return every constant error of every joint, at zero."""
-    kinds = [
-        k
-        for k in REGISTRY.values()
-        if k.traits.cause and _constant(k) and k.of in ('joint', 'link')
-    ]
+    kinds = [k for k in REGISTRY.values() if _lasting(k) and k.of in ('joint', 'link')]
     return tuple(kind(joint) for kind in kinds for joint in robot.joint_names)  # type: ignore[call-arg]
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_lab.contacts.data import places_of, robot_of, touches
 from weld_twin_lab.contacts.touching import postures_at
+from weld_twin_lab.real_arms.sources import places_of, socket_robot, touches
 
 PLACES = {'front': [0.5, 0.0, 0.2], 'left': [0.0, 0.5, 0.4]}
 EACH = 6
@@ -17,7 +17,7 @@ EACH = 6
 def data(tmp_path_factory):
     """Return a directory with touches of an exact arm, sockets 50 mm apart."""
     folder, rng = tmp_path_factory.mktemp('data'), np.random.default_rng(2)
-    robot = robot_of(folder, 'kuka_14')
+    robot = socket_robot(folder, 'kuka_14')
     for place, point in PLACES.items():
         (folder / 'kuka_14' / place).mkdir(parents=True)
         for socket in (0, 1):
@@ -31,7 +31,7 @@ def test_touches_of_an_exact_arm_do_not_scatter(data):
     assert places_of(data, 'kuka_14') == ('front', 'left')
     recording = touches(data, 'kuka_14', ['left'])
     assert recording.contacts.labels == ('left/0',) * EACH + ('left/1',) * EACH
-    _, model = aligned(recording, robot_of(data, 'kuka_14'), '', ())
+    _, model = aligned(recording, socket_robot(data, 'kuka_14'), '', ())
     points = model.twin(0).poses(recording, recording.joints.t).position.reshape(2, EACH, 3)
     assert np.ptp(points, axis=1).max() < 1e-8
     assert np.linalg.norm(points[0, 0] - points[1, 0]) == pytest.approx(0.05, abs=1e-8)

@@ -1,3 +1,3 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Arms calibrated without an instrument: a ball in sockets, judged on places left out."""
+"""Arms of the plant that touch things: a ball in sockets, with one flaw and some slack."""

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ from scipy.special import ndtr
 
 from weld_twin_core.arrays import Array
 from weld_twin_msgs_py.bags import read_recording
-from weld_twin_msgs_py.files.markdown import table
 from weld_twin_msgs_py.robots import load_robot
 
 from ..blind import layout
@@ -22,6 +21,7 @@ from ..blind.achieved import NORMAL_90, counted
 from ..blind.ambiguous import Site
 from ..blind.displacement import rms
 from ..blind.judging import CONFIDENT, IN_LIBRARY, answers_of
+from ..study import tabled
 from .course import Run
 from .open_form import Cause, ContestAnswer, Name
 
@@ -175,15 +175,8 @@ def page(runs: Mapping[str, Mapping[str, Run]], cases: Mapping[str, Sealed], nom
 
     nominal: what is said of a method that gave no answer: it is taken for the nominal arm, silent.
     """
-    head = (
-        *('method', 'answers', 'detected', 'false alarms', 'family', 'joint', 'belief (FIA)'),
-        *('sure and wrong', 'gap left, median', 'over the floor, median', 'worse than nominal'),
-        *('90 % hold', 'their width [mm]', 'CRPS [mm]', 'processor [s]', 'memory [MB]'),
-    )
-    rows: list[Sequence[object]] = [head]
-    for method, said in runs.items():
-        rows.append((method, *_row(said, cases)))
-    return table(*rows) + f'\n{nominal}\n'
+    rows = [(method, summary(said, cases)) for method, said in runs.items()]
+    return tabled(COLUMNS, rows) + f'\n{nominal}\n'
 
 
 def summary(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> dict[str, Any]:
@@ -205,23 +198,30 @@ def summary(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> dict[str, A
     return out
 
 
-def _row(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> tuple[object, ...]:
-    found = summary(runs, cases)
-    shares = ('detected', 'false_alarm', 'family', 'joint')
-    return (
-        f'{found["answers"]} of {found["cases"]}',
-        *(_share(found[key]) for key in shares),
-        '-' if found['belief'] is None else f'{found["belief"]:.2f}',
-        _share(found['sure_wrong']),
-        '-' if found['left'] is None else f'{found["left"]:.2f}',
-        '-' if found['over_floor'] is None else f'{found["over_floor"]:.2f}',
-        found['worse_than_nominal'],
-        _share(found['held']),
-        *('-' if found[k] is None else f'{found[k] * 1e3:.3f}' for k in ('width_m', 'crps_m')),
-        f'{found["seconds"]:.1f}',
-        f'{found["memory_bytes"] / 1e6:.0f}',
-    )
-
-
 def _share(value: float | None) -> str:
     return '-' if value is None else f'{100.0 * value:.0f} %'
+
+
+def _number(value: float | None, digits: int = 2, unit: float = 1.0) -> str:
+    return '-' if value is None else f'{value / unit:.{digits}f}'
+
+
+COLUMNS: dict[str, Callable[[Any], object]] = {
+    'method': lambda row: row[0],
+    'answers': lambda row: f'{row[1]["answers"]} of {row[1]["cases"]}',
+    'detected': lambda row: _share(row[1]['detected']),
+    'false alarms': lambda row: _share(row[1]['false_alarm']),
+    'family': lambda row: _share(row[1]['family']),
+    'joint': lambda row: _share(row[1]['joint']),
+    'belief (FIA)': lambda row: _number(row[1]['belief']),
+    'sure and wrong': lambda row: _share(row[1]['sure_wrong']),
+    'gap left, median': lambda row: _number(row[1]['left']),
+    'over the floor, median': lambda row: _number(row[1]['over_floor']),
+    'worse than nominal': lambda row: row[1]['worse_than_nominal'],
+    '90 % hold': lambda row: _share(row[1]['held']),
+    'their width [mm]': lambda row: _number(row[1]['width_m'], 3, 1e-3),
+    'CRPS [mm]': lambda row: _number(row[1]['crps_m'], 3, 1e-3),
+    'processor [s]': lambda row: f'{row[1]["seconds"]:.1f}',
+    'memory [MB]': lambda row: f'{row[1]["memory_bytes"] / 1e6:.0f}',
+}
+"""Columns of the table of methods, each a name and its summary."""

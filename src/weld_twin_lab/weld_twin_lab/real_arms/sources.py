@@ -3,6 +3,9 @@
 """
 Third-party recordings as a user has them: a robot, and a table.
 
+Arms whose ball rests in one of two sockets have a directory per place, which holds ``hole_0.csv`` and
+``hole_1.csv``: a row of joint angles [rad] per posture.
+
 Each directory is named as the data are published; docs/real_arms.md says where they come from. Where
 a maker publishes no masses of its links, round figures from the arm's weight stand in.
 """
@@ -10,6 +13,7 @@ a maker publishes no masses of its links, round figures from the arm's weight st
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,13 +24,24 @@ from scipy.spatial.transform import Rotation
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
+from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_msgs_py.robots import load_robot
 
-from ..contacts.data import places_of, robot_of, touches
 from ..transfer.servo_axis import axis_recording, axis_robot
 from ..transfer.splits import HOME, alone, stations
 
+SOCKETS = 0.05
+"""Distance of the sockets [m], as their drawing has it."""
+CALLIPER = 1e-4
+"""Its uncertainty [m]: what a calliper tells of a printed part."""
+ARMS = {
+    'panda_1': ('panda_nominal.urdf', 'panda_link0', 'ball_link'),
+    'panda_2': ('panda_nominal.urdf', 'panda_link0', 'ball_link'),
+    'kuka_14': ('kuka_iiwa14', None, None),
+}
+"""Robot file in the data's directory, or bundled robot, and its ends."""
 HALF_PI = float(np.pi / 2.0)
 """A right angle [rad]."""
 LEAN = float(np.radians(15.0))
@@ -67,10 +82,51 @@ def servo(data: Path) -> Source:
 
 def sockets(data: Path, arm: str) -> Source:
     """Return an arm whose ball rested in sockets, at all its places."""
-    places = places_of(data / 'mukca', arm)
-    return Source(
-        robot_of(data / 'mukca', arm), touches(data / 'mukca', arm, places), align=('tool',)
-    )
+    here = data / 'mukca'
+    recording = touches(here, arm, places_of(here, arm))
+    return Source(socket_robot(here, arm), recording, align=('tool',))
+
+
+def socket_robot(data: Path, arm: str) -> Robot:
+    """Return the nominal robot of one of `ARMS`."""
+    spec, base, tip = ARMS[arm]
+    return load_robot(data / spec if spec.endswith('.urdf') else spec, base, tip)
+
+
+def places_of(data: Path, arm: str) -> tuple[str, ...]:
+    """
+    Return the places at which an arm was measured, in order of their names.
+
+    Raises DataError: there are none.
+    """
+    folder = data / arm
+    found = sorted(item.name for item in folder.glob('*') if (item / 'hole_0.csv').is_file())
+    if not found:
+        raise DataError(f"'{folder}' holds no place with hole_0.csv; --data names its parent")
+    return tuple(found)
+
+
+def touches(data: Path, arm: str, places: Sequence[str]) -> Recording:
+    """
+    Return the contacts of an arm at some places, as one recording.
+
+    arm: one of `ARMS`.
+    """
+    postures, labels = [], []
+    contacts, ties = [], []
+    for place in places:
+        names = [f'{place}/{socket}' for socket in (0, 1)]
+        for socket, name in enumerate(names):
+            path = data / arm / place / f'hole_{socket}.csv'
+            rows = np.loadtxt(path, delimiter=',', ndmin=2)
+            postures.append(rows)
+            labels += [name] * len(rows)
+            contacts.append(Contact(name))
+        ties.append(Tie((names[0], names[1]), SOCKETS, CALLIPER))
+    q = np.concatenate(postures)
+    touched = Contacts(Artefact(tuple(contacts), tuple(ties)), tuple(labels))
+    motion = JointMotion(np.arange(float(len(q))), q, static=True)
+    return Recording(arm, motion, contacts=touched)
 
 
 def positioner(data: Path) -> Source:

@@ -36,20 +36,12 @@ def run(study: Study) -> bool:
     require_simulator()
     args, engine = study.args, engine_digest()
     seeds = range(args.seed, args.seed + args.cells)
-    sets = (
-        [Task(sealed, (kind, seed, engine), kind) for seed in seeds for kind in KINDS],
-        [
-            Task(beside_a_camera, (seed, engine), 'camera')
-            for seed in range(args.seed, args.seed + args.cameras)
-        ],
-        [Task(part, (args.data, k, engine), 'pixels') for k in range(PARTS)] if args.data else [],
-    )
-    every = study.tasks([task for tasks in sets for task in tasks], 'telling whole cells')
-    told, at = [], 0
-    for tasks in sets:
-        told.append(every[at : at + len(tasks)])
-        at += len(tasks)
-    cells, pixels, real = told
+    kinds = [Task(sealed, (kind, seed, engine), kind) for seed in seeds for kind in KINDS]
+    cameras = range(args.seed, args.seed + args.cameras)
+    beside = [Task(beside_a_camera, (seed, engine), 'camera') for seed in cameras]
+    parts = [Task(part, (args.data, k, engine), 'pixels') for k in range(PARTS * bool(args.data))]
+    with study.runner('telling whole cells') as runner:
+        cells, pixels, real = (runner.run(tasks) for tasks in (kinds, beside, parts))
     content = head('cells/1', seed=args.seed, cells=cells, pixels=pixels, real=real)
     study.write('cells', content, page(cells, pixels, real))
     return named_as_tracked(pixels) >= AS_TRACKED

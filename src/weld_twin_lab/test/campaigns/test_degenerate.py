@@ -19,7 +19,7 @@ from weld_twin_lab.campaigns.fuzzing.recordings import (
     tried,
 )
 
-DRAWS = 12
+DRAWS = 8
 """Recordings drawn; `weld-twin lab campaign fuzz --recordings 3000` draws thousands."""
 VALUES = {
     'robot': ROBOTS,

@@ -15,6 +15,9 @@ from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_nodes.harness.health_listener import HealthListener
 from weld_twin_nodes.live.bag_player import Playing, play
+from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
+from weld_twin_nodes.live.error_injector import ErrorInjector
+from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 
 pytestmark = pytest.mark.cells
 
@@ -71,18 +74,14 @@ def player(cell, *topics, options=()):
     )
 
 
-SIM = {'use_sim_time': True, 'reliable_inputs': True, 'wait_for_subscribers': 1}
+SIM = {'use_sim_time': True, 'reliable_inputs': True}
 
 
 def test_every_node_does_the_same_from_a_played_bag_as_it_did_live(cell, recorded):
     taps = {topic: cell.collect(topic) for topic in READ}
-    cell.start('deviation_analyzer', use_sim_time=True, reliable_inputs=True)
-    cell.start('forward_kinematics_twin', **{**SIM, 'wait_for_subscribers': 2})
-    cell.start('error_injector', effects=EFFECTS, seed=7, **{**SIM, 'wait_for_subscribers': 0})
-    # The bag is over in a second: the analyzer must be known before it begins.
-    both = ('/twin/tool_pose', '/measured/tool_pose')
-    cell.wait(lambda: all(cell.node.count_subscribers(t) == 2 for t in both), 'the analyzer')
-    cell.meet()
+    cell.add(DeviationAnalyzer, **SIM)
+    cell.add(ForwardKinematicsTwin, **SIM)
+    cell.add(ErrorInjector, effects=EFFECTS, seed=7, **SIM)
     player(cell, '/joint_states', options=('--subscribers', '2'))
     count = len(recorded['/deviation'])
     cell.wait(lambda: all(len(tap) >= count for tap in taps.values()), 'all of the bag')
@@ -92,9 +91,8 @@ def test_every_node_does_the_same_from_a_played_bag_as_it_did_live(cell, recorde
 
 def test_a_bag_in_a_loop_begins_anew_each_time_and_says_so_once(cell, recorded):
     deviations, health = cell.collect('/deviation'), HealthListener(cell.node)
-    cell.start('deviation_analyzer', use_sim_time=True, reliable_inputs=True)
-    cell.start('forward_kinematics_twin', **SIM)
-    cell.meet()
+    cell.add(DeviationAnalyzer, **SIM)
+    cell.add(ForwardKinematicsTwin, **SIM)
     player(cell, '/joint_states', '/measured/tool_pose', options=('--loop', '2'))
     count = len(recorded['/deviation'])
 

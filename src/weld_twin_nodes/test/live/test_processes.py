@@ -21,6 +21,7 @@ from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.error_injector import ErrorInjector
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 from weld_twin_nodes.live.recorder import Recorder
+from weld_twin_nodes.live.trajectory_generator import TrajectoryGenerator
 
 pytestmark = pytest.mark.cells
 
@@ -80,8 +81,8 @@ def test_a_recorder_that_cannot_record_leaves_nothing(cell, tmp_path, wrong, sen
 
 
 def test_simulated_time_drives_the_generator(cell):
-    cell.start(
-        'trajectory_generator',
+    cell.add(
+        TrajectoryGenerator,
         use_sim_time=True,
         profile='aggressive',
         rate=100.0,

@@ -138,25 +138,31 @@ def test_a_turn_of_the_base_moves_the_tool_by_its_lever():
         pose_covariances(known, Twin(robot), still, np.zeros(1), setup=2)
 
 
-def test_only_the_discrepancy_grows_with_the_distance():
+def test_a_model_is_less_sure_the_farther_it_is_from_what_was_recorded():
     robot = load('ur5')
     narrow = tuple(((-0.5, 0.5),) for _ in range(6))
     domain = Domain(robot.joint_names, narrow, (0.02,) * 6, (True,) * 6)
     rest = Discrepancy(2e-5, 3e-5, np.zeros(6), np.full(6, 1e-4), 0.1)
     known = Posterior(Directions((), 1, ()), np.zeros(0), np.zeros((0, 0)), rest, domain)
     q = np.zeros((4, 6))
-    q[:, 0] = [0.0, 0.5, 0.55, 2.0]
+    q[:, 0] = [0.0, 0.52, 0.57, 2.0]
     still = Recording('m', JointMotion(np.arange(4.0), q, None, True))
     got = pose_covariances(known, Twin(robot), still, still.joints.t)
     np.testing.assert_allclose(
         got[0], np.diag(np.repeat([4e-10, 9e-10], 3)), rtol=1e-12, atol=1e-24
     )
-    np.testing.assert_allclose(got[1], got[0], atol=1e-24)
-    # Half way and beyond the reach: a turn about joint 1, which is the world's z. What is left over
-    # at the tool is half as large again there, and twice as large.
-    np.testing.assert_allclose(got[2, 5, 5] - 1.5**2 * 9e-10, 0.25e-8, rtol=1e-9)
-    np.testing.assert_allclose(got[3, 5, 5] - 2.0**2 * 9e-10, 1e-8, rtol=1e-9)
+    # Within the margin nothing but the gear's fine errors is added.
+    np.testing.assert_allclose(got[1, 5, 5], 9e-10 + 0.2**2 * 1e-8, rtol=1e-9)
+    # Half way beyond it, and beyond the reach: a turn about joint 1, which is the world's z. All is
+    # half as large again there, and twice as large.
+    np.testing.assert_allclose(got[2, 5, 5], 1.5**2 * (9e-10 + 0.7**2 * 1e-8), rtol=1e-9)
+    np.testing.assert_allclose(got[3, 5, 5], 2.0**2 * (9e-10 + 1e-8), rtol=1e-9)
     np.testing.assert_allclose(got[3, 2, 2], 2.0**2 * 4e-10, rtol=1e-9)
+    # Faster than anything recorded is as far outside, wherever the joints are.
+    fast = Recording('m', JointMotion(np.arange(4.0), np.zeros((4, 6)), np.full((4, 6), 2.0)))
+    slow = replace(known, domain=replace(domain, speeds=(0.5,) * 6))
+    got = pose_covariances(slow, Twin(robot), fast, fast.joints.t)
+    np.testing.assert_allclose(got[:, 2, 2], 2.0**2 * 4e-10, rtol=1e-9)
 
 
 def test_effects_at_the_middle_move_the_tool_as_far_as_the_models_in_the_middle_do():

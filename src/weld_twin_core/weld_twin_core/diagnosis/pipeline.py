@@ -26,7 +26,7 @@ from .levels.formulas import missed, no_noise
 from .levels.placed import placed
 from .many.fitted_together import fitted_together
 from .many.weighed_families import weighed_families
-from .predicting.allowed import allowed
+from .predicting.allowed import allowed, elsewhere
 from .predicting.alone import alone
 from .result import Diagnosis
 from .soundness.efforts import with_sign
@@ -211,6 +211,8 @@ def _told(
     own = replace(model, alone=alone(result.problem, model, shrink, many=result.dense))
     result = replace(result, final=replace(result.final, model=own))
     posterior = allowed(result.problem, result.final.model, result.scale, result.precision, floor)
+    if result.final.model.found:
+        shrink = elsewhere(shrink, posterior)
     progress('weighed what the data leave open')
     reported = (statements, alternative, places, limits)
     return answer(result, unseen, evidence, verdict, shrink, examined, posterior, *reported)

@@ -154,18 +154,40 @@ class Domain:
         wrench: shape (M, 6) [N, N m].
         temperature: shape (M,) [degC].
         """
-        looks = [*self._postures(q)]
-        if qd is not None:
-            looks.append(self._speeds(np.abs(qd)))
-        if wrench is not None:
-            looks += self._loads(wrench)
-        if temperature is not None and self.temperature is not None:
-            looks.append(self._warmth(temperature, *self.temperature))
+        looks = [*self._postures(q), *self._others(q, qd, wrench, temperature)]
         return sorted(
             Outside(first, last, why(slice(first, last + 1)))
             for beyond, why in looks
             for first, last in runs(beyond)
         )
+
+    def unlike(self, recording: Recording, at: Array) -> NDArray[np.bool_]:
+        """
+        Return where a motion is outside for another reason than where its joints are, shape (M,).
+
+        It is faster, carries more, is warmer or colder, or is far from all places that were touched. Of
+        motions stations tell nothing, neither that they are as ever nor that they are not.
+
+        at: shape (M,) [s].
+        """
+        q, qd, *more = as_seen(recording, at)
+        looks = self._others(q, None if self.speeds is None else qd, *more)
+        out = np.zeros(at.size, dtype=bool)
+        for beyond, _ in looks:
+            out |= beyond
+        return out
+
+    def _others(
+        self, q: Array, qd: Array | None, wrench: Array | None, temperature: Array | None
+    ) -> Iterator[_Look]:
+        if self.spots is not None:
+            yield self._places(self.spots, q)
+        if qd is not None:
+            yield self._speeds(np.abs(qd))
+        if wrench is not None:
+            yield from self._loads(wrench)
+        if temperature is not None and self.temperature is not None:
+            yield self._warmth(temperature, *self.temperature)
 
     def _postures(self, q: Array) -> Iterator[_Look]:
         away = self.beyond(q)
@@ -176,15 +198,17 @@ class Domain:
                 return f'{name} is {far} beyond what was recorded'
 
             yield away[:, i] > self.margins[i], why
-        if self.spots is not None:
-            far, reach = self.spots.away(q), self.spots.reach
-            yield (
-                far > reach,
-                lambda part: (
-                    f'the tool is {far[part].max():.2g} m from the nearest place that was touched, '
-                    f'and the model was tested to {reach:.2g} m'
-                ),
-            )
+
+    @staticmethod
+    def _places(spots: Spots, q: Array) -> _Look:
+        far = spots.away(q)
+        return (
+            far > spots.reach,
+            lambda part: (
+                f'the tool is {far[part].max():.2g} m from the nearest place that was touched, '
+                f'and the model was tested to {spots.reach:.2g} m'
+            ),
+        )
 
     def _unit(self, i: int) -> str:
         return 'rad' if self.turns[i] else 'm'
@@ -261,6 +285,20 @@ class Domain:
             'temperature': None if self.temperature is None else list(self.temperature),
             **({} if self.spots is None else {'spots': self.spots.as_dict()}),
         }
+
+
+def as_seen(
+    recording: Recording, at: Array
+) -> tuple[Array, Array | None, Array | None, Array | None]:
+    """Return what `Domain.outside` asks of a recording at stamps, shape (M,) [s]."""
+    q, qd = recording.joints.at(at)
+    wrench, warm = recording.wrench, recording.temperature
+    return (
+        q,
+        None if recording.joints.static else qd,
+        None if wrench is None else wrench.at(at),
+        None if warm is None else warm.at(at),
+    )
 
 
 def runs(flags: np.ndarray) -> list[tuple[int, int]]:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import diagnose
@@ -27,6 +28,7 @@ from ..programs.cells import CELLS
 from ..programs.corrections import promised_and_true, seam_driven
 from ..programs.plain_controller import evenly
 from ..programs.sealed_seams import BARE, sealed_seam
+from .held import twin_for
 from .sealed import of_drawn, of_motion, on_an_arm
 
 YEARS = 10
@@ -76,7 +78,18 @@ def of_touches(seed: int) -> dict[str, Any]:
     rng = np.random.default_rng([seed, 1])
     places = [*SOCKETS, np.array(PLACE)]
     q = np.concatenate([postures_at(case.robot, place, EACH, rng) for place in places])
-    return entry | of_motion(found, case.recording, _true(case.robot.to_mapping(), case.cause, q))
+    true = _true(case.robot.to_mapping(), case.cause, q)
+    assert true.measured is not None
+    told = twin_for(found.model, case.recording, true).poses(true, true.measured.t).position
+    seen = replace(true.measured, position=_where_it_stands(true.measured.position, told))
+    return entry | of_motion(found, case.recording, replace(true, measured=seen))
+
+
+def _where_it_stands(points: Array, told: Array) -> Array:
+    """Return points moved as one onto those told: touches do not see where the base stands."""
+    middle, goal = points.mean(axis=0), told.mean(axis=0)
+    turn, _ = Rotation.align_vectors(told - goal, points - middle)
+    return np.asarray(goal + turn.apply(points - middle))
 
 
 def _true(robot: dict[str, Any], cause: Cause, q: Array) -> Recording:

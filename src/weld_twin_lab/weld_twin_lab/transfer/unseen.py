@@ -26,6 +26,7 @@ from weld_twin_core.effects.dated import seen_from
 from weld_twin_core.effects.effect import Effect
 from weld_twin_core.effects.plausible import spreads
 from weld_twin_core.recording import Recording
+from weld_twin_core.twin.domain import as_seen
 from weld_twin_core.twin.posterior import Posterior
 
 ALIGN = frozenset({'base', 'tool'})
@@ -90,14 +91,7 @@ def residual(model: Model, train: Recording, other: Recording) -> Array:
 
 def flagged(posterior: Posterior, other: Recording, t: Array) -> NDArray[np.bool_]:
     """Return which poses a prediction flags as outside what was recorded, shape (M,)."""
-    q, qd = other.joints.at(t)
-    warm, load = other.temperature, other.wrench
-    found = posterior.domain.outside(
-        q,
-        None if other.joints.static else qd,
-        None if load is None else load.at(t),
-        None if warm is None else warm.at(t),
-    )
+    found = posterior.domain.outside(*as_seen(other, t))
     out = np.zeros(t.size, dtype=bool)
     for first, last, _ in found:
         out[first : last + 1] = True

@@ -53,6 +53,7 @@ def _posterior(robot: Robot, entry: Mapping[str, Any]) -> Posterior:
         readonly(rest['curves'], (robot.n,), 'posterior.discrepancy.curves'),
         max(_size(rest['reach'], 'reach'), 1e-9),
         readonly(rest.get('turns', np.zeros(robot.n)), (robot.n,), 'posterior.discrepancy.turns'),
+        readonly(rest.get('peaks_m', ()), (None,), 'posterior.discrepancy.peaks_m'),
     )
     return Posterior(
         what,

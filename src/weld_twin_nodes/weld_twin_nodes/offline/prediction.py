@@ -15,6 +15,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 from weld_twin_core.recording import Recording
+from weld_twin_core.twin.domain import as_seen
 from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covariances
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly.whole_recording import refuse_apart
@@ -71,15 +72,9 @@ class Predictor(NamedTuple):
         """Return the stretches of a motion that lie outside what was recorded."""
         if self.posterior is None:
             return []
-        motion = recording.joints
-        wrench, temperature = recording.wrench, recording.temperature
-        result = self.posterior.domain.outside(
-            motion.q,
-            None if motion.static else motion.velocity,
-            None if wrench is None else wrench.at(motion.t),
-            None if temperature is None else temperature.at(motion.t),
-        )
-        t = motion.t - motion.t[0]
+        t = recording.joints.t
+        result = self.posterior.domain.outside(*as_seen(recording, t))
+        t = t - t[0]
         return [Stretch(float(t[a]), float(t[b]), why) for a, b, why in result]
 
 

@@ -48,7 +48,7 @@ def contacts_sentence(result: ContactResult) -> str:
     )
     return (
         f'The tool point is {before} from what it touched on average, {after} after the fit, and '
-        f'{held} where it was foretold from the others: that is what to expect elsewhere.'
+        f'{held} where it was foretold from the others: that is what to expect near them.'
     )
 
 

@@ -29,6 +29,7 @@ from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
 from ..algebra.problem import Model, Problem, Scale
 from ..frames.open_directions import VISIBLE, open_directions
+from ..result import Shrink
 from ..unseen.folds import posture_regions
 from ..unseen.unseen_stretches import Unseen
 from . import plausible_arm
@@ -92,6 +93,20 @@ def allowed(
         middle=remaining.middle,
     )
     return _with_usual_sigma(posterior, model, problem)
+
+
+def elsewhere(shrink: Shrink, posterior: Posterior) -> Shrink:
+    """
+    Return the shrink with what may be left of the gap where nothing was recorded.
+
+    Regions of one motion that foretell each other say little of others: beyond what they show the model
+    may be off by as much as the posterior has it there.
+    """
+    if shrink.elsewhere_ci95 is None or shrink.rms_before_m == 0.0:
+        return shrink
+    most = float(np.hypot(shrink.rms_after_m, posterior.anywhere_m)) / shrink.rms_before_m
+    low, high = shrink.elsewhere_ci95
+    return replace(shrink, elsewhere_ci95=(low, max(high, most)))
 
 
 def _noisy(scale: Scale) -> Scale:
@@ -238,11 +253,13 @@ def left_open(problem: Problem, model: Model) -> tuple[str, ...]:
     Return the directions of aligned frames in which an error does not show, in words.
 
     A direction is named by the axes that make most of it: 'base z with tool z' is a shift of both
-    along z by which no measured pose changes.
+    along z by which no measured pose changes. Places that are touched and not known say nothing of where
+    the arm stands.
     """
+    unseen = problem.untracked and not problem.placed
     result = open_directions(problem, model)
     size = np.array([VISIBLE[int(name.split('.')[1]) // 3] for name in result.names])
-    out = []
+    out = [f'base {axis}' for axis in AXES] if unseen else []
     for vector in result.vectors.T:
         share = np.abs(vector / size)
         order = [i for i in np.argsort(-share) if share[i] >= PARTNERS * share.max()]

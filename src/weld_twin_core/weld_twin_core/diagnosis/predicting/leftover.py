@@ -58,6 +58,9 @@ FEW = 12
 """Samples after turns of a joint below which they tell nothing of what is left there."""
 PEAK = 1.7321
 """Largest size of an error that grows from nothing and goes again, in that of its RMS: a triangle's."""
+STRAYED = 1.5
+"""Times what chance makes of the largest miss of a stretch from which on it is more than chance: the
+largest of a hundred varies by a tenth."""
 CLEAR = 2.0
 """Standard errors by which more must be left there than elsewhere: a bound that is told too wide does
 less harm than one too narrow."""
@@ -144,7 +147,8 @@ class Rest(NamedTuple):
     What is left over: per axis at the tool [m], about each axis [rad], in every gear, shape (n,) [rad].
 
     ``turns``, shape (n,) [rad or m], is what is left over in joints that have just turned around,
-    on top of that. ``middle`` is how far to go from the fitted model to the middle of those allowed, as
+    on top of that. ``peaks``, shape (K,) [m], is how far each region was off at its worst, beyond
+    chance. ``middle`` is how far to go from the fitted model to the middle of those allowed, as
     a share of the way, to predict unseen postures best.
     """
 
@@ -152,6 +156,7 @@ class Rest(NamedTuple):
     orientation: float
     gears: Array
     turns: Array
+    peaks: Array
     middle: float
 
 
@@ -194,8 +199,24 @@ def leftover(
         orientation * share,
         spread.gears * of_gears,
         at_turns,
+        # An instrument strays as well, and no more of that is the arm's than of the rest.
+        _peaks(foretold) * of_gears,
         foretold.middle,
     )
+
+
+def _peaks(foretold: Foretold) -> Array:
+    """Return how far each region of posture was off at its worst, beyond chance, shape (K,) [m]."""
+    use = foretold.good & foretold.seen[:, :3].all(axis=1)
+    off, regions = (foretold.error[use, :3] ** 2).sum(axis=1), foretold.region[use]
+    out = []
+    for region in np.unique(regions):
+        here = off[regions == region]
+        usual = np.median(here) / float(chdtri(3.0, 0.5))
+        chance = usual * float(chdtri(3.0, 1.0 - 0.5 ** (1.0 / here.size)))
+        strayed = here.max() > STRAYED**2 * chance
+        out.append(np.sqrt(here.max() - chance) if strayed else 0.0)
+    return np.array(out)
 
 
 def _at_turns(problem: Problem, foretold: Foretold, lost: Array) -> Array:

@@ -166,4 +166,5 @@ def discrepancy(robot: Robot, rest: Rest, fine: Array, result: Sequence[Effect])
         fine * turning,
         SPACING,
         rest.turns,
+        rest.peaks,
     )

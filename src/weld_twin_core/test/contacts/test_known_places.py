@@ -11,6 +11,7 @@ import weld_twin_core as wt
 from weld_twin_core.arm.rotation import rotation_matrix
 from weld_twin_core.contacts import Artefact, Contacts, lengths, places
 from weld_twin_core.diagnosis.frames.aligned import aligned, other_causes
+from weld_twin_core.diagnosis.predicting.allowed import left_open
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.inverse.newton import reaching
 
@@ -75,6 +76,8 @@ def test_the_same_block_at_an_unknown_place_says_nothing_of_the_base(robot):
     np.testing.assert_allclose(off[0], off[1], atol=1e-9)
     assert 'base_pose' in other_causes(problem)
     assert problem.align == frozenset()
+    open_ = left_open(problem, model)
+    assert open_[:3] == ('base x', 'base y', 'base z') and len(open_) == 6
 
 
 def test_a_base_that_is_not_known_is_found_beside_the_cause(robot):

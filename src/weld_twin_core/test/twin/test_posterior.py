@@ -12,6 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.diagnosis.predicting.allowed import elsewhere
+from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import JointMotion, Recording
@@ -278,3 +280,22 @@ def test_the_size_of_one_of_two_that_take_each_other_s_place_is_known_given_the_
     assert known.doubt(zero)[0] > 3e-4
     assert known.doubt(zero, {('axis_parallelism', joint)})[0] == pytest.approx(3e-5, rel=0.3)
     assert known.doubt(zero, {('link_twist', joint)}) == known.doubt(zero)
+
+
+def test_on_a_path_a_tool_strays_as_far_as_a_stretch_of_the_recordings_did():
+    robot = load('ur5')
+    rest = Discrepancy(1e-5, 1e-5, np.zeros(6), np.zeros(6), 0.1, None, np.array([0.0, 1e-3]))
+    known = posterior(robot, Directions((), 1, ()), np.zeros((0, 0)), None, rest)
+    recording = motion(robot)
+    seen = Features(Twin(robot), recording, recording.joints.t)
+    off = np.linalg.norm(known.drawn(seen)[:, 0], axis=2)
+    # Every other model strays, at one place each.
+    assert np.all((off > 9e-4).sum(axis=0) == np.tile([0, 1], 200))
+
+
+def test_the_shrink_elsewhere_reaches_as_far_as_the_model_may_be_off_there():
+    robot = load('ur5')
+    known = replace(posterior(robot, Directions((), 1, ()), np.zeros((0, 0))), anywhere_m=4e-4)
+    told = Shrink(1e-3, 3e-4, 0.3, (0.28, 0.32), 'stretches', elsewhere_ci95=(0.25, 0.35))
+    assert elsewhere(told, known).elsewhere_ci95 == pytest.approx((0.25, 0.5))
+    assert elsewhere(told, replace(known, anywhere_m=1e-5)).elsewhere_ci95 == (0.25, 0.35)

@@ -247,7 +247,9 @@ def test_what_is_said_of_stamps_is_what_they_are(rng):
     )
     half = np.delete(t, np.arange(100, 300))
     assert told(half)[0][0] == 'warning'
-    assert 'in whole 10 ms' in told(np.round(np.arange(500.0) / 60.0, 2))[0][1]
+    for start in (0.0, 0.123456):
+        rounded = start + np.round(np.arange(500.0) / 60.0, 2)
+        assert 'in whole 10 ms' in told(rounded)[0][1]
     assert 'give or take' in told(t + rng.uniform(0.0, 0.015, t.size))[0][1]
 
 

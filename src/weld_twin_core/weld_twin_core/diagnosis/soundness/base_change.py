@@ -29,7 +29,7 @@ from ..algebra.problem import Model, Problem, Scale
 from ..hypotheses.library import plain_causes
 from ..hypotheses.still_joints import moved_most
 from .lag import KEPT
-from .limits import FEW, ROWS, TINY, WIDER
+from .limits import FEW, TINY, WIDER
 
 LASTING = ('constant', 'angle', 'direction', 'speed', 'acceleration', 'load', 'temperature')
 """What errors of an arm depend on that are no change in time."""
@@ -200,15 +200,6 @@ def _of_arm(problem: Problem, model: Model, features: list[Features]) -> list[Ar
         ):
             own.append(part[known] * size[known, None, None])
     return [np.concatenate(own) for own in out]
-
-
-def thinned(problem: Problem, parts: list[Array]) -> tuple[Problem, list[Array]]:
-    """Return fewer measurements and their residuals, where there are too many."""
-    few = problem.thinned(ROWS)
-    out = []
-    for whole, thin, part in zip(problem.recordings, few.recordings, parts, strict=True):
-        out.append(part[:, np.isin(whole.seen.t, thin.seen.t)])
-    return few, out
 
 
 def _scale(parts: list[Array]) -> Scale:

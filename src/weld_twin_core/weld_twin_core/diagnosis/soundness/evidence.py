@@ -16,10 +16,10 @@ from ...recording import Recording
 from ..algebra.problem import Model, Problem
 from ..frames.alignment import refined
 from ..result import Unsound
-from .base_change import Rest, rest_of, thinned
+from .base_change import Rest, rest_of
 from .lag import Lag, lag
 from .lengths import distance, middle
-from .limits import ENOUGH, FAR, FEW, HALVED, SOUND, TINY, UNEXPLAINED, WORTH
+from .limits import ENOUGH, FAR, FEW, HALVED, ROWS, SOUND, TINY, UNEXPLAINED, WORTH
 from .mending import Mend, as_entry
 from .slips import Settling, Slip, changes
 from .snapshot import Snapshot, snapshot
@@ -141,8 +141,8 @@ class Case:
     @cached_property
     def rest(self) -> tuple[Problem, Rest]:
         """Return fewer measurements, and what frames and arm leave of them."""
-        problem, parts = thinned(self.problem, self.residuals)
-        return problem, rest_of(parts, problem, self.model)
+        few = self.problem.thinned(ROWS)
+        return few, rest_of(few.residuals(self.model), few, self.model)
 
     @cached_property
     def changes(self) -> list[Slip | Settling]:

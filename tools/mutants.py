@@ -51,7 +51,8 @@ TESTS = {
     'normal_equations definite impossible_effects steps_by_hand',
     'src/weld_twin_core/test/diagnosis': 'needed_kinds planned sizes arm_or_field decision '
     'learned_sizes stray_readings folds',
-    'src/weld_twin_core/test/soundness': 'alignment checks_by_hand gravity mends soundness trials',
+    'src/weld_twin_core/test/soundness': 'alignment checks_by_hand gravity mends mixups_by_hand '
+    'soundness trials',
     'src/weld_twin_core/test/advice': 'next_experiment pieces_by_hand',
 }
 """What asks about the engine, folder by folder: files of tests that take a second or two at most.

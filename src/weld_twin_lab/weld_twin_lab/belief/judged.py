@@ -104,7 +104,9 @@ def _right(row: Mapping[str, Any], told: Judged) -> bool:
 def _first(causes: Sequence[Mapping[str, Any]], level: str, words: frozenset[str]) -> bool:
     """Return whether the first place, or dependence, of the largest cause is right."""
     word = 'at' if level == 'place' else 'on'
-    return bool(causes and causes[0][level] and causes[0][level][0][word] in words)
+    placed = [cause for cause in causes if cause[level]]
+    first = max(placed, key=lambda cause: float(cause['share']), default=None)
+    return first is not None and first[level][0][word] in words
 
 
 def _family(row: Mapping[str, Any]) -> float:

@@ -81,12 +81,13 @@ def causes(
         _sized(claim, float(share), float(error))
         for claim, share, error in zip(claims, whole, spread, strict=True)
     ]
-    out.sort(key=lambda cause: -cause.share)
     # Of what nothing is known, neither a place nor what stands beside it, there is nothing to tell.
     much = remaining > beliefs.unexplained and bool(out)
     if rest is not None and (much or (rest.place and not out)):
         error = float(np.sqrt((spread**2).sum()))
         out.append(replace(_sized(rest, remaining, error), rest=True))
+    # What has no place either says nothing that somebody could begin with.
+    out.sort(key=lambda cause: (not cause.place, -cause.share))
     return tuple(out), Shares(unexplained=remaining, noise=max(noise, 0.0))
 
 

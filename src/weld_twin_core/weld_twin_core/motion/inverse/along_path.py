@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from ...arm.bulk import kernel_of
 from ...arm.chain import Frames, chain_jacobian, forward, frames
@@ -193,6 +192,9 @@ def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
     if len(index) == len(poses):
         return knots
     along = travel(robot, poses)
+    # Slow to load, and who corrects poses needs no path.
+    from scipy.interpolate import CubicSpline
+
     spline = CubicSpline(along[index], np.where(np.isfinite(knots), knots, 0.0), axis=1)
     tracks = spline(along)
     lost: Mask = np.any(np.isnan(knots), axis=-1)

@@ -22,14 +22,15 @@ from weld_twin_msgs_py.programs import (
     read_sources,
     rewritten,
 )
-from weld_twin_msgs_py.programs.notation import (
+from weld_twin_msgs_py.programs.source import (
     ABB_POSE,
     FANUC_POSE,
     KUKA_POSE,
+    NUMBER,
     UR_POSE,
     YASKAWA_POSE,
+    Source,
 )
-from weld_twin_msgs_py.programs.source import NUMBER, Source
 
 MADE = Path(__file__).parent / 'made'
 PROGRAMS = {

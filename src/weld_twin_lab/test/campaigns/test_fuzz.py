@@ -18,7 +18,7 @@ from weld_twin_core.errors import DataError, ModelError, PathError, TwinError
 from weld_twin_lab.campaigns.fuzzing import hunt
 from weld_twin_lab.campaigns.fuzzing.malicious import harms, try_one
 from weld_twin_lab.campaigns.fuzzing.targets import targets
-from weld_twin_msgs_py.bags.unpack import unlz4, unzstd, zstd
+from weld_twin_msgs_py.bags.reader import unlz4, unzstd, zstd
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.files.effects_file import read_effects
 from weld_twin_msgs_py.files.path_file import read_path

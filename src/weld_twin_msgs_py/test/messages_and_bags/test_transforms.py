@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.assembly.transforms import NoTransform, NotYet, TransformTree
-from weld_twin_msgs_py.messages.cdr_types import (
+from weld_twin_msgs_py.messages.cdr_read import (
     Header,
     TFMessage,
     Time,

@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags (mcap and sqlite3, directories and single files) in and out; nothing else opens one."""
 
-from .background import BackgroundBag
 from .contents import BagInfo, TopicInfo, bag_info
 from .from_bag import read_recording
-from .growing import GrowingBag
+from .growing import BackgroundBag, GrowingBag
 from .reader import BagReader, provenance
 from .rebuild import Recovery, recover
 from .to_bag import write_recording

@@ -15,8 +15,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
 
 from ..messages.from_messages import stamp_ns
-from ..messages.image_points import FIELDS, points
-from ..messages.tag_detections import TAGS, Marks, corners
+from ..messages.image_points import FIELDS, TAGS, Marks, corners, points
 from ..messages.topics import IMAGE_POINTS, TopicNames
 from .reader import BagReader
 

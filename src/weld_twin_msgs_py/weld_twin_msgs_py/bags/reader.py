@@ -6,11 +6,16 @@ Streaming access to one bag: a message is decoded, handed over and forgotten.
 Only messages of the topics that are asked for are decoded: with the definitions of Jazzy, or, for a
 type that Jazzy does not bring, with the one that the bag holds. A bag that also holds somebody's
 own types reads as well.
+
+A kilobyte of zstd can stand for gigabytes. rosbags unpacks whatever it finds, so the two unpackers
+it looks up by name are replaced here by such as stop at a size that can be meant.
 """
 
 from __future__ import annotations
 
+import errno
 import json
+import shutil
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -20,15 +25,119 @@ from traceback import clear_frames
 from types import TracebackType
 from typing import Any, NamedTuple
 
+from lz4.frame import LZ4FrameDecompressor
 from rosbags.interfaces import MessageDefinitionFormat
-from rosbags.rosbag2 import Reader
+from rosbags.rosbag2 import Reader, storage_mcap
 
 from weld_twin_core.errors import DataError, TwinError
 
 from ..messages.from_messages import NANOSECONDS
 from ..messages.typestore import PROVENANCE_PREFIX, TYPES, decode, types_with
 from .storage import PACKED, look
-from .unpack import unpack_file, unzstd
+
+zstd: Any = storage_mcap.zstd  # type: ignore[attr-defined]
+"""The one rosbags found; where it lies depends on the version of Python."""
+RATIO = 200
+"""Times smaller than its content that recorded motion ever gets."""
+SMALL = 64_000_000
+"""Bytes that are unpacked whatever the ratio."""
+MOST = 2_000_000_000
+"""Bytes that are never unpacked in memory."""
+_HEAD = 18
+"""Bytes of the longest header of a zstd frame (RFC 8878), which may tell the size of its content."""
+_PIECE = 1 << 20
+"""Bytes read at once."""
+
+
+def allowed(packed: int) -> int:
+    """Return how many bytes may come out of so many."""
+    return min(max(SMALL, RATIO * packed), MOST)
+
+
+def unzstd(data: bytes, size: int | None = None) -> bytes:
+    """
+    Return the content of a zstd frame.
+
+    Raises DataError: it is larger than declared or than can be meant.
+
+    size: what is declared beside it.
+    """
+    limit = _limit(data, size)
+    return _whole(zstd.ZstdDecompressor().decompress(data, limit + 1), limit)
+
+
+def unlz4(data: bytes, size: int | None = None) -> bytes:
+    """Return the content of an lz4 frame; as `unzstd`."""
+    limit = _limit(data, size)
+    return _whole(LZ4FrameDecompressor().decompress(data, limit + 1), limit)
+
+
+def unpack_file(packed: Path, out: Path) -> None:
+    """
+    Unpack a zstd file.
+
+    Raises DataError: it holds more than can be meant, or than there is room for.
+    """
+    most = max(SMALL, RATIO * packed.stat().st_size)
+    free = shutil.disk_usage(out.parent).free
+    with packed.open('rb') as raw:
+        reported = zstd.get_frame_info(raw.read(_HEAD)).decompressed_size or 0
+    if reported > most:
+        raise _bomb()
+    if reported > free:
+        raise _no_room(packed, out, f'unpacks to {reported / 1e9:.1f} GB')
+    done = 0
+    try:
+        with packed.open('rb') as raw, zstd.open(raw, 'rb') as source, out.open('wb') as sink:
+            while piece := source.read(_PIECE):
+                done += len(piece)
+                if done > most:
+                    raise _bomb()
+                sink.write(piece)
+    except OSError as error:
+        if error.errno == errno.ENOSPC:
+            raise _no_room(packed, out, 'unpacks to more than that') from None
+        raise
+
+
+def _no_room(packed: Path, out: Path, what: str) -> DataError:
+    free = shutil.disk_usage(out.parent).free
+    return DataError(
+        f"'{packed}' {what}, and '{out.parent}' has room for {free / 1e9:.1f} GB; make room, or "
+        'set TMPDIR to a place that has it'
+    )
+
+
+def guard_rosbags() -> None:
+    """Put these unpackers in the place of those of rosbags."""
+    table: dict[str, Any] = storage_mcap.DECOMPRESSORS
+    table.update(zstd=unzstd, lz4=unlz4)
+
+
+def _limit(data: bytes, size: int | None) -> int:
+    most = allowed(len(data))
+    if size is None:
+        return most
+    if size > most:
+        raise _bomb()
+    return size
+
+
+def _whole(out: bytes, limit: int) -> bytes:
+    if len(out) > limit:
+        raise _bomb()
+    return out
+
+
+def _bomb() -> DataError:
+    return DataError(
+        f'compressed data in the bag would unpack to more than {RATIO} times its size; such a bag '
+        'is not opened'
+    )
+
+
+guard_rosbags()
+
 
 CDR_HEADER = 4
 """Bytes before the first field of a serialised message; the second gives the byte order."""

@@ -7,24 +7,221 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import sqlite3
 from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import IO, Any
+from zlib import crc32
+
+from mcap.records import Channel as ChannelRecord
+from mcap.records import Chunk, Footer, Message, Schema
+from mcap.stream_reader import StreamReader
+from rosbags.interfaces import Qos
+from rosbags.rosbag2.metadata import parse_qos
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from weld_twin_core.errors import DataError
 
 from ..files.whole_files import followed
 from ..messages.typestore import TYPES, decode
 from .growing import NOTES, UNFINISHED, is_growing, lock, unfinished
-from .salvage import Damage, Found
-from .salvage_mcap import salvage_mcap
-from .salvage_sqlite import salvage_sqlite
-from .segment import SUFFIXES, clear_write_errors, sync
-from .segments import Segments
+from .reader import unlz4, unzstd
+from .segment import SUFFIXES, Channel, Segments, clear_write_errors, sync
 from .storage import look, storage_files
 from .writer import custom_data
+
+Found = tuple[Channel, int, bytes]
+"""Channel, time of recording [ns] and serialised message."""
+
+
+class Damage:
+    """What was wrong with the files."""
+
+    def __init__(self) -> None:
+        self.sentences: list[str] = []
+
+    def tell(self, path: Path, what: str) -> None:
+        """Note something, once for each file."""
+        sentence = f"'{path.name}' {what}"
+        if sentence not in self.sentences:
+            self.sentences.append(sentence)
+
+
+def channel_of(topic: str, kind: str, definition: str, qos: Any) -> Channel:
+    """Return the channel of a topic; of a definition nobody understands only the name is kept."""
+    if kind in TYPES.types:
+        return Channel(topic, kind, qos=_qos(qos))
+    try:
+        store = get_typestore(Stores.ROS2_JAZZY)
+        store.register(get_types_from_msg(definition, kind))
+        return Channel(topic, kind, definition, store.hash_rihs01(kind), _qos(qos))
+    except Exception:  # a grammar and a type system, each with its own errors
+        return Channel(topic, kind)
+
+
+def _qos(text: Any) -> tuple[Qos, ...]:
+    try:
+        return tuple(parse_qos(text))
+    except Exception:  # it is YAML from a broken file
+        return ()
+
+
+_UNPACK = {'': lambda data, _: data, 'zstd': unzstd, 'lz4': unlz4}
+
+
+def salvage_mcap(path: Path, damage: Damage) -> Iterator[Found]:
+    """
+    Yield messages in the order of the file, up to the first record that is not whole.
+
+    A chunk whose content does not match its checksum is passed over and told.
+    """
+    channels: dict[int, Channel] = {}
+    schemas: dict[int, Schema] = {}
+    complete = False
+    with path.open('rb') as file:
+        for record in _records(file, path.stat().st_size):
+            complete = complete or isinstance(record, Footer)
+            for inner in _opened(record, path, damage):
+                if isinstance(inner, Schema):
+                    schemas[inner.id] = inner
+                elif isinstance(inner, ChannelRecord) and inner.id not in channels:
+                    channels[inner.id] = _channel(inner, schemas)
+                elif isinstance(inner, Message) and inner.channel_id in channels:
+                    yield channels[inner.channel_id], inner.log_time, bytes(inner.data)
+    if not complete:
+        damage.tell(path, 'ends early')
+
+
+class _Bounded:
+    """A file that is never asked for more than it has, whatever length a record claims."""
+
+    def __init__(self, file: IO[bytes], size: int) -> None:
+        self._file = file
+        self._left = size
+
+    def read(self, size: int) -> bytes:
+        """Return the next bytes, all of them."""
+        if size > self._left:
+            raise EOFError
+        self._left -= size
+        return self._file.read(size)
+
+
+def _records(file: IO[bytes], size: int, *, inside: bool = False) -> Iterator[Any]:
+    """Yield whole records, of a file or from inside a chunk, up to the first that is not."""
+    bounded: Any = _Bounded(file, size)
+    reader = StreamReader(bounded, skip_magic=inside, emit_chunks=True, record_size_limit=size)
+    with suppress(Exception):  # a cut or flipped byte surfaces as anything from EOFError on
+        yield from reader.records
+
+
+def _opened(record: Any, path: Path, damage: Damage) -> Iterator[Any]:
+    """Yield a record, or those inside when it is a chunk."""
+    if not isinstance(record, Chunk):
+        yield record
+        return
+    try:
+        data = _UNPACK[record.compression](record.data, record.uncompressed_size)
+        whole = len(data) == record.uncompressed_size
+    except Exception:  # every compressor has its own errors
+        whole = False
+    if not whole or (record.uncompressed_crc and crc32(data) != record.uncompressed_crc):
+        damage.tell(path, 'holds a damaged chunk, which is left out')
+        return
+    yield from _records(BytesIO(data), len(data), inside=True)
+
+
+def _channel(record: ChannelRecord, schemas: dict[int, Schema]) -> Channel:
+    schema = schemas.get(record.schema_id)
+    kind = '' if schema is None else schema.name
+    text = ''
+    if schema is not None and schema.encoding == 'ros2msg':
+        with suppress(UnicodeDecodeError):
+            text = schema.data.decode()
+    return channel_of(record.topic, kind, text, record.metadata.get('offered_qos_profiles', ''))
+
+
+JOURNALS = ('-journal', '-wal')
+"""Files beside a database in which a writer that died has left a step half done."""
+
+
+def salvage_sqlite(path: Path, damage: Damage) -> Iterator[Found]:
+    """Yield messages in the order they were written, up to the first that cannot be read."""
+    with ExitStack() as stack:
+        try:
+            base = _open(path, stack)
+            channels = _channels(base)
+            rows = base.execute('SELECT topic_id, timestamp, data FROM messages ORDER BY id')
+            for number, log_ns, data in rows:
+                if number in channels and isinstance(log_ns, int) and isinstance(data, bytes):
+                    yield channels[number], log_ns, data
+                else:
+                    damage.tell(path, 'holds rows that are no messages, which are left out')
+        except (sqlite3.Error, OverflowError) as error:
+            damage.tell(path, f'is damaged ({error})')
+
+
+def _open(path: Path, stack: ExitStack) -> sqlite3.Connection:
+    """
+    Open a database as it is, or as a copy that can be mended.
+
+    Opening undoes a step that was half done; half a page at the end is cut off, for it would
+    read as half a message and zeros.
+    """
+    journals = [file for file in _beside(path) if file.exists()]
+    torn = path.stat().st_size % _page(path)
+    mode = 'immutable=1'
+    if journals or torn:
+        folder = Path(
+            stack.enter_context(TemporaryDirectory(dir=path.parent, prefix='.recovering-'))
+        )
+        for file in (path, *journals):
+            shutil.copy(file, folder / file.name)
+        path, mode = folder / path.name, 'mode=rw'
+        os.truncate(path, path.stat().st_size - torn)
+    base = sqlite3.connect(f'{path.resolve().as_uri()}?{mode}', uri=True)
+    stack.enter_context(closing(base))
+    base.execute('PRAGMA trusted_schema = OFF')
+    base.execute('PRAGMA writable_schema = ON')  # or a file that lacks its last page is refused
+    return base
+
+
+def _page(path: Path) -> int:
+    """Return the size of a page [bytes]."""
+    with path.open('rb') as file:
+        size = int.from_bytes(file.read(18)[16:18], 'big')
+    return 65536 if size == 1 else max(size, 512)
+
+
+def _beside(path: Path) -> list[Path]:
+    return [path.with_name(path.name + suffix) for suffix in JOURNALS]
+
+
+def _channels(base: sqlite3.Connection) -> dict[Any, Channel]:
+    listed = base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
+    tables = {name for (name,) in listed}
+    if not {'messages', 'topics'} <= tables:  # a view of that name might never end
+        raise sqlite3.DatabaseError('it lacks the tables of a bag')
+    texts: dict[str, str] = {}
+    if 'message_definitions' in tables:
+        texts = dict(
+            base.execute(
+                'SELECT topic_type, encoded_message_definition FROM message_definitions '
+                "WHERE encoding = 'ros2msg'"
+            )
+        )
+    known = {row[1] for row in base.execute('PRAGMA table_info(topics)')}
+    qos = 'offered_qos_profiles' if 'offered_qos_profiles' in known else "''"
+    return {
+        number: channel_of(str(topic), str(kind), str(texts.get(kind, '')), text)
+        for number, topic, kind, text in base.execute(f'SELECT id, name, type, {qos} FROM topics')
+    }
+
 
 _STORAGE = {'.mcap': ('mcap', salvage_mcap), '.db3': ('sqlite3', salvage_sqlite)}
 _SCRATCH = '.recovering'

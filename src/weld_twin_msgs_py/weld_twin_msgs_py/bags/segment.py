@@ -1,7 +1,7 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-One storage file that grows, and is put on the disk piece by piece.
+Storage files that grow, put on the disk piece by piece, and the metadata.yaml that lists them.
 
 rosbags keeps an open transaction (sqlite3) or up to 1 MiB of messages (mcap) in memory and
 offers nothing to part with them before the end, so this reaches into its writers. Chunks of an
@@ -12,8 +12,11 @@ content, and only a checksum tells.
 from __future__ import annotations
 
 import os
+import shlex
+import shutil
 import sqlite3
-from collections.abc import Callable, Iterator
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
@@ -21,6 +24,7 @@ from struct import Struct
 from typing import Any, NamedTuple
 from zlib import crc32
 
+import yaml
 from rosbags.interfaces import (
     Connection,
     Qos,
@@ -299,3 +303,129 @@ def _offered(qos: TopicQos) -> Qos:
         liveliness_lease_duration=_NEVER,
         avoid_ros_namespace_conventions=False,
     )
+
+
+INFORMATION = 'rosbag2_bagfile_information'
+METADATA = 'metadata.yaml'
+
+
+class Segments:
+    """
+    The storage files of a bag, NAME_0, NAME_1 and so on.
+
+    The one that grows lies in a directory of its own and joins the others when it is complete.
+
+    folder: directory of the bag; exists.
+    name: what the files are called.
+    """
+
+    def __init__(self, folder: Path, name: str, storage: str) -> None:
+        self.folder = folder
+        self._name = name
+        self._storage = storage
+        self._complete: list[dict[str, Any]] = []
+        self.growing = self._next()
+
+    def write(self, channel: Channel, data: bytes, log_ns: int) -> None:
+        """Write a serialised message."""
+        self.growing.write(channel, data, log_ns)
+
+    def split(self) -> None:
+        """Complete the file that grows and begin another."""
+        self._settle()
+        self.growing = self._next()
+
+    def finish(self, custom: dict[str, str]) -> None:
+        """Complete the last file and list them all."""
+        self._settle(custom)
+        listing = self.folder / METADATA
+        scratch = listing.with_suffix('.yaml.tmp')
+        text = yaml.safe_dump({INFORMATION: _merged(self._complete, custom)}, sort_keys=False)
+        scratch.write_text(text, encoding='utf-8')
+        sync(scratch)
+        scratch.replace(listing)
+        sync(self.folder)
+
+    def abort(self) -> None:
+        """Let go of everything as it is."""
+        self.growing.abort()
+
+    def _next(self) -> Segment:
+        segment = Segment(self.folder / f'{self._name}_{len(self._complete)}', self._storage)
+        sync(segment.folder)
+        sync(self.folder)
+        return segment
+
+    def _settle(self, custom: dict[str, str] | None = None) -> None:
+        """Close the file that grows and put it beside the others."""
+        segment = self.growing
+        segment.close(custom or {})
+        file = segment.file
+        text = (segment.folder / METADATA).read_text(encoding='utf-8')
+        self._complete.append(yaml.safe_load(text)[INFORMATION])
+        file.rename(self.folder / file.name)
+        shutil.rmtree(segment.folder)
+        sync(self.folder)
+
+
+def _merged(parts: list[dict[str, Any]], custom: Mapping[str, str]) -> dict[str, Any]:
+    """Return the metadata of a bag from those of its files."""
+    filled = [part for part in parts if part['message_count']] or parts[:1]
+    starts = [_start(part) for part in filled]
+    ends = [_start(part) + part['duration']['nanoseconds'] for part in filled]
+    topics: dict[tuple[str, str], dict[str, Any]] = {}
+    for part in parts:
+        for row in part['topics_with_message_count']:
+            key = (row['topic_metadata']['name'], row['topic_metadata']['type'])
+            known = topics.setdefault(key, {**row, 'message_count': 0})
+            known['message_count'] += row['message_count']
+    return {
+        **parts[0],
+        'relative_file_paths': [path for part in parts for path in part['relative_file_paths']],
+        'duration': {'nanoseconds': max(ends) - min(starts)},
+        'starting_time': {'nanoseconds_since_epoch': min(starts)},
+        'message_count': sum(part['message_count'] for part in parts),
+        'topics_with_message_count': list(topics.values()),
+        'files': [file for part in parts for file in part['files']],
+        'custom_data': dict(custom) or None,
+    }
+
+
+def _start(part: Mapping[str, Any]) -> int:
+    return int(part['starting_time']['nanoseconds_since_epoch'])
+
+
+SPARE = 10_000_000
+"""Bytes [B] that a disk must have left beside the copy: others write on it, too."""
+
+
+def recover_command(path: Path, growing: Path | None = None) -> str:
+    """
+    Return ``weld-twin bag recover`` for a recording, onto another disk where its own has no room.
+
+    path: what the recorder was told to write.
+    growing: the directory it grew in; it is copied.
+    """
+    command = ['weld-twin', 'bag', 'recover', str(path)]
+    needed = _size(path if growing is None else growing) + SPARE
+    if not _has_room(path.parent, needed):
+        places = (Path.cwd(), Path.home(), Path(tempfile.gettempdir()))
+        result = next((place for place in places if _has_room(place, needed)), None)
+        command += ['--out', str((result or Path('ANOTHER_DISK')) / path.name)]
+    return shlex.join(command)
+
+
+def _has_room(folder: Path, needed: int) -> bool:
+    """Return whether so many bytes can be written into a directory."""
+    with suppress(OSError):
+        return os.access(folder, os.W_OK) and shutil.disk_usage(folder).free >= needed
+    return False
+
+
+def _size(folder: Path) -> int:
+    """Return the bytes of all files in a directory; those that go meanwhile count nothing."""
+    total = 0
+    with suppress(OSError):
+        for file in [folder, *folder.rglob('*')]:
+            total += file.stat().st_size
+    return total

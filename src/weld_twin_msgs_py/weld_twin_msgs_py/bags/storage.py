@@ -12,9 +12,7 @@ import yaml
 from weld_twin_core.errors import DataError
 
 from .growing import UNFINISHED, is_growing, unfinished
-from .recover_command import recover_command
-from .segment import SUFFIXES
-from .segments import INFORMATION, METADATA
+from .segment import INFORMATION, METADATA, SUFFIXES, recover_command
 
 PACKED = '.zstd'
 TABLES = ('.csv', '.tsv', '.txt')

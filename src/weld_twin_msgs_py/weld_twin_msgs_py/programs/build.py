@@ -1,13 +1,13 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What is understood of a program: points with the places of their numbers, and moves."""
+"""What is understood of a program: points with the places of their numbers, moves and postures."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from weld_twin_core.motion.programs import Move, MoveProgram, Use
 from weld_twin_core.motion.programs.moves import Kind
 
 from .controllers import Controller, Frame
-from .notation import Notation
-from .source import Number, Source
+from .source import Notation, Number, Source
 
 Suits = Callable[[Robot, Controller], Callable[[Array], Array]]
 """Makes, for a robot, what tells the postures that a program asks for."""
@@ -243,3 +242,75 @@ def _base(
 def _use(ref: Ref, base: Array) -> Use:
     before = base if ref.before is None else base @ ref.before
     return Use(ref.point, before, np.eye(4) if ref.after is None else ref.after, ref.leads)
+
+
+SIGN_DOUBT = np.radians(0.5)
+"""An axis this near zero may have either sign in T, which was worked out from other digits."""
+QUADRANT_DOUBT = np.radians(0.5)
+"""An axis this near the edge of its quadrant may count to either."""
+
+
+def turn_bits(turn: int) -> Suits:
+    """
+    Return what takes the postures whose axes have the signs of T.
+
+    turn: bit k is set where axis k + 1 is below zero.
+    """
+
+    def suits(robot: object, controller: Controller) -> Any:
+        del robot
+        back = np.linalg.inv(controller.mix)
+
+        def of(q: Array) -> Array:
+            axes = q @ back.T[:, : q.shape[1] - len(controller.external)]
+            below = np.array([bool(turn >> k & 1) for k in range(axes.shape[1])])
+            fits = np.where(below, axes < SIGN_DOUBT, axes > -SIGN_DOUBT)
+            return np.asarray(fits.all(axis=1))
+
+        return of
+
+    return suits
+
+
+def quadrants(conf: Sequence[int]) -> Suits:
+    """
+    Return what takes the postures whose axes 1, 4 and 6 are in the quadrants of a confdata.
+
+    conf: cf1, cf4, cf6 and cfx, which is left out: its meaning depends on the arm.
+    """
+
+    def suits(robot: object, controller: Controller) -> Any:
+        del robot
+        first = len(controller.external)
+        places = first + np.array([0, 3, 5])
+
+        def of(q: Array) -> Array:
+            if q.shape[1] < first + 6:
+                return np.ones(len(q), dtype=bool)
+            low = np.array(conf[:3]) * 0.5 * np.pi
+            axes = q[:, places]
+            inside = (axes > low - QUADRANT_DOUBT) & (axes < low + 0.5 * np.pi + QUADRANT_DOUBT)
+            return np.asarray(inside.all(axis=1))
+
+        return of
+
+    return suits
+
+
+def nearest(near: Array) -> Suits:
+    """
+    Return what takes the posture nearest given joint positions, as qnear does.
+
+    near: shape (n,).
+    """
+
+    def suits(robot: object, controller: Controller) -> object:
+        del robot, controller
+
+        def of(q: Array) -> Array:
+            away = np.abs(q - near).sum(axis=1)
+            return np.asarray(away == away.min())
+
+        return of
+
+    return suits  # type: ignore[return-value]

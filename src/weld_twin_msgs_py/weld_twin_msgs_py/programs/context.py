@@ -13,8 +13,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 
 from .controllers import Controller
-from .notation import Notation, joint_notation
-from .source import Number
+from .source import Notation, Number, joint_notation
 
 
 class Context(NamedTuple):

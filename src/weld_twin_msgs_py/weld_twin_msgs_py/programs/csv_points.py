@@ -22,8 +22,8 @@ from weld_twin_core.motion.programs.moves import Kind
 
 from ..files.csv_text import unguarded
 from .build import Program, Ref, Step
-from .notation import Notation, joint_notation
 from .reader import LEAST_SPEED, Reader, Span
+from .source import Notation, joint_notation
 
 POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
 _TURNS = {'': 1.0, '_rad': 1.0, ' [rad]': 1.0} | dict.fromkeys(

@@ -26,9 +26,8 @@ from weld_twin_core.motion.programs.moves import Kind
 from .build import Program, Ref, Step
 from .context import Context
 from .controllers import Frame
-from .notation import FANUC_POSE, Notation
 from .reader import LEAST_SPEED, Reader
-from .source import NUMBER, Number, Source, closing
+from .source import FANUC_POSE, NUMBER, Notation, Number, Source, closing
 
 POSE_KEYS = ('X', 'Y', 'Z', 'W', 'P', 'R')
 _PART = re.compile(r'^/(MN|POS|END)\b', re.M)

@@ -28,9 +28,8 @@ from weld_twin_core.motion.programs.moves import Kind
 from .build import Program, Ref, Step
 from .context import Context
 from .controllers import Frame
-from .notation import YASKAWA_POSE, Notation, joint_notation
 from .reader import LEAST_SPEED, Reader
-from .source import Number, Source
+from .source import YASKAWA_POSE, Notation, Number, Source, joint_notation
 
 _HEAD = re.compile(r'^///(\w+)(?:[ \t]+([^\r\n]*))?', re.M)
 _POINT = re.compile(r'^(B?P|B?C|EC|EX)(\d+)[ \t]*=[ \t]*([^\r\n]*)', re.M)

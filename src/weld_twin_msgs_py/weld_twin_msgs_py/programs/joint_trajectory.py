@@ -18,9 +18,8 @@ import numpy as np
 from weld_twin_core.errors import DataError
 
 from .build import Program, Ref, Step
-from .notation import joint_notation
 from .reader import Reader, Span
-from .source import closing, stripped
+from .source import closing, joint_notation, stripped
 
 _NAMES = re.compile(r'["\']?joint_names["\']?[ \t]*:[ \t]*')
 _POSITIONS = re.compile(r'["\']?\bpositions["\']?[ \t]*:[ \t]*')

@@ -28,13 +28,11 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
-from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere
+from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, turn_bits
 from .context import Context
 from .controllers import Frame
-from .notation import KUKA_POSE
-from .postures import turn_bits
 from .reader import LEAST_SPEED, Reader
-from .source import NUMBER, Number, Source, closing, number_at, split_outside, stripped
+from .source import KUKA_POSE, NUMBER, Number, Source, closing, number_at, split_outside, stripped
 
 KINDS: dict[str, Kind] = {'PTP': 'joint', 'LIN': 'linear', 'CIRC': 'circular'}
 POSE_KEYS, EXTERNAL = ('X', 'Y', 'Z', 'A', 'B', 'C'), ('E1', 'E2', 'E3', 'E4', 'E5', 'E6')

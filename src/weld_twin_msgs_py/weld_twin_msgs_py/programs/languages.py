@@ -18,10 +18,18 @@ from .fanuc_ls import FanucReader
 from .inform import InformReader
 from .joint_trajectory import TrajectoryReader
 from .krl import KrlReader
-from .notation import ABB_POSE, FANUC_POSE, KUKA_POSE, UR_POSE, YASKAWA_POSE, Notation
 from .rapid import RapidReader
 from .reader import Reader
-from .source import Source, read_source
+from .source import (
+    ABB_POSE,
+    FANUC_POSE,
+    KUKA_POSE,
+    UR_POSE,
+    YASKAWA_POSE,
+    Notation,
+    Source,
+    read_source,
+)
 from .urscript import UrscriptReader
 
 

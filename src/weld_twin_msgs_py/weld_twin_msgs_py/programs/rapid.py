@@ -29,13 +29,11 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
-from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere
+from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, quadrants
 from .context import Context
 from .controllers import Frame
-from .notation import ABB_POSE
-from .postures import quadrants
 from .reader import LEAST_SPEED, Reader
-from .source import Number, Source, closing, split_outside, stripped
+from .source import ABB_POSE, Number, Source, closing, split_outside, stripped
 
 NO_AXIS = 8.9e9
 """ABB writes 9E9 for an external axis that is not there."""

@@ -1,16 +1,169 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The text of a program, kept to the byte, with the places of the numbers in it."""
+"""
+The text of a program, kept to the byte, and how makers write poses and joints in its numbers.
+
+| maker | position | orientation |
+|---|---|---|
+| KUKA | X Y Z [mm] | A B C [deg]: about z, then the new y, then the new x |
+| FANUC | X Y Z [mm] | W P R [deg]: about the fixed x, y, z |
+| Yaskawa | X Y Z [mm] | Rx Ry Rz [deg]: about the fixed x, y, z |
+| ABB | x y z [mm] | q1 q2 q3 q4: a quaternion, its scalar first |
+| Universal Robots | x y z [m] | rx ry rz [rad]: axis times angle |
+
+A about z, B about the new y and C about the new x is the same turn as C, B, A about the fixed x, y
+and z, so KUKA, FANUC and Yaskawa differ in the order of the numbers alone.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
+from weld_twin_core.arm.rotation import (
+    matrix_from_quaternion,
+    quaternion_from_matrix,
+    rotation_matrix,
+    rotation_vector,
+    transform,
+)
+from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
+
+GIMBAL = 1e-7
+"""Cosine of the middle angle below which the other two turn about the same axis."""
+LENGTH = 0.02
+"""Quaternions are written with few digits; one off its length by more than this is a mistake."""
+
+
+class Notation(NamedTuple):
+    """One way of writing a target."""
+
+    name: str
+    joints: bool
+    """The numbers are joint positions."""
+    value: Callable[[Sequence[float]], Array]
+    """Takes the numbers, returns a pose (4, 4) [m] or joint positions (n,) [rad]."""
+    numbers: Callable[[Array, Sequence[float]], list[float]]
+    """Takes a value and the numbers it replaces; returns the new numbers, as near the old ones as
+    the same value can be written."""
+    decimals: tuple[int, int]
+    """Digits after the point that a length and an angle get at least."""
+
+
+def fixed_angles(rx: float, ry: float, rz: float) -> Array:
+    """Return the rotation, shape (3, 3), about the fixed x, then y, then z [rad]."""
+    about = [rotation_matrix(row) for row in np.diag([rx, ry, rz])]
+    return np.asarray(about[2] @ about[1] @ about[0])
+
+
+def angles_fixed(rotation: Array, near: Sequence[float]) -> list[float]:
+    """
+    Return the angles about the fixed x, y and z of a rotation that are nearest given ones [rad].
+
+    rotation: shape (3, 3).
+    """
+    cosine = float(np.hypot(rotation[0, 0], rotation[1, 0]))
+    pitch = float(np.arctan2(-rotation[2, 0], cosine))
+    if cosine < GIMBAL:
+        # Only the difference (or sum) of the two others counts: the last stays as it was.
+        yaw = float(near[2])
+        back = rotation_matrix([0.0, 0.0, -yaw]) @ rotation
+        roll = float(np.arctan2(-back[1, 2], back[1, 1]))
+        return [_unwound(v, n) for v, n in zip((roll, pitch, yaw), near, strict=True)]
+    roll = float(np.arctan2(rotation[2, 1], rotation[2, 2]))
+    yaw = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+    other = (roll + np.pi, np.pi - pitch, yaw + np.pi)
+    ways = [
+        [_unwound(v, n) for v, n in zip(angles, near, strict=True)]
+        for angles in ((roll, pitch, yaw), other)
+    ]
+    return min(ways, key=lambda way: sum(abs(v - n) for v, n in zip(way, near, strict=True)))
+
+
+def _unwound(angle: float, near: float) -> float:
+    return float(angle - 2.0 * np.pi * np.round((angle - near) / (2.0 * np.pi)))
+
+
+def _euler(name: str, order: tuple[int, int, int], decimals: tuple[int, int]) -> Notation:
+    """Return a notation in millimetres and degrees; order: which number turns about x, y, z."""
+    places = [3 + k for k in order]
+
+    def value(numbers: Sequence[float]) -> Array:
+        turns = np.radians([numbers[k] for k in places])
+        return transform(fixed_angles(*turns), np.array(numbers[:3]) * 1e-3)
+
+    def numbers(pose: Array, old: Sequence[float]) -> list[float]:
+        angles = angles_fixed(pose[:3, :3], np.radians([old[k] for k in places]).tolist())
+        out = [*(float(v) for v in pose[:3, 3] * 1e3), 0.0, 0.0, 0.0]
+        for place, angle in zip(places, angles, strict=True):
+            out[place] = float(np.degrees(angle))
+        return out
+
+    return Notation(name, False, value, numbers, decimals)
+
+
+def _quaternion_value(numbers: Sequence[float]) -> Array:
+    w, x, y, z = numbers[3:7]
+    length = float(np.linalg.norm(numbers[3:7]))
+    if abs(length - 1.0) > LENGTH:
+        raise DataError(f'the quaternion has length {length:.4g}, an orientation needs 1')
+    turn = matrix_from_quaternion(np.array([x, y, z, w]) / length)
+    return transform(turn, np.array(numbers[:3]) * 1e-3)
+
+
+def _quaternion_numbers(pose: Array, old: Sequence[float]) -> list[float]:
+    x, y, z, w = quaternion_from_matrix(pose[:3, :3]).tolist()
+    sign = 1.0 if np.dot([w, x, y, z], old[3:7]) >= 0.0 else -1.0
+    return [*(float(v) for v in pose[:3, 3] * 1e3), *(sign * v for v in (w, x, y, z))]
+
+
+def _rotvec_value(numbers: Sequence[float]) -> Array:
+    return transform(rotation_matrix(list(numbers[3:6])), np.array(numbers[:3]))
+
+
+def _rotvec_numbers(pose: Array, old: Sequence[float]) -> list[float]:
+    vector = rotation_vector(pose[:3, :3])
+    angle = float(np.linalg.norm(vector))
+    if angle > 1e-9:
+        # Any number of full turns about the axis is the same; the nearest to what stood there.
+        axis = vector / angle
+        turns = np.round((float(axis @ np.array(old[3:6])) - angle) / (2.0 * np.pi))
+        vector = axis * (angle + 2.0 * np.pi * turns)
+    return [*(float(v) for v in pose[:3, 3]), *(float(v) for v in vector)]
+
+
+KUKA_POSE = _euler('X Y Z A B C', (2, 1, 0), (4, 5))
+FANUC_POSE = _euler('X Y Z W P R', (0, 1, 2), (3, 3))
+YASKAWA_POSE = _euler('X Y Z Rx Ry Rz', (0, 1, 2), (3, 4))
+ABB_POSE = Notation('x y z q1 q2 q3 q4', False, _quaternion_value, _quaternion_numbers, (4, 8))
+UR_POSE = Notation('x y z rx ry rz', False, _rotvec_value, _rotvec_numbers, (7, 7))
+
+
+def joint_notation(per_unit: Array, mix: Array, decimals: int, name: str) -> Notation:
+    """
+    Return a notation of joint positions.
+
+    per_unit: model units [rad or m] of one unit as written, shape (n,).
+    mix: makes the joints of the model from those of the controller, where they are coupled, shape
+    (n, n).
+    """
+    back = np.linalg.inv(mix)
+
+    def value(numbers: Sequence[float]) -> Array:
+        return np.asarray(mix @ (np.array(numbers) * per_unit))
+
+    def numbers(joints: Array, old: Sequence[float]) -> list[float]:
+        del old
+        return [float(v) for v in (back @ joints) / per_unit]
+
+    return Notation(name, True, value, numbers, (decimals, decimals))
+
 
 SIZE_LIMIT = 20_000_000
 """Bytes; programs of a hundred thousand points have some ten megabytes."""

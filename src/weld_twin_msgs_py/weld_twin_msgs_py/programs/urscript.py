@@ -24,13 +24,11 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.motion.programs.moves import Kind
 
-from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere
+from .build import Program, Ref, Step, Suits, hold_if_used_elsewhere, nearest
 from .context import Context
 from .controllers import Frame
-from .notation import UR_POSE, Notation
-from .postures import nearest
 from .reader import LEAST_SPEED, Reader
-from .source import Number, Source, closing, stripped
+from .source import UR_POSE, Notation, Number, Source, closing, stripped
 
 MOVES: dict[str, tuple[Kind, tuple[str, ...]]] = {
     'movej': ('joint', ('q', 'a', 'v', 't', 'r')),

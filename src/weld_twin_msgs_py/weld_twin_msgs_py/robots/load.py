@@ -1,10 +1,15 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A robot from whatever the user names: a bundled model, a YAML file or a URDF."""
+"""
+A robot from whatever the user names: a bundled model, a file, or a robot of one's own by its name.
+
+A file dropped in a folder is a robot by its name, as a bundled one is.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from weld_twin_core.arm import catalog
@@ -14,12 +19,74 @@ from weld_twin_core.errors import ModelError
 
 from ..files.whole_files import write_text
 from ..files.yaml_file import read_yaml, yaml_text
-from .own_robots import as_file, looked_in
-from .urdf_read import read_urdf
-from .wrong_units import refuse_wrong_units
+from .urdf_read import read_urdf, refuse_wrong_units
 
-YAML_SUFFIXES = ('.yaml', '.yml')
+_YAML_SUFFIXES = ('.yaml', '.yml')
 URDF_SUFFIXES = ('.urdf', '.xml')
+_FOLDERS = 'WELD_TWIN_ROBOTS'
+"""Variable of the environment: one folder, or several as in PATH."""
+_DROPPED = (*_YAML_SUFFIXES, '.urdf')
+"""Of the files that are taken for robots."""
+
+
+def _folders() -> tuple[Path, ...]:
+    """Return where robots of one's own lie: what the environment says, else the user's settings."""
+    reported = os.environ.get(_FOLDERS, '')
+    if reported:
+        return tuple(Path(part).expanduser() for part in reported.split(os.pathsep) if part)
+    home = os.environ.get('XDG_CONFIG_HOME') or os.path.join(os.path.expanduser('~'), '.config')
+    return (Path(home, 'weld_twin', 'robots'),)
+
+
+def own_files() -> tuple[Path, ...]:
+    """Return the files of one's own robots, by their names."""
+    return tuple(sorted(_files(), key=lambda file: (file.stem.lower(), file)))
+
+
+def _files() -> Iterator[Path]:
+    for folder in _folders():
+        if folder.is_dir():
+            yield from (file for file in folder.iterdir() if file.suffix.lower() in _DROPPED)
+
+
+def robot_names() -> tuple[str, ...]:
+    """Return the names of the bundled robots, then of one's own."""
+    own = dict.fromkeys(file.stem for file in own_files())
+    return (*catalog.names(), *(name for name in own if name.lower() not in catalog.names()))
+
+
+def _own_robot(spec: str) -> Path | None:
+    """
+    Return the file of a robot of one's own, None where the name is none of theirs.
+
+    Raises ModelError: several robots have the name; none of them is taken for the other.
+
+    spec: a name without a suffix, in capital or small letters.
+    """
+    result = [str(file) for file in own_files() if file.stem.lower() == spec.lower()]
+    if result and spec.lower() in catalog.names():
+        result.insert(0, 'the bundled one')
+    if len(result) > 1:
+        raise ModelError(
+            f'{spec!r} is the name of several robots: {", ".join(result)}; rename all files but one'
+        )
+    return Path(result[0]) if result else None
+
+
+def as_file(spec: str) -> str:
+    """Return the path of a robot's file where a name is that of one's own; else what was given."""
+    if Path(spec).is_file():
+        return spec
+    own = _own_robot(spec)
+    return spec if own is None else str(own)
+
+
+def _looked_in() -> str:
+    """Return in which folders was looked, and which are none."""
+    return ' and '.join(
+        f"'{folder}'" + ('' if folder.is_dir() else ', which is no folder')
+        for folder in _folders()
+    )
 
 
 def load_robot(
@@ -34,7 +101,7 @@ def load_robot(
     Parameters
     ----------
     spec : str or Path
-        Name of a bundled model or of one of your own (`own_robots`), or path of a YAML or URDF file.
+        Name of a bundled model or of one of your own (`own_files`), or path of a YAML or URDF file.
     base_link, tip_link : str, optional
         Ends of the chain in a URDF; left out, its root and its only leaf (or ``tool0``).
     flange_link : str, optional
@@ -53,14 +120,14 @@ def load_robot(
         raise ModelError(f"'{spec}' is a xacro file; run 'xacro {spec}' to make the URDF of it")
     if suffix in URDF_SUFFIXES:
         return with_lent_masses(read_urdf(path, base_link, tip_link, flange_link))
-    if suffix in YAML_SUFFIXES or path.is_file():
+    if suffix in _YAML_SUFFIXES or path.is_file():
         robot = read_robot_yaml(path)
     elif spec.lower() in catalog.names():
         robot = catalog.load(spec.lower())
     else:
         raise ModelError(
             f'{spec!r} is neither a bundled robot ({", ".join(catalog.names())}) nor a .yaml or '
-            f'.urdf file, nor is there one of that name in {looked_in()}'
+            f'.urdf file, nor is there one of that name in {_looked_in()}'
         )
     if any(link is not None for link in (base_link, tip_link, flange_link)):
         raise ModelError(

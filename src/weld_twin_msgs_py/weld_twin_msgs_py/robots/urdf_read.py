@@ -1,9 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A URDF chain to an exact standard Denavit-Hartenberg robot."""
+"""A URDF chain to an exact standard Denavit-Hartenberg robot; numbers in wrong units are refused."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -18,7 +19,13 @@ from weld_twin_core.errors import ModelError
 from .axes_to_dh import Axis, dh_rows, inverse
 from .controller_links import FLANGE, Placed, flange_link_of, foot_of
 from .urdf_tree import MOVABLE, Joint, Tree, parse_tree, read_tree
-from .wrong_units import refuse_wrong_units
+
+_TURN = 2.0 * np.pi + 1e-6
+"""A whole turn [rad], and what rounding may add."""
+_MANY_TURNS = 60.0
+"""Joint limits beyond this [rad] are degrees: no arm turns ten times."""
+_LONG = 20.0
+"""DH lengths beyond this [m] are millimetres."""
 
 
 def read_urdf(
@@ -301,3 +308,27 @@ def _gravity(tree: Tree, base: str) -> Array:
             return np.array(STANDARD_GRAVITY)
         rotation, link = joint.T_parent_joint[:3, :3] @ rotation, joint.parent
     return np.asarray(rotation.T @ np.array(STANDARD_GRAVITY))
+
+
+def refuse_wrong_units(robot: Robot) -> None:
+    """
+    Refuse a robot whose numbers look like degrees or millimetres.
+
+    Raises ModelError: names the joint, the value and the unit wanted.
+    """
+    names, turning = robot.joint_names, ~robot.prismatic
+    for key in ('alpha', 'theta', 'beta'):
+        _check(names, getattr(robot, key), _TURN, key, 'degrees in a radian field')
+    for key in ('a', 'd'):
+        _check(names, getattr(robot, key), _LONG, key, 'millimetres in a metre field')
+    for key in ('lower', 'upper'):
+        values = np.where(turning & np.isfinite(getattr(robot, key)), getattr(robot, key), 0.0)
+        _check(names, values, _MANY_TURNS, key, 'degrees in a radian field')
+    if robot.com is not None:
+        _check(names, abs(robot.com).max(axis=1), _LONG, 'com', 'millimetres in a metre field')
+
+
+def _check(names: Sequence[str], values: Array, limit: float, key: str, what: str) -> None:
+    if (abs(values) > limit).any():
+        k = int(np.argmax(abs(values) > limit))
+        raise ModelError(f'joint {names[k]!r}: {key} is {values[k]:.6g}, which looks like {what}')

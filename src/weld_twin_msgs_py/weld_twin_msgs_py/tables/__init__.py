@@ -6,8 +6,8 @@ from .build import Table, read_table
 from .camera_files import read_camera, read_target
 from .contacts import read_contacts, write_touches
 from .pixels import read_pixels
-from .table_options import TableOptions
 from .two_tables import read_two_tables
+from .words import TableOptions
 
 __all__ = [
     'Table',

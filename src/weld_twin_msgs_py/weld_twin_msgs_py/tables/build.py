@@ -17,15 +17,12 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, JointSignal, Measurements, Recording, Signal
 
-from .agreement import misfit
 from .cells import Cells, read_cells
-from .clock_column import stamps
 from .header import Columns, find_columns
 from .joint_readings import Units, joint_angles, joint_units
 from .rotations import AGREES, disagreement, find_convention, rotations
-from .table_options import TableOptions
-from .unit_guess import METRES, RADIANS, angle_unit, factor, length_unit
-from .words import OWN, tokens
+from .unit_guess import METRES, RADIANS, angle_unit, factor, length_unit, misfit, stamps
+from .words import OWN, TableOptions, tokens
 
 _FAR = 10.0
 """A row this many times farther off than the median row is pointed out."""

@@ -16,7 +16,7 @@ from weld_twin_core.cameras.sightings import PLACED
 from weld_twin_core.errors import DataError
 
 from ..files.yaml_file import read_yaml
-from ..messages.tag_detections import label
+from ..messages.image_points import label
 from .cells import read_cells
 from .header import unit_of
 from .unit_guess import METRES, factor

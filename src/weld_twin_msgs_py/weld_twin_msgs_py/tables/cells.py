@@ -18,8 +18,7 @@ from weld_twin_core.errors import DataError
 
 from .current_positions import is_positions, read_positions
 from .formats import Read, read, recognised
-from .lines import LOOK, split_lines
-from .number_text import COMMA, EMPTY, decimal_sign, number, without_units
+from .lines import COMMA, EMPTY, LOOK, decimal_sign, number, split_lines, without_units
 from .point_lists import (
     is_joint_targets,
     is_point_list,

@@ -22,9 +22,8 @@ from .build import Table, own_epoch
 from .cells import Cells, read_cells
 from .header import CONTACTS, joint_columns, unit_of
 from .joint_readings import station_joints
-from .table_options import TableOptions
 from .unit_guess import METRES, factor
-from .words import shortened
+from .words import TableOptions, shortened
 
 WORDS = {
     'contact': CONTACTS,

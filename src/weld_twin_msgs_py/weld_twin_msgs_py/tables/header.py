@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import DataError
 
-from .table_options import TableOptions, flag_of
 from .words import (
     ANGLES,
     CLOCK,
@@ -31,6 +30,8 @@ from .words import (
     TARGET,
     TEMPERATURE,
     TURNS,
+    TableOptions,
+    flag_of,
     parted,
     shortened,
     tokens,

@@ -16,8 +16,8 @@ from weld_twin_core.errors import DataError
 
 from .cells import Cells
 from .header import unit_of
-from .table_options import TableOptions, flag_of
 from .unit_guess import METRES, RADIANS, factor, largest
+from .words import TableOptions, flag_of
 
 CLEARLY = 3.0
 """Other units than the usual guess are taken where the measured positions fit them so many times

@@ -17,11 +17,10 @@ from weld_twin_core.recording import JointMotion, Recording
 
 from .build import Table, own_epoch
 from .cells import Cells, read_cells
-from .clock_column import stamps
 from .header import joint_columns, time_columns, unit_of
 from .joint_readings import station_joints
-from .table_options import TableOptions
-from .words import shortened
+from .unit_guess import stamps
+from .words import TableOptions, shortened
 
 WORDS = {
     'camera': {'camera', 'cam', 'kamera'},

@@ -18,7 +18,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-from .table_options import EULER_ORDERS, ROTATION_VECTOR
+from .words import EULER_ORDERS, ROTATION_VECTOR
 
 AGREES = np.radians(3.0)
 """RMS disagreement of relative angles an arm with unknown errors may show."""

@@ -17,10 +17,10 @@ from weld_twin_core.recording import JointMotion
 
 from .build import BEYOND, LAST_STAMP, Table, own_epoch, stations, table_of
 from .cells import Cells, read_cells
-from .clock_column import later_rows, stamps
 from .header import joint_columns, time_columns, unit_of
 from .joint_readings import joint_angles
-from .table_options import TableOptions
+from .unit_guess import later_rows, stamps
+from .words import TableOptions
 
 STREAM = 0.2
 """Median step of a log [s] below which it follows the motion, not stations."""

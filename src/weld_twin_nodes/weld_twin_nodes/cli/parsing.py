@@ -65,7 +65,7 @@ def integers(text: str) -> tuple[int, ...]:
 
 def robot_file(spec: str) -> str:
     """Return the file of a robot of one's own that is named; what else was given as it is."""
-    from weld_twin_msgs_py.robots.own_robots import as_file
+    from weld_twin_msgs_py.robots.load import as_file
 
     return as_file(spec)
 

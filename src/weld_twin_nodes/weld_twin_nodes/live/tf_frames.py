@@ -19,7 +19,7 @@ from weld_twin_msgs_py.assembly import Role
 from weld_twin_msgs_py.assembly.foreign_types import stamped_pose
 from weld_twin_msgs_py.assembly.transforms import NoTransform, NotYet, TransformTree
 from weld_twin_msgs_py.messages import from_messages
-from weld_twin_msgs_py.messages.cdr_types import Header, PointStamped, Xyz
+from weld_twin_msgs_py.messages.cdr_read import Header, PointStamped, Xyz
 from weld_twin_msgs_py.messages.topics import MEASURED_POINT, MEASURED_POSE, TF, TF_STATIC
 
 from .cell_node import CellNode

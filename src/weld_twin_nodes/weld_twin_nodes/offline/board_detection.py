@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.errors import DataError, ModelError
-from weld_twin_msgs_py.messages.tag_detections import label
+from weld_twin_msgs_py.messages.image_points import label
 from weld_twin_msgs_py.tables.camera_files import board_points
 
 DICTIONARY = 'DICT_5X5_100'

@@ -23,7 +23,7 @@ from weld_twin_core.motion.programs import travel
 from weld_twin_msgs_py.files.joint_file import EASY, REST, read_joint_motion
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.programs import Context, read_sources, to_moves
-from weld_twin_msgs_py.programs.external_axes import BY_NAME, carrying
+from weld_twin_msgs_py.programs.controllers import BY_NAME, carrying
 from weld_twin_msgs_py.programs.source import Source
 from weld_twin_msgs_py.programs.writing import Exported, ExportMove, sheet, written
 

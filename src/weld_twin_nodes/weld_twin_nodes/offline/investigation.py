@@ -18,7 +18,7 @@ from weld_twin_core.diagnosis.advice.chosen_pieces import LEAST, NOTHING
 from weld_twin_core.diagnosis.result import NAMING
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.input_files import hashed
-from weld_twin_msgs_py.files.json_file import read_json, write_json
+from weld_twin_msgs_py.files.whole_files import read_json, write_json
 
 from .closing import ALIKE, closes
 

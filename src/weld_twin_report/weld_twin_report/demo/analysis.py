@@ -16,8 +16,7 @@ from weld_twin_core.sensitivity import default_tolerances, local_sensitivity, st
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.bags import read_recording
-from weld_twin_msgs_py.files.json_file import write_json
-from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.whole_files import write_json, write_text
 
 from .hand_over import Job
 

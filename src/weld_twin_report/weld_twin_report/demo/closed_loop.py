@@ -15,8 +15,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import TwinError
 from weld_twin_core.motion.inverse.newton import polish
 from weld_twin_core.twin.goal_motion import Goal, course
-from weld_twin_msgs_py.files.json_file import write_json
-from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.whole_files import write_json, write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, MEASURED_POSE, POSE_IN, POSE_OUT

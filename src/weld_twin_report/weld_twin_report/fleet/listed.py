@@ -13,7 +13,7 @@ from pathlib import Path
 from weld_twin_core import __version__
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.files.input_files import hashed
-from weld_twin_msgs_py.robots.own_robots import as_file
+from weld_twin_msgs_py.robots.load import as_file
 from weld_twin_nodes.offline.content_hash import digest
 
 from ..history.entry import instant

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from weld_twin_core.arrays import Array
-from weld_twin_msgs_py.files.json_file import plain as finite
+from weld_twin_msgs_py.files.whole_files import plain as finite
 
 from .html import Html, tag
 

@@ -12,7 +12,7 @@ import numpy as np
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.effects.frame_errors import RootPose
 from weld_twin_msgs_py.programs.controllers import world_of
-from weld_twin_msgs_py.programs.notation import ABB_POSE, FANUC_POSE, KUKA_POSE, Notation
+from weld_twin_msgs_py.programs.source import ABB_POSE, FANUC_POSE, KUKA_POSE, Notation
 
 
 class _Frames(NamedTuple):

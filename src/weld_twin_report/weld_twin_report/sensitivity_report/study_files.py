@@ -15,8 +15,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.sensitivity import Tolerance
 from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.csv_text import csv_text
-from weld_twin_msgs_py.files.json_file import write_json
-from weld_twin_msgs_py.files.whole_files import write_text
+from weld_twin_msgs_py.files.whole_files import write_json, write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 from weld_twin_nodes.offline.output_directory import new_directory
 from weld_twin_nodes.offline.task_pool import Pool, Runner, Task, Tell

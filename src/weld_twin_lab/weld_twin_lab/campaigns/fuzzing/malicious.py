@@ -18,7 +18,7 @@ from lz4.frame import compress as lz4_compress
 
 from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.bags import bag_info, read_recording, recover
-from weld_twin_msgs_py.bags.unpack import zstd
+from weld_twin_msgs_py.bags.reader import zstd
 from weld_twin_msgs_py.files.diagnosis_model import load_model
 from weld_twin_msgs_py.files.path_file import read_path
 from weld_twin_msgs_py.robots import load_robot

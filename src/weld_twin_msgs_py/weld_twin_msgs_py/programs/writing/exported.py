@@ -12,7 +12,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 
 from ..context import Context
-from ..external_axes import ExternalAxis
+from ..controllers import ExternalAxis
 
 
 class ExportMove(NamedTuple):

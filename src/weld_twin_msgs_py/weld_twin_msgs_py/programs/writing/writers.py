@@ -11,7 +11,7 @@ import numpy as np
 from weld_twin_core.errors import DataError
 
 from ...files.csv_text import guarded
-from ..notation import ABB_POSE, KUKA_POSE, UR_POSE
+from ..source import ABB_POSE, KUKA_POSE, UR_POSE
 from .exported import Exported, ExportMove, comma
 
 BLEND = 1e-3

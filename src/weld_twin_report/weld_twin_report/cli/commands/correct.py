@@ -120,7 +120,7 @@ def _corrected_bag(args: argparse.Namespace) -> int:
 
 def _corrected_program(args: argparse.Namespace) -> int:
     """Read, correct, write; say what is expected."""
-    from weld_twin_msgs_py.files.json_file import write_json
+    from weld_twin_msgs_py.files.whole_files import write_json
     from weld_twin_msgs_py.programs import read_program
     from weld_twin_msgs_py.programs.languages import language_of
     from weld_twin_msgs_py.programs.source import read_source
@@ -141,8 +141,7 @@ def _corrected_program(args: argparse.Namespace) -> int:
 
 def _by_model(args: argparse.Namespace, context: Context, program: Program) -> int:
     from weld_twin_core.twin.program_correction import Caps
-    from weld_twin_msgs_py.files.json_file import write_json
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_msgs_py.files.whole_files import write_json, write_text
     from weld_twin_nodes.offline.correcting import (
         corrected_program,
         correction_entry,

@@ -388,7 +388,7 @@ class _Investigation:
         self, bags: list[str], place: Path, changes: Mapping[str, str], more: Sequence[str] = ()
     ) -> dict[str, Any]:
         """Run the diagnosis as its own command does; return the content of diagnosis.json."""
-        from weld_twin_msgs_py.files.json_file import read_json
+        from weld_twin_msgs_py.files.whole_files import read_json
 
         from ...report.diagnosis_files import RESULT
         from . import diagnose

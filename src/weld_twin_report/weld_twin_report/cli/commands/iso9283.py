@@ -80,8 +80,7 @@ def _write(
     args: argparse.Namespace,
 ) -> None:
     from weld_twin_core import __version__
-    from weld_twin_msgs_py.files.json_file import write_json
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_msgs_py.files.whole_files import write_json, write_text
 
     from ...report.performance_page import performance_page
 

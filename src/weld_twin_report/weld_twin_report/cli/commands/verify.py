@@ -92,8 +92,7 @@ def _write(
     args: argparse.Namespace, content: dict[str, Any], epoch_ns: int, result: Verification
 ) -> None:
     """Write verification.json and the page."""
-    from weld_twin_msgs_py.files.json_file import write_json
-    from weld_twin_msgs_py.files.whole_files import write_text
+    from weld_twin_msgs_py.files.whole_files import write_json, write_text
 
     from ...report.verification_page import verification_page
 
@@ -128,7 +127,7 @@ def _robot(args: argparse.Namespace, content: dict[str, Any]) -> Robot:
 
 
 def _correction(folder: str) -> dict[str, Any]:
-    from weld_twin_msgs_py.files.json_file import read_json
+    from weld_twin_msgs_py.files.whole_files import read_json
 
     path = Path(folder)
     path = path / CORRECTION if path.is_dir() else path

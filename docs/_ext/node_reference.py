@@ -17,8 +17,8 @@ from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.deviation_markers import DeviationMarkers
 from weld_twin_nodes.live.error_injector import ErrorInjector
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
-from weld_twin_nodes.live.graph_table import COMMON, SPOKEN, Spoken
 from weld_twin_nodes.live.live_diagnosis import LiveDiagnosis
+from weld_twin_nodes.live.policy import COMMON, SPOKEN, Spoken
 from weld_twin_nodes.live.recorder import Recorder
 from weld_twin_nodes.live.settings import SHARED, Setting
 from weld_twin_nodes.live.trajectory_generator import TrajectoryGenerator

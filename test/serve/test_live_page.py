@@ -12,7 +12,7 @@ import urllib.request
 import pytest
 
 from weld_twin_msgs_py.messages.topics import DIAGNOSIS
-from weld_twin_nodes.harness.ros_domain import own_domain
+from weld_twin_nodes.harness.process import own_domain
 
 for needed in ('rclpy', 'fastapi', 'uvicorn'):
     pytest.importorskip(needed, reason='the live page needs ROS 2 and the server')

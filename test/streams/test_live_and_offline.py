@@ -25,7 +25,7 @@ from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly import Role
 from weld_twin_msgs_py.bags import BagReader, BagWriter, read_recording
 from weld_twin_msgs_py.messages.to_messages import bag_messages
-from weld_twin_nodes.live.diagnosis_window import Window
+from weld_twin_nodes.live.live_diagnosis import Window
 from weld_twin_nodes.streams.twin_stream import JointStream
 
 START = 1_700_000_000_123_456_789

@@ -31,7 +31,7 @@ from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_POSE
 from weld_twin_nodes.harness import Cell
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 

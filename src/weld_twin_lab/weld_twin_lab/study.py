@@ -35,8 +35,7 @@ from weld_twin_msgs_py.files import markdown
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_nodes.cli.options import POOL
 from weld_twin_nodes.cli.parsing import Options
-from weld_twin_nodes.offline.output_directory import write_owned
-from weld_twin_nodes.offline.owned_files import LIST
+from weld_twin_nodes.offline.output_directory import LIST, write_owned
 
 if TYPE_CHECKING:
     from weld_twin_nodes.offline.task_pool import Runner, Task

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from weld_twin_lab.experiments.closing_weights import heard, page, reached, unseen, weights
-from weld_twin_nodes.offline import closing
+from weld_twin_nodes.offline.investigation import AGAINST, BEGIN, FOR, OWN
 
 KEPT = Path(__file__).parents[4] / 'docs/results/investigate/learned.json'
 
@@ -20,7 +20,7 @@ def answer(own, same, against, right):
 
 def test_the_weights_are_those_of_the_table():
     found = weights(heard(json.loads(KEPT.read_text(encoding='utf-8'))['cases']))
-    kept = (closing.OWN, closing.FOR, closing.AGAINST, closing.BEGIN)
+    kept = (OWN, FOR, AGAINST, BEGIN)
     assert [*found.slopes, found.bias] == pytest.approx(kept, abs=0.006)
 
 

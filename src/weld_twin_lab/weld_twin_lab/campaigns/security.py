@@ -46,7 +46,7 @@ def _tried(args: argparse.Namespace, folder: Path, tell: Callable[[str], None]) 
     from contextlib import ExitStack
 
     from weld_twin_core.errors import TwinError
-    from weld_twin_nodes.harness.ros_domain import own_domain
+    from weld_twin_nodes.harness.process import own_domain
 
     from .securing.middleware import secured_middleware
     from .securing.scenario import PARTIES, locks, played

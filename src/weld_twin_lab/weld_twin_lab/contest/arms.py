@@ -15,7 +15,7 @@ import numpy as np
 from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
 from weld_twin_core.recording import Recording
-from weld_twin_msgs_py.files.csv_text import table
+from weld_twin_msgs_py.files.markdown import table
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.files.yaml_file import yaml_text
 

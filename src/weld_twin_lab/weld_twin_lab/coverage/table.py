@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from weld_twin_msgs_py.files.csv_text import table
+from weld_twin_msgs_py.files.markdown import table
 
 Entry = dict[str, Any]
 REGIONS = ('inside', 'outside')

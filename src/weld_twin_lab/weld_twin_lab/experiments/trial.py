@@ -13,8 +13,7 @@ from typing import Any
 from weld_twin_core.diagnosis.advice import Limits
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
-from weld_twin_nodes.offline.closing import STATED, signs, weighed
-from weld_twin_nodes.offline.investigation import decided, question, short
+from weld_twin_nodes.offline.investigation import STATED, decided, question, short, signs, weighed
 
 from .sealed_cell import SealedCell, as_motion
 

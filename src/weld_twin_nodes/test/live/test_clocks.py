@@ -12,7 +12,7 @@ import pytest
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_msgs_py.messages.topics import MEASURED_POSE, TWIN_POSE
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.streams.deviation_stream import Deviations
 

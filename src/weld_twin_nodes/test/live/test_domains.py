@@ -13,14 +13,14 @@ import pytest
 import rclpy
 from rclpy.node import Node
 
-from weld_twin_nodes.harness.ros_domain import DOMAINS, own_domain
+from weld_twin_nodes.harness.process import DOMAINS, own_domain
 
 pytestmark = pytest.mark.cells
 
 HOLD = """
 import os, sys
 os.getpid = lambda: int(sys.argv[1])
-from weld_twin_nodes.harness.ros_domain import own_domain
+from weld_twin_nodes.harness.process import own_domain
 with own_domain() as domain:
     print(domain, flush=True)
     sys.stdin.read()

@@ -13,10 +13,10 @@ from weld_twin_core.arm.rotation import quaternion_from_matrix, rotation_matrix,
 from weld_twin_core.errors import ModelError
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import MEASURED_POINT, MEASURED_POSE, TWIN_BASE, TWIN_POSE
-from weld_twin_nodes.harness.health_listener import HealthListener
-from weld_twin_nodes.live.cell_frames import frame_from
+from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
+from weld_twin_nodes.live.robot_settings import frame_from
 
 S = 1_000_000_000
 ROBOT = load('ur5')

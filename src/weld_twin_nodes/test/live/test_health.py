@@ -16,7 +16,7 @@ from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.assembly.joint_states import JointStates
 from weld_twin_msgs_py.messages.to_messages import bag_messages
 from weld_twin_msgs_py.messages.topics import BY_NAME
-from weld_twin_nodes.live.deviation_lines import DeviationLines, colors
+from weld_twin_nodes.live.deviation_markers import DeviationLines, colors
 from weld_twin_nodes.live.health import ERROR, OK, STALE, WARN, Health
 
 CONFIG = Path(__file__).parents[4] / 'src/weld_twin_nodes/config'

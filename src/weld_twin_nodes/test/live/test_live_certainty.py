@@ -15,7 +15,7 @@ from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior, as
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import TWIN_COVARIANCE, TWIN_POSE
 from weld_twin_nodes.harness import Cell
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin
 
 pytestmark = pytest.mark.cells

@@ -25,8 +25,8 @@ from weld_twin_msgs_py.messages.topics import (
     MEASURED_POINT,
     TopicNames,
 )
-from weld_twin_nodes.live.diagnosis_window import LONGEST, Window
 from weld_twin_nodes.live.diagnosis_worker import Finding, Job, Worker, find
+from weld_twin_nodes.live.live_diagnosis import LONGEST, Window
 from weld_twin_nodes.offline.told_twin import told_cameras
 
 START = 1_700_000_000_000_000_000

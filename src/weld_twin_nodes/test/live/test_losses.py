@@ -12,7 +12,7 @@ import pytest
 
 from weld_twin_msgs_py.messages.topics import JOINT_STATES
 from weld_twin_nodes.harness import Cell
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 
 pytestmark = pytest.mark.cells
 

@@ -26,7 +26,7 @@ from weld_twin_msgs_py.messages.topics import (
 )
 from weld_twin_msgs_py.robots import write_urdf
 from weld_twin_nodes.cli.main import main
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.error_injector import ErrorInjector
 from weld_twin_nodes.live.forward_kinematics_twin import ForwardKinematicsTwin

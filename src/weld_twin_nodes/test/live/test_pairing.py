@@ -17,8 +17,7 @@ from weld_twin_msgs_py.assembly.stamp_order import RESTART_AFTER, Forward
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import MEASURED_POSE, TWIN_BASE, TWIN_POSE
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
-from weld_twin_nodes.streams.deviation_stream import Deviations
-from weld_twin_nodes.streams.pairing import Pairing
+from weld_twin_nodes.streams.deviation_stream import Deviations, Pairing
 
 MS = 1_000_000
 

@@ -13,7 +13,7 @@ import pytest
 from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.live.bag_player import Playing, play
 from weld_twin_nodes.live.deviation_analyzer import DeviationAnalyzer
 from weld_twin_nodes.live.error_injector import ErrorInjector

@@ -5,8 +5,8 @@
 import numpy as np
 
 from weld_twin_core.effects.measurement import MeasurementNoise
-from weld_twin_nodes.live.pacing import STALLED, Pump
-from weld_twin_nodes.streams.injected_noise import Noise
+from weld_twin_nodes.live.trajectory_generator import STALLED, Pump
+from weld_twin_nodes.streams.twin_stream import Noise
 
 STAMPS = np.arange(100) * 10_000_000 + 5
 S = 1_000_000_000

@@ -15,7 +15,7 @@ from rclpy.qos import ReliabilityPolicy
 
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, TOOL_WRENCH
 from weld_twin_nodes.harness import Cell
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 
 pytestmark = pytest.mark.cells
 

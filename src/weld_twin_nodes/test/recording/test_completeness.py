@@ -26,7 +26,7 @@ from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, message_class
 from weld_twin_msgs_py.robots import write_urdf
 from weld_twin_nodes.harness import Cell
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.live.cell_node import CellNode
 
 pytestmark = pytest.mark.cells

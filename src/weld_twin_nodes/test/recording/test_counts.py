@@ -21,8 +21,8 @@ from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import Status, bag_messages
 from weld_twin_msgs_py.messages.typestore import TYPES
 from weld_twin_nodes.live.completeness import NEW, SentBook, shortfall
-from weld_twin_nodes.live.meeting import apart, beyond
-from weld_twin_nodes.live.message_definition import definition
+from weld_twin_nodes.live.recorded_topic import definition
+from weld_twin_nodes.live.trajectory_generator import apart, beyond
 from weld_twin_nodes.live.words import Book, Sent, word
 
 TWIN, INJECTOR = '/forward_kinematics_twin', '/error_injector'

@@ -19,7 +19,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages.topics import JOINT_STATES
 from weld_twin_nodes.harness import Cell
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 
 pytestmark = pytest.mark.cells
 

@@ -20,8 +20,7 @@ Everything happens in a ROS domain of its own, on this machine only. `Cell.add` 
 this process instead, where a debugger reaches it.
 """
 
-from .cell import Cell, CellTimeout
+from .cell import Cell, CellTimeout, Tap
 from .process import NodeProcess
-from .tap import Tap
 
 __all__ = ['Cell', 'CellTimeout', 'NodeProcess', 'Tap']

@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import tempfile
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -30,13 +31,81 @@ from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.to_messages import ros_messages
-from weld_twin_msgs_py.messages.topics import BY_NAME, JOINT_STATES, Topic
+from weld_twin_msgs_py.messages.topics import BY_NAME, DIAGNOSTICS, JOINT_STATES, Topic
 
-from ..live.pacing import Pump
+from ..live.trajectory_generator import Pump
 from ..offline.seam_motion import stamps
-from .process import NodeProcess, stop_all
-from .ros_domain import own_domain
-from .tap import Tap
+from .process import NodeProcess, own_domain, stop_all
+
+
+class Tap:
+    """Messages of one topic."""
+
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self.messages: list[Any] = []
+
+    def __len__(self) -> int:
+        return len(self.messages)
+
+    @property
+    def last(self) -> Any:
+        """Return the newest message."""
+        return self.messages[-1]
+
+    @property
+    def stamps(self) -> np.ndarray:
+        """Return the header stamps, int64 [ns]."""
+        return np.array(
+            [from_messages.stamp_ns(message) for message in self.messages], dtype=np.int64
+        )
+
+
+LEVELS = ('ok', 'warn', 'error', 'stale')
+
+
+class HealthListener:
+    """
+    The statuses on /diagnostics, by name.
+
+    Attributes
+    ----------
+    told : dict
+        Level and message of every status since the last `clear`, by its name.
+    values : dict
+        The last key-value pairs, by name of the status.
+
+    """
+
+    def __init__(self, node: Node) -> None:
+        self.told: dict[str, list[tuple[str, str]]] = defaultdict(list)
+        self.values: dict[str, dict[str, str]] = {}
+        node.create_subscription(
+            DIAGNOSTICS.message_class(),
+            DIAGNOSTICS.name,
+            self._take,
+            DIAGNOSTICS.requested.to_rclpy(),
+        )
+
+    def clear(self) -> None:
+        """Forget what was told, not the values."""
+        self.told.clear()
+
+    def of(self, node: str) -> list[tuple[str, str]]:
+        """Return level and message of all statuses of a node, by its name with the namespace."""
+        node = '/' + node.lstrip('/')
+        return [
+            entry
+            for name, entries in self.told.items()
+            if name == node or name.startswith(node + ': ')
+            for entry in entries
+        ]
+
+    def _take(self, message: Any) -> None:
+        for status in message.status:
+            self.told[status.name].append((LEVELS[ord(status.level)], status.message))
+        self.values |= from_messages.diagnostics(message)
+
 
 DEEP = 20_000
 """Samples a tap may be behind: what collects must not lose what the nodes keep up with."""

@@ -12,8 +12,7 @@ from typing import Any
 
 from weld_twin_core.errors import DataError
 
-from .qos_overrides import PREFIX
-from .settings import Setting
+from .settings import PREFIX, Setting
 
 MODULES = {
     'trajectory_generator': 'weld_twin_nodes.live.trajectory_generator',

@@ -22,8 +22,7 @@ from weld_twin_msgs_py.bags.reader import has_header
 from weld_twin_msgs_py.messages.to_messages import ros_messages
 from weld_twin_msgs_py.messages.topics import BY_NAME, DIAGNOSTICS, RELIABLE, Qos, Topic
 
-from .health import Health
-from .outputs import Output
+from .health import Health, Output
 
 CLOCK = '/clock'
 SETTLE = 0.2

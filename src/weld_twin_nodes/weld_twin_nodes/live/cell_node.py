@@ -33,15 +33,11 @@ from weld_twin_msgs_py.messages.topics import (
 
 from ..streams.stamp_watch import StampWatch
 from .all_nodes import refuse_unknown
-from .health import Input
-from .outputs import Output
-from .partners import full_names, unreached_subscribers
-from .qos_overrides import QosOverrides
-from .reading import Turn, measured_turn, reader
-from .settings import SHARED, Setting
-from .source import Source, Wanted
+from .health import Input, Output
+from .settings import SHARED, QosOverrides, Setting
+from .source import Source, Wanted, full_names, unreached_subscribers
 from .telling_node import TellingNode
-from .words import ALIVE
+from .words import ALIVE, Turn, measured_turn, reader
 
 READY_EVERY = 0.02
 """Seconds between two looks at whether the listeners are there."""

@@ -10,10 +10,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
+import numpy as np
 from rclpy.task import Future
 
 from weld_twin_core.arm.rotation import transform
-from weld_twin_core.twin.goal_correction import CorrectedGoal, Refusal
+from weld_twin_core.twin.goal_correction import CorrectedGoal, GoalLimits, Refusal
 from weld_twin_core.twin.pose_correction import PoseCorrection
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.assembly import Intake, Role
@@ -32,20 +33,85 @@ from weld_twin_msgs_py.messages.topics import (
     TOOL_WRENCH,
 )
 
-from ..offline.loaded_model import LoadedModel, loaded
+from ..offline.correcting import LoadedModel, loaded
 from ..streams.arm_state import ArmState, Moving
 from ..streams.looks_beside import LooksBeside
 from ..streams.pose_stream import PoseStream
 from ..streams.supervision import Supervision
-from .cell_frames import base_frame
-from .compensator_settings import COMPENSATOR_SETTINGS, limits_of
-from .goal_audit import GoalAudit
-from .goal_judge import GoalJudge, Judged
+from .cell_node import CellNode
+from .goal_judge import GoalAudit, GoalJudge, Judged
 from .goal_relay import Decision, GoalRelay
 from .managed_node import ManagedNode
-from .robot_settings import robot_of
+from .robot_settings import JOINT_SETTINGS, ROBOT_SETTINGS, base_frame, robot_of
 from .run_node import run
 from .settings import Setting
+
+COMPENSATOR_SETTINGS = (
+    Setting(
+        'managed',
+        True,
+        'work only between the transitions activate and deactivate of a managed node; else at once',
+    ),
+    *ROBOT_SETTINGS,
+    *JOINT_SETTINGS,
+    Setting('model', '', 'diagnosis.json of this arm; ~/reload reads it again', live=True),
+    Setting(
+        'controller',
+        'joint_trajectory_controller',
+        'controller whose action follow_joint_trajectory corrected goals go to',
+    ),
+    Setting('apply', False, 'send what is corrected; else tell the correction alone', live=True),
+    Setting(
+        'on_refusal',
+        'stop',
+        'what becomes of poses that are refused: stop (nothing is sent) or pass; goals are rejected',
+        live=True,
+        choices=('stop', 'pass'),
+    ),
+    Setting('max_correction_m', 2e-3, 'longest way a pose may be moved [m]', 0.0, 0.1, live=True),
+    Setting(
+        'max_correction_rad',
+        float(np.pi / 180.0),
+        'largest turn a pose may be moved by [rad]',
+        0.0,
+        0.2,
+        live=True,
+    ),
+    Setting('max_rate_m_s', 0.05, 'fastest change of that way [m/s]', 1e-6, 10.0, live=True),
+    Setting('max_rate_rad_s', 0.2, 'fastest change of that turn [rad/s]', 1e-6, 100.0, live=True),
+    Setting(
+        'max_acceleration',
+        20.0,
+        'largest acceleration of a joint in what is corrected [rad/s^2, m/s^2]; the robot file may '
+        'say less',
+        1e-6,
+        1e4,
+        live=True,
+    ),
+    Setting(
+        'max_model_age',
+        0.0,
+        'age of the model file above which nothing is corrected [s]; 0: any',
+        0.0,
+        1e10,
+        live=True,
+    ),
+    Setting(
+        'max_age',
+        1.0,
+        'age of the last joint state above which it is not known where the arm stands [s]',
+        0.05,
+        3600.0,
+    ),
+    Setting('audit', '', 'file that the audit line of every goal is added to; none when empty'),
+)
+
+
+def limits_of(node: CellNode) -> GoalLimits:
+    """Return what a correction may do at most, by the parameters of a node."""
+    names = ('correction_m', 'correction_rad', 'rate_m_s', 'rate_rad_s', 'acceleration')
+    return GoalLimits(*(node.setting(f'max_{name}') for name in names))
+
 
 INACTIVE = 'the compensator is not active; configure and activate it'
 CHANGED = 'the model was exchanged while the goal was worked out; send it again'

@@ -19,7 +19,7 @@ from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.topics import CONTACT, JOINT_STATES
 
 from .cell_node import CellNode
-from .input_settings import JOINT_SETTINGS
+from .robot_settings import JOINT_SETTINGS
 from .run_node import run
 from .settings import Setting
 

@@ -21,10 +21,8 @@ from weld_twin_msgs_py.messages.topics import (
 )
 
 from ..streams.deviation_stream import METRICS, Deviation, Deviations
-from .cell_frames import base_frame
 from .cell_node import CellNode
-from .input_settings import JOINT_SETTINGS, MEASURED_SETTINGS
-from .robot_settings import ROBOT_SETTINGS, robot_of
+from .robot_settings import JOINT_SETTINGS, MEASURED_SETTINGS, ROBOT_SETTINGS, base_frame, robot_of
 from .run_node import run
 from .settings import Setting
 from .tf_frames import MeasuredInputs

@@ -11,10 +11,9 @@ from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.messages.cdr_write import JointStateEncoder, PoseEncoder
 from weld_twin_msgs_py.messages.topics import ACTUAL_JOINT_STATES, MEASURED_POSE
 
-from ..streams.injected_noise import Noise
-from ..streams.twin_stream import Sample
-from .cell_frames import measuring_frame
+from ..streams.twin_stream import Noise, Sample
 from .model_node import ModelNode
+from .robot_settings import measuring_frame
 from .run_node import run
 from .settings import Setting
 

@@ -15,8 +15,8 @@ from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 from weld_twin_msgs_py.messages.topics import TWIN_BASE, TWIN_COVARIANCE, TWIN_POSE
 
 from ..streams.twin_stream import Sample
-from .cell_frames import measuring_frame
 from .model_node import ModelNode
+from .robot_settings import measuring_frame
 from .run_node import run
 
 OUTSIDE = 'outside what was recorded'

@@ -1,10 +1,14 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Goals worked out beside a node, so that it serves poses and the rest meanwhile."""
+"""Goals worked out beside a node, so that it serves poses meanwhile, and what became of each."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from concurrent.futures import Future, wait
+from datetime import datetime, timezone
+from pathlib import Path
 from typing import Any
 
 from weld_twin_core.errors import DataError, TwinError
@@ -17,9 +21,96 @@ from weld_twin_core.twin.goal_correction import (
 )
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.messages.goals import GoalPoints, beyond_tolerance, read_goal
+from weld_twin_msgs_py.messages.topics import AUDIT
 
 from .cell_node import CellNode
 from .work_beside import WorkBeside
+
+WRITTEN = 1.0
+"""Seconds an ending node gives its disk to take the audit."""
+
+
+class GoalAudit:
+    """Tells of goals for a node, whose parameters ``apply`` and ``audit`` it reads."""
+
+    def __init__(self, node: CellNode) -> None:
+        self._node = node
+        self._out = node.offer(AUDIT, awaited=False)
+        self._books = WorkBeside()
+        self._written: Future[None] | None = None
+
+    def close(self) -> None:
+        """End, when what became of goals is written."""
+        if self._written is not None and not wait([self._written], WRITTEN).done:
+            path = self._node.setting('audit')
+            self._node.get_logger().warning(f"audit '{path}' has not taken all lines")
+
+    def judged(self, model: str | None, result: CorrectedGoal | Refusal, below: str = '') -> None:
+        """Tell of a goal that was worked out; as `settle`."""
+        if isinstance(result, Refusal):
+            self.settle(model, result, 'refused', result.reason, below)
+        else:
+            self.settle(
+                model, result, 'corrected' if result.before else 'nothing to correct', '', below
+            )
+
+    def settle(
+        self,
+        model: str | None,
+        result: CorrectedGoal | Refusal | None,
+        verdict: str,
+        why: str,
+        below: str = '',
+    ) -> None:
+        """
+        Tell what became of a goal.
+
+        model: digest of the model.
+        below: what the controller said where it did not take it.
+        """
+        largest = None if result is None else result.largest
+        line: dict[str, Any] = {
+            'time': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),
+            'model': model,
+            'applied': self._node.setting('apply'),
+            'verdict': 'rejected by the controller' if below else verdict,
+            'why': below or why,
+            'largest_m': None if largest is None else largest[0],
+            'largest_rad': None if largest is None else largest[1],
+        }
+        if isinstance(result, CorrectedGoal):
+            line |= {
+                'expected_before_m': result.before,
+                'expected_after_m': result.after,
+                'bound_m': result.bound,
+                'waits_s': result.waits,
+                'notes': list(result.notes),
+            }
+        text = json.dumps(line)
+        self._out.publish(AUDIT.message_class()(data=text))
+        reported = f'goal {text}'
+        if below or verdict == 'refused':
+            self._node.get_logger().warning(reported)
+            self._node.health.say(f'goal {line["verdict"]}: {line["why"]}')
+        else:
+            self._node.get_logger().info(reported)
+        self._write(text)
+
+    def _write(self, text: str) -> None:
+        """Add a line to the file beside: poses do not wait for a disk."""
+        path = self._node.setting('audit')
+        if path:
+            if self._written is not None and not self._written.done():
+                self._node.warn(path, f"audit '{path}' does not take lines; they wait")
+            self._written = self._books.submit(self._append, path, text)
+
+    def _append(self, path: str, text: str) -> None:
+        try:
+            with Path(path).open('a', encoding='utf-8') as file:
+                file.write(text + '\n')
+        except OSError as error:
+            self._node.warn(path, f"audit '{path}' cannot be written: {error.strerror}")
+
 
 POLL = 0.002
 """Seconds between two looks at whether a goal is worked out."""

@@ -17,10 +17,8 @@ from weld_twin_msgs_py.messages.topics import JOINT_STATES, TEMPERATURE, TOOL_WR
 
 from ..offline.told_twin import build_twin, doubts
 from ..streams.twin_stream import JointStream, Sample
-from .cell_frames import placed_twin
 from .cell_node import CellNode
-from .input_settings import JOINT_SETTINGS
-from .robot_settings import ROBOT_SETTINGS, robot_of
+from .robot_settings import JOINT_SETTINGS, ROBOT_SETTINGS, placed_twin, robot_of
 from .settings import Setting
 
 MODEL_SETTINGS = (

@@ -1,15 +1,126 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The SROS2 policy of the nodes, for a namespace and with remaps: each may do what it does."""
+"""
+What each node says, hears, answers and asks: the one table of it, and the SROS2 policy made of it.
+
+The reference is made from it, too; a test holds it to what the running nodes open. Names without a
+slash lie in the node's namespace.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.messages import topics as t
+from weld_twin_msgs_py.messages.topics import Topic
 
-from .graph_table import SPOKEN
+_EVERYBODY_SAYS = ('/diagnostics', '/parameter_events', '/rosout')
+_EVERYBODY_HEARS = ('/clock', '/diagnostics')
+_EVERYBODY_ANSWERS = tuple(
+    f'~/{name}'
+    for name in (
+        'describe_parameters',
+        'get_parameter_types',
+        'get_parameters',
+        'get_type_description',
+        'list_parameters',
+        'set_parameters',
+        'set_parameters_atomically',
+    )
+)
+COMMON = frozenset({*_EVERYBODY_SAYS, *_EVERYBODY_HEARS, *_EVERYBODY_ANSWERS})
+"""What every node has."""
+_MANAGED_ANSWER = tuple(
+    f'~/{name}'
+    for name in (
+        'change_state',
+        'get_available_states',
+        'get_available_transitions',
+        'get_state',
+        'get_transition_graph',
+    )
+)
+_MANAGED_SAY = ('~/transition_event',)
+
+
+class Spoken(NamedTuple):
+    """Topics, services and actions of a node, sorted, each name once."""
+
+    publishes: tuple[str, ...]
+    hears: tuple[str, ...]
+    answers: tuple[str, ...]
+    asks: tuple[str, ...] = ()
+    does: tuple[str, ...] = ()
+    """Actions that it offers."""
+    sends: tuple[str, ...] = ()
+    """Actions of others that it sends goals to."""
+
+
+def _names(rows: Iterable[Topic | str]) -> set[str]:
+    return {row if isinstance(row, str) else row.relative for row in rows}
+
+
+def _node(
+    says: Iterable[Topic | str],
+    hears: Iterable[Topic | str],
+    answers: Iterable[str] = (),
+    asks: Iterable[str] = (),
+    actions: tuple[Iterable[str], Iterable[str]] = ((), ()),
+) -> Spoken:
+    return Spoken(
+        tuple(sorted({*_EVERYBODY_SAYS, *_names(says)})),
+        tuple(sorted({*_EVERYBODY_HEARS, *_names(hears)})),
+        tuple(sorted({*_EVERYBODY_ANSWERS, *answers})),
+        tuple(sorted(asks)),
+        *(tuple(sorted(each)) for each in actions),
+    )
+
+
+_MODEL = (t.JOINT_STATES, t.TOOL_WRENCH, t.TEMPERATURE, t.ROBOT_DESCRIPTION, *t.FRAMES)
+_MEASURED = (t.MEASURED_POSE, t.MEASURED_POINT, t.ROBOT_DESCRIPTION, *t.FRAMES)
+SPOKEN = {
+    'trajectory_generator': _node(
+        (t.JOINT_STATES, t.PLANNED_TRAJECTORY, t.PLANNED_PATH),
+        (
+            *(t.DEVIATION, t.JOINT_TRAJECTORY, t.PATH, t.ROBOT_DESCRIPTION),
+            *t.FRAMES,
+        ),
+    ),
+    'error_injector': _node((t.ACTUAL_JOINT_STATES, t.MEASURED_POSE), _MODEL, ('~/reload',)),
+    'forward_kinematics_twin': _node(
+        (t.TWIN_POSE, t.TWIN_COVARIANCE, t.TWIN_BASE), _MODEL, ('~/reload',)
+    ),
+    'deviation_analyzer': _node(
+        (t.DEVIATION, t.DEVIATION_METRICS), (*_MEASURED, t.TWIN_BASE, t.TWIN_POSE)
+    ),
+    'live_diagnosis': _node(
+        (t.DIAGNOSIS, *_MANAGED_SAY),
+        (*_MODEL, *_MEASURED, t.MEASURED_SIGMA, t.IMAGE_POINTS),
+        _MANAGED_ANSWER,
+    ),
+    'deviation_markers': _node((t.MARKERS,), (*_MEASURED, t.TWIN_BASE, t.DEVIATION)),
+    'contact_marker': _node((t.CONTACT,), (t.JOINT_STATES,), ('~/mark',)),
+    'compensator': _node(
+        (t.POSE_OUT, t.CORRECTION, t.AUDIT, *_MANAGED_SAY),
+        (*_MODEL, t.DEVIATION, t.POSE_IN),
+        ('~/reload', *_MANAGED_ANSWER),
+        actions=(
+            ('~/follow_joint_trajectory',),
+            ('joint_trajectory_controller/follow_joint_trajectory',),
+        ),
+    ),
+    'recorder': _node(
+        _MANAGED_SAY,
+        (*t.TOPICS, *t.AROUND, *t.FRAMES, '/parameter_events'),
+        ('~/counts', *_MANAGED_ANSWER),
+        ('error_injector/get_parameters', 'forward_kinematics_twin/get_parameters'),
+    ),
+}
+"""Everything that a node opens with any of its parameters."""
+
 
 HEAD = """\
 <?xml version="1.0" encoding="UTF-8"?>

@@ -1,21 +1,138 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One topic being recorded: its type, its quality of service, what came of it."""
+"""One topic being recorded: its type, its definition, its quality of service, what came of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
-from weld_twin_core.errors import TwinError
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from rosbags.interfaces import Qos as BagQos
+from rosbags.interfaces import QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.bags.reader import has_header
+from weld_twin_msgs_py.bags.segment import Channel
 from weld_twin_msgs_py.messages.cdr_read import checked
 from weld_twin_msgs_py.messages.topics import BY_NAME, LATCHED, RELIABLE, VOLATILE, Qos
+from weld_twin_msgs_py.messages.typestore import TYPES
 
 from .cell_node import CellNode
-from .outputs import header_stamp
-from .partners import full_names
-from .source import LEAST, Wanted
+from .health import header_stamp
+from .source import LEAST, Wanted, full_names
 from .words import Sent
+
+RULE = '=' * 80
+"""The line between the parts of a definition, as rosbag2 writes it."""
+_SIZES = (8, 16, 32, 64)
+"""Bits of the whole numbers there are."""
+BUILT_IN = (
+    *('bool', 'byte', 'char', 'float32', 'float64', 'string', 'wstring'),
+    *(f'int{size}' for size in _SIZES),
+    *(f'uint{size}' for size in _SIZES),
+)
+"""Primitive types of the interface definition language."""
+
+
+def definition(kind: str) -> str:
+    """
+    Return the definition of a message type and of all it is made of, as bags hold it.
+
+    Raises DataError: its package, or one it needs, is not installed with its .msg files.
+    """
+    parts: dict[str, str] = {}
+    _gather(kind, parts, _installed)
+    first, *others = parts.items()
+    return first[1] + ''.join(f'{RULE}\nMSG: {_short(name)}\n{text}' for name, text in others)
+
+
+def _gather(kind: str, parts: dict[str, str], read: Callable[[str], str]) -> None:
+    """Add a type and what its fields need."""
+    if kind in parts:
+        return
+    text = parts[kind] = read(kind).rstrip() + '\n'
+    package = kind.split('/')[0]
+    for line in text.splitlines():
+        words = line.split('#')[0].split()
+        base = words[0].split('[')[0].split('<')[0] if len(words) > 1 else ''
+        if not base or base in BUILT_IN:
+            continue
+        *owner, name = base.split('/')
+        _gather(f'{owner[0] if owner else package}/msg/{name}', parts, read)
+
+
+def _installed(kind: str) -> str:
+    package, _, name = kind.split('/')
+    for share in _shares(package):
+        file = Path(share, 'msg', f'{name}.msg')
+        if file.is_file():
+            return file.read_text(encoding='utf-8')
+    raise DataError(
+        f'the definition of {kind} is not installed here; install the package {package}'
+    )
+
+
+def _shares(package: str) -> Iterator[str]:
+    """Yield where a package may keep its files; wheels keep them without telling the index."""
+    with suppress(PackageNotFoundError, LookupError, OSError):
+        yield get_package_share_directory(package)
+    yield f'{sys.prefix}/share/{package}'
+
+
+def _short(kind: str) -> str:
+    return kind.replace('/msg/', '/')
+
+
+NANOSECONDS = 1_000_000_000
+UNTOLD = 'RIHS01_' + 64 * '0'
+"""Hash of a type that nobody could be asked for any more."""
+
+
+def offered_channel(topic: str, kind: str, publishers: Sequence[Any]) -> Channel:
+    """Return a topic as its publishers offer it."""
+    digest = next((str(info.topic_type_hash) for info in publishers), '')
+    text = ''
+    if kind not in TYPES.types:
+        try:
+            text = definition(kind)
+            digest = digest or type_hash(kind, text)
+        except DataError:  # the messages are worth keeping without
+            text = '# the definition of this type was not installed where it was recorded\n'
+            digest = digest or UNTOLD
+    qos = tuple(_profile(info.qos_profile) for info in publishers)
+    return Channel(topic, kind, text, digest, qos)
+
+
+def type_hash(kind: str, text: str) -> str:
+    """Return the hash of a type by its definition."""
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(text, kind))
+    return store.hash_rihs01(kind)
+
+
+def _profile(offered: Any) -> BagQos:
+    """Return a profile of rclpy as bags hold it; the graph does not tell history and depth."""
+    return BagQos(
+        history=QosHistory[offered.history.name],
+        depth=offered.depth,
+        reliability=QosReliability[offered.reliability.name],
+        durability=QosDurability[offered.durability.name],
+        deadline=_time(offered.deadline),
+        lifespan=_time(offered.lifespan),
+        liveliness=QosLiveliness[offered.liveliness.name],
+        liveliness_lease_duration=_time(offered.liveliness_lease_duration),
+        avoid_ros_namespace_conventions=offered.avoid_ros_namespace_conventions,
+    )
+
+
+def _time(duration: Any) -> QosTime:
+    return QosTime(*divmod(duration.nanoseconds, NANOSECONDS))
+
 
 DEEP = 10_000
 """

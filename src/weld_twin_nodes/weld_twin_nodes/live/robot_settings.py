@@ -1,23 +1,231 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters by which a node is told its robot."""
+"""
+The parameters by which a node is told its robot, its frames, and what its inputs call things.
+
+Where the base is may be taken from `/tf` when a node starts; it is watched from then on.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.errors import TwinError
+from weld_twin_core.arm.rotation import (
+    angle_between,
+    matrix_from_quaternion,
+    rotation_matrix,
+    transform,
+)
+from weld_twin_core.arrays import Array
+from weld_twin_core.errors import DataError, ModelError, TwinError
+from weld_twin_core.twin.twin import Twin
+from weld_twin_msgs_py.assembly.frame_names import BASE, WORLD
+from weld_twin_msgs_py.assembly.joint_states import names_called
+from weld_twin_msgs_py.assembly.transforms import NoTransform
+from weld_twin_msgs_py.files.yaml_file import parse_yaml
 from weld_twin_msgs_py.messages.cdr_read import decoder
 from weld_twin_msgs_py.messages.topics import ROBOT_DESCRIPTION
 from weld_twin_msgs_py.robots import load_robot, parse_urdf
 
-from .cell_frames import FRAME_SETTINGS, placed
 from .cell_node import CellNode
-from .input_settings import joint_names
-from .settings import Setting
+from .settings import NO_NUMBERS, Setting
+from .tf_frames import Frames, frames_of
+
+LOOK_EVERY = 0.5
+"""Seconds between two looks at whether the base is still there."""
+MOVED = 1e-4
+"""Way [m] or turn [rad] of a base that has moved: a tenth of a millimetre, what good trackers see."""
+
+
+def base_on_tf(node: CellNode) -> Array:
+    """
+    Return T_measuring_base, shape (4, 4), once `/tf` tells it.
+
+    Raises ModelError: the two frames have no names, `/tf` cannot be read here, or the node is
+    stopped before they are told.
+    """
+    measuring, base = node.setting('measuring_frame'), node.setting('base_frame')
+    if not measuring or not base:
+        raise ModelError('base_from_tf needs the names measuring_frame and base_frame')
+    frames = frames_of(node)
+    if frames.lack:
+        raise ModelError(f'base_from_tf cannot be done: {frames.lack}')
+
+    def told() -> bool:
+        try:
+            frames.tree.latest(measuring, base)
+        except NoTransform as error:
+            node.keep('frames', f'waiting for /tf: {error}', logged=False)
+            return False
+        return True
+
+    if not told():
+        node.serve_until(told, f'/tf to tell where {base!r} is in {measuring!r}')
+    node.keep('frames', '')
+    T = frames.tree.latest(measuring, base)
+    node.remark(f'the base is where /tf has {base!r} in {measuring!r}')
+    node.every(LOOK_EVERY, lambda: _watch(node, frames, T))
+    return T
+
+
+def _watch(node: CellNode, frames: Frames, taken: Array) -> None:
+    """Tell, as long as it is so, that the base is not where it was when the node started."""
+    measuring, base = node.setting('measuring_frame'), node.setting('base_frame')
+    try:
+        now = frames.tree.latest(measuring, base)
+    except NoTransform as error:
+        node.keep('frames', str(error))
+        return
+    way = float(np.linalg.norm(now[:3, 3] - taken[:3, 3]))
+    turn = float(np.linalg.norm(angle_between(now[:3, :3], taken[:3, :3])))
+    sentence = (
+        f'{base!r} has moved in {measuring!r} by {way * 1e3:.3g} mm and {np.degrees(turn):.3g} '
+        'degrees since this node started; it goes on with the base where it was then: start it '
+        'anew, or say T_measuring_base'
+    )
+    node.keep('frames', sentence if way >= MOVED or turn >= MOVED else '')
+
+
+FRAME_SETTINGS = (
+    Setting(
+        'measuring_frame',
+        '',
+        'frame that measurements must be given in, and that poses are given in; empty: the first '
+        'that comes, and world',
+    ),
+    Setting('base_frame', '', "name of the robot's base in what is published; empty: base"),
+    Setting(
+        'base_from_tf',
+        False,
+        'take from /tf where the base is: base_frame in measuring_frame, when the node starts',
+    ),
+    Setting(
+        'T_measuring_base',
+        NO_NUMBERS,
+        'where the base is in the measuring frame [m, rad]: x y z and a rotation vector, or x y z '
+        'and a quaternion x y z w; not set: as the robot or its model has it',
+        numbers=True,
+    ),
+)
+
+
+def measuring_frame(node: CellNode) -> str:
+    """Return the name of the frame in which poses are told."""
+    return node.setting('measuring_frame') or WORLD
+
+
+def base_frame(node: CellNode) -> str:
+    """Return the name of the robot's base in what is published."""
+    return node.setting('base_frame') or BASE
+
+
+def placed(node: CellNode, robot: Robot) -> Robot:
+    """
+    Return the robot with its base where the node's parameters put it.
+
+    Raises ModelError: ``T_measuring_base`` is no pose, or the node is stopped before `/tf` tells
+    one.
+    """
+    values = node.setting('T_measuring_base')
+    if values != NO_NUMBERS:
+        return robot.with_origin(frame_from(values))
+    if not node.setting('base_from_tf'):
+        return robot
+    if node.arm is not None:  # it was asked for when the node took its robot
+        return robot.with_frames(base=node.arm.T_world_base)
+    return robot.with_origin(base_on_tf(node))
+
+
+def placed_twin(node: CellNode, twin: Twin) -> Twin:
+    """Return the twin of a model likewise; the parameter counts more than a fitted base."""
+    robot = placed(node, twin.robot)
+    moved = abs(robot.T_world_base - twin.robot.T_world_base).max()
+    if moved > 0.0:
+        node.remark('the base that was given is used; the base of the model differs from it')
+    return twin if moved == 0.0 else Twin(robot, twin.effects)
+
+
+def frame_from(values: Sequence[float] | str) -> Array:
+    """
+    Return the 4 x 4 matrix of x y z and a rotation vector or a quaternion.
+
+    Raises ModelError: there are neither six nor seven finite numbers, or the quaternion is not of
+    length 1.
+    """
+    try:
+        numbers = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.size not in (6, 7) or not np.isfinite(numbers).all():
+        raise ModelError(
+            'T_measuring_base takes 6 numbers, x y z and a rotation vector, or 7, x y z and a '
+            f'quaternion x y z w, got {values if isinstance(values, str) else list(values)}'
+        )
+    if numbers.size == 6:
+        return transform(rotation_matrix(numbers[3:]), numbers[:3])
+    try:
+        return transform(matrix_from_quaternion(numbers[3:], 'T_measuring_base'), numbers[:3])
+    except DataError as error:
+        raise ModelError(str(error)) from None
+
+
+JOINT_SETTINGS = (
+    Setting(
+        'joint_prefix',
+        '',
+        "what the joint states put before the robot's joint names; empty: any one prefix is taken "
+        'off and reported',
+    ),
+    Setting(
+        'joint_map',
+        '',
+        "what the joint states call joints, as a YAML mapping from the robot's own names, such as "
+        "'{joint_1: A1, joint_2: A2}'; names left out stay",
+    ),
+    Setting(
+        'joints_beside',
+        '',
+        'joints on the same topic that do not carry the arm, such as those of a gripper, separated '
+        'by commas: that they move is no cause for a warning',
+    ),
+    Setting(
+        'joint_part',
+        '',
+        "part of a controller's state that is taken; empty: reference for commanded joints, "
+        'feedback where it stands for a measurement',
+    ),
+)
+MEASURED_SETTINGS = (
+    Setting(
+        'measured_frame',
+        '',
+        'frame that was measured, where measurements come as transforms',
+    ),
+)
+
+
+def joint_names(node: CellNode, robot: Robot) -> tuple[str, ...] | None:
+    """
+    Return what the joint states call the joints of a robot; None where nothing is said.
+
+    Raises ModelError: the map is no mapping of names, names a joint the robot has not, or gives a
+    name twice.
+    """
+    prefix, text = node.setting('joint_prefix'), node.setting('joint_map')
+    if not prefix and not text:
+        return None
+    given = parse_yaml(text, 'joint_map') if text else {}
+    if not isinstance(given, dict) or not all(isinstance(v, str) for v in given.values()):
+        raise ModelError(
+            f'joint_map must be a mapping of names such as {{joint_1: A1}}, got {text!r}'
+        )
+    return names_called(robot, prefix, given)
+
 
 ROBOT_SETTINGS = (
     Setting(

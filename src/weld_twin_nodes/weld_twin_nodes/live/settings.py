@@ -1,13 +1,92 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of a node: declared once, with unit and range, in a table at the top of its file."""
+"""
+Parameters of a node: declared once, with unit and range, in a table at the top of its file.
+
+Quality of service comes from a parameter file, as other nodes of ROS 2 take it:
+``qos_overrides./joint_states.subscription.reliability: reliable`` and the like.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.node import Node
+
+from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.messages.topics import BEST_EFFORT, LATCHED, RELIABLE, VOLATILE, Qos
+
+PREFIX = 'qos_overrides.'
+ROLES = ('publisher', 'subscription')
+CHOICES = {'reliability': (RELIABLE, BEST_EFFORT), 'durability': (VOLATILE, LATCHED)}
+"""Policies that can be chosen, and what each may be; `depth` is a number from 1."""
+
+
+class QosOverrides:
+    """
+    What the parameters of a node say of its topics.
+
+    given: names of the parameters that the node was started with.
+    topics: what the node may have, under the names they have for it.
+
+    Raises DataError: a parameter names no such topic, or a policy that cannot be chosen.
+    """
+
+    def __init__(self, node: Node, given: Iterable[str], topics: Collection[str]) -> None:
+        self._node = node
+        self._given = {name for name in given if name.startswith(PREFIX)}
+        for name in self._given:
+            self._refuse_odd(name, topics)
+
+    def of(self, topic: str, role: str, qos: Qos) -> Qos:
+        """
+        Return the quality of service of a publisher or subscription.
+
+        Raises DataError: a value is none of those that there are.
+        """
+        policies = ('reliability', 'durability', 'depth')
+        values = {policy: self._value(topic, role, policy) for policy in policies}
+        return replace(qos, **{key: value for key, value in values.items() if value is not None})
+
+    def has(self, topic: str, role: str) -> bool:
+        """Return whether anything is said of a topic."""
+        return any(name.startswith(f'{PREFIX}{topic}.{role}.') for name in self._given)
+
+    def _value(self, topic: str, role: str, policy: str) -> Any:
+        name = f'{PREFIX}{topic}.{role}.{policy}'
+        if name not in self._given:
+            return None
+        if not self._node.has_parameter(name):
+            described = ParameterDescriptor(
+                description=f'{policy} of the {role}', read_only=True, dynamic_typing=True
+            )
+            self._node.declare_parameter(name, '', described)
+        value = self._node.get_parameter(name).value
+        choices = CHOICES.get(policy)
+        if choices is None and not (isinstance(value, int) and value > 0):
+            raise DataError(f'{name} must be a whole number from 1, got {value!r}')
+        if choices is not None and value not in choices:
+            raise DataError(f'{name} must be {" or ".join(choices)}, got {value!r}')
+        return value
+
+    def _refuse_odd(self, name: str, topics: Collection[str]) -> None:
+        """Refuse what would be passed over."""
+        topic, role, policy = (*name.removeprefix(PREFIX).rsplit('.', 2), '', '')[:3]
+        if role not in ROLES or policy not in (*CHOICES, 'depth'):
+            raise DataError(
+                f"'{name}' says nothing that can be chosen here: it is "
+                f'{PREFIX}TOPIC.ROLE.POLICY, with the roles {" and ".join(ROLES)} and the policies '
+                f'{", ".join(CHOICES)} and depth'
+            )
+        if topic not in topics:
+            like = get_close_matches(topic, topics, n=1)
+            hint = f"; did you mean '{like[0]}'?" if like else ''
+            raise DataError(f"'{name}': no node has a topic '{topic}'{hint}")
+
 
 NO_NUMBERS = ''
 """

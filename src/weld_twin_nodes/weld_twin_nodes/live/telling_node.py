@@ -16,11 +16,9 @@ from rclpy.node import Node
 from weld_twin_msgs_py.messages.to_messages import ros_messages
 from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, Topic
 
-from .health import Health, Input
+from .health import Health, Input, Output
 from .losses import Losses
-from .neighbour_health import NeighbourHealth
-from .outputs import Output
-from .words import Word
+from .words import NeighbourHealth, Word
 
 WARN_EVERY = 5.0
 """Seconds between two warnings about the same topic."""

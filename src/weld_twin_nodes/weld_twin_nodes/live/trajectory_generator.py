@@ -1,9 +1,16 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectory generator: plans a seam and publishes it as joint states."""
+"""
+Trajectory generator: plans a seam and publishes it as joint states.
+
+It begins when the nodes beside it are there and reach each other, and sends in real time or as fast
+as the listeners keep up.
+"""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any, ClassVar
 
@@ -25,13 +32,182 @@ from weld_twin_msgs_py.messages.topics import (
 )
 
 from ..offline.seam_motion import backward, joint_motion, plan_through, sampled, stamps, thinned
-from .cell_frames import measuring_frame
+from .all_nodes import MODULES
 from .cell_node import CellNode
-from .meeting import Meeting
-from .pacing import Pump
-from .robot_settings import ROBOT_SETTINGS, robot_of
+from .robot_settings import ROBOT_SETTINGS, measuring_frame, robot_of
 from .run_node import run
 from .settings import Setting
+from .words import Book
+
+QUIET = 1.0
+"""
+Seconds without a change on the graph after which nobody else is taken to be coming. Nodes that
+are started together appear within some tenths of a second of each other.
+"""
+LOOK_EVERY = 0.05
+"""Seconds between two looks at who is there."""
+Count = Callable[[str], int]
+
+
+def apart(book: Book, there: Collection[str]) -> list[str]:
+    """
+    Return whose word or whose listeners are still to come, among the nodes there are.
+
+    The graph a node sees is its own: that two others have not found each other yet, only they know,
+    and one of the two may know it before the other.
+    """
+    told = [word for word in book.latest() if word.node in there]
+    known = [node for node in there if node.rpartition('/')[2] in MODULES]
+    out = [f'{node} to tell of itself' for node in known if node not in book.nodes()]
+    for word in told:
+        for topic, count in word.reached.items():
+            wanted = [other.node for other in told if topic in other.inputs]
+            if count < len(wanted):
+                out.append(f'{word.node} to reach {" and ".join(wanted)} on {topic}')
+    for word in told:
+        for topic, heard in word.heard.items():
+            wanted = [other.node for other in told if topic in other.reached]
+            if heard.publishers < len(wanted):
+                out.append(f'{word.node} to hear {" and ".join(wanted)} on {topic}')
+    return out
+
+
+def beyond(book: Book, there: Collection[str], publishers: Count, subscribers: Count) -> list[str]:
+    """
+    Return whom the nodes that are there have met and the own graph does not show yet.
+
+    publishers, subscribers: from the name of a topic to how many the own graph has.
+    """
+    out = []
+    for word in book.latest():
+        if word.node in there:
+            out += [
+                f'somebody to be seen who sends {topic} to {word.node}'
+                for topic, heard in word.heard.items()
+                if publishers(topic) < heard.publishers
+            ]
+            out += [
+                f'somebody to be seen who takes {topic} from {word.node}'
+                for topic, count in word.reached.items()
+                if subscribers(topic) < count
+            ]
+    return out
+
+
+class Meeting:
+    """
+    Runs an action once, when the listeners of a node are there.
+
+    With ``wait_for_subscribers`` it waits for that many. Without, for a graph that has at least
+    one listener and no longer changes, on which the nodes of the project reach each other. Either
+    wait has an end, at which it says what is missing.
+
+    within: longest wait [s].
+    """
+
+    def __init__(self, node: CellNode, within: float, action: Callable[[], None]) -> None:
+        self._node, self._within, self._action = node, within, action
+        self._begun = self._changed = time.monotonic()
+        self._seen: Any = None
+        self._book = Book()
+        node.neighbours.hear(self._book.take)
+        self._timer = node.every(LOOK_EVERY, self._look)
+
+    def _look(self) -> None:
+        now = time.monotonic()
+        missing = self._missing(now)
+        if missing and now - self._begun <= self._within:
+            self._node.wait_for(missing)
+            return
+        if missing:
+            self._node.tell_once(f'waited {self._within:g} s for {missing}; beginning without')
+        self._node.wait_for('')
+        self._timer.cancel()
+        self._node.neighbours.hear_no_more(self._book.take)
+        self._action()
+
+    def _missing(self, now: float) -> str:
+        """Return what is still to come, empty when nothing is."""
+        node = self._node
+        if node.setting('wait_for_subscribers'):
+            unmet = node.lacking() or [f'{topic} to be matched' for topic in node.unmatched()]
+            return ', '.join(unmet)
+        seen = (sorted(node.get_node_names_and_namespaces()), node.listeners(), node.unmatched())
+        if seen != self._seen:
+            self._seen, self._changed = seen, now
+        if not any(node.listeners().values()):
+            return f'somebody to listen to {" or ".join(node.listeners())}'
+        there = {f'{space.rstrip("/")}/{name}' for name, space in seen[0]}
+        unmet = apart(self._book, there)
+        unmet += beyond(self._book, there, node.count_publishers, node.count_subscribers)
+        if unmet:
+            return ', '.join(unmet)
+        if node.unmatched() or now - self._changed < QUIET:
+            return 'the listeners to be complete'
+        return ''
+
+
+STALLED = 5.0
+"""Seconds without an answer after which the window is taken to be too small: a loaded machine may
+starve a listener for a second or two, and a wider window would then overflow its queue."""
+
+
+class Pump:
+    """
+    Hands out sample numbers to send.
+
+    stamps: header stamps, increasing, shape (N,) [ns].
+    playback: run speed against the stamps; 0 is as fast as the listeners keep up.
+    window: how many samples may be under way that nobody has answered yet.
+    answered: whether answers will be told at all; without them the window is not kept.
+    """
+
+    def __init__(
+        self, stamps: np.ndarray, *, playback: float, window: int, answered: bool
+    ) -> None:
+        self._stamps = stamps
+        self._playback = playback
+        self._window = window
+        self._limit = window if answered else len(stamps)
+        self._begin: int | None = None
+        self._progress: int | None = None
+        self.sent = 0
+
+    @property
+    def done(self) -> bool:
+        """Return whether all samples were handed out."""
+        return self.sent == len(self._stamps)
+
+    def answer(self, stamp: int) -> None:
+        """Take note that a listener has worked through the samples up to a stamp."""
+        seen = int(np.searchsorted(self._stamps, stamp, side='right'))
+        self._limit = max(self._limit, seen + self._window)
+        self._progress = None
+
+    def due(self, now: int, most: int) -> range:
+        """Return the numbers of the samples to send at a time [ns], at most so many."""
+        if self._begin is None:
+            self._begin = now
+        end = min(self._limit, self.sent + most, len(self._stamps))
+        if self._playback > 0.0:
+            reached = self._stamps[0] + (now - self._begin) * self._playback
+            end = min(end, int(np.searchsorted(self._stamps, reached, side='right')))
+        out = range(self.sent, max(end, self.sent))
+        self.sent = out.stop
+        self._widen(now)
+        return out
+
+    def _widen(self, now: int) -> None:
+        """Open the window when answers stay out: a late measurement clock shifts them all."""
+        if self.sent < self._limit or self.done:
+            self._progress = None
+        elif self._progress is None:
+            self._progress = now
+        elif now - self._progress > STALLED * 1e9:
+            self._window *= 2
+            self._limit += self._window
+            self._progress = None
+
 
 TICK = 0.002
 """Seconds between two looks at what is due."""

@@ -10,9 +10,19 @@ have found each other, and how many messages there were, only those know who sen
 from __future__ import annotations
 
 import json
+import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
+
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+
+from weld_twin_core.errors import DataError, TwinError
+from weld_twin_msgs_py.assembly.foreign_types import CONTROLLER, FedBack, plain_messages
+from weld_twin_msgs_py.messages import from_messages
+from weld_twin_msgs_py.messages.cdr_read import READERS, decoder
+from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, JOINT_STATES, message_class
 
 SENT, REACHED, HEARD, RUN, NODE = 'sent', 'reached', 'heard', 'run', 'node'
 """Keys of the health: what it sent by topic, how many subscriptions it reaches by topic, how many
@@ -136,3 +146,96 @@ class Book:
         early = ([w for w in words if w.at <= at - UNDER_WAY] for words in self._words.values())
         last = (words[-1].sent.get(topic) for words in early if words)
         return sum(sent.number for sent in last if sent is not None)
+
+
+Turn = Callable[[str, Any], Iterable[Any]]
+"""A type and a message of it, to the messages that it stands for."""
+
+
+def measured_turn(part: str, fed_back: FedBack | None) -> Turn:
+    """
+    Return what turns messages that stand for a measured pose into poses.
+
+    part: the frame that was measured, where a message holds several.
+    fed_back: turns what a controller feeds back; None where the robot is not known.
+    """
+
+    def turn(kind: str, message: Any) -> Iterable[Any]:
+        if kind == CONTROLLER and fed_back is not None:
+            return fed_back(message)
+        return plain_messages(kind, message, part)
+
+    return turn
+
+
+def reader(kind: str) -> Callable[[bytes], Any]:
+    """
+    Return what turns serialised messages of a type into objects.
+
+    Types of standard packages are read here. Others, whose definitions differ from release to
+    release, are read by the package that is installed.
+    """
+    if kind in READERS or kind == JOINT_STATES.type:
+        return decoder(kind)
+    of = message_class(kind)
+
+    def read(data: bytes) -> Any:
+        try:
+            return deserialize_message(bytes(data), of)
+        except Exception as error:  # rclpy raises bare RuntimeError and what numpy raises
+            raise DataError(
+                f'{len(data)} bytes that are no {kind} ({error}); something else publishes there'
+            ) from None
+
+    return read
+
+
+Hearer = Callable[[Word], None]
+
+
+class NeighbourHealth:
+    """One subscription of a node, for all of its parts that ask what the others tell."""
+
+    def __init__(self, node: Node) -> None:
+        self._read = reader(DIAGNOSTICS.type)
+        self._book = Book()
+        self._hearers: list[Hearer] = [self._book.take]
+        self._subscription: Any = node.create_subscription(
+            DIAGNOSTICS.message_class(),
+            DIAGNOSTICS.name,
+            self._take,
+            DIAGNOSTICS.requested.to_rclpy(),
+            raw=True,
+        )
+
+    def hear(self, hearer: Hearer) -> None:
+        """Hand on what they tell from now on."""
+        self._hearers.append(hearer)
+
+    def hear_no_more(self, hearer: Hearer) -> None:
+        """End what `hear` began."""
+        self._hearers.remove(hearer)
+
+    def alive(self) -> set[str]:
+        """Return the nodes that have told of themselves just now, also where none is served."""
+        handle = self._subscription.handle
+        with handle:
+            while (taken := handle.take_message(self._subscription.msg_type, True)) is not None:
+                self._take(taken[0])
+        return self._book.nodes(time.monotonic() - ALIVE)
+
+    def twice(self, node: str) -> bool:
+        """Return whether two nodes of one name tell of themselves."""
+        return self._book.twice(node, time.monotonic())
+
+    def _take(self, data: bytes) -> None:
+        """Hand on what nodes of the project tell; statuses of others are not even read."""
+        if REACHED.encode() not in data:
+            return
+        try:
+            told = word(from_messages.diagnostics(self._read(data)), time.monotonic())
+        except TwinError:  # somebody else's, and none of the inputs
+            return
+        if told is not None:
+            for hearer in [*self._hearers]:
+                hearer(told)

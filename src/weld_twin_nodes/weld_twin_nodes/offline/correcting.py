@@ -1,11 +1,17 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A robot program corrected by a model file: what is read, what is changed, what is told."""
+"""
+A robot program corrected by a model file: what is read, what is changed, what is told.
+
+Whether it keeps a tolerance all along, and the model as a running node corrects goals with it.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +21,14 @@ from weld_twin_core import __version__
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.predicting.planned import Wanted, plan_more
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.motion.programs.travel import repeated
-from weld_twin_core.twin.program_accuracy import Accuracy, along_seams
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.features import Features
+from weld_twin_core.twin.program_accuracy import SURE, Accuracy, along_seams, conforms
 from weld_twin_core.twin.program_correction import Caps, ProgramCorrection, correct_program
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_msgs_py.files.diagnosis_model import load_model, read_model
@@ -34,7 +43,8 @@ from weld_twin_msgs_py.programs import (
 )
 from weld_twin_msgs_py.programs.source import Source
 
-from .told_twin import build_twin, diagnosis_of
+from ..streams.supervision import Promise
+from .told_twin import build_twin, diagnosis_of, refuse_mended
 
 SCHEMA = 'weld_twin/correction/1'
 TOOL_LEFT = (
@@ -298,3 +308,147 @@ def _accuracy(value: Accuracy | None) -> dict[str, Any] | None:
     same = None if value.same is None else list(value.same)
     own = {'rms_m': value.rms, 'rms_ci90_m': interval, 'worst_m': value.worst}
     return own | {'rms_ci90_same_setup_m': same}
+
+
+MORE = (5, 10, 20, 40)
+"""Numbers of postures that are tried, fewest first: a measurement is no finer planned than that."""
+OFFERED = 60
+"""Postures along a program of which those to measure are chosen."""
+
+
+def tolerance_entry(
+    made: CorrectedProgram, model: ProgramModel, tolerance: float, noise: float
+) -> dict[str, Any]:
+    """
+    Return how probably the tool keeps a tolerance all along, before and after, as plain JSON values.
+
+    model: it was corrected with.
+    tolerance: of the tool's distance from where the program means it [m].
+    noise: standard deviation of a measured coordinate, of postures measured in addition [m].
+
+    Raises DataError: the tolerance means nothing, or the model does not say how sure it is.
+    """
+    if not 0.0 < tolerance < 1.0:
+        raise DataError(f'--tolerance must be above zero, got {tolerance * 1e3:g} mm')
+    reported = {}
+    for name, value in zip(('before', 'after'), made.accuracy, strict=True):
+        if value is None or value.worsts is None:
+            raise DataError('--tolerance needs a model that says how sure it is: a diagnosis.json')
+        probability = float(value.within(tolerance) or 0.0)
+        reported[name] = {
+            'probability': probability,
+            'decision': conforms(probability),
+            'sure_within_m': value.sure_within,
+        }
+    more = None
+    if reported['after']['decision'] != 'kept':
+        more = _postures_more(made, model, tolerance, noise)
+    return {'tolerance_m': tolerance, **reported, 'postures_more': more}
+
+
+def _postures_more(
+    made: CorrectedProgram, model: ProgramModel, tolerance: float, noise: float
+) -> int | None:
+    """Return how many postures measured along the program make it sure; None where none do."""
+    assert model.posterior is not None
+    q = np.concatenate([piece.motion.q for piece in made.found.travel.pieces])
+    postures = q[np.unique(np.linspace(0, len(q) - 1, min(OFFERED, len(q))).round().astype(int))]
+    twin = model.twin(made.found.travel.pieces[0].moves[0].tool)
+    count = min(MORE[-1], len(postures))
+    wanted = Wanted(tolerance, noise)
+    stations = plan_more(model.posterior, twin, (postures, postures), count, wanted).q
+    for number in MORE:
+        if number > len(stations):
+            break
+        t = np.arange(float(number))
+        still = Recording('stations', JointMotion(t, stations[:number], static=True))
+        surer = replace(
+            model, posterior=model.posterior.after(Features(twin, still, t), noise), _twins={}
+        )
+        drawn = tuple(surer.drawn(piece, piece.motion) for piece in made.found.travel.pieces)
+        _, after = along_seams(replace(made.found, drawn=drawn))
+        if after is not None and (after.within(tolerance) or 0.0) >= SURE:
+            return number
+    return None
+
+
+DIGITS = 12
+"""Of the hash of a file, as it is told: enough for all models of a plant."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedModel:
+    """A model and the file it came from."""
+
+    path: Path
+    digest: str  # of the content of the file
+    read: ProgramModel
+    promised: Promise | None  # how far measurements are from the twin that has the model
+    modified: float  # when the file was written [s since 1970]
+
+    def outdated(self, most_age: float = 0.0) -> str:
+        """
+        Return why the model is not fresh; empty where it is.
+
+        ``most_age`` [s]: age of the file above which it is not; 0 for any.
+        """
+        try:
+            now = self.path.stat().st_mtime
+            changed = now != self.modified and _digest(self.path) != self.digest
+        except OSError as error:
+            return f"the model '{self.path}' cannot be read any more: {error.strerror}"
+        if changed:
+            return (
+                f"the model '{self.path}' was exchanged; call ~/reload to go on with the new one"
+            )
+        age = time.time() - self.modified
+        if most_age and age > most_age:
+            return (
+                f'the model is {age / 3600.0:.1f} hours old, at most {most_age / 3600.0:g} are '
+                'allowed (max_model_age); measure and diagnose anew'
+            )
+        return ''
+
+    def around(self, wrench: Array | None, frame: str, warm: float | None) -> ProgramModel:
+        """Return what acts on the arm under a load [N, N m] and at a temperature [degC]."""
+        return replace(self.read, wrench=wrench, wrench_frame=frame, temperature=warm, _twins={})
+
+
+def loaded(robot: Robot, path: str) -> LoadedModel:
+    """
+    Return the model of a file.
+
+    Raises ModelError: there is none, it is of another robot, its data were unsound, or it counts
+    joints otherwise than they are read.
+    """
+    if not path:
+        raise ModelError("the compensator needs the parameter 'model': a diagnosis.json")
+    file = Path(path)
+    try:
+        modified, digest = file.stat().st_mtime, _digest(file)
+    except OSError as error:
+        raise ModelError(f"the model '{path}' cannot be read: {error.strerror}") from None
+    content = diagnosis_of(file)
+    refuse_mended(content, file)
+    read = program_model(robot, file)
+    return LoadedModel(file, digest, read, _promised(content, read), modified)
+
+
+def _promised(content: dict[str, Any], read: ProgramModel) -> Promise | None:
+    """Return what a model leaves on unseen data; None where its file does not say so."""
+    remaining = _number(content, 'shrink', 'rms_after_m')
+    if not remaining:
+        return None
+    unsure = 0.0 if read.posterior is None else read.posterior.recorded_m
+    return Promise.of(remaining, unsure, max(int(_number(content, 'gap', 'samples')), 1))
+
+
+def _number(content: dict[str, Any], part: str, key: str) -> float:
+    """Return a number of a diagnosis; 0 where it has none."""
+    values = content.get(part)
+    value = values.get(key) if isinstance(values, dict) else None
+    return float(value) if isinstance(value, int | float) else 0.0
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:DIGITS]

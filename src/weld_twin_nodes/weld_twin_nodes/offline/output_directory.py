@@ -4,24 +4,272 @@
 Output folders: new files appear when all of them are made, and nothing of a person's is lost.
 
 A folder that was not there appears whole, in one step. In a folder that is there, ours are replaced one
-by one, each whole, and the rest stays; see `owned_files`.
+by one, each whole, and the rest stays. A list in the folder (`LIST`) holds the names and digests of
+what was written there. A file is ours as long as its digest is the one in the list: once a person has
+changed it, it is theirs. Nothing that is not ours is ever deleted or overwritten; at the most it gets
+another name.
+
+New files are made in a scratch directory, together with a note of what is to happen with them. From
+the moment the note is whole, the change is decided: who is killed while files are moved into place has
+the rest of them moved by the next one who works in the folder.
 """
 
 from __future__ import annotations
 
 import fcntl
+import json
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from pathlib import Path
+from dataclasses import asdict, dataclass
+from itertools import count
+from pathlib import Path, PurePosixPath
+from typing import Any
 
 from weld_twin_core.errors import DataError
+from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.scratch import Scratch, sweep
 from weld_twin_msgs_py.files.whole_files import followed, write_text
 
-from . import owned_files
-from .owned_files import LIST, MADE
+LIST = '.weld_twin_files.json'
+"""The list, in the folder that it speaks of."""
+NOTE = 'change.json'
+"""What is to happen with the files of a scratch directory; not there while they are being made."""
+MADE = 'made'
+"""Where they are made, in the scratch directory."""
+SCHEMA = 'weld_twin/files/1'
+_ABOUT = (
+    'What weld-twin wrote here, with SHA-256. It replaces these files as long as nobody has changed '
+    'them, and no others. Without this list it replaces nothing.'
+)
+
+LARGEST = 50_000_000
+"""Bytes of a list or a note that are read; a list of 100,000 files has 15 million."""
+_DAMAGED = (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError)
+"""What reading a list or a note raises that somebody or something has changed."""
+
+Digests = dict[str, str]
+"""SHA-256 by the name of a file, relative to the folder, with slashes."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """What is to happen in a folder; plain values, for it is written down."""
+
+    mark: str  # name of the result that the files belong to
+    place: Mapping[str, str | None]
+    """New files, in order, and the digest of what each may replace; None for nothing."""
+    drop: Mapping[str, str]  # files of ours that were not made again, and their digests
+    listed: Mapping[str, str]  # files of this result afterwards, and their digests
+
+
+def files_of(folder: Path) -> Digests:
+    """Return the digests of all files below a folder, but for the list itself."""
+    names = [
+        (Path(where) / name).relative_to(folder).as_posix()
+        for where, _, files in os.walk(folder)
+        for name in files
+    ]
+    return {name: digest(folder / name) for name in sorted(names) if name != LIST}
+
+
+def digest(file: Path) -> str:
+    """Return the SHA-256 of a file; of anything else, a word that no file has."""
+    if file.is_symlink() or not file.is_file():
+        return 'no file'
+    return hashed('', file).sha256
+
+
+def listed(folder: Path) -> dict[str, Digests]:
+    """
+    Return what the list of a folder holds: the files of every result, by its mark.
+
+    A list that is damaged, of another version, or with a name that leads out of the folder lists
+    nothing: what it may have meant is not ours.
+    """
+    try:
+        content = _read(folder / LIST)
+        results = content['results'] if content['schema'] == SCHEMA else {}
+        return {str(mark): _digests(files) for mark, files in results.items()}
+    except _DAMAGED:
+        return {}
+
+
+def write_list(folder: Path, results: Mapping[str, Mapping[str, str]]) -> None:
+    """Write a list into a folder."""
+    content = {'schema': SCHEMA, 'about': _ABOUT, 'results': results}
+    write_text(folder / LIST, json.dumps(content, indent=1) + '\n', overwrite=True)
+
+
+def change_of(folder: Path, made: Mapping[str, str], mark: str, *, adds: bool) -> Change:
+    """
+    Return what is to happen in a folder so that it has the files made.
+
+    ``made``: digests of the new files by name. ``adds``: whether files of this result that were
+    not made again stay.
+    """
+    own = listed(folder).get(mark, {})
+    # The mark comes last: who finds the new one finds all the others.
+    names = sorted(made, key=lambda name: (name == mark, name))
+    place = {name: own.get(name) for name in names if digest(folder / name) != made[name]}
+    remaining = {name: own[name] for name in own if name not in made}
+    return Change(mark, place, {} if adds else remaining, {**(remaining if adds else {}), **made})
+
+
+def in_the_way(folder: Path, change: Change) -> Iterator[str]:
+    """Yield the files of a folder that a change would replace or drop, and that are not ours."""
+    if _is_no_list(folder):
+        yield LIST
+    for name, ours in change.place.items():
+        foreign = _foreign(folder, name, ours)
+        if foreign is not None:
+            yield foreign
+    yield from changed(folder, change.drop)
+
+
+def changed(folder: Path, own: Mapping[str, str]) -> list[str]:
+    """Return the files that are there and are not what was written."""
+    there = (_foreign(folder, name, own[name]) for name in own if _there(folder / name))
+    return [name for name in dict.fromkeys(there) if name is not None]
+
+
+def decide(scratch: Path, change: Change) -> None:
+    """Write the note: from now on the change happens, whoever carries it out."""
+    write_text(scratch / NOTE, json.dumps(asdict(change)) + '\n')
+
+
+def carry_out(folder: Path, scratch: Path, kept: Callable[[str, str], object]) -> None:
+    """
+    Do what the note of a scratch directory says, as far as it is not done; nothing without a note.
+
+    ``kept``: told every file that was not ours: its name, and the name that it has now.
+    """
+    try:
+        change = _decided(scratch / NOTE)
+    except _DAMAGED:
+        return
+    made = scratch / MADE
+    for name, ours in change.place.items():
+        new = change.listed[name]
+        if not _there(made / name) or _foreign(made, name, new) is not None:
+            continue  # moved before the one who began was killed, or not what was made
+        foreign = _foreign(folder, name, ours, new)
+        if foreign is not None:
+            kept(foreign, _keep(folder, foreign))
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        os.replace(made / name, folder / name)
+    for name, ours in change.drop.items():
+        if not _there(folder / name):
+            continue
+        foreign = _foreign(folder, name, ours)
+        if foreign is None:
+            _drop(folder, name)
+        else:
+            kept(foreign, _keep(folder, foreign))
+    if _is_no_list(folder):
+        kept(LIST, _keep(folder, LIST))
+    write_list(scratch, {**listed(folder), change.mark: change.listed})
+    os.replace(scratch / LIST, folder / LIST)
+
+
+def sentence(folder: Path, mark: str, names: list[str]) -> str:
+    """Return what stands in the way, and how to go on."""
+    what = 'is there already, and no list says that weld-twin wrote it'
+    if names[0] in listed(folder).get(mark, {}):
+        what = 'was changed after weld-twin wrote it'
+    more = f' (so it is with {len(names) - 1} more)' if len(names) > 1 else ''
+    return (
+        f"'{folder / names[0]}' {what}{more}; choose another --out, or give --force, which keeps it "
+        f"as '{_kept_name(folder, names[0])}'"
+    )
+
+
+def _there(path: Path) -> bool:
+    return os.path.lexists(path)
+
+
+def _read(file: Path) -> Any:
+    """Return what a file of ours holds; it may have come with a folder from anybody."""
+    if file.is_symlink() or not file.is_file() or file.stat().st_size > LARGEST:
+        raise ValueError('it is none of ours')
+    return json.loads(file.read_text(encoding='utf-8'))
+
+
+def _decided(note: Path) -> Change:
+    """Return the change that a note holds."""
+    change = Change(**_read(note))
+    place = {name: None if ours is None else str(ours) for name, ours in change.place.items()}
+    new = _digests(change.listed)
+    if not place.keys() <= new.keys():
+        raise ValueError('it places what it does not list')
+    return Change(str(change.mark), place, _digests(change.drop), new)
+
+
+def _digests(reported: Mapping[str, object]) -> Digests:
+    """Return digests by names that stay in their folder, refused if one does not."""
+    for name in reported:
+        path = PurePosixPath(name)
+        if not path.parts or path.is_absolute() or '..' in path.parts or '\0' in name:
+            raise ValueError(f'{name!r} is no name of a file in this folder')
+    return {name: str(value) for name, value in reported.items()}
+
+
+def _is_no_list(folder: Path) -> bool:
+    """Tell whether something else has the name of the list."""
+    list_ = folder / LIST
+    return _there(list_) and (list_.is_symlink() or not list_.is_file())
+
+
+def _foreign(folder: Path, name: str, *ours: str | None) -> str | None:
+    """Return what is not ours where a file of ours should be; None where nothing is."""
+    blocking = _blocking(folder, name)
+    if blocking is None and _there(folder / name) and digest(folder / name) not in ours:
+        return name
+    return blocking
+
+
+def _blocking(folder: Path, name: str) -> str | None:
+    """Return what stands where a folder of ours, or a file, should be: a link, a file, a folder."""
+    parts = Path(name).parts
+    for k in range(1, len(parts)):
+        above = folder / Path(*parts[:k])
+        if above.is_symlink() or (_there(above) and not above.is_dir()):
+            return above.relative_to(folder).as_posix()
+    return name if (folder / name).is_dir() else None
+
+
+def _keep(folder: Path, name: str) -> str:
+    """Give a file that is not ours another name, and return it."""
+    new = _kept_name(folder, name)
+    os.rename(folder / name, folder / new)
+    return new
+
+
+def _kept_name(folder: Path, name: str) -> str:
+    path = Path(name)
+    names = (path.with_name(f'{path.stem}.kept-{k}{path.suffix}') for k in count(1))
+    return next(new for new in names if not _there(folder / new)).as_posix()
+
+
+def _drop(folder: Path, name: str) -> None:
+    """Remove a file of ours, and folders that are empty then."""
+    (folder / name).unlink()
+    with suppress(OSError):
+        for above in Path(name).parents:
+            if above != Path('.'):
+                (folder / above).rmdir()
+
+
+def refuse(folder: Path, mark: str, names: list[str]) -> None:
+    """
+    Refuse a change that files are in the way of.
+
+    Raises DataError: there are some.
+    """
+    if names:
+        raise DataError(sentence(folder, mark, names))
+
 
 INSIDE = '.weld_twin-'
 """Prefix of scratch directories in a folder that is there already."""
@@ -124,7 +372,7 @@ def _rescue(target: Path, tell: Callable[[str], None]) -> Callable[[Path], None]
     def rescue(scratch: Path) -> None:
         if target.is_dir():
             with _alone(target):
-                owned_files.carry_out(target, scratch, _kept_notice(tell))
+                carry_out(target, scratch, _kept_notice(tell))
 
     return rescue
 
@@ -151,21 +399,21 @@ def _install(
     if not scratch.is_whole:
         raise DataError(f"'{target}' was deleted while it was being written; run it again")
     folder = scratch.path / MADE
-    made = owned_files.files_of(folder)
+    made = files_of(folder)
     if not os.path.lexists(target):
-        owned_files.write_list(folder, {mark: made})
+        write_list(folder, {mark: made})
         with suppress(OSError):  # it has appeared meanwhile
             folder.rename(target)
             return
     if not target.is_dir():
         _refuse_foreign(target, mark, force)
     with _alone(target):
-        change = owned_files.change_of(target, made, mark, adds=adds)
+        change = change_of(target, made, mark, adds=adds)
         if not force:
-            owned_files.refuse(target, mark, list(owned_files.in_the_way(target, change)))
-        owned_files.decide(scratch.path, change)
+            refuse(target, mark, list(in_the_way(target, change)))
+        decide(scratch.path, change)
         try:
-            owned_files.carry_out(target, scratch.path, _kept_notice(tell))
+            carry_out(target, scratch.path, _kept_notice(tell))
         except BaseException:
             scratch.leave()  # the next one ends what is begun
             raise
@@ -173,9 +421,9 @@ def _install(
 
 def _refuse_before(target: Path, mark: str) -> None:
     """Refuse what would be refused when all is computed, as far as it is known."""
-    own = owned_files.listed(target).get(mark, {})
+    own = listed(target).get(mark, {})
     unlisted = [mark] if mark not in own and os.path.lexists(target / mark) else []
-    owned_files.refuse(target, mark, owned_files.changed(target, own) + unlisted)
+    refuse(target, mark, changed(target, own) + unlisted)
 
 
 def _refuse_foreign(target: Path, mark: str, any_folder: bool) -> None:
@@ -184,7 +432,7 @@ def _refuse_foreign(target: Path, mark: str, any_folder: bool) -> None:
         raise DataError(f"'{target}' is a file; give a folder")
     if any_folder or not target.is_dir() or (target / mark).is_file():
         return
-    results = owned_files.listed(target)
+    results = listed(target)
     ours = {Path(name).parts[0] for files in results.values() for name in files} | {LIST}
     names = {entry.name for entry in target.iterdir() if not entry.name.startswith(INSIDE)}
     if mark not in results and names - ours:

@@ -1,20 +1,31 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The twin with identified effects over a whole recording, and how sure it is."""
+"""
+The twin with identified effects over a whole recording, and how sure it is.
+
+Also the commands that put the real tool on the seam, and tables and a picture of poses and deviations.
+"""
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.diagnosis.soundness.mending import reading_map
 from weld_twin_core.errors import ModelError
-from weld_twin_core.recording import Recording
+from weld_twin_core.metrics.deviation import deviation
+from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.compensation import Compensation, compensate
 from weld_twin_core.twin.domain import as_seen
 from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covariances
 from weld_twin_core.twin.twin import Twin
@@ -29,6 +40,7 @@ from weld_twin_msgs_py.files.diagnosis_model import (
 )
 from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
+from weld_twin_msgs_py.files.whole_files import write_text
 
 from .told_twin import build_twin, diagnosis_of
 
@@ -208,3 +220,171 @@ def sureness_sentences(model: Predictor, got: Written) -> list[str]:
         parts = [f'{s.t_start:.2f} to {s.t_end:.2f} s: {s.why}' for s in got.outside[:MOST]]
         out.append('outside what was recorded, ' + '; '.join(parts) + last)
     return out
+
+
+WHOLE = 0.999
+"""Share of a correction that counts as all of it."""
+
+
+class Compensated(NamedTuple):
+    """Compensated commands with what the model knows of them."""
+
+    result: Compensation
+    model: Predictor
+    outside: Sequence[Stretch]  # of the nominal commands: where they leave what was recorded
+    least: float
+    """Smallest share of the correction that was applied anywhere, 1 for all of it everywhere."""
+    motion: JointMotion  # the new commands, counted as the nominal ones came
+    told: str = ''
+    """That the commands were read as the diagnosis mended its recordings, and are written as they
+    came; empty where they are not."""
+
+
+def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compensated:
+    """
+    Return the commands for a model file, less corrected where the model knows less.
+
+    Raises ModelError: the file is of no use.
+    """
+    content, twin = diagnosis_of(path), build_twin(robot, path, mended=True)
+    model = Predictor(twin, read_posterior(robot, path) if content else None)
+    stored = read_model(robot, path) if 'model' in content else None
+    given, reported = recording, ''
+    if stored is not None:
+        # Its clocks are its own, and commands need none.
+        recording, reported = mended_source(stored, robot, given, -1)
+    nominal, real = Twin(twin.robot).poses(recording), twin.poses(recording)
+    covariances = model.covariances(recording)
+    share = None
+    if model.posterior is not None and covariances is not None:
+        share = model.posterior.domain.trust(
+            recording.joints.q,
+            real.position - nominal.position,
+            covariances[:, :3, :3],
+        )
+    result = compensate(twin.robot, twin.effects, recording, trust=share)
+    least = 1.0 if share is None else float(share.min())
+    motion = result.motion
+    if stored is not None and recording is not given:
+        motion = _as_given(motion, stored)
+    return Compensated(result, model, model.outside(recording), least, motion, reported)
+
+
+def _as_given(motion: JointMotion, stored: Model) -> JointMotion:
+    """Return mended joint positions counted as they came: they go to the same controller."""
+    matrix, offset = reading_map(stored.mends, stored.robot.n)
+    back = np.linalg.inv(matrix).T
+    qd = None if motion.qd is None else motion.qd @ back
+    return replace(motion, q=(motion.q - offset) @ back, qd=qd)
+
+
+def write_compensated(
+    path: Path | str, made: Compensated, recording: Recording, *, storage: str = 'mcap'
+) -> None:
+    """
+    Write the commands, where the model has the tool under them, and how sure it is.
+
+    Raises DataError: the path exists or cannot be written.
+    """
+    twin = made.model.twin
+    commands = replace(recording, joints=made.result.motion, measured=None)
+    poses = twin.poses(commands, commands.joints.t)
+    write_recording(
+        path,
+        replace(commands, joints=made.motion),
+        twin.robot,
+        twin=(poses.position, poses.rotation),
+        covariance=made.model.covariances(commands),
+        storage=storage,
+        provenance={'compensated_with': [effect.to_mapping() for effect in twin.effects]},
+        beside=beside_bag(made.model, made.outside),
+    )
+
+
+def trust_sentences(made: Compensated) -> list[str]:
+    """Return in words where the commands lie outside what was recorded, and what was held back."""
+    if made.model.posterior is None or not made.outside:
+        return []
+    worst = made.outside[0]
+    out = [
+        f'outside what was recorded at {len(made.outside)} stretch(es), the first '
+        f'{worst.t_start:.2f} to {worst.t_end:.2f} s: {worst.why}'
+    ]
+    if made.least < WHOLE:
+        out.append(
+            f'there no more is corrected than the model knows: down to {made.least:.0%} of what '
+            'it would say'
+        )
+    return out
+
+
+COLUMNS = 't_s,x_m,y_m,z_m,dx_m,dy_m,dz_m,d_m'
+
+
+def write_table(path: Path | str, recording: Recording, off: Array) -> None:
+    """
+    Write measured positions and their deviations, shape (M, 3) [m], as CSV.
+
+    Raises DataError: the file exists or cannot be written.
+    """
+    measured = recording.measured
+    assert measured is not None
+    text = io.StringIO()
+    rows = np.column_stack([measured.t, measured.position, off, deviation(off)])
+    np.savetxt(text, rows, delimiter=',', header=COLUMNS, comments='', fmt='%.9g')
+    write_text(path, text.getvalue())
+
+
+def draw(path: Path | str, recording: Recording, off: Array) -> None:
+    """Draw where the stations are off and how often by how much."""
+    import matplotlib
+
+    matplotlib.use('Agg')
+    from matplotlib.figure import Figure
+
+    measured = recording.measured
+    assert measured is not None
+    size = deviation(off) * 1e3
+    figure = Figure(figsize=(10.0, 4.6), layout='constrained', dpi=120)
+    left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
+    where, vector = measured.position[:, :2] * 1e3, off[:, :2] * 1e3
+    arrows = left.quiver(*where.T, *vector.T, size, cmap='viridis', width=0.003)
+    figure.colorbar(arrows, ax=left, label='deviation D [mm]', pad=0.01)
+    left.set(aspect='equal', xlabel='x [mm]', ylabel='y [mm]')
+    left.set_title(f'{recording.name}: measured minus twin, seen from above', loc='left')
+    for name, column in zip('xyz', off.T * 1e3, strict=True):
+        right.hist(column, bins=40, histtype='step', label=name)
+    right.hist(size, bins=40, color='0.8', label='D', zorder=0)
+    right.set(xlabel='deviation [mm]', ylabel='stations')
+    right.set_title('base and tool frame not fitted', loc='left')
+    right.legend(frameon=False)
+    figure.savefig(path)
+
+
+POSE = 't_s,x_m,y_m,z_m,qx,qy,qz,qw'
+SIGMA = 'sigma_x_m,sigma_y_m,sigma_z_m,sigma_rx_rad,sigma_ry_rad,sigma_rz_rad,outside'
+
+
+def write_prediction_table(path: Path | str, model: Predictor, recording: Recording) -> None:
+    """
+    Write the twin's pose at every joint state as CSV.
+
+    Where the model knows how sure it is, standard deviations along and about the world's axes
+    follow, and whether the pose lies outside what was recorded (1) or not (0).
+
+    ``path``: must not exist. Raises DataError: the file exists or cannot be written.
+    """
+    t = recording.joints.t
+    poses = model.twin.poses(recording, t)
+    columns = [t, poses.position, quaternion_from_matrix(poses.rotation)]
+    covariances = model.covariances(recording)
+    head = POSE
+    if covariances is not None:
+        flags = np.zeros(t.size)
+        for start, end, _ in model.outside(recording):
+            flags[(t - t[0] >= start) & (t - t[0] <= end)] = 1.0
+        columns += [np.sqrt(covariances[:, range(6), range(6)]), flags]
+        head = f'{POSE},{SIGMA}'
+    text = io.StringIO()
+    np.savetxt(text, np.column_stack(columns), delimiter=',', header=head, comments='', fmt='%.9g')
+    write_text(path, text.getvalue())

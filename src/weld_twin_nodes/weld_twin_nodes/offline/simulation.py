@@ -34,7 +34,7 @@ from weld_twin_msgs_py.messages.topics import (
 )
 
 from ..streams.deviation_stream import METRICS, Deviation, Deviations
-from ..streams.injected_noise import Noise
+from ..streams.twin_stream import Noise
 
 METRICS_EVERY = 50
 """Samples between two messages of metrics."""

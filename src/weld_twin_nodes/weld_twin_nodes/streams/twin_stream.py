@@ -4,15 +4,78 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from weld_twin_core.arrays import Array
+from weld_twin_core.effects import Effect
 from weld_twin_core.effects.effect import Stage
+from weld_twin_core.effects.measurement import MeasurementNoise
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly import Intake, Role, Taken
-from weld_twin_msgs_py.assembly.held_signal import HeldSignal
 from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
+
+
+class Noise:
+    """Draws for each `measurement_noise` of a list of effects from a stream of its own."""
+
+    def __init__(self, effects: Iterable[Effect], seed: int) -> None:
+        self._seed = seed
+        self._generators: list[np.random.Generator] = []
+        self.change(effects)
+
+    def change(self, effects: Iterable[Effect]) -> None:
+        """Take other effects; streams that are running go on."""
+        self._effects = [e for e in effects if isinstance(e, MeasurementNoise)]
+        for k in range(len(self._generators), len(self._effects)):
+            self._generators.append(np.random.default_rng([self._seed, k]))
+
+    def draw(self, samples: int) -> Array:
+        """Return errors of measured positions, shape (samples, 3) [m]."""
+        total = np.zeros((samples, 3))
+        for effect, generator in zip(self._effects, self._generators, strict=False):
+            total += effect.draw(samples, generator)
+        return total
+
+
+MOST = 10_000
+"""Samples kept that are ahead of the joint states: 100 s of a sensor at 100 Hz."""
+
+
+class HeldSignal:
+    """
+    Gives the last sample not after a stamp, as `Signal.at` does over a recording.
+
+    Stamps that are asked for must not go back, but after `hold`.
+    """
+
+    def __init__(self) -> None:
+        self._samples: deque[tuple[int, Array]] = deque(maxlen=MOST)
+
+    def add(self, stamp: int, value: Array, *, restarted: bool = False) -> None:
+        """Take a sample [ns]; stamps increase, unless time has started anew."""
+        if restarted:
+            self._samples.clear()
+        self._samples.append((stamp, value))
+
+    def hold(self) -> None:
+        """Keep the last value as one from before all time: the clock begins anew."""
+        if self._samples:
+            value = self._samples[-1][1]
+            self._samples.clear()
+            self._samples.append((0, value))
+
+    def at(self, stamp: int) -> Array | None:
+        """Return the value in force at a stamp [ns]; None before the first."""
+        while len(self._samples) > 1 and self._samples[1][0] <= stamp:
+            self._samples.popleft()
+        if not self._samples or self._samples[0][0] > stamp:
+            return None
+        return self._samples[0][1]
 
 
 class Sample(NamedTuple):

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 
 from weld_twin_core.diagnosis.result import Diagnosis, Found, Site
 
-from .leading import in_order
 from .mending import advised, left_with
 from .quantities import STAYS, both_angles, millimetres, odds, percent, turns_only
 from .switches import switches
@@ -32,6 +31,28 @@ from .words import (
     someplace,
     untried_in_short,
 )
+
+
+def in_order(diagnosis: Diagnosis) -> list[int]:
+    """
+    Return the causes, counted from 0, those first that take most off the squared gap.
+
+    Shares of places without a name say what their own motion tells, which a second place may tell
+    as well; what a curve takes off is what a reader can have.
+    """
+    reported = diagnosis.contributions
+    count = len(diagnosis.causes)
+    if reported is None:
+        return list(range(count))
+    taken = [0.0] * count
+    for run, (remaining, parts) in enumerate(zip(reported.left, reported.parts, strict=True)):
+        good = diagnosis.traces.trusted[run] if diagnosis.traces.trusted else slice(None)
+        whole = (remaining + parts.sum(axis=0))[good]
+        for k in range(count):
+            part = parts[k][good]
+            taken[k] += float((part * (2.0 * whole - part)).sum())
+    return sorted(range(count), key=lambda k: -taken[k])
+
 
 _NAMED = 3
 """Names in a sentence; more are counted."""

@@ -5,15 +5,16 @@
 import pytest
 
 from weld_twin_core.errors import DataError
-from weld_twin_nodes.offline.closing import belief, weighed
 from weld_twin_nodes.offline.investigation import (
     begin,
+    belief,
     changed,
     decided,
     question,
     read_state,
     recordings,
     take_in,
+    weighed,
     write_state,
 )
 from weld_twin_report.report.investigation_page import investigation_page

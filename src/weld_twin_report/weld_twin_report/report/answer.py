@@ -18,7 +18,7 @@ from typing import NamedTuple
 from weld_twin_core.diagnosis.result import NAMING, Candidate, Diagnosis
 from weld_twin_core.metrics.conformity import Rule
 from weld_twin_core.recording import Recording
-from weld_twin_nodes.offline.where_it_holds import elsewhere, left_open, which_file
+from weld_twin_nodes.offline.exports import elsewhere, left_open, which_file
 from weld_twin_nodes.wording.mending import correctable
 from weld_twin_nodes.wording.quantities import (
     change,

@@ -15,8 +15,7 @@ from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_msgs_py.files.whole_files import json_text, write_text
 from weld_twin_msgs_py.robots.urdf_like import GivenUrdf
-from weld_twin_nodes.offline.exports import write_all
-from weld_twin_nodes.offline.where_it_holds import where_it_holds
+from weld_twin_nodes.offline.exports import where_it_holds, write_all
 
 from .diagnosis_page import Sheet, report_page
 from .to_do import weighed

@@ -15,9 +15,9 @@ from weld_twin_core.diagnosis.result import Candidate, Diagnosis, Site
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.apart import ELSE, way
 from weld_twin_core.metrics.conformity import PASS, Rule
-from weld_twin_nodes.wording.leading import in_order
 from weld_twin_nodes.wording.mending import left_without, look_at, warning
 from weld_twin_nodes.wording.quantities import millimetres
+from weld_twin_nodes.wording.verdict import in_order
 from weld_twin_nodes.wording.words import (
     cause,
     cause_by_site,

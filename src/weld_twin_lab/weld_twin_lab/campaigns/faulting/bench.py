@@ -24,7 +24,7 @@ from weld_twin_msgs_py.messages.topics import (
     Topic,
 )
 from weld_twin_nodes.harness import Cell, NodeProcess
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 
 RATE = 100.0
 """Joint states a second."""

@@ -21,7 +21,7 @@ from weld_twin_core.arm.chain import forward
 from weld_twin_core.arrays import Array
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, MEASURED_POSE, Topic
 from weld_twin_nodes.harness import Cell
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 
 JOINT_RATE, POSE_RATE = 100.0, 60.0
 """Messages a second of the controller and of the tracker."""

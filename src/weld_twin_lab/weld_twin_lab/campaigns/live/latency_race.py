@@ -22,7 +22,7 @@ from rclpy.task import Future
 
 from weld_twin_msgs_py.messages.cdr_read import HEADER
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, TWIN_POSE
-from weld_twin_nodes.harness.ros_domain import own_domain
+from weld_twin_nodes.harness.process import own_domain
 from weld_twin_nodes.live.run_node import executor
 
 from ..building.message_packages import messages_importable

@@ -17,7 +17,7 @@ from weld_twin_core.arm import catalog
 from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.bags import BagReader
 from weld_twin_nodes.harness import Cell
-from weld_twin_nodes.harness.health_listener import HealthListener
+from weld_twin_nodes.harness.cell import HealthListener
 from weld_twin_nodes.offline.seam_motion import plan_motion
 
 from .usage import children, cpu_ns, rss_bytes

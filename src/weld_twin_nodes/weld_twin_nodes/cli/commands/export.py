@@ -61,8 +61,7 @@ def model(args: argparse.Namespace) -> int:
     from weld_twin_msgs_py.files.diagnosis_model import read_model
     from weld_twin_msgs_py.files.posterior_entry import read_posterior
 
-    from ...offline.exports import FORMATS, write_given_urdf
-    from ...offline.where_it_holds import where_it_holds
+    from ...offline.exports import FORMATS, where_it_holds, write_given_urdf
 
     robot = robot_of(args)
     model, posterior = read_model(robot, args.model), read_posterior(robot, args.model)

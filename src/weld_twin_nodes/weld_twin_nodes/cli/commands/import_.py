@@ -99,9 +99,9 @@ def _touched(
 
 
 def _write_deviations(args: argparse.Namespace, recording: Recording, off: Array) -> None:
-    from ...offline import pose_tables
+    from ...offline.prediction import draw, write_table
 
     if args.table:
-        pose_tables.write_table(args.table, recording, off)
+        write_table(args.table, recording, off)
     if args.picture:
-        pose_tables.draw(args.picture, recording, off)
+        draw(args.picture, recording, off)

@@ -108,8 +108,13 @@ def _predict(args: argparse.Namespace) -> int:
     """Write the bag; say how far measured and twin are apart where something was measured."""
     from weld_twin_msgs_py.bags import read_recording
 
-    from ...offline.pose_tables import write_prediction_table
-    from ...offline.prediction import on_one_clock, predictor, sureness_sentences, write_prediction
+    from ...offline.prediction import (
+        on_one_clock,
+        predictor,
+        sureness_sentences,
+        write_prediction,
+        write_prediction_table,
+    )
 
     if not args.model:
         raise DataError('say with --model which effects the twin of a recording has')

@@ -84,11 +84,7 @@ def run(args: argparse.Namespace) -> int:
 def _corrected_bag(args: argparse.Namespace) -> int:
     """Write the commands and say what they gain by the model, and where it knows too little."""
     from weld_twin_msgs_py.bags import read_recording
-    from weld_twin_nodes.offline.compensating import (
-        compensated,
-        trust_sentences,
-        write_compensated,
-    )
+    from weld_twin_nodes.offline.prediction import compensated, trust_sentences, write_compensated
 
     if not args.model:
         raise DataError('say with --model by which effects the commands are corrected')
@@ -147,10 +143,10 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
         correction_entry,
         other_causes,
         program_model,
+        tolerance_entry,
         way,
     )
     from weld_twin_nodes.offline.told_twin import diagnosis_of, other_readings
-    from weld_twin_nodes.offline.tolerances import tolerance_entry
 
     from ...report.correction_page import correction_page, headline, tolerance_sentences
 

@@ -366,8 +366,7 @@ class _Investigation:
 
     def _heard(self, bags: list[str], changes: str, place: Path) -> tuple[Mapping[str, Any], str]:
         """Diagnose all recordings, and the experiments by themselves; return what to believe."""
-        from weld_twin_nodes.offline.closing import weighed
-        from weld_twin_nodes.offline.investigation import changed, recordings
+        from weld_twin_nodes.offline.investigation import changed, recordings, weighed
         from weld_twin_nodes.offline.set_up_changes import FRAMES
 
         first, later = recordings(self.state)

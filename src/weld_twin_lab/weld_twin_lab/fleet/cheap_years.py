@@ -20,7 +20,7 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.history import Observation
 from weld_twin_report.history import Entry, observations
-from weld_twin_report.history.tracking import likely, named
+from weld_twin_report.history.words import likely, named
 
 from .life import Event, Year, moved, year
 from .scoring import WEEK, score

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from weld_twin_report.history import Entry, observations
-from weld_twin_report.history.tracking import likely, named
+from weld_twin_report.history.words import likely, named
 
 from .life import Year, cause, moved, year
 from .scoring import WEEK, score

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from weld_twin_report.demo.closed_loop_page import Seam, closed_loop_page
+from weld_twin_report.demo.closed_loop import Seam, closed_loop_page
 
 
 def seam(off):

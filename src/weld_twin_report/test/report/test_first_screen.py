@@ -18,8 +18,8 @@ from weld_twin_nodes.wording.quantities import in_short, short_rows
 from weld_twin_report.report import report_page
 from weld_twin_report.report.acceptance import Demand
 from weld_twin_report.report.answer import Answer
+from weld_twin_report.report.charts import furthest
 from weld_twin_report.report.controllers import correction
-from weld_twin_report.report.curve_plot import furthest
 from weld_twin_report.report.diagnosis_page import Sheet
 from weld_twin_report.report.footing import next_section, parts_what
 from weld_twin_report.report.to_do import warned, worth_doing

@@ -9,8 +9,8 @@ import pytest
 
 from weld_twin_core.errors import DataError
 from weld_twin_report.report import report_page
-from weld_twin_report.report.pdf import browser as program
-from weld_twin_report.report.pdf import print_page
+from weld_twin_report.report.diagnosis_files import browser as program
+from weld_twin_report.report.diagnosis_files import print_page
 
 
 def test_the_page_is_printed_on_two_sides_at_most(tmp_path):

@@ -23,7 +23,7 @@ from weld_twin_nodes.offline.task_pool import (
     pool_of,
 )
 from weld_twin_report.sensitivity_report import Effort, Setting
-from weld_twin_report.sensitivity_report.whole import run_study
+from weld_twin_report.sensitivity_report.work import run_study
 
 
 def note_down(path, value):

@@ -1,24 +1,196 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The offline part: the bag against the twin, the errors ranked, the numbers written, the seam drawn."""
+"""The steps of the demo: live nodes recorded, what was recorded analysed and diagnosed, handed over."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
-from weld_twin_core.errors import DataError
-from weld_twin_core.metrics.deviation import deviation, deviation_metrics
+from weld_twin_core.diagnosis import diagnose
+from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.effects import Effect, effects_from_list
+from weld_twin_core.errors import DataError, TwinError
+from weld_twin_core.metrics.deviation import DeviationMetrics, deviation, deviation_metrics
+from weld_twin_core.motion.planned_motion import Plan
 from weld_twin_core.motion.seam_frame import seam_components
+from weld_twin_core.recording import Measurements, Recording
 from weld_twin_core.sensitivity import default_tolerances, local_sensitivity, study_of_plan
 from weld_twin_core.twin.poses import Poses
 from weld_twin_core.twin.twin import Twin
-from weld_twin_msgs_py.bags import read_recording
+from weld_twin_msgs_py.bags import bag_info, read_recording
+from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.whole_files import write_json, write_text
+from weld_twin_msgs_py.files.yaml_file import yaml_text
+from weld_twin_msgs_py.messages.topics import (
+    ACTUAL_JOINT_STATES,
+    DEVIATION,
+    JOINT_STATES,
+    MEASURED_POSE,
+    TWIN_POSE,
+)
+from weld_twin_nodes.harness import Cell, Tap
+from weld_twin_nodes.wording.verdict import verdict
 
-from .hand_over import Job
+from ..report.diagnosis_files import PAGE, write_results
+
+Progress = Callable[[float], None]
+"""Tells how much of a step is done, 0 to 1."""
+
+
+@dataclass
+class Job:
+    """The example, and what is known of it so far."""
+
+    folder: Path  # where results go
+    robot: Robot
+    effects: tuple[Effect, ...]  # what is wrong with the robot; the twin does not know
+    seam: str  # kind of the bundled seam
+    rate: float  # [1/s], of the joint states
+    seed: int  # of the measurement noise
+    plan: Plan = field(init=False)  # from the first step on
+    bag: Path = field(init=False)  # from the second step on
+    recording: Recording = field(init=False)  # the bag read again, from the third step on
+    deviation: Array = field(init=False)
+    """Shape (M, 3) [m]: measured minus twin in the world frame."""
+    seam_deviation: Array = field(init=False)
+    """Shape (M, 3) [m]: the same along, across and normal to the seam."""
+    metrics: DeviationMetrics = field(init=False)
+    lines: list[str] = field(default_factory=list)  # what to tell the user at the end
+
+
+class Step(NamedTuple):
+    """A step: what it says it does, and the function that does it."""
+
+    title: str
+    run: Callable[[Job, Progress], None]
+
+
+NOISE = 2e-5
+"""Standard deviation of a measured coordinate [m], as the live injector has it."""
+STEPS = 12
+"""About as many things does a diagnosis of a short bag report."""
+
+
+OPEN = (
+    {'effect': 'backlash', 'joint': 'shoulder_pan_joint', 'width': 8e-4},
+    {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 3e-4},
+)
+"""Errors of another robot on the same seam: what the elbow has, its zero or play that the load takes
+up, moves the tool alike there."""
+
+
+def find_causes(job: Job, progress: Progress) -> None:
+    """Write the diagnosis, its page and the corrected model, and say the verdict."""
+    result = _diagnosed(job, job.recording, progress)
+    folder = job.folder / 'diagnosis'
+    folder.mkdir()
+    write_results(folder, result, [hashed('recording', job.bag)])
+    job.lines += ['', *verdict(result), f'diagnosis/{PAGE} has the whole answer']
+
+
+def leave_open(job: Job, progress: Progress) -> None:
+    """Diagnose another robot, of which one seam does not tell everything, and say so."""
+    commanded = job.recording.with_measured(None)
+    real = Twin(job.robot, effects_from_list(list(OPEN), job.robot)).poses(commanded)
+    noise = np.random.default_rng(job.seed).normal(scale=NOISE, size=real.position.shape)
+    seen = Measurements(commanded.joints.t, real.position + noise, real.rotation)
+    result = _diagnosed(job, commanded.with_measured(seen), progress)
+    folder = job.folder / 'open'
+    folder.mkdir()
+    write_results(folder, result, [])
+    job.lines += [
+        '',
+        'Another robot on the same seam:',
+        *verdict(result),
+        f'open/{PAGE} says more',
+    ]
+
+
+def _diagnosed(job: Job, recording: Recording, progress: Progress) -> Diagnosis:
+    reported: list[str] = []
+
+    def tell(text: str) -> None:
+        reported.append(text)
+        progress(min(len(reported) / STEPS, 0.99))
+
+    return diagnose([recording], job.robot, progress=tell)
+
+
+LIMIT = 120.0
+"""Seconds the run may stand still on a slow machine."""
+EACH = (JOINT_STATES, ACTUAL_JOINT_STATES, MEASURED_POSE, TWIN_POSE, DEVIATION)
+"""Topics with one message for each joint state."""
+
+
+def run_live(job: Job, progress: Progress) -> None:
+    """
+    Run the motion through the nodes, at the speed they keep up with, and record it.
+
+    Raises TwinError: a node failed or stood still, or the recording is not complete; the message
+    says what is missing.
+    """
+    job.bag = job.folder / 'bag'
+    samples = job.plan.motion.t.size
+    try:
+        with Cell() as cell:
+            deviations = _start(cell, job)
+
+            def told() -> bool:
+                progress(len(deviations) / samples)
+                return len(deviations) == samples
+
+            cell.wait(
+                told,
+                lambda: f'the deviations: {len(deviations)} of {samples} are here',
+                limit=LIMIT,
+                progress=lambda: len(deviations),
+            )
+            cell.wait_recorded({topic.name: samples for topic in EACH})
+            recorder = cell.processes[0]
+            recorder.interrupt()
+            if recorder.end() != 0:
+                raise TwinError(f'the recorder failed: {recorder.log}')
+    except TimeoutError as error:
+        raise TwinError(str(error)) from None
+    lacking = bag_info(job.bag).incomplete
+    if lacking:
+        raise TwinError(f'the recording is not complete: {"; ".join(lacking)}')
+
+
+def _start(cell: Cell, job: Job) -> Tap:
+    """
+    Start the nodes; what listens comes before what speaks, and each waits for the next.
+
+    The deviations have three listeners: the recorder, the harness, and the generator, which
+    sends as fast as they come. Measured and twin poses have the analyzer and the recorder, joint
+    states the injector, the twin and the recorder.
+    """
+    common = {'robot': job.robot.name, 'reliable_inputs': True}
+    cell.start('recorder', out=str(job.bag), reliable_inputs=True)
+    cell.start('deviation_analyzer', path_length=job.plan.length, wait_for_subscribers=3, **common)
+    cell.start('forward_kinematics_twin', wait_for_subscribers=2, **common)
+    effects = yaml_text([effect.to_mapping() for effect in job.effects])
+    cell.start('error_injector', effects=effects, seed=job.seed, wait_for_subscribers=2, **common)
+    deviations = cell.collect(DEVIATION.name)
+    cell.start(
+        'trajectory_generator',
+        robot=job.robot.name,
+        path=job.seam,
+        rate=job.rate,
+        playback=0.0,
+        follow=DEVIATION.name,
+        wait_for_subscribers=3,
+        meet_within=LIMIT,
+        exit_when_done=True,
+    )
+    return deviations
 
 
 def analyse(job: Job, _: object) -> None:

@@ -21,11 +21,19 @@ from weld_twin_core.effects import effects_from_list
 from weld_twin_nodes.offline.output_directory import new_directory
 from weld_twin_nodes.offline.seam_motion import plan_motion
 
-from .analysis import MARK, analyse, draw, rank, write_table
+from .analysis import (
+    MARK,
+    Job,
+    Step,
+    analyse,
+    draw,
+    find_causes,
+    leave_open,
+    rank,
+    run_live,
+    write_table,
+)
 from .closed_loop import close_loop
-from .demo_diagnosis import find_causes, leave_open
-from .hand_over import Job, Step
-from .live_run import run_live
 
 ROBOT = 'ur5'
 SEAM = 'polyline'

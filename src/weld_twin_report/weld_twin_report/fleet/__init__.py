@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings of many cells, diagnosed side by side into one database."""
 
-from .listed import Listed, read_list
-from .running import run_fleet
+from .running import Listed, read_list, run_fleet
 
 __all__ = ['Listed', 'read_list', 'run_fleet']

@@ -5,6 +5,6 @@
 from .database import Database
 from .entry import Entry, entry_of
 from .opening import Unavailable
-from .tracking import observations
+from .words import observations
 
 __all__ = ['Database', 'Entry', 'Unavailable', 'entry_of', 'observations']

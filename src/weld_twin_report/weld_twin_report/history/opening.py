@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from weld_twin_core.errors import DataError
 
-from .migrations import STEPS
-from .schema import VERSION
+from .schema import STEPS, VERSION
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection, Engine, MetaData

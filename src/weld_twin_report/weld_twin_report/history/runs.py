@@ -14,8 +14,7 @@ from weld_twin_core.errors import DataError
 from .database import Damaged, Database, Refused
 from .entry import Entry
 from .opening import Unavailable
-from .tracking import changed, observations
-from .words import as_dict
+from .words import as_dict, changed, observations
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection

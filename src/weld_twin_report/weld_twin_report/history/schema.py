@@ -1,17 +1,46 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of the history, alike on SQLite and PostgreSQL."""
+"""
+The tables of the history, alike on SQLite and PostgreSQL, and what brings an older version to them.
+
+A change of the schema is a function here that makes version k + 2 of version k + 1, in its place in
+`STEPS`, all of them in one transaction. The tables are the newest; a step adds what they have besides,
+with plain SQL that SQLite and PostgreSQL both take. A kit for migrations is left out on purpose: users
+open a history by their first command, there is nobody who runs an upgrade, and a table with one number
+says all that five tables in one line of versions need.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
 from .entry import ARRAYS
-from .migrations import STEPS
 
 if TYPE_CHECKING:
-    from sqlalchemy import MetaData
+    from sqlalchemy import Connection, MetaData
+
+
+def _locks_are_no_refusals(connection: Connection) -> None:
+    """Version 2: a diagnosis that met a lock was written as refused; now it can run again."""
+    from sqlalchemy import text
+
+    connection.execute(
+        text(
+            "UPDATE runs SET state = 'failed' WHERE state = 'refused' "
+            "AND sentence LIKE 'the history %cannot be used: %'"
+        )
+    )
+
+
+def _promises_are_kept(connection: Connection) -> None:
+    """Version 3: what was measured after corrections has a table, which `schema` makes."""
+
+
+STEPS: tuple[Callable[[Connection], None], ...] = (_locks_are_no_refusals, _promises_are_kept)
+"""The step at place k makes version k + 2 of version k + 1."""
+
 
 VERSION = 1 + len(STEPS)
 """Of the schema; an older database is brought to it, a newer one is refused."""

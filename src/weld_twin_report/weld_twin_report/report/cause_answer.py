@@ -38,8 +38,8 @@ from weld_twin_nodes.wording.words import (
     unnamed,
 )
 
+from .charts import values
 from .controllers import BRANDS, UNCHECKED, UNNAMED, correction, gearing
-from .curve_plot import values
 from .page_data import components, rms_words, sides_words
 from .seam_view import seen_at
 from .to_do import TOGETHER

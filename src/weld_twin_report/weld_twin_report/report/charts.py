@@ -1,10 +1,10 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Charts that a page draws by itself: lines over something, with ticks, hover values, linked cursors.
+Charts that a page draws by itself: lines over something, and a cause as a small measured curve.
 
-uPlot draws them; it is embedded, see `uplot/README.md`. A page with charts passes ``charts=True`` to
-`html.document`.
+uPlot draws them, with ticks, hover values and linked cursors; it is embedded, see `uplot/README.md`. A
+page with charts passes ``charts=True`` to `html.document`.
 """
 
 from __future__ import annotations
@@ -16,8 +16,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
+from weld_twin_core.diagnosis.result import Cause, Diagnosis
+from weld_twin_core.effects.curves import FrameCurve, JointCurve, basis
+from weld_twin_core.effects.effect import Effect
+from weld_twin_core.effects.servo_lag import ServoLag
 from weld_twin_msgs_py.files.whole_files import plain as finite
+from weld_twin_nodes.wording.quantities import DEGREES, in_short, millimetres, short_rows, turned
+from weld_twin_nodes.wording.words import CURVES, parameter_word
 
 from .html import Html, tag
 
@@ -112,3 +119,174 @@ def thinned(rows: Sequence[Array], most: int = POINTS) -> np.ndarray:
     bins = np.array_split(np.arange(count), max(most // len(rows), 1))
     kept = {int(b[np.argmax(row[b])]) for b in bins for row in rows}
     return np.array(sorted(kept | {0, count - 1}))
+
+
+_SAMPLES = 60
+"""Points of a drawn curve: one for every four units of its width."""
+_FLAT = 0.05
+"""Part of a curve's size within which it is told as the same everywhere."""
+_NINETY = 1.645
+"""Standard deviations to either side that hold 90 % of a Gaussian."""
+_DEGREES = 180.0 / np.pi
+"""Degrees in a radian."""
+_AXES = {
+    'angle': (_DEGREES, Axis('angle', '°')),
+    'direction': (1.0, Axis('direction, backward to forward')),
+    'speed': (_DEGREES, Axis('speed', '°/s')),
+    'load': (1.0, Axis('load torque', 'N m')),
+    'temperature': (1.0, Axis('temperature', '°C')),
+    'time': (1.0, Axis('time', 's')),
+}
+_VALUES = {'d': (1e3, 'mm'), 'a': (1e3, 'mm')}
+
+
+def curve_figure(diagnosis: Diagnosis, m: int, curve: JointCurve) -> Html:
+    """
+    Return a figure of a curve over what it runs over; over its angle, the cursor follows the instant.
+
+    ``m``: which of the effects found it is; their covariance makes the band.
+    """
+    covariance = _spread(diagnosis, m)
+    x, weights, y = _sampled(curve)
+    band = np.zeros_like(y)
+    if covariance is not None:
+        band = _NINETY * np.sqrt(
+            np.maximum(np.einsum('ki,kl,li->i', weights, covariance, weights), 0)
+        )
+    size, unit = _VALUES.get(curve.channel, (_DEGREES, '°'))
+    across, label = _AXES[curve.over]
+    what = 'how far off' if curve.channel == 'q' else curve.channel
+    middle, half = y * size, band * size
+    return chart(
+        f'{curve.joint}: {what} by {curve.over}, {furthest(curve)}',
+        x * across,
+        [Line('off by', middle), Line('not off', 0.0 * middle, 'soft', dashed=True)],
+        (label, Axis('off by', unit)),
+        band=(middle - half, middle + half),
+        joint=diagnosis.model.robot.index(curve.joint) if curve.over == 'angle' else None,
+    )
+
+
+def _spread(diagnosis: Diagnosis, m: int) -> Array | None:
+    """Return the covariance of the coordinates of a found effect, None where it is not known."""
+    effect, posterior = diagnosis.model.found[m], diagnosis.posterior
+    if posterior is None:
+        return None
+    what = posterior.directions
+    starts = what.frame_count + np.concatenate([[0], np.cumsum(what.sizes)]).astype(int)
+    for k, other in enumerate(what.effects):
+        if (other.name, other.site, other.key) == (effect.name, effect.site, effect.key):
+            rows = slice(starts[k], starts[k + 1])
+            return np.asarray(posterior.covariance[rows, rows])
+    return None
+
+
+def furthest_off(diagnosis: Diagnosis, cause: Cause) -> tuple[int, JointCurve] | None:
+    """Return which curve is furthest off of those that stand for a cause; a constant only alone."""
+    result = diagnosis.model.found
+    curves = {
+        m: effect
+        for m in cause.members
+        if m < len(result) and isinstance(effect := result[m], JointCurve)
+    }
+    if not curves:
+        return None
+
+    def rank(item: tuple[int, JointCurve]) -> tuple[bool, float]:
+        return item[1].over != 'constant', float(np.abs(item[1].values).max())
+
+    return max(curves.items(), key=rank)
+
+
+def furthest(curve: JointCurve) -> str:
+    """Return how far a curve is off where it is furthest off, and where that is."""
+    size, unit = _VALUES.get(curve.channel, (_DEGREES, '°'))
+    if curve.over == 'constant':
+        return f'{size * float(np.ravel(curve.values)[0]):.3g}{_spaced(unit)} everywhere'
+    x, _, y = _sampled(curve)
+    at = int(np.argmax(np.abs(y)))
+    if float(np.ptp(y)) < _FLAT * abs(float(y[at])):
+        return f'{size * float(y[at]):.3g}{_spaced(unit)} everywhere'
+    return (
+        f'up to {size * abs(float(y[at])):.3g}{_spaced(unit)} {_where(curve.over, float(x[at]))}'
+    )
+
+
+def furthest_frame(curve: FrameCurve) -> str:
+    """Return how far a frame moves by its curve where it moves furthest."""
+    moved, turned = (
+        float(np.linalg.norm(np.reshape(part, (3, -1)), axis=0).max())
+        for part in (np.asarray(curve.xyz), np.asarray(curve.rotvec))
+    )
+    return (
+        f'up to {1e3 * moved:.3g}\N{NO-BREAK SPACE}mm and turns by up to {_DEGREES * turned:.3g}°'
+    )
+
+
+def _where(over: str, at: float) -> str:
+    if over == 'direction':
+        return f'going {"forward" if at > 0.0 else "backward"}'
+    across, axis = _AXES[over]
+    return f'at {across * at:.3g}{_spaced(axis.unit)}'
+
+
+def _spaced(unit: str) -> str:
+    return unit if unit == '°' else f'\N{NO-BREAK SPACE}{unit}'
+
+
+def _sampled(curve: JointCurve) -> tuple[Array, Array, Array]:
+    """Return what a curve runs over, (N,), the weights of its values, (K, N), and what it is there."""
+    x = np.linspace(curve.knots[0], curve.knots[-1], _SAMPLES)
+    weights = np.asarray(basis(curve.knots, x))
+    return x, weights, np.asarray(np.asarray(curve.values) @ weights)
+
+
+_SHARES = ('scale', 'ratio', 'difference')
+"""Parameters of joints that are a share of an angle."""
+_QUARTER = 90.0
+"""Degrees that such a share is told of."""
+
+
+def values(diagnosis: Diagnosis, cause: Cause, effects: Sequence[Effect]) -> list[str]:
+    """Return how far off the effects of a cause are, the most telling first."""
+    errors = {(f.effect.name, f.effect.site): f.std for f in diagnosis.effects}
+    curve, rows = furthest_off(diagnosis, cause), []
+    if curve is not None:
+        rows.append(f'off by {furthest(curve[1])}')
+    for effect in effects:
+        if isinstance(effect, FrameCurve):
+            rows.append(f'moves by {furthest_frame(effect)}')
+        if effect.name in CURVES:
+            continue
+        if isinstance(effect, ServoLag):
+            rows.append(_trail(diagnosis, effect))
+        rows += _in_a_quarter(effect, diagnosis.model.robot)
+        for name, value in short_rows(
+            effect, errors.get((effect.name, effect.site), {}), diagnosis.model.robot
+        ):
+            rows.append(f'{parameter_word(name)} {value}')
+    return rows
+
+
+def _in_a_quarter(effect: Effect, robot: Robot) -> list[str]:
+    """Return what an error that grows with the angle makes of a quarter turn, or of a metre."""
+    share = next((getattr(effect, n) for n in _SHARES if hasattr(effect, n)), None)
+    if share is None or effect.of != 'joint':
+        return []
+    if effect.on_slide(robot):
+        return [f'off by {in_short(1e3 * float(share), None, 1.0, "mm")} in every metre']
+    return [f'off by {in_short(_QUARTER * float(share), None, 1.0, "°")} in every 90°']
+
+
+def _trail(diagnosis: Diagnosis, lag: ServoLag) -> str:
+    """Return how far a joint trails its command where the recordings move it fastest."""
+    robot = diagnosis.model.robot
+    i = robot.index(lag.joint)
+    speeds = [np.abs(r.joints.velocity[:, i]).max() for r in diagnosis.recordings]
+    fastest = float(max(speeds, default=0.0))
+    trail = fastest * float(lag.time_constant)
+    if robot.prismatic[i]:
+        return (
+            f'{lag.joint} trails by {millimetres(trail)} at its fastest ({1e3 * fastest:.0f} mm/s)'
+        )
+    return f'{lag.joint} trails by {turned(trail)} at its fastest ({DEGREES * fastest:.0f} °/s)'

@@ -1,9 +1,12 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The files a diagnosis leaves behind."""
+"""The files a diagnosis leaves behind, the page as a PDF to sign among them."""
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +14,7 @@ from typing import Any
 
 from weld_twin_core import __version__
 from weld_twin_core.diagnosis.result import Diagnosis
+from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.files.input_files import InputFile
 from weld_twin_msgs_py.files.joint_file import write_joint_motion
 from weld_twin_msgs_py.files.whole_files import json_text, write_text
@@ -19,6 +23,56 @@ from weld_twin_nodes.offline.exports import where_it_holds, write_all
 
 from .diagnosis_page import Sheet, report_page
 from .to_do import weighed
+
+BROWSERS = ('chromium', 'chromium-browser', 'google-chrome', 'microsoft-edge')
+_SECONDS = 60
+"""Longest that printing may take; it takes two."""
+_SETTLED_MS = 3000
+"""Time of the page's own clock until it is printed: scripts have drawn by then."""
+
+
+def browser() -> str:
+    """
+    Return the browser to print with.
+
+    Raises DataError: there is none.
+    """
+    result = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if result is None:
+        raise DataError(
+            '--pdf needs Chromium, Chrome or Edge, and none is installed: apt-get install chromium, '
+            'or print report.html from any browser'
+        )
+    return result
+
+
+def print_page(page: Path, out: Path) -> None:
+    """
+    Print a page to a PDF.
+
+    Raises DataError: there is no browser, or it did not print.
+    """
+    program = browser()
+    with tempfile.TemporaryDirectory() as profile:
+        command = [
+            program,
+            '--headless',
+            '--no-sandbox',
+            '--disable-gpu',
+            '--no-first-run',
+            '--no-pdf-header-footer',
+            f'--user-data-dir={profile}',
+            f'--virtual-time-budget={_SETTLED_MS}',
+            f'--print-to-pdf={out.resolve()}',
+            page.resolve().as_uri(),
+        ]
+        try:
+            subprocess.run(command, capture_output=True, timeout=_SECONDS, check=True)
+        except (subprocess.SubprocessError, OSError) as error:
+            raise DataError(f'{page}: {program} did not print it ({error})') from None
+    if not out.is_file():
+        raise DataError(f'{page}: {program} did not print it')
+
 
 RESULT = 'diagnosis.json'
 PAGE = 'report.html'

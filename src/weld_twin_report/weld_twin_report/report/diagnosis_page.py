@@ -29,8 +29,7 @@ from .acceptance import (
     rule_of,
 )
 from .answer import Answer
-from .cause_cards import causes_cards
-from .cause_list import causes_section, changed_section, shrink_section
+from .cause_list import causes_cards, causes_section, changed_section, shrink_section
 from .charts import embedded
 from .circle_plot import circle_data, circles_section
 from .contact_clouds import contacts_section

@@ -23,8 +23,7 @@ from weld_twin_nodes.offline.task_pool import Pool, Runner, Task, Tell
 from .figures import Drawing, draw, drawable
 from .setting import Setting
 from .study_page import study_page
-from .whole import run_study
-from .work import claim_case
+from .work import claim_case, run_study
 
 ROBOTS = (
     'ur5',

@@ -29,15 +29,13 @@ from ..history import Unavailable
 from ..history.database import Database
 from ..report.html import Html
 from . import pages
-from .access import Access, People, be, be_nobody
-from .bodies import Busy, TooMuch, TooSlow
-from .connections import Doors
+from .access import Access, Doors, People, be, be_nobody
 from .directory import NO_ROOM, NoRoom, is_full, refuse_full
 from .fields import sentence
 from .job import DIAGNOSIS, DONE, FOUND, MODEL, OPEN, PROGRAM, RECORDING, UPLOADS, Job
 from .queue import HISTORY, UNKNOWN, Queue
 from .settings import Settings
-from .uploads import asked_of, asked_of_program, save, save_program
+from .uploads import Busy, TooMuch, TooSlow, asked_of, asked_of_program, save, save_program
 
 FIELDS = 40
 """Fields of a form at most, besides its files."""

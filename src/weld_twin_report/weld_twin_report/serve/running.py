@@ -72,8 +72,8 @@ def serve(settings: Settings, tell: Callable[[str], None]) -> None:
     try:
         import uvicorn
 
+        from .access import Doors, protocol
         from .app import make_app
-        from .connections import Doors, protocol
     except ImportError as error:
         raise DataError(
             f"the server needs {error.name}; install it with: pip install 'weld-twin[serve]'"

@@ -109,8 +109,8 @@ rare:
 def _sheet(args: argparse.Namespace) -> Sheet:
     """Return what the page is to show; checked before anything is computed."""
     from ...report.acceptance import Demand
+    from ...report.diagnosis_files import browser
     from ...report.diagnosis_page import Sheet, joint_labels
-    from ...report.pdf import browser
 
     if args.pdf:
         browser()
@@ -130,8 +130,7 @@ def run(args: argparse.Namespace) -> int:
     from rich.console import Console
 
     from ...report import print_summary
-    from ...report.diagnosis_files import PAGE, PDF, RESULT, write_results
-    from ...report.pdf import print_page
+    from ...report.diagnosis_files import PAGE, PDF, RESULT, print_page, write_results
 
     sheet = _sheet(args)
     with output(args, RESULT) as place:

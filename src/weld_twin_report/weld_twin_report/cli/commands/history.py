@@ -170,8 +170,15 @@ def changed(args: argparse.Namespace) -> int:
 
     from ...history import observations
     from ...history.entry import instant
-    from ...history.tracking import DAY, changed
-    from ...history.words import as_dict, forecast, forecast_sentence, sentence, since
+    from ...history.words import (
+        DAY,
+        as_dict,
+        changed,
+        forecast,
+        forecast_sentence,
+        sentence,
+        since,
+    )
 
     limits = _limits(args.limit)
     with opened(args) as database:

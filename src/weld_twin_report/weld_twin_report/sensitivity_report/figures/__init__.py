@@ -9,7 +9,7 @@ from collections.abc import Callable
 from weld_twin_core.errors import DataError
 
 from ..setting import RECORDED, Setting
-from . import paths, posture, sizes, together
+from . import paths, sizes
 from .canvas import Drawing
 
 __all__ = ['FIGURES', 'Drawing', 'draw', 'drawable']
@@ -20,12 +20,12 @@ FIGURES: dict[str, Callable[[Setting], Drawing | None]] = {
     '8': paths.profiles,
     '9': paths.play,
     '10': sizes.angles,
-    '11': together.combined,
+    '11': sizes.combined,
     '12': sizes.joints,
     '13': sizes.widths,
-    '14': together.drift,
-    'posture': posture.standing,
-    'recorded': posture.recorded,
+    '14': sizes.drift,
+    'posture': paths.standing,
+    'recorded': paths.recorded,
 }
 """By the number the paper gives them, or a name."""
 _PLANNED_ONLY = ('6', '8')

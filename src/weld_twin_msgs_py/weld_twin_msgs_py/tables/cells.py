@@ -16,16 +16,20 @@ from numpy.typing import NDArray
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-from .current_positions import is_positions, read_positions
 from .formats import Read, read, recognised
 from .lines import COMMA, EMPTY, LOOK, decimal_sign, number, split_lines, without_units
-from .point_lists import (
+from .recorded_files import (
+    TRACE_MARK,
+    is_c3d,
     is_joint_targets,
     is_point_list,
+    is_positions,
+    read_c3d,
     read_joint_targets,
     read_point_list,
+    read_positions,
+    read_trace,
 )
-from .recorded_files import TRACE_MARK, is_c3d, read_c3d, read_trace
 from .words import parted, shortened
 
 

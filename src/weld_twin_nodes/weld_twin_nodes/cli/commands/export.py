@@ -13,6 +13,7 @@ from pathlib import Path
 
 from weld_twin_core.errors import DataError
 
+from ..file_options import PROGRAM, TRIGGER, check_program, context_of, quantity
 from ..options import (
     ROBOT,
     file_output,
@@ -22,7 +23,6 @@ from ..options import (
     robot_of,
     write_or_print,
 )
-from ..program_options import PROGRAM, TRIGGER, check_program, context_of, quantity
 from . import job, jobs
 
 USUAL = 'model'

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 from weld_twin_core.errors import ModelError
 
+from ..file_options import TABLE, table_of
 from ..options import BAG_OUTPUT, CAMERAS, ROBOT, robot_of
-from ..table_options import TABLE, table_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot

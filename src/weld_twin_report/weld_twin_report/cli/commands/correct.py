@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from weld_twin_core.errors import DataError
+from weld_twin_nodes.cli.file_options import PROGRAM, context_of, quantity, start_of
 from weld_twin_nodes.cli.options import (
     OF_TOPICS,
     ROBOT,
@@ -28,7 +29,6 @@ from weld_twin_nodes.cli.options import (
     say_doubts,
     topics_of,
 )
-from weld_twin_nodes.cli.program_options import PROGRAM, context_of, quantity, start_of
 
 if TYPE_CHECKING:
     from weld_twin_msgs_py.programs import Context, Program

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from weld_twin_core.errors import DataError, ModelError
+from weld_twin_nodes.cli.file_options import RARE_TABLE, table_of
 from weld_twin_nodes.cli.options import (
     ALIGN,
     ROBOT,
@@ -32,7 +33,6 @@ from weld_twin_nodes.cli.options import (
     topics_of,
     twin_of,
 )
-from weld_twin_nodes.cli.table_options import RARE_TABLE, table_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot

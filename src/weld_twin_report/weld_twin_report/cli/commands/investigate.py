@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from weld_twin_core.errors import DataError, TwinError
+from weld_twin_nodes.cli.file_options import PROGRAM, TRIGGER, check_program, context_of
 from weld_twin_nodes.cli.options import ANY_ROBOT, FORCE, links_of, output, refuse, robot_of
 from weld_twin_nodes.cli.parsing import add_options
-from weld_twin_nodes.cli.program_options import PROGRAM, TRIGGER, check_program, context_of
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot

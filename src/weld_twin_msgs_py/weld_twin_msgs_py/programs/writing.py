@@ -1,18 +1,189 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The writers, one for every language, as short as a program is."""
+"""
+The writers of new programs, one for every language, and the sheets that go with them.
+
+A sheet says how to load the program, run it first, and record.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-from ...files.csv_text import guarded
-from ..source import ABB_POSE, KUKA_POSE, UR_POSE
-from .exported import Exported, ExportMove, comma
+from ..files.csv_text import guarded
+from .context import Context
+from .controllers import ExternalAxis
+from .source import ABB_POSE, KUKA_POSE, UR_POSE
+
+
+class ExportMove(NamedTuple):
+    """One move."""
+
+    kind: Literal['joint', 'linear']
+    """'joint' or 'linear'."""
+    q: Array
+    """Joint positions of the model at its end, shape (n,)."""
+    pose: Array
+    """The tool there, in the controller's robot frame, shape (4, 4) [m]."""
+    speed: float
+    """Of the tool [m/s]; of a joint move what its share of joint speed makes of it."""
+    share: float
+    """Of the joints' speeds."""
+    stop: bool = True
+    dwell: float = 0.0
+    """[s]"""
+    duration: float = 1.0
+    """How long it takes [s]."""
+    comment: str = ''
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """A program to write."""
+
+    name: str
+    """Letters, digits and underscores, as all controllers take it."""
+    moves: tuple[ExportMove, ...]
+    context: Context
+    tool: Array
+    """On the controller's flange, shape (4, 4) [m]."""
+    trigger: int
+    """Number of the digital output that tells the instrument when to measure."""
+    stations: bool
+    """The output is on while the arm stands; else from the first to the last move."""
+    comments: tuple[str, ...] = ()
+
+    def joints(self, move: ExportMove) -> list[float]:
+        """Return the joints of a move as the controller shows them, degrees or mm."""
+        return self.context.degrees().numbers(move.q, [0.0] * self.context.robot.n)
+
+    @property
+    def external(self) -> tuple[ExternalAxis, ...]:
+        """Return the external axes that the controller has."""
+        return self.context.controller.external
+
+    def labelled(self, move: ExportMove, own: str) -> dict[str, float]:
+        """
+        Return the joints of a move as shown, by what the controller calls them.
+
+        own: a form with a number, of the arm's joints; external axes follow in the order of their
+        names.
+        """
+        names = [own.format(k + 1) for k in range(self.context.axes)]
+        labels = [*names, *(axis.label for axis in self.external)]
+        shown = list(zip(labels, self.joints(move), strict=True))
+        return dict(shown[: len(names)] + sorted(shown[len(names) :]))
+
+    @property
+    def joint_sizes(self) -> Array:
+        """Return the speed limits of the joints, shape (n,) [rad/s or m/s]."""
+        return np.asarray(self.context.robot.max_velocity)
+
+
+def move_count(program: Exported) -> int:
+    """Return how many moves a program has."""
+    return len(program.moves)
+
+
+def comma(values: list[float], digits: int) -> str:
+    """Return numbers with commas between, no minus before a zero."""
+    return ', '.join(f'{0.0 if abs(v) < 0.5 * 10.0**-digits else v:.{digits}f}' for v in values)
+
+
+LOADING: dict[str, tuple[str, str, str]] = {
+    'urscript': (
+        'Copy the file to the controller (USB stick, or SFTP to /programs). Put a Script node with '
+        'this file into a program, or send it to port 30002.',
+        'Record actual_q over RTDE (port 30004), such as with the RTDE client of Universal Robots, '
+        'at 125 Hz or 500 Hz.',
+        'digital output {trigger} (standard)',
+    ),
+    'krl': (
+        'Copy the file to KRC:\\R1\\Program (USB stick, or WorkVisual), in the user group Expert.',
+        'Record $AXIS_ACT_MEAS with the oscilloscope (trace) of the controller, or over RSI.',
+        '$OUT[{trigger}]',
+    ),
+    'rapid': (
+        'Load the module into task T_ROB1 (FlexPendant: Program Editor, or RobotStudio). Define the '
+        'signal doTracker{trigger} first, and enter mass and centre of the tool into tMeasured.',
+        'Record the joints with Test Signal Viewer, or poll Robot Web Services.',
+        'signal doTracker{trigger}',
+    ),
+    'inform': (
+        'Load the job from a USB stick (EX. MEMORY, LOAD, JOB). Tool 0 must hold the numbers below. '
+        'Compare one point in the job with the pulses that the pendant shows.',
+        'Record pulses over the Ethernet server (HSES), or with MotoROS2.',
+        'OT#({trigger})',
+    ),
+    'fanuc-ls': (
+        'Load the file from a USB stick or by FTP. A .ls needs the option ASCII Upload; without it, '
+        'translate it to .tp with MakeTP of RoboGuide. UTOOL 1 must hold the numbers below.',
+        'Record the joints with the data monitor, or over the stream motion or PC interface.',
+        'DO[{trigger}]',
+    ),
+    'joint-trajectory': (
+        'ros2 topic pub --once /TOPIC trajectory_msgs/msg/JointTrajectory "$(cat FILE)", or read the '
+        'file in a node of yours. Send the arm to the first point before.',
+        'ros2 bag record /joint_states, and the poses of the instrument.',
+        'no output: a trajectory has none; measure by time',
+    ),
+    'csv': (
+        'A table: one line is one move. Bring it into your own software.',
+        'Record joint positions with their stamps.',
+        'no output: a table has none',
+    ),
+}
+"""For every language: how to load a program, how to record joints, what triggers the instrument."""
+
+
+def sheet(program: Exported, language: str, file: str, speeds: str, notes: Sequence[str]) -> str:
+    """
+    Return the sheet as Markdown.
+
+    file: name of the program's file.
+    speeds: how fast it runs, in one sentence.
+    notes: what to look out for, in sentences.
+    """
+    load, record, output = (text.format(trigger=program.trigger) for text in LOADING[language])
+    when = 'while the arm stands' if program.stations else 'from the first to the last move'
+    minutes = sum(m.duration + m.dwell for m in program.moves) / 60.0
+    x, y, z = program.tool[:3, 3] * 1e3
+    rows = [
+        f'# {file}',
+        '',
+        f'{len(program.moves)} moves, about {minutes:.1f} minutes. {speeds}',
+        '',
+    ]
+    rows += [f'- {text}' for text in program.comments]
+    rows += ['', '## Load it', '', load, '']
+    rows += [
+        f'The tool must be {x:.3f} {y:.3f} {z:.3f} mm from the flange, as in the robot file.',
+        '',
+    ]
+    rows += ['## Run it first', '']
+    rows += [
+        '1. Check every point for collisions: the file knows the arm, not your cell.',
+        '2. Run it in manual mode at reduced speed, with a hand on the enabling switch.',
+        '3. Only then run it in automatic mode and record.',
+        '',
+    ]
+    rows += [f'- {note}' for note in notes] + ([''] if notes else [])
+    rows += ['## Record', '', record, '']
+    rows += [f'The instrument measures at: {output}, on {when}.', '']
+    rows += [
+        'Bring joints and measured positions into one table, a column for every joint and x, y, z,',
+        'and read it with `weld-twin import TABLE.csv --robot ROBOT --out BAG`.',
+        '',
+    ]
+    return '\n'.join(rows)
+
 
 BLEND = 1e-3
 """Corners are rounded within this much [m] where the arm goes on."""

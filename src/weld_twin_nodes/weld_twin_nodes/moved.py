@@ -11,9 +11,26 @@ from importlib import import_module
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-_WORDING = ('leading', 'mending', 'quantities', 'switches', 'verdict', 'words')
+_WORDING = ('mending', 'quantities', 'switches', 'verdict', 'words')
 _ROOMS = ('demo', 'fleet', 'guarded', 'history', 'report', 'sensitivity_report', 'serve')
+_INTO = {
+    'report': 'family_table answer cause_cards cause_list curve_plot charts root_frame controllers '
+    'pdf diagnosis_files',
+    'history': 'migrations schema tracking words',
+    'fleet': 'listed running',
+    'demo': 'closed_loop_page closed_loop demo_diagnosis analysis live_run analysis hand_over analysis',
+    'serve': 'connections access bodies uploads',
+    'sensitivity_report': 'whole work figures.posture figures.paths figures.together figures.sizes',
+}
+"""Modules of a room that stand in another one of it now: the old name, then the new one, and so on."""
+_PAIRS = {room: iter(names.split()) for room, names in _INTO.items()}
 MOVED = {
+    'weld_twin_nodes.report.leading': 'weld_twin_nodes.wording.verdict',
+    **{
+        f'weld_twin_nodes.{room}.{old}': f'weld_twin_report.{room}.{new}'
+        for room, names in _PAIRS.items()
+        for old, new in zip(names, names, strict=True)
+    },
     **{f'weld_twin_nodes.report.{name}': f'weld_twin_nodes.wording.{name}' for name in _WORDING},
     **{f'weld_twin_nodes.{name}': f'weld_twin_report.{name}' for name in _ROOMS},
 }

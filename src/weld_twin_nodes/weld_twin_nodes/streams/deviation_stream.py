@@ -40,11 +40,13 @@ class Pair(NamedTuple):
 class Pairing:
     """
     Pairs two streams of positions whose stamps need not agree.
+
     The twin is interpolated by the parabola through the two poses around a measurement and the
     one before them, by a straight line where there is none before: at 100 Hz and 1 m/s^2 a
     straight line alone would be 12 um off. Nothing is interpolated across a break of the stream,
     a step of more than four times the usual. A measurement waits until the twin has passed it. One
     that can never be paired is counted in `dropped`.
+
     depth: how many samples of each stream are kept.
     max_gap: longest step between two twin poses that is still interpolated [s].
     """
@@ -75,6 +77,7 @@ class Pairing:
     def add_twin(self, stamp: int, position: Array) -> list[Pair]:
         """
         Take a twin pose; return the pairs it completes.
+
         Raises DataError: the stamp is not after the last one.
         """
         if self._twin_order.restarted_at(stamp):
@@ -86,6 +89,7 @@ class Pairing:
     def add_measured(self, stamp: int, position: Array) -> list[Pair]:
         """
         Take a measurement; return the pairs it completes.
+
         Raises DataError: the stamp is not after the last one.
         """
         if self._measured_order.restarted_at(stamp):
@@ -125,6 +129,7 @@ class Pairing:
     def _longest(self, high: int) -> int:
         """
         Return the longest step up to a pose that is interpolated, by the steps before it.
+
         The usual step is the longest but two, so that poses may come in bursts and two breaks
         among those steps do not make a third one usual.
         """

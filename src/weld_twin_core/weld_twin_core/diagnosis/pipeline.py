@@ -28,7 +28,7 @@ from .many.fitted_together import fitted_together
 from .many.weighed_families import weighed_families
 from .predicting.allowed import allowed, elsewhere
 from .predicting.alone import alone
-from .result import Diagnosis
+from .result import Diagnosis, Shrink
 from .soundness.efforts import with_sign
 from .soundness.gate import Examined, examine
 from .soundness.mending import Given
@@ -206,16 +206,20 @@ def _told(
     progress('held against curves without a formula')
     which = verdict, alternative, holdout, beliefs
     result, unseen, shrink, verdict = carried(result, unseen, shrink, *which)
-    result = _held(result, examined.given.robot)
-    model = result.final.model
-    own = replace(model, alone=alone(result.problem, model, shrink, many=result.dense))
-    result = replace(result, final=replace(result.final, model=own))
+    result = _alone(_held(result, examined.given.robot), shrink)
     posterior = allowed(result.problem, result.final.model, result.scale, result.precision, floor)
     if result.final.model.found:
         shrink = elsewhere(shrink, posterior)
     progress('weighed what the data leave open')
     reported = (statements, alternative, places, limits)
     return answer(result, unseen, evidence, verdict, shrink, examined, posterior, *reported)
+
+
+def _alone(result: Search, shrink: Shrink) -> Search:
+    """Return what was found with what a robot file alone does of it."""
+    model = result.final.model
+    own = replace(model, alone=alone(result.problem, model, shrink, many=result.dense))
+    return replace(result, final=replace(result.final, model=own))
 
 
 def _held(result: Search, robot: Robot) -> Search:

@@ -11,17 +11,15 @@ them but one. So it is surer than anybody can be who has to find these out.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from math import lgamma, log, pi
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 from scipy.special import logsumexp
 
-from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array
 
 from ..blind.blind_cell import BlindCell, Take, deviation, exact, record
@@ -32,7 +30,7 @@ from ..blind.displacement import rms
 from ..blind.making import SealedCase
 from .levels_of_truth import alike_by_structure
 from .mix import COMMON, OFTEN, SEVERAL, drawn
-from .visible import STEP, TURNING, changed
+from .visible import STEP, TURNING, changed, fitted, frame_columns, moved
 
 DRAWS = 2
 """Causes drawn of each family at each joint: phases and instants differ; sizes are fitted."""
@@ -65,6 +63,8 @@ class _Bench(NamedTuple):
     """What was measured, (rows,); on the sealed motion the truth without noise."""
     beside: list[Cause]
     """All causes but the one that is asked for."""
+    without: Array
+    """What these alone move, (rows,)."""
     nuisance: Array
     """Columns of frames and of the other causes, (rows, p)."""
 
@@ -99,9 +99,8 @@ def of_one(case: SealedCase, k: int, mix: str, rng: np.random.Generator) -> floa
     """Return the posterior probability of one cause, the others known."""
     bench, own = _bench(case, k, rng), case.causes[k]
     wanted = rms(deviation(case.cell, [own], case.train)) / case.cell.noise
-    true = _weighed(bench, own, wanted)
-    if true is None:
-        return 0.0
+    whole = moved(bench.cell, [*bench.beside, own], bench.takes)
+    *_, true = _refined(bench, own, whole)
     alike = alike_by_structure(case.lot.robot, site(own))
     right = [true.log_weight + _log_prior(case, own['effect'], mix)]
     wrong: list[float] = []
@@ -123,53 +122,72 @@ def _bench(case: SealedCase, k: int, rng: np.random.Generator) -> _Bench:
     cell = replace(case.cell, align=())
     takes = (case.train, *case.also, case.test)
     beside = [*case.causes[:k], *case.causes[k + 1 :]]
-    whole = _moved(cell, [*beside, case.causes[k]], takes)
-    seen = whole.size - _moved(cell, (), takes[-1:]).size
+    whole = moved(cell, [*beside, case.causes[k]], takes)
+    seen = whole.size - moved(cell, (), takes[-1:]).size
     columns = [
-        (_moved(cell, new, takes) - whole) / STEP
+        (moved(cell, new, takes) - whole) / STEP
         for j in range(len(beside))
         for new in changed([*beside, case.causes[k]], j)
     ]
-    columns += _frames(cell, takes, case.cell.align)
+    columns += frame_columns(cell, takes, case.cell.align)
     y = whole.copy()
     y[:seen] += rng.standard_normal(seen)
     nuisance = np.array(columns).T if columns else np.zeros((whole.size, 0))
     count = 3 * len(record(cell, (), case.test, exact(cell.tracker)).position)
-    return _Bench(cell, takes, seen, slice(seen, seen + count), y, beside, nuisance)
+    return _Bench(
+        cell,
+        takes,
+        seen,
+        slice(seen, seen + count),
+        y,
+        beside,
+        moved(cell, beside, takes),
+        nuisance,
+    )
 
 
-def _weighed(bench: _Bench, cause: Cause, ratio: float, best: float = np.inf) -> _Weighed | None:
+def _weighed(bench: _Bench, cause: Cause, ratio: float, best: float) -> _Weighed | None:
     """
-    Return the weight of a cause, its numbers fitted; None where it has none.
+    Return the weight of a cause other than the one at work; None where it has none.
 
     ratio: of its deviation to the noise, as it is given.
     best: chi-square of the cause at work.
     """
-    whole = _moved(bench.cell, [*bench.beside, cause], bench.takes)
-    if np.isfinite(best) and _one_number(cause):
-        without = _moved(bench.cell, bench.beside, bench.takes)
-        if _fitted(bench, without, (whole - without)[:, None])[0] > best + HOPELESS:
+    whole = moved(bench.cell, [*bench.beside, cause], bench.takes)
+    if _one_number(cause):
+        alone = (whole - bench.without)[:, None]
+        if _solved(bench, bench.without, alone)[0] > best + HOPELESS:
             return None
-    causes = [*bench.beside, cause]
-    changes = changed(causes, len(bench.beside))
-    columns = [(_moved(bench.cell, new, bench.takes) - whole) / STEP for new in changes]
-    chi2, moved, predicted, volume = _fitted(bench, whole, np.array(columns).T)
+    sizes, own, weighed = _refined(bench, cause, whole)
+    growth = float(np.linalg.norm(own) / np.linalg.norm(sizes))
+    possible = STRATA[0][0] / WIDE < ratio * growth < STRATA[-1][1] * WIDE
+    possible = possible and (_signed(cause) or own[0] >= 0.0)
+    return weighed if possible and weighed.chi2 <= best + NEAR else None
+
+
+def _refined(bench: _Bench, cause: Cause, whole: Array) -> tuple[Array, Array, _Weighed]:
+    """
+    Return the sizes of a cause as given and as fitted, in units of its columns, and its weight.
+
+    whole: what it moves beside the others, (rows,).
+    """
+    changes = changed([*bench.beside, cause], len(bench.beside))
+    columns = [(moved(bench.cell, new, bench.takes) - whole) / STEP for new in changes]
+    chi2, step, predicted, volume = _solved(bench, whole, np.array(columns).T)
     sizes = np.concatenate([_scaled(cause, key) for key in SIZES[cause['effect']] if key in cause])
-    grown = sizes + moved[: sizes.size]
-    growth = float(np.linalg.norm(grown) / np.linalg.norm(sizes))
-    sensible = STRATA[0][0] / WIDE < ratio * growth < STRATA[-1][1] * WIDE
-    signed = CAUSES[cause['effect']].signed or sizes.size > 1
-    if (chi2 > best + NEAR or not sensible or (not signed and grown[0] < 0.0)) and np.isfinite(
-        best
-    ):
-        return None
-    sphere = log(2.0) + 0.5 * sizes.size * log(pi) - lgamma(0.5 * sizes.size)
-    sphere = sphere if signed else 0.0
-    turns = (moved.size - sizes.size) * log(2.0 * pi)
-    density = (
-        -log(FLAT) - sphere - sizes.size * log(max(float(np.linalg.norm(grown)), 1e-9)) - turns
-    )
-    return _Weighed(chi2, density + volume - 0.5 * chi2, predicted)
+    own = sizes + step[: sizes.size]
+    half_lines = log(2.0) + 0.5 * sizes.size * log(pi) - lgamma(0.5 * sizes.size)
+    directions = half_lines if _signed(cause) else 0.0
+    turns = (step.size - sizes.size) * log(2.0 * pi)
+    radius = max(float(np.linalg.norm(own)), 1e-9)
+    density = -log(FLAT) - directions - sizes.size * log(radius) - turns
+    return sizes, own, _Weighed(chi2, density + volume - 0.5 * chi2, predicted)
+
+
+def _signed(cause: Cause) -> bool:
+    """Return whether a cause may point either way, or anywhere."""
+    count = sum(np.size(cause[key]) for key in SIZES[cause['effect']] if key in cause)
+    return CAUSES[cause['effect']].signed or count > 1
 
 
 def _one_number(cause: Cause) -> bool:
@@ -183,68 +201,21 @@ def _scaled(cause: Cause, key: str) -> Array:
     return np.asarray(value / np.abs(value).max())
 
 
-def _fitted(bench: _Bench, whole: Array, columns: Array) -> tuple[float, Array, Array, float]:
+def _solved(bench: _Bench, whole: Array, columns: Array) -> tuple[float, Array, Array, float]:
     """
     Return chi-square, coefficients of the columns, the prediction, and the log volume of the posterior.
 
     whole: what the causes move, (rows,); columns: their derivatives, (rows, k).
     """
     seen, design = slice(bench.seen), np.concatenate([columns, bench.nuisance], axis=1)
-    scale = np.maximum(np.linalg.norm(design[seen], axis=0), 1e-12)
     gap = bench.y - whole
-    fitted = np.linalg.lstsq(design[seen] / scale, gap[seen], rcond=1e-9)[0] / scale
-    left = gap - design @ fitted
+    step = fitted(design[seen], gap[seen])
+    left = gap - design @ step
     basis = np.linalg.qr(bench.nuisance[seen])[0]
     bare = columns[seen] - basis @ (basis.T @ columns[seen])
     sizes = np.maximum(np.linalg.svd(bare, compute_uv=False), 1e-3)
     volume = float(0.5 * sizes.size * log(2.0 * pi) - np.log(sizes).sum())
-    return float((left[seen] ** 2).sum()), fitted[: columns.shape[1]], bench.y - left, volume
-
-
-def _moved(cell: BlindCell, causes: Sequence[Cause], takes: Sequence[Take]) -> Array:
-    """
-    Return how far causes move what is measured, over its noise, (rows,).
-
-    Of each recording the positions, and then the turns where they are measured.
-    """
-    out = []
-    for taken in takes:
-        out.append(deviation(cell, causes, taken).ravel() / cell.tracker.sigma)
-        if cell.tracker.orientation:
-            moved, ideal = (record(cell, c, taken, exact(cell.tracker)) for c in (causes, ()))
-            there = Rotation.from_quat(ideal.quaternion)
-            if not ideal.static:
-                t = np.clip(moved.t_measured, ideal.t_measured[0], ideal.t_measured[-1])
-                there = Slerp(ideal.t_measured, there)(t)
-            turn = (Rotation.from_quat(moved.quaternion) * there.inv()).as_rotvec()
-            out.append(turn.ravel() / cell.tracker.sigma_orientation)
-    return np.concatenate(out)
-
-
-def _frames(cell: BlindCell, takes: Sequence[Take], align: Sequence[str]) -> list[Array]:
-    """Return columns of the frames that are fitted, in the rows of `_moved`."""
-    seen = [record(cell, (), taken, exact(cell.tracker)) for taken in takes]
-    out = []
-    for axis in np.eye(3):
-        for shift, turn in ((axis, np.zeros(3)), (np.zeros(3), axis)):
-            for frame in align:
-                parts = []
-                for own in seen:
-                    rotation = matrix_from_quaternion(np.asarray(own.quaternion))
-                    arm = own.position if frame == 'base' else np.zeros_like(own.position)
-                    along, about = (
-                        (
-                            np.broadcast_to(v, own.position.shape)
-                            if frame == 'base'
-                            else rotation @ v
-                        )
-                        for v in (shift, turn)
-                    )
-                    parts.append((along + np.cross(about, arm)).ravel() / cell.tracker.sigma)
-                    if cell.tracker.orientation:
-                        parts.append(about.ravel() / cell.tracker.sigma_orientation)
-                out.append(np.concatenate(parts))
-    return [column for column in out if np.abs(column).max() > 0.0]
+    return float((left[seen] ** 2).sum()), step[: columns.shape[1]], bench.y - left, volume
 
 
 def _log_prior(case: SealedCase, family: str, mix: str) -> float:

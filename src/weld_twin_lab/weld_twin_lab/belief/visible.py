@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
 
 from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array
@@ -21,6 +22,7 @@ from weld_twin_core.arrays import Array
 from ..blind.blind_cell import BlindCell, Take, deviation, exact, floor, record
 from ..blind.cause_sizes import SIZES, Cause
 from ..blind.making import SealedCase
+from ..plant.plant_recording import PlantRecording
 
 STEP = 0.1
 """Share of a parameter by which it is changed for its column; angles by as much [rad]."""
@@ -34,53 +36,75 @@ def shown(case: SealedCase) -> list[float]:
 
     Causes are taken as linear in their parameters about the truth.
     """
-    cell = replace(case.cell, align=())
+    positions = replace(case.cell.tracker, orientation=False)
+    cell = replace(case.cell, align=(), tracker=positions)
     takes = (case.train, *case.also, case.test)
-    whole = _moved(cell, case.causes, takes)
-    frames = _frames(cell, takes, case.cell.align)
+    whole = moved(cell, case.causes, takes)
+    frames = frame_columns(cell, takes, case.cell.align)
     columns = [
-        [(_moved(cell, new, takes) - whole) / STEP for new in changed(case.causes, k)]
+        [(moved(cell, new, takes) - whole) / STEP for new in changed(case.causes, k)]
         for k in range(len(case.causes))
     ]
-    unseen = np.arange(whole.size) >= whole.size - 3 * _samples(cell, case.test)
+    unseen = np.arange(whole.size) >= whole.size - moved(cell, (), takes[-1:]).size
     out = []
     for k in range(len(case.causes)):
         others = [own for j, part in enumerate(columns) if j != k for own in part]
         design = np.array([*others, *frames]).T
-        gone = whole - _moved(cell, [*case.causes[:k], *case.causes[k + 1 :]], takes)
-        left = gone - design @ _fitted(design[~unseen], gone[~unseen]) if design.size else gone
-        rises = [float((left[part] ** 2).sum()) for part in (unseen, ~unseen)]
-        out.append(min(rises) / cell.tracker.sigma**2)
+        gone = whole - moved(cell, [*case.causes[:k], *case.causes[k + 1 :]], takes)
+        left = gone - design @ fitted(design[~unseen], gone[~unseen]) if design.size else gone
+        out.append(min(float((left[part] ** 2).sum()) for part in (unseen, ~unseen)))
     return out
 
 
-def _fitted(design: Array, target: Array) -> Array:
+def fitted(design: Array, target: Array) -> Array:
     """Return least-squares coefficients; columns differ in size by orders of magnitude."""
     size = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
     return np.asarray(np.linalg.lstsq(design / size, target, rcond=1e-9)[0] / size)
 
 
-def _moved(cell: BlindCell, causes: Sequence[Cause], takes: Sequence[Take]) -> Array:
-    """Return how far causes move the measured positions on all recordings, (rows,) [m]."""
-    return np.concatenate([deviation(cell, causes, taken).ravel() for taken in takes])
+def moved(cell: BlindCell, causes: Sequence[Cause], takes: Sequence[Take]) -> Array:
+    """
+    Return how far causes move what is measured on all recordings, over its noise, (rows,).
+
+    Of each recording the positions, and then the turns where the cell measures them.
+    """
+    out = []
+    for taken in takes:
+        out.append(deviation(cell, causes, taken).ravel() / cell.tracker.sigma)
+        if cell.tracker.orientation:
+            real, ideal = (record(cell, own, taken, exact(cell.tracker)) for own in (causes, ()))
+            there = Rotation.from_quat(ideal.quaternion)
+            if not ideal.static:
+                t = np.clip(real.t_measured, ideal.t_measured[0], ideal.t_measured[-1])
+                there = Slerp(ideal.t_measured, there)(t)
+            turn = (Rotation.from_quat(real.quaternion) * there.inv()).as_rotvec()
+            out.append(turn.ravel() / cell.tracker.sigma_orientation)
+    return np.concatenate(out)
 
 
-def _samples(cell: BlindCell, taken: Take) -> int:
-    return len(record(cell, (), taken, exact(cell.tracker)).position)
-
-
-def _frames(cell: BlindCell, takes: Sequence[Take], align: Sequence[str]) -> list[Array]:
-    """Return the columns of the frames that are fitted; of the tool its shift alone."""
+def frame_columns(cell: BlindCell, takes: Sequence[Take], align: Sequence[str]) -> list[Array]:
+    """Return the columns of the frames that are fitted, in the rows of `moved`; none that is zero."""
     seen = [record(cell, (), taken, exact(cell.tracker)) for taken in takes]
-    out: list[Array] = []
-    for axis in np.eye(3):
-        if 'base' in align:
-            out.append(np.concatenate([np.cross(axis, own.position).ravel() for own in seen]))
-            out.append(np.concatenate([np.tile(axis, len(own.position)) for own in seen]))
-        if 'tool' in align:
-            turns = [matrix_from_quaternion(np.asarray(own.quaternion)) for own in seen]
-            out.append(np.concatenate([(turn @ axis).ravel() for turn in turns]))
-    return out
+    columns = [
+        np.concatenate([_frame_column(cell, own, frame, shift, turn) for own in seen])
+        for frame in align
+        for shift, turn in zip(np.eye(6, 3), np.eye(6, 3, -3), strict=True)
+    ]
+    return [column for column in columns if column.any()]
+
+
+def _frame_column(
+    cell: BlindCell, seen: PlantRecording, frame: str, shift: Array, turn: Array
+) -> Array:
+    """Return what a frame's shift or turn, (3,) each, does to one recording, over its noise."""
+    if frame == 'tool':
+        rotation = matrix_from_quaternion(np.asarray(seen.quaternion))
+        along, about = rotation @ shift, rotation @ turn
+    else:
+        about = np.tile(turn, (len(seen.position), 1))
+        along = shift + np.cross(about, seen.position)
+    out = (along.ravel() / cell.tracker.sigma, about.ravel() / cell.tracker.sigma_orientation)
+    return np.concatenate(out if cell.tracker.orientation else out[:1])
 
 
 def changed(causes: Sequence[Cause], k: int) -> Iterator[list[Cause]]:

@@ -107,13 +107,10 @@ def calibrated(
         said += levels
     slots = [cause for cause in reported if cause.slot is not None]
     names = [before.names[cause.slot].features for cause in slots if cause.slot is not None]
-    reported_slots = {cause.slot for cause in slots}
-    unnamed = [
-        one.probability
-        for k, one in enumerate(before.names)
-        if verdict.status in NAMING and not verdict.families and k not in reported_slots
-    ]
-    whole = of_whole([cause.probability for cause in slots], names, unnamed)
+    few = verdict.status in NAMING and not verdict.families
+    named = {cause.slot for cause in slots}
+    doubted = [one.probability for k, one in enumerate(before.names) if few and k not in named]
+    whole = of_whole([cause.probability for cause in slots], names, doubted)
     whole = {**before.situation, **whole, **of_form(placing)}
     verdict, more = _of_answer(verdict, whole, learned)
     if verdict.sure and verdict.status in NAMING:

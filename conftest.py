@@ -7,6 +7,7 @@ import gc
 import os
 import shutil
 import sys
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -58,8 +59,8 @@ def pytest_collection_modifyitems(items):
     )
 
 
-FIRST_LINE = ('/recording/', '/install/')
-"""Directories whose cells stand in the first of two lines; both take about two minutes."""
+FIRST_LINE = ('/recording/', '/install/', '/test_compensator')
+"""Places whose cells stand in the first of two lines; both take about two minutes."""
 BESIDE = 5
 """How much less the other tests weigh for the scheduler than those of cells, which stand in line one
 after the other and would else end last; 5 is a third of the weight."""
@@ -73,7 +74,13 @@ HOUSE = 'test/house'
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item):
-    """Let tests of cells go first where tests run side by side."""
+    """Let tests of cells go first where tests run side by side; their nodes are forks."""
+    if item.get_closest_marker(CELLS) is not None:
+        with suppress(ImportError):  # some of them run without ROS
+            from weld_twin_nodes.harness import NodeProcess
+
+            # As interpreters of their own they start in test_starting, test_colcon and test_demo.
+            NodeProcess.forked = True
     beside = 'PYTEST_XDIST_WORKER' in os.environ and item.get_closest_marker(CELLS) is None
     if beside and os.getpriority(os.PRIO_PROCESS, 0) < BESIDE:
         os.setpriority(os.PRIO_PROCESS, 0, BESIDE)
@@ -164,6 +171,7 @@ def chromium():
 
 
 CONTRAST = 'color-contrast'
+AXE = '(options) => axe.run(document, options).then((told) => told.violations)'
 CLIPPED = """() => [...document.querySelectorAll('main *')].filter((item) => {
   const box = item.getBoundingClientRect(), style = getComputedStyle(item);
   if (!box.width || !item.checkVisibility() || style.position === 'absolute') return false;
@@ -224,8 +232,10 @@ class Browser:
         """Return what hinders reading a page: light, dark, on a phone, in print; or on its console."""
         axe = pytest.importorskip('axe_playwright_python.sync_playwright').Axe()
         page, out = self.open(text), []
+        page.evaluate(axe.axe_script)
         # Contrasts are those of a scheme, and take longest where a page is narrow.
         shape, colours = {'rules': {CONTRAST: {'enabled': False}}}, {'runOnly': [CONTRAST]}
+        told_alone = {'resultTypes': ['violations']}
         looks = ((390, 'light', shape), (1100, 'light', colours), (1100, 'dark', colours))
         for width, scheme, rules in looks:
             page.set_viewport_size({'width': width, 'height': 900})
@@ -233,7 +243,7 @@ class Browser:
             page.wait_for_timeout(60)
             told = [*page.evaluate(CLIPPED), *page.evaluate(OVERLAP)]
             told += ['an empty drawing'] * page.evaluate(EMPTY)
-            for found in axe.run(page, options=rules).response['violations']:
+            for found in page.evaluate(AXE, rules | told_alone):
                 if found['impact'] in ('serious', 'critical'):
                     told += [f'{found["id"]}: {node["html"][:90]}' for node in found['nodes'][:4]]
             out += [f'{width} {scheme}: {item}' for item in told]

@@ -83,11 +83,10 @@ def test_a_tool_that_may_change_and_did_by_millimetres_is_fitted(cell, rng):
 
 @pytest.mark.parametrize(('degrees', 'turns'), [(90.0, True), (8.0, False)])
 def test_a_tool_that_was_changed_without_a_word_is_told_and_fitted(rng, degrees, turns):
-    made = pair(rng, turned(degrees), turns=turns)
-    assert kinds(*made) == [('reflector_jumped', ('tool',))]
-    found = looked(*made, apply=True)
+    found = looked(*pair(rng, turned(degrees), turns=turns), apply=True)
     assert found.given.may_change == ('tool_pose',) and found.posed is not None
     (item,) = found.unsound
+    assert (item.kind, item.at) == ('reflector_jumped', ('tool',))
     assert 'after' in item.sentence and '--may-change tool_pose' in item.remedy
 
 
@@ -236,8 +235,9 @@ def on_the_arm(rng, noise=5e-5):
 
 def test_a_board_seen_from_the_arm_is_told_and_inverted(rng, cell):
     board = on_the_arm(rng)
-    assert kinds(board) == [('camera_inverted', ('instrument',))]
-    assert looked(board, apply=True).posed is not None
+    seen = looked(board, apply=True)
+    (item,) = seen.unsound
+    assert (item.kind, item.at) == ('camera_inverted', ('instrument',)) and seen.posed is not None
     code, found = cell(board, options=('--align', 'base,tool', '--measured-inverse'))
     assert code == 0 and not found['unsound']
     assert 'u' in {effect['joint'] for effect in found['verdict']['effects']}

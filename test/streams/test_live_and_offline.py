@@ -213,8 +213,9 @@ def keep(tmp_path_factory):
 
 
 @pytest.fixture(scope='module')
-def whole(keep):
-    return keep(in_order(sides(), joints()))
+def half(keep):
+    """Half a second, in which all that has a date happens."""
+    return keep([one for one in in_order(sides(), joints()) if one[0] < START + SECOND // 2])
 
 
 @pytest.fixture(scope='module')
@@ -254,8 +255,8 @@ def test_a_cell_of_two_drivers_is_the_same_live_and_offline(cell, name):
 
 
 @pytest.mark.parametrize('name', sorted(set(REGISTRY) - set(OF_CELLS)))
-def test_every_effect_is_the_same_live_and_offline(whole, name):
-    compare(whole, (example(name), SPRING))
+def test_every_effect_is_the_same_live_and_offline(half, name):
+    compare(half, (example(name), SPRING), at_least=COUNT // 3)
 
 
 @pytest.mark.parametrize('qd', [True, 'some', False])

@@ -90,9 +90,8 @@ def test_joint_1_off_by_a_turn_is_a_base_that_stands_turned_and_both_are_told(ur
     assert item.alike == (('constant_angle', ('shoulder_pan_joint',)),)
 
 
-@pytest.mark.parametrize(('axis', 'degrees'), [('y', -90.0), ('x', 180.0)])
-def test_a_base_that_stands_turned_axis_onto_axis_is_turned_back(ur5, run, axis, degrees):
-    turn = Rotation.from_euler(axis, degrees, degrees=True)
+def test_a_base_that_stands_turned_axis_onto_axis_is_turned_back(ur5, run):
+    turn = Rotation.from_euler('y', -90.0, degrees=True)
     bad = remeasured(run, position=run.measured.position @ turn.as_matrix().T)
     found, item = mended(ur5, bad, align=())
     assert (item.kind, item.at) == ('base_turned', ('base',))

@@ -59,12 +59,6 @@ def test_the_sign_of_a_joint_is_told_with_the_gap_before_and_after(ur5, still):
     assert not judged(ur5, still)
 
 
-def test_rows_that_do_not_belong_together_are_explained_by_nothing(ur5, still, rng):
-    shuffled = rejointed(still, still.joints.q[rng.permutation(40)])
-    (found,) = judged(ur5, shuffled)
-    assert (found.kind, found.at) == ('other', ()) and 'no mix-up' in found.sentence
-
-
 def test_of_mix_ups_that_do_as_well_the_first_of_the_table_is_named_and_the_others_are_alike(
     ur5, still
 ):

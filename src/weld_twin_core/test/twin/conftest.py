@@ -107,9 +107,19 @@ ROBOTS = {
 }
 
 
+BUILDS = ('standard', 'modified gantry', 'positioner', 'modified positioner')
+"""What effects can meet: either convention, axes that slide, joints behind the workpiece."""
+
+
 @pytest.fixture(params=ROBOTS, ids=str)
 def robot(request):
     """Return each kind of robot in turn."""
+    return ROBOTS[request.param]
+
+
+@pytest.fixture(params=BUILDS, ids=str)
+def build(request):
+    """Return each build in turn, for what is tried with every effect."""
     return ROBOTS[request.param]
 
 

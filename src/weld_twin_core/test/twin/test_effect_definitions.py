@@ -355,9 +355,9 @@ def test_every_effect_is_tested_here_or_held_against_the_plant():
 
 @pytest.mark.parametrize('name', DEFINITIONS)
 def test_effect_does_what_its_definition_says(
-    name, robot, textbook, make_recording, motion_at, stamps
+    name, build, textbook, make_recording, motion_at, stamps
 ):
-    values, definition = DEFINITIONS[name]
+    robot, (values, definition) = build, DEFINITIONS[name]
     recording = make_recording(robot)
     at = stamps(recording, 6)
     # Beside a positioner a lean of the arm is one of the positioner the other way, to its square.

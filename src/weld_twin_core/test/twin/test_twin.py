@@ -56,9 +56,9 @@ def everything():
     )
 
 
-def test_live_steps_give_the_poses_of_the_batch(robot, make_recording):
-    recording = make_recording(robot)
-    twin = Twin(robot, everything())
+def test_live_steps_give_the_poses_of_the_batch(build, make_recording):
+    recording = make_recording(build)
+    twin = Twin(build, everything())
     batch, joints, live = twin.poses(recording), twin.joints(recording), twin.live()
     for k, t in enumerate(recording.joints.t):
         found, pose = live.step(
@@ -109,25 +109,18 @@ def _six_joints():
 DRAWN = usual()
 
 
-BUILDS = ('modified gantry', 'positioner')
-"""Either convention, axes that slide, and joints behind the workpiece."""
-
-
-@pytest.mark.parametrize('robot', BUILDS, indirect=True)
+@pytest.mark.parametrize(
+    ('robot', 'draws'),
+    [
+        ('modified gantry', 4),  # three would be as many as coordinates, and a mix-up unnoticed
+        ('positioner', 3),  # which must be no mix-up either
+    ],
+    indirect=['robot'],
+)
 @pytest.mark.parametrize('name', DRAWN)
-def test_draws_of_an_effect_are_a_loop_over_draws(name, robot, make_recording, stamps):
-    # Three draws would be as many as coordinates: a wrong broadcast would go unnoticed.
-    looped(name, robot, 4, make_recording(robot), stamps)
-
-
-@pytest.mark.parametrize('name', DRAWN)
-def test_as_many_draws_as_coordinates_are_a_loop_too(name, arm, make_recording, stamps):
-    looped(name, arm, 3, make_recording(arm), stamps)
-
-
-def looped(name, robot, draws, recording, stamps):
+def test_draws_of_an_effect_are_a_loop_over_draws(name, robot, draws, make_recording, stamps):
     """Compare draws of an effect that are taken together with one after the other."""
-    one = effect(name, **DRAWN[name])
+    recording, one = make_recording(robot), effect(name, **DRAWN[name])
     values = one.vector() * np.linspace(0.4, 1.0, draws)[:, None]
     drawn = one.with_vector(values)
     np.testing.assert_array_equal(drawn.vector(), values)

@@ -92,12 +92,12 @@ def worst(robot, effects, recording, at, relative, absolute=0.0):
 
 
 @pytest.mark.parametrize('name', ENTRIES)
-def test_derivative_by_every_parameter_alone(name, robot, make_recording, stamps):
-    recording = make_recording(robot)
+def test_derivative_by_every_parameter_alone(name, build, make_recording, stamps):
+    recording = make_recording(build)
     effects = [effect(name)]
     if name in SPRUNG:
         effects.append(effect('joint_compliance'))
-    excess, name = worst(robot, effects, recording, stamps(recording), 2e-6)
+    excess, name = worst(build, effects, recording, stamps(recording), 2e-6)
     assert excess <= 1.0, name
 
 

@@ -87,7 +87,7 @@ def test_one_axis_is_no_traceback(draw):
 
 
 @pytest.mark.filterwarnings('ignore')
-@pytest.mark.parametrize('seed', [10, 40, 107, 108, 1084, 1146])
+@pytest.mark.parametrize('seed', [10, 40, 107, 108])
 def test_draws_that_once_ended_in_a_traceback(seed):
     assert tried(drawn(seed))['traceback'] is None
 

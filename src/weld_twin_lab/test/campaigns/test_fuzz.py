@@ -27,7 +27,7 @@ from weld_twin_msgs_py.robots import load_robot
 from weld_twin_nodes.cli import main
 
 SEED = 7
-CASES = 15
+CASES = 8
 
 anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
@@ -40,7 +40,7 @@ anything = st.recursive(
     max_leaves=12,
 )
 few = settings(
-    max_examples=60,
+    max_examples=25,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],

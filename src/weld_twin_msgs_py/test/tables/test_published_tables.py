@@ -83,11 +83,9 @@ def test_two_tables_without_a_date_do_not_share_one(ur5, ur10):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('name', ['ur5', 'ur10'])
-def test_sixty_poses_of_a_real_arm_shrink_by_geometry(name, request):
-    recording = request.getfixturevalue(name).recording
-    found = diagnose(
-        [recording], catalog.load(name), align=frozenset({'base', 'tool'}), experiment=False
-    )
+def test_sixty_poses_of_a_real_arm_shrink_by_geometry(ur10):
+    """Both arms, whole: `weld-twin lab real-arms`."""
+    robot, align = catalog.load('ur10'), frozenset({'base', 'tool'})
+    found = diagnose([ur10.recording], robot, align=align, experiment=False)
     assert found.shrink.ratio < 0.8
     assert found.gap.noise_floor_m < 0.5 * found.gap.rms_m

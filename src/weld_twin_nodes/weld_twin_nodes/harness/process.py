@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import yaml
 
@@ -22,6 +22,7 @@ from weld_twin_core.errors import TwinError
 
 from ..live.all_nodes import MODULES
 from ..offline.environment import environment
+from .forked import Forked
 
 DOMAINS = range(1, 102)
 """Domains whose ports stay clear of those Linux hands out by itself."""
@@ -98,8 +99,13 @@ class NodeProcess:
     ----------
     known : bool
         Whether it is a node of this package, so that ``name`` is its name on the graph.
+    forked : bool
+        Whether nodes of this package are forks of one process that has them all loaded; one that
+        starts many cells says so of the class. Else each is an interpreter of its own.
 
     """
+
+    forked: ClassVar[bool] = False
 
     def __init__(
         self, node: str | Sequence[str], parameters: Mapping[str, Any], folder: Path
@@ -113,10 +119,14 @@ class NodeProcess:
             file = folder / f'{self.name}.yaml'
             file.write_text(yaml.safe_dump({'/**': {'ros__parameters': dict(parameters)}}))
             command += ['--ros-args', '--params-file', str(file)]
+        self._process: subprocess.Popen[bytes] | Forked
         with self._log.open('w') as log, _interruptible():
-            self._process = subprocess.Popen(
-                command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
-            )
+            if self.known and NodeProcess.forked:
+                self._process = Forked(command[2], command[3:], self._log)
+            else:
+                self._process = subprocess.Popen(
+                    command, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
+                )
 
     @property
     def log(self) -> str:

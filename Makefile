@@ -9,14 +9,14 @@ RUN := tools/in_env
 demo: setup
 	@$(RUN) weld-twin demo --out out
 
-# Types are checked beside the tests. Tests of nodes wait for these half of their time, so that there are
-# three processes of tests for two cores.
+# Types are checked beside the tests. Two lines of tests of nodes wait most of their time, so that there are
+# two processes more than cores: `conftest.py` counts them.
 test: setup-test
 	@$(RUN) ruff check .
 	@$(RUN) ruff format --check .
 	@mkdir -p build
 	@nice $(RUN) mypy > build/types.txt 2>&1 & types=$$!; \
-	$(RUN) python -m pytest -n $$((3 * $$(nproc) / 2)) --dist loadscope --no-loadscope-reorder; tests=$$?; \
+	$(RUN) python -m pytest -n auto --dist loadscope --no-loadscope-reorder; tests=$$?; \
 	wait $$types; types=$$?; cat build/types.txt; exit $$((tests | types))
 	@tools/browser why
 

@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.algebra.learned_sizes import learned_precision
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.many.shrinkage import groups, shrunk_fit
+from weld_twin_core.diagnosis.many.small_errors import groups, shrunk_fit
 
 ROWS = 150
 

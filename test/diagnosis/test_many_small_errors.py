@@ -11,11 +11,10 @@ from diagnosis_cells import SIGMA, SIGMA_TURN, effect, known_scale, tiny
 from weld_twin_core.diagnosis.algebra.columns import Maker
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.many.shrinkage import groups
-from weld_twin_core.diagnosis.many.small_errors import Lines, lines_of, with_lines
+from weld_twin_core.diagnosis.many.small_errors import Lines, groups, lines_of, with_lines
 from weld_twin_core.diagnosis.many.weighed_families import weighed_families
-from weld_twin_core.diagnosis.unseen.leftover_structure import Structure
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
+from weld_twin_core.diagnosis.unseen.where import Structure
 from weld_twin_core.diagnosis.verdict.decision import Evidence, decide
 from weld_twin_core.twin.twin import Twin
 

@@ -5,8 +5,12 @@
 import numpy as np
 import pytest
 
-from weld_twin_core.diagnosis.algebra.alias import outside, share_outside, span_of
-from weld_twin_core.diagnosis.algebra.definite import unit_diagonal
+from weld_twin_core.diagnosis.algebra.definite import (
+    outside,
+    share_outside,
+    span_of,
+    unit_diagonal,
+)
 
 COUNT, ROWS = 7, 60
 

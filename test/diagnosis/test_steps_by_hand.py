@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.frames.alignment import chord
 from weld_twin_core.diagnosis.frames.open_directions import shown
-from weld_twin_core.diagnosis.levels.placed import _tilt
+from weld_twin_core.diagnosis.levels.curved import _tilt
 from weld_twin_core.diagnosis.predicting.leftover import _middle, _shared
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, weighed
 from weld_twin_core.diagnosis.soundness.computed import _noise, _paired

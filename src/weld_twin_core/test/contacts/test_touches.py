@@ -13,7 +13,7 @@ from weld_twin_core.diagnosis.algebra.fit import design, fit
 from weld_twin_core.diagnosis.algebra.problem import Scale
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_core.diagnosis.unseen import leftover_structure
+from weld_twin_core.diagnosis.unseen import where
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.errors import DataError
 
@@ -61,14 +61,14 @@ def test_three_touches_of_a_pin_tell_the_elbow_offset():
 
 def test_what_is_left_of_touches_depends_on_joints_alone(monkeypatch):
     """No instrument measured that could err from place to place, and a touch has no time."""
-    monkeypatch.setattr(leftover_structure, 'TOLD', 99)
+    monkeypatch.setattr(where, 'TOLD', 99)
     postures = np.random.default_rng(1).uniform(0.5, 0.9, (24, 2))
     problem, model = aligned(touching(two_links(), postures, ['a', 'b'] * 12), two_links(), '', ())
     scale = Scale(SIGMA, 1.0, tuple(np.ones(m) for m in problem.samples))
     bare = fit(problem, model, scale)
     unseen = Unseen.of(problem, scale, bare, np.zeros(0))
     everything = Beliefs(dependence_gain=-np.inf, dependence_sure=-np.inf)
-    told = leftover_structure.structure(unseen, model, bare, everything).depends_on
+    told = where.structure(unseen, model, bare, everything).depends_on
     assert told and all(name.endswith((' shoulder', ' elbow')) for name in told)
 
 

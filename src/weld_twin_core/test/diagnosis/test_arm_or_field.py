@@ -11,8 +11,8 @@ import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.noise_floor import WIDEST, noise_floor
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem
 from weld_twin_core.diagnosis.frames.alignment import refined
+from weld_twin_core.diagnosis.levels.curved import arm_first
 from weld_twin_core.diagnosis.levels.free_form import FreeForm, Part
-from weld_twin_core.diagnosis.levels.placed import arm_first
 from weld_twin_core.diagnosis.unseen.groups import Group
 from weld_twin_core.effects import JointOffset, LinkLength, LinkTwist
 

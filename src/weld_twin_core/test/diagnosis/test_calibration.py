@@ -13,7 +13,7 @@ from weld_twin_core.diagnosis.calibration.features import KINDS, odds, of_whole
 from weld_twin_core.diagnosis.calibration.weights import calibration_from, usual_calibration
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
 from weld_twin_core.diagnosis.result import Site
-from weld_twin_core.diagnosis.verdict.table import Row
+from weld_twin_core.diagnosis.verdict.evidence import Row
 
 PLAY = Site('backlash', 'elbow_joint')
 

@@ -13,7 +13,8 @@ from small_arm import small_arm
 import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.columns import Columns, Piece
 from weld_twin_core.diagnosis.beliefs import Beliefs
-from weld_twin_core.diagnosis.levels.formulas import Missed, no_noise
+from weld_twin_core.diagnosis.levels.curved import no_noise
+from weld_twin_core.diagnosis.levels.formulas import Missed
 from weld_twin_core.diagnosis.levels.free_form import Choosing, Member, chosen, worth
 from weld_twin_core.diagnosis.unseen.folds import posture_regions, steadiness
 from weld_twin_core.diagnosis.unseen.groups import Group

@@ -20,8 +20,13 @@ from weld_twin_core.diagnosis.soundness.images import _undone
 from weld_twin_core.diagnosis.soundness.lag import Lag, lag
 from weld_twin_core.diagnosis.soundness.lengths import instant, length, listed
 from weld_twin_core.diagnosis.soundness.mending import Given, as_entry
-from weld_twin_core.diagnosis.soundness.repeats import _apart, _common, refuse_reused, repeats
-from weld_twin_core.diagnosis.soundness.richness import motion
+from weld_twin_core.diagnosis.soundness.richness import (
+    _apart,
+    _common,
+    motion,
+    refuse_reused,
+    repeats,
+)
 from weld_twin_core.diagnosis.soundness.slips import Settling, Slip, changes
 from weld_twin_core.diagnosis.soundness.snapshot import FRAMES, Snapshot
 from weld_twin_core.diagnosis.soundness.stamps import _stream, streams, written

@@ -12,13 +12,13 @@ from measured_cells import asked, moving, recorded, rejointed, remeasured, stati
 from weld_twin_core.diagnosis.algebra.problem import Change
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.soundness.base_change import _of_strays, _scale, rest_of
-from weld_twin_core.diagnosis.soundness.changed import setup
 from weld_twin_core.diagnosis.soundness.computed import _rounding, _stations
 from weld_twin_core.diagnosis.soundness.evidence import Case
 from weld_twin_core.diagnosis.soundness.gate import examine
 from weld_twin_core.diagnosis.soundness.images import _farther, _larger
 from weld_twin_core.diagnosis.soundness.mending import Given
 from weld_twin_core.diagnosis.soundness.mixups import _best, mixups
+from weld_twin_core.diagnosis.soundness.set_up import setup
 from weld_twin_core.diagnosis.soundness.slips import Slip, _simplest, changes
 from weld_twin_core.diagnosis.soundness.snapshot import Snapshot
 from weld_twin_core.diagnosis.soundness.stamps import streams

@@ -19,10 +19,10 @@ from measured_cells import (
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.rotation import matrix_from_quaternion, quaternion_from_matrix
 from weld_twin_core.diagnosis.frames.alignment import initial_frames
-from weld_twin_core.diagnosis.soundness.changed import setup
 from weld_twin_core.diagnosis.soundness.evidence import Case
 from weld_twin_core.diagnosis.soundness.gate import CHECKS, examine
 from weld_twin_core.diagnosis.soundness.mending import Given
+from weld_twin_core.diagnosis.soundness.set_up import setup
 from weld_twin_core.diagnosis.soundness.slips import Settling, Slip
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.effects.dated import InstrumentKnock

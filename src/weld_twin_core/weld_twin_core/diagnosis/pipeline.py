@@ -21,9 +21,8 @@ from .frames.changes import families_named, settled_between
 from .frames.open_directions import held
 from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
-from .levels.curved import carried, curved
-from .levels.formulas import missed, no_noise
-from .levels.placed import placed
+from .levels.curved import carried, curved, no_noise, placed
+from .levels.formulas import missed
 from .many.fitted_together import fitted_together
 from .many.weighed_families import weighed_families
 from .predicting.allowed import allowed, elsewhere
@@ -32,14 +31,13 @@ from .result import Diagnosis, Shrink
 from .soundness.efforts import with_sign
 from .soundness.gate import Examined, examine
 from .soundness.mending import Given
-from .soundness.repeats import refuse_reused
+from .soundness.richness import refuse_reused
 from .unseen.elsewhere import borne_out
 from .unseen.held_out_shrink import held_out_shrink
-from .unseen.leftover_structure import structure
 from .unseen.unseen_stretches import Unseen
+from .unseen.where import structure
 from .verdict.decision import LIKELIER, decide
-from .verdict.evidence import gathered
-from .verdict.table import Row
+from .verdict.evidence import Row, gathered
 
 Progress = Callable[[str], None]
 

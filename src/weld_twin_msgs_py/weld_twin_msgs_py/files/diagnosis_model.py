@@ -13,8 +13,7 @@ import numpy as np
 from weld_twin_core.arm.known_arms import fingerprint
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array, readonly
-from weld_twin_core.diagnosis.algebra.model import Alone
-from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.diagnosis.algebra.problem import Alone, Model
 from weld_twin_core.diagnosis.soundness.mending import Given, replayed
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.effects.dated import of_the_robot, seen_from

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.diagnosis.algebra.model import Alone
-from weld_twin_core.diagnosis.algebra.problem import Model
+from weld_twin_core.diagnosis.algebra.problem import Alone, Model
 from weld_twin_core.diagnosis.soundness.mending import reading_map, turned_joints
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.dated import of_the_robot

@@ -46,8 +46,7 @@ from ..unseen.where import locate
 from ..verdict.decision import Left, Verdict
 from ..verdict.evidence import Evidence
 from .contact_spreads import contact_spreads
-from .named_effects import named_effects
-from .share_intervals import with_intervals
+from .named_effects import named_effects, with_intervals
 
 
 def answer(

@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays import Array
 from ...contacts import Length, lengths, spreads
 from ...effects.plausible import spreads as spreads_of
-from ..algebra.alias import outside, span_of
+from ..algebra.definite import outside, span_of
 from ..algebra.problem import Model, Problem
 from ..hypotheses.library import plain_causes
 from ..hypotheses.search import Search

@@ -12,8 +12,7 @@ from ..beliefs import Beliefs
 from ..levels.free_form import FreeForm
 from ..result import NAMING, Cause
 from ..verdict.decision import Verdict
-from ..verdict.evidence import Evidence
-from ..verdict.table import Row
+from ..verdict.evidence import Evidence, Row
 from .features import (
     TOLD_AS,
     Numbers,

@@ -18,8 +18,7 @@ from ..beliefs import Beliefs
 from ..levels.free_form import FreeForm
 from ..result import Cause
 from ..verdict.decision import Left
-from ..verdict.evidence import Evidence
-from ..verdict.table import Row
+from ..verdict.evidence import Evidence, Row
 
 Numbers = dict[str, float]
 FAR = 1e3

@@ -21,7 +21,7 @@ from ...effects.registry import REGISTRY
 from ...recording import JointMotion, Recording
 from ...twin.features import Features, joints_of
 from ...twin.twin import Twin
-from ..algebra.alias import outside, share_outside, span_of
+from ..algebra.definite import outside, share_outside, span_of
 from ..result import Site
 
 POSTURES = 40

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arrays import Array
-from ..algebra.alias import outside, span_of
+from ..algebra.definite import outside, span_of
 from ..algebra.fit import Fit, design, solve_scaled
 from ..result import Site
 from .library import Library

@@ -12,8 +12,8 @@ from ...arrays import Array
 from ...effects.effect import Effect, Stage, View
 from ...twin.features import Features
 from ...twin.memory import Picker
-from ..algebra.alias import outside, span_of
 from ..algebra.columns import Maker, Piece
+from ..algebra.definite import outside, span_of
 from ..algebra.fit import design
 from ..algebra.problem import Model, Problem, Scale
 from .still_joints import moved_most

@@ -26,8 +26,7 @@ from ..result import Cause, Contributions, Shares, Site
 from ..unseen.folds import jackknife
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
-from ..verdict.evidence import lacking
-from ..verdict.table import Row, marginal
+from ..verdict.evidence import Row, lacking, marginal
 from .curved import Curved
 from .free_form import FreeForm, Part
 

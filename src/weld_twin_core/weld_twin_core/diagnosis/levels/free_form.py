@@ -21,7 +21,7 @@ from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import steadiness, ways_to_divide
 from ..unseen.groups import Group, all_groups
 from ..unseen.unseen_stretches import Base, Unseen
-from ..verdict.table import marginal
+from ..verdict.evidence import marginal
 
 STANDS_OUT, NAMED = 0.5, 3
 """Weight from which one place is named alone, and how many are named where none has it."""

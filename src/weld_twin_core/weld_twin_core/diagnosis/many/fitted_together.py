@@ -25,8 +25,7 @@ from ..hypotheses.search import Search
 from ..unseen.chance import Candidates, chance_gain, may_be_chance
 from ..unseen.folds import ways_to_divide
 from ..unseen.unseen_stretches import Unseen
-from .shrinkage import predicted
-from .small_errors import many_small
+from .small_errors import many_small, predicted
 
 BEAR = (10, 30, 100)
 """

@@ -26,7 +26,7 @@ from ..hypotheses.search import Search
 from ..result import Family, Site
 from ..unseen.folds import STRETCHES
 from ..unseen.unseen_stretches import Unseen
-from .shrinkage import believed
+from .small_errors import believed
 
 TINY = 1e-9
 """Least error [m] divided by: a nanometre, far below any instrument."""

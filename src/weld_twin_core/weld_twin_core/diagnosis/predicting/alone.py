@@ -26,9 +26,8 @@ from ...effects.geometry import ChannelError
 from ...twin.corrected import corrected
 from ...twin.features import joints_of
 from ..algebra.fit import fit, robust_scale, trusted
-from ..algebra.model import Alone
 from ..algebra.prior import effect_precision, frame_offset
-from ..algebra.problem import Model, Problem
+from ..algebra.problem import Alone, Model, Problem
 from ..result import Shrink
 from ..unseen.unseen_stretches import Unseen
 

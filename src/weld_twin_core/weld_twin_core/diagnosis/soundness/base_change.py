@@ -22,7 +22,7 @@ from ...arrays import Array
 from ...effects.measurement import MeasurementScale
 from ...effects.plausible import spreads
 from ...twin.features import Features
-from ..algebra.alias import outside, span_of
+from ..algebra.definite import outside, span_of
 from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale

@@ -23,7 +23,6 @@ from ..frames.aligned import aligned, tracked_part
 from ..frames.alignment import refined
 from ..frames.changes import with_changes
 from ..result import Check, Unsound
-from .changed import parted, setup
 from .computed import computed, source
 from .efforts import efforts
 from .evidence import Case, Checker, Finding, mistake
@@ -31,9 +30,8 @@ from .images import images
 from .limits import FEW, MOST, ROWS
 from .mending import Given, as_entry
 from .mixups import mixups
-from .orientation import gravity, orientation
-from .repeats import outliers, repeats
-from .richness import motion, quantity
+from .richness import motion, outliers, quantity, repeats
+from .set_up import gravity, orientation, parted, setup
 from .slips import Slip
 from .stamps import clocks, stamps, streams, velocities_checked
 from .stuck import stuck

@@ -21,7 +21,7 @@ from ...cameras import Sightings
 from ...cameras.located import located
 from ...cameras.sightings import Fitted
 from ...errors import DataError
-from ..algebra.alias import outside, span_of
+from ..algebra.definite import outside, span_of
 from .evidence import Case, Finding, mistake
 from .limits import ENOUGH, FEW, HALVED, ROWS, STRAY, WORTH
 

@@ -17,8 +17,7 @@ import numpy as np
 
 from ..beliefs import Beliefs
 from ..result import Family, Site
-from .evidence import Evidence
-from .table import named_together
+from .evidence import Evidence, named_together
 
 FIELD = 'instrument'
 """A free field over the workspace speaks against every formula: it is what each of them bends to."""

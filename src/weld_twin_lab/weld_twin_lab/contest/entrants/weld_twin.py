@@ -12,7 +12,7 @@ import numpy as np
 
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import diagnose
-from weld_twin_core.diagnosis.algebra.model import Model
+from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.twin.posterior import Posterior, pose_covariances
 from weld_twin_msgs_py.files.diagnosis_model import read_model
 from weld_twin_nodes.offline.told_twin import build_twin

@@ -10,9 +10,9 @@ import pytest
 from diagnosis_cells import tiny
 from scipy.spatial.transform import Rotation
 
+from weld_twin_core.diagnosis.algebra.open_directions import shown
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.frames.alignment import chord
-from weld_twin_core.diagnosis.frames.open_directions import shown
 from weld_twin_core.diagnosis.levels.curved import _tilt
 from weld_twin_core.diagnosis.predicting.leftover import _middle, _shared
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, weighed

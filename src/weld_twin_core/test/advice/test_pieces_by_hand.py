@@ -12,11 +12,11 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.advice.candidates import MASS, PRESS, RISE, Piece, candidates
 from weld_twin_core.diagnosis.advice.chosen_pieces import SAFE, Plan, _by_turns, _longer
 from weld_twin_core.diagnosis.advice.experiment import _apart, _name, _side
-from weld_twin_core.diagnosis.advice.next_step import _promise
 from weld_twin_core.diagnosis.advice.next_touches import MOST, _Option
 from weld_twin_core.diagnosis.advice.postures import Limits, Room, joined, widened
 from weld_twin_core.diagnosis.advice.separation import Parting
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem
+from weld_twin_core.diagnosis.answer.next_step import _promise
 from weld_twin_core.effects import Backlash, JointCompliance, JointOffset
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 

@@ -15,8 +15,8 @@ from weld_twin_core.diagnosis.advice.next_touches import (
     scatter,
 )
 from weld_twin_core.diagnosis.algebra.problem import Scale
+from weld_twin_core.diagnosis.algebra.still_joints import plain_causes
 from weld_twin_core.diagnosis.frames.aligned import aligned
-from weld_twin_core.diagnosis.hypotheses.library import plain_causes
 from weld_twin_core.motion.inverse.newton import reaching
 
 PLACES = {'low': [0.45, 0.1, 0.2], 'left': [0.1, 0.5, 0.35], 'right': [0.35, -0.35, 0.3]}

@@ -14,8 +14,7 @@ import pytest
 
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
-from weld_twin_core.diagnosis.result import Family, Site
-from weld_twin_core.diagnosis.unseen.where import Structure
+from weld_twin_core.diagnosis.result import Family, Site, Structure
 from weld_twin_core.diagnosis.verdict.decision import Left, decide
 from weld_twin_core.diagnosis.verdict.evidence import Evidence
 

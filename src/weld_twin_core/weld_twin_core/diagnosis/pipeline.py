@@ -12,17 +12,18 @@ from ..effects.effect import Effect
 from ..recording import Recording
 from .advice import Limits
 from .algebra.noise_floor import noise_floor
+from .algebra.open_directions import held
 from .algebra.problem import frames_named
 from .answer.answer import answer, refusal
 from .beliefs import Beliefs
 from .calibration.calibrated import stated
 from .frames.aligned import other_causes
 from .frames.changes import families_named, settled_between
-from .frames.open_directions import held
 from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
 from .levels.curved import carried, curved, no_noise, placed
 from .levels.formulas import missed
+from .levels.gathered import gathered
 from .many.fitted_together import fitted_together
 from .many.weighed_families import weighed_families
 from .predicting.allowed import allowed, elsewhere
@@ -37,7 +38,7 @@ from .unseen.held_out_shrink import held_out_shrink
 from .unseen.unseen_stretches import Unseen
 from .unseen.where import structure
 from .verdict.decision import LIKELIER, decide
-from .verdict.evidence import Row, gathered
+from .verdict.evidence import Row
 
 Progress = Callable[[str], None]
 

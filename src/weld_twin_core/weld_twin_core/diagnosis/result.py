@@ -306,6 +306,23 @@ class Shrink:
     """Interval of the ratio on a motion where nothing was recorded."""
 
 
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What groups of columns without a formula find."""
+
+    rms_m: float
+    """RMS error on unseen stretches with the best of them beside the model, [m]."""
+    gain: float
+    """Share of the squared error on unseen stretches that it takes away."""
+    sure: float
+    """The gain over its standard error between stretches."""
+    depends_on: tuple[str, ...]
+    chance: float = 0.0
+    """Share that the best of them hardly ever takes off noise alone; 0 where rows are many."""
+    of_gap: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    """By joint and dependence: share of the squared gap, no effect fitted, that one takes off."""
+
+
 @dataclass(frozen=True)
 class Unexplained:
     """What remains after the verdict."""

@@ -12,7 +12,6 @@ import numpy as np
 
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.diagnosis.algebra.problem import Alone, Model
-from weld_twin_core.diagnosis.soundness.mending import reading_map, turned_joints
 from weld_twin_core.effects import Effect
 from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.effects.wording import TURNED_ROUND, stands, to_mend
@@ -154,7 +153,7 @@ def write_offsets(path: Path, model: Model, notes: Sequence[str]) -> None:
     del notes
     robot = model.robot
     offsets = joint_offsets(robot, _causes(model)) + _zeros(model)
-    turned, rows = turned_joints(model.mends, robot), []
+    turned, rows = model.turned, []
     for name, offset, slides in zip(robot.joint_names, offsets, robot.prismatic, strict=True):
         shown = offset * 1e3 if slides else np.degrees(offset)
         units = ('m', 'mm') if slides else ('rad', 'deg')
@@ -249,7 +248,7 @@ def _zeros(model: Model) -> np.ndarray:
     readings as they were recorded. Columns, signs and units that were mixed up belong to the
     recording alone: a file that repeated them would be wrong at the robot.
     """
-    matrix, offset = reading_map(model.mends, model.robot.n)
+    matrix, offset = model.reading_map()
     return offset if np.array_equal(matrix, np.eye(model.robot.n)) else np.zeros(model.robot.n)
 
 

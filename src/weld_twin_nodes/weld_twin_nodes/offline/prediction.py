@@ -21,7 +21,6 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis.algebra.problem import Model
-from weld_twin_core.diagnosis.soundness.mending import reading_map
 from weld_twin_core.errors import ModelError
 from weld_twin_core.metrics.deviation import deviation
 from weld_twin_core.recording import JointMotion, Recording
@@ -272,7 +271,7 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
 
 def _as_given(motion: JointMotion, stored: Model) -> JointMotion:
     """Return mended joint positions counted as they came: they go to the same controller."""
-    matrix, offset = reading_map(stored.mends, stored.robot.n)
+    matrix, offset = stored.reading_map()
     back = np.linalg.inv(matrix).T
     qd = None if motion.qd is None else motion.qd @ back
     return replace(motion, q=(motion.q - offset) @ back, qd=qd)

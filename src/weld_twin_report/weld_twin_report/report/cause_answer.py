@@ -289,7 +289,7 @@ class CauseAnswer:
         else:
             twins = same_words(self.diagnosis, *(Site(e.name, e.site) for e in effects))
             ways = filter(None, [*dict.fromkeys(map(gearing, effects)), self._warning])
-            reported = [*dict.fromkeys(actions(effects, model.robot, model.mends)), *twins, *ways]
+            reported = [*dict.fromkeys(actions(effects, model.robot, model.turned)), *twins, *ways]
         if effects and self.alike:
             return [
                 f'Which of them it is must be measured first. S{self._should_it_be}',

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from weld_twin_core.diagnosis.advice import actions
+from weld_twin_core.diagnosis.algebra.still_joints import REASON
 from weld_twin_core.diagnosis.hypotheses.library import EXCLUDED
-from weld_twin_core.diagnosis.hypotheses.still_joints import REASON
 from weld_twin_core.diagnosis.result import Candidate, Diagnosis, Site
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.effects.apart import ELSE, way
@@ -184,7 +184,7 @@ def _at(diagnosis: Diagnosis, k: int) -> str:
     result = diagnosis.model.found
     held = [result[m] for m in cause.members if m < len(result)]
     model = diagnosis.model
-    return ' '.join(actions(held, model.robot, model.mends))
+    return ' '.join(actions(held, model.robot, model.turned))
 
 
 def minutes(wanted: Mapping[str, Any] | None) -> str:

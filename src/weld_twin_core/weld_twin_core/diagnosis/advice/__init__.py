@@ -2,13 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What to do next: mend what was found, or measure what would decide."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Collection, Sequence
 
 from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.wording import TURNED_ROUND
-from ..soundness.mending import turned_joints
 from .experiment import next_experiment
 from .postures import Limits
 
@@ -16,15 +14,14 @@ __all__ = ['Limits', 'actions', 'next_experiment']
 
 
 def actions(
-    result: Sequence[Effect], robot: Robot, mends: Sequence[Mapping[str, Any]] = ()
+    result: Sequence[Effect], robot: Robot, turned: Collection[str | None] = ()
 ) -> tuple[str, ...]:
     """
     Return what to do about every effect found, one sentence each, in their order.
 
-    By the nominal model, which is entered in the controller now. Where a joint was recorded with the
-    other sign, as ``mends`` of the data tell, it is said how to read that.
+    By the nominal model, which is entered in the controller now. Of joints that were recorded with
+    the other sign, ``turned``, it is said how to read that.
     """
-    turned = turned_joints(mends, robot)
     counted = [each.traits.set_at_controller and each.site in turned for each in result]
     return tuple(
         f'{each.remedy(robot)} {TURNED_ROUND}' if other else each.remedy(robot)

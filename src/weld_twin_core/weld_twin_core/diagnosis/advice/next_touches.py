@@ -32,7 +32,7 @@ from ...sequences import halton
 from ...twin.features import Features
 from ..algebra.prior import effect_precision, frame_prior
 from ..algebra.problem import PLACES, Model, Problem, Scale
-from ..hypotheses.library import plain_causes
+from ..algebra.still_joints import plain_causes
 from .experiment import motion_entry
 from .postures import widened
 

@@ -534,6 +534,25 @@ class Model:
         """Return the errors that all samples of recording k share, shape (count,)."""
         return self.common[k] if self.common else np.zeros(count)
 
+    def reading_map(self) -> tuple[Array, Array]:
+        """
+        Return what undoing mistakes made of joint positions as they were recorded.
+
+        Mended positions are q matrix' + offset, (n, n) and (n,) [rad or m].
+        """
+        matrix, offset = np.eye(self.robot.n), np.zeros(self.robot.n)
+        for entry in self.mends:
+            if entry.get('do') == 'joints':
+                turn = np.asarray(entry['matrix'], dtype=float)
+                matrix, offset = turn @ matrix, turn @ offset + np.asarray(entry['offset'])
+        return matrix, offset
+
+    @property
+    def turned(self) -> tuple[str, ...]:
+        """Return the joints whose readings were recorded with the other sign."""
+        negative = np.flatnonzero(np.diag(self.reading_map()[0]) < 0.0)
+        return tuple(self.robot.joint_names[k] for k in negative.tolist())
+
     def without(self, k: int) -> Model:
         """Return the model without found effect k."""
         return self.with_found(self.found[:k] + self.found[k + 1 :])

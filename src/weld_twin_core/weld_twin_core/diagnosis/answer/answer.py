@@ -12,11 +12,11 @@ import numpy as np
 
 from ...twin.posterior import Posterior
 from ..advice import Limits, actions
-from ..advice.next_step import next_step
 from ..algebra.fit import trusted
 from ..algebra.problem import Model
 from ..beliefs import Beliefs
 from ..calibration.calibrated import Stated, calibrated
+from ..calibration.features import of_form
 from ..frames.aligned import NOT_TOLD, other_causes
 from ..frames.changes import told, untold
 from ..hypotheses.any_motion import never_parted
@@ -47,6 +47,7 @@ from ..verdict.decision import Left, Verdict
 from ..verdict.evidence import Evidence
 from .contact_spreads import contact_spreads
 from .named_effects import named_effects, with_intervals
+from .next_step import next_step
 
 
 def answer(
@@ -58,9 +59,9 @@ def answer(
     examined: Examined,
     posterior: Posterior,
     before: Stated,
-    alternative: Curved | None = None,
-    placing: FreeForm | None = None,
-    limits: Limits | None = None,
+    alternative: Curved | None,
+    placing: FreeForm,
+    limits: Limits | None,
 ) -> Diagnosis:
     """
     Return the diagnosis of what was found in data that were examined.
@@ -72,24 +73,24 @@ def answer(
     """
     forms = alternative, evidence.floor, result.work.beliefs, placing
     reported, shares = causes(result, unseen, before.table, verdict, *forms)
-    verdict, reported, statements = calibrated(verdict, reported, before, placing)
+    groups = of_form(len(placing.parts), placing.steady)
+    verdict, reported, statements = calibrated(verdict, reported, before, groups)
     reported = with_intervals(reported, result, unseen, verdict, evidence.floor)
     effects, verdict, reported = named_effects(result, unseen, verdict, reported, posterior)
-    step = None if limits is None else next_step(result, verdict, limits, alternative)
     return Diagnosis(
         gap=_gap(result, evidence.floor),
         where=locate(result, evidence.structure, reported),
         status=verdict.status,
         effects=effects,
         indistinguishable=verdict.sets,
-        reasons=verdict.reasons,
         candidates=_weighed_candidates(result, evidence),
         shrink=shrink,
         unexplained=_unexplained(result.work.beliefs, evidence, verdict, shrink, placing),
-        next_experiment=step,
+        next_experiment=None
+        if limits is None
+        else next_step(result, verdict, limits, alternative),
         actions=_mended(result, effects),
         model=result.final.model,
-        families=verdict.families,
         evidence=evidence,
         posterior=posterior,
         **_parted(unseen, reported, shares, verdict),
@@ -101,7 +102,7 @@ def answer(
 
 def _mended(result: Search, effects: Sequence[Found]) -> tuple[str, ...]:
     robot = result.baseline.model.robot
-    return actions([each.effect for each in effects], robot, result.final.model.mends)
+    return actions([each.effect for each in effects], robot, result.final.model.turned)
 
 
 def _parted(
@@ -114,6 +115,8 @@ def _parted(
     return {
         'causes': reported,
         'shares': shares,
+        'reasons': verdict.reasons,
+        'families': verdict.families,
         'contributions': contributions(unseen, reported),
         'confidence': verdict.confidence,
         'sure': verdict.sure,
@@ -227,7 +230,7 @@ def _unexplained(
     evidence: Evidence,
     verdict: Verdict,
     shrink: Shrink,
-    placing: FreeForm | None,
+    placing: FreeForm,
 ) -> Unexplained:
     """
     Return what remains after the verdict, and what that or the gap itself depends on.
@@ -236,7 +239,7 @@ def _unexplained(
     """
     case = Left(evidence, beliefs)
     names = evidence.structure.depends_on if case.structured else ()
-    if verdict.status == 'unknown' and placing is not None and placing.parts:
+    if placing.parts:
         names = tuple(dict.fromkeys(part.words for part in placing.parts))
     return Unexplained(shrink.rms_after_m, case.above_noise, names)
 

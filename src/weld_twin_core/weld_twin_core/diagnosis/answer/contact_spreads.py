@@ -11,7 +11,7 @@ from ...contacts import Length, lengths, spreads
 from ...effects.plausible import spreads as spreads_of
 from ..algebra.definite import outside, span_of
 from ..algebra.problem import Model, Problem
-from ..hypotheses.library import plain_causes
+from ..algebra.still_joints import plain_causes
 from ..hypotheses.search import Search
 from ..result import ContactResult, KnownLength, Touched
 from ..unseen.unseen_stretches import Unseen

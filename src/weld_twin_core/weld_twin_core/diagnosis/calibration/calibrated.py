@@ -9,14 +9,12 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from ..beliefs import Beliefs
-from ..levels.free_form import FreeForm
 from ..result import NAMING, Cause
 from ..verdict.decision import Verdict
 from ..verdict.evidence import Evidence, Row
 from .features import (
     TOLD_AS,
     Numbers,
-    of_form,
     of_level,
     of_name,
     of_rest,
@@ -89,19 +87,19 @@ def calibrated(
     verdict: Verdict,
     causes: Sequence[Cause],
     before: Stated,
-    placing: FreeForm | None,
+    form: Numbers,
 ) -> tuple[Verdict, tuple[Cause, ...], tuple[Statement, ...]]:
     """
     Return a verdict and its causes with probabilities, and the statements that these come from.
 
     causes: with the weights of the table of answers.
     before: what was said of the names.
-    placing: what places what has no name.
+    form: of what places what has no name, as `features.of_form` has it.
     """
     learned = usual_calibration()
     reported, said = list[Cause](), list[Statement]()
     for k, cause in enumerate(causes):
-        levels = _levels(k, cause, bool(verdict.families), before, placing, learned)
+        levels = _levels(k, cause, bool(verdict.families), before, form, learned)
         reported.append(_with(cause, [one.probability for one in levels], learned))
         said += levels
     slots = [cause for cause in reported if cause.slot is not None]
@@ -110,7 +108,7 @@ def calibrated(
     named = {cause.slot for cause in slots}
     doubted = [one.probability for k, one in enumerate(before.names) if few and k not in named]
     whole = of_whole([cause.probability for cause in slots], names, doubted)
-    whole = {**before.situation, **whole, **of_form(placing)}
+    whole = {**before.situation, **whole, **form}
     verdict, more = _of_answer(verdict, whole, learned)
     if verdict.sure and verdict.status in NAMING:
         # Who is sure of the whole answer is sure of each part of it.
@@ -124,7 +122,7 @@ def _levels(
     cause: Cause,
     many: bool,
     before: Stated,
-    placing: FreeForm | None,
+    form: Numbers,
     learned: Calibration,
 ) -> list[Statement]:
     """Return what is said of place and dependence of a cause, and of its name if it has one."""
@@ -137,7 +135,6 @@ def _levels(
     if many and cause.name and not cause.rest:
         reported = {'place': KIND_AT, 'dependence': KIND_AT, 'name': KIND}
         return [Statement(f'{on} of many', k, dict(situation), p) for on, p in reported.items()]
-    form = of_form(placing)
     own = [{**situation, **form, **of_rest(cause, level)} for level in both]
     return [
         _told(f'{level} of the rest', k, more, learned)

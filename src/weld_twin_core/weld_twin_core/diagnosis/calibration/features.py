@@ -15,7 +15,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..beliefs import Beliefs
-from ..levels.free_form import FreeForm
 from ..result import Cause
 from ..verdict.decision import Left
 from ..verdict.evidence import Evidence, Row
@@ -98,11 +97,9 @@ def of_level(row: Row, level: str) -> Numbers:
     return plain({f'weight of the {level}': odds(max(weights.values()))})
 
 
-def of_form(form: FreeForm | None) -> Numbers:
+def of_form(groups: int, steady: float) -> Numbers:
     """Return how many groups without a formula stand for what has no name, and how surely."""
-    if form is None:
-        return {'groups': 0.0, 'steady': 0.0}
-    return plain({'groups': len(form.parts), 'steady': min(form.steady, 10.0)})
+    return plain({'groups': groups, 'steady': min(steady, 10.0)})
 
 
 def of_rest(cause: Cause, level: str) -> Numbers:

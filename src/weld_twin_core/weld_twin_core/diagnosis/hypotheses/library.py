@@ -4,22 +4,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...arm.robot import Robot
 from ...effects.effect import Effect, Stage
 from ...effects.registry import REGISTRY
-from ...effects.view import View
 from ...twin.features import joints_of
 from ..algebra.columns import Columns, Maker, Piece
 from ..algebra.problem import Model, Problem, Scale
+from ..algebra.still_joints import REASON, hardly_moves, moved_most, orders_told
 from ..result import Site
 from .any_motion import set_instead
 from .seed_systems import Role, SeedSystems, Unit
-from .still_joints import REASON, hardly_moves, moved_most, orders_told
 
 EXCLUDED = 'excluded by the user'
 FEW = 2
@@ -162,20 +160,3 @@ def _shown(seed: Effect, piece: Piece) -> bool:
     scales = seed.fit.coordinate_scales()
     reach = 1e3 * float(scales.max()) if scales.size else 1.0
     return bool(piece.peaks().max(initial=0.0) * reach > 1e-2)
-
-
-def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
-    """
-    Return causes in joints and links that depend on nothing but some quantities, at zero.
-
-    view: the samples that reach them.
-    on: what they may depend on: 'constant', 'load'.
-    """
-    out: dict[tuple[str, ...], Effect] = {}
-    for kind in REGISTRY.values():
-        if kind.of not in ('joint', 'link') or not kind.traits.cause or kind.traits.dated:
-            continue
-        for joint in joints_of(kind, robot):
-            if kind.applicable(view, joint) is None:
-                out |= {e.key: e for e in kind.search.small(view, joint, 1) if e.on in on}
-    return list(out.values())

@@ -63,6 +63,12 @@ class Search:
         """Return the library searched."""
         return self.work.library
 
+    @property
+    def lacking(self) -> tuple[Effect, ...]:
+        """Return what was taken out of the library and fits clearly better than what was found."""
+        robot = self.final.model.robot
+        return tuple(effect for effect in self.refused if not beyond(robot, effect))
+
     def effective(self, result: Fit) -> float:
         """Return the number of independent rows of a fit on the workspace's measurements."""
         return self.work.effective(result)

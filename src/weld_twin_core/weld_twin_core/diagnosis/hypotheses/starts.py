@@ -16,7 +16,7 @@ from ..algebra.columns import Maker, Piece
 from ..algebra.definite import outside, span_of
 from ..algebra.fit import design
 from ..algebra.problem import Model, Problem, Scale
-from .still_joints import moved_most
+from ..algebra.still_joints import moved_most
 
 MEMORY = (Stage.SERVO, Stage.PLAY)
 LEAST = 1e-9

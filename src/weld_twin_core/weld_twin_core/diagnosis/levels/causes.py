@@ -26,7 +26,7 @@ from ..result import Cause, Contributions, Shares, Site
 from ..unseen.folds import jackknife
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
-from ..verdict.evidence import Row, lacking, marginal
+from ..verdict.evidence import Row, marginal
 from .curved import Curved
 from .free_form import FreeForm, Part
 
@@ -52,14 +52,14 @@ def causes(
     alternative: Curved | None,
     floor: float,
     beliefs: Beliefs,
-    placing: FreeForm | None = None,
+    placing: FreeForm,
 ) -> tuple[tuple[Cause, ...], Shares]:
     """
     Return the causes, largest share first, and what of the squared gap is left and is noise.
 
     alternative: the free-form explanation; it is the model itself where ``unseen`` is its own.
     floor: RMS of the noise alone [m].
-    placing: what tells the places of an unknown gap.
+    placing: what tells the places of an unknown gap; of any other nothing.
     """
     reported = _told_claims(result, table, verdict)
     curved = alternative if alternative is not None and alternative.unseen is unseen else None
@@ -72,7 +72,7 @@ def causes(
     given = np.array([claim.share for claim in claims])
     if result.dense:
         whole = np.where(np.isnan(given), whole, given)
-    elif placing is not None:
+    else:
         whole, spread = _as_placed(whole, spread, given, placing)
     noise = min(floor**2 / max(float(squares[0].mean()), 1e-300), 1.0 - float(whole.sum()))
     remaining = max(1.0 - float(whole.sum()) - noise, 0.0)
@@ -166,7 +166,7 @@ def _nameless(
     reported: list[Cause],
     verdict: Verdict,
     curved: Curved | None,
-    placing: FreeForm | None,
+    placing: FreeForm,
     beliefs: Beliefs,
 ) -> tuple[list[Cause], Cause | None]:
     """Return all claims with those of curves that the model holds, and what is left beside."""
@@ -174,11 +174,11 @@ def _nameless(
         # What was found and does not count as named is left, and nothing else says where it sits.
         return reported, _rest([], beliefs) if len(reported) < len(result.slots) else None
     model = result.final.model.found
-    places = _by_place(() if placing is None else placing.parts)
+    places = _by_place(placing.parts)
     held = _carried_by(places, curved) if places else {}
     claims, remaining = list(reported), list[Part]()
     taken = {at for claim in reported for at in claim.members}
-    if taken_out := lacking(result):
+    if taken_out := result.lacking:
         beside = tuple(k for k in range(len(model)) if k not in taken and curved is not None)
         stand_in = _stand_in(taken_out[0], beside, model)
         return ([*claims, stand_in], _rest([], beliefs)) if beside else (claims, stand_in)

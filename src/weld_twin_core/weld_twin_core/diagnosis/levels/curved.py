@@ -191,9 +191,9 @@ def placed(
     alternative: Curved | None,
     missed: Missed,
     beliefs: Beliefs,
-) -> FreeForm | None:
+) -> FreeForm:
     """
-    Return the groups that tell place and dependence of an unknown gap; None of any other.
+    Return the groups that tell place and dependence of an unknown gap; of any other nothing.
 
     They explain what is left beside everything that is told.
 
@@ -203,7 +203,7 @@ def placed(
     finds any.
     """
     if verdict.status != 'unknown':
-        return None
+        return FreeForm(())
     if result.dense:
         # Beside many small errors it is what they leave that has no place yet.
         bare = replace(result.final, model=result.final.model.with_found(()))

@@ -30,9 +30,9 @@ from ..algebra.fit import Fit, coordinates, fit, robust_scale, solve_scaled, ste
 from ..algebra.learned_sizes import learned_precision, projected
 from ..algebra.prior import effect_precision, frame_prior
 from ..algebra.problem import Model, Problem, Scale
+from ..algebra.still_joints import hardly_moves, moved_most, orders_told
 from ..beliefs import Beliefs
 from ..hypotheses.library import candidate_kinds
-from ..hypotheses.still_joints import hardly_moves, moved_most, orders_told
 from ..unseen.unseen_stretches import Unseen
 
 SEEN = 0.05

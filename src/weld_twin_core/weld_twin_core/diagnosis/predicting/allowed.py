@@ -27,8 +27,8 @@ from ..algebra.definite import inverted
 from ..algebra.fit import LEAST_TURN, Fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.noise_floor import NoiseFloor
+from ..algebra.open_directions import VISIBLE, open_directions
 from ..algebra.problem import Model, Problem, Scale
-from ..frames.open_directions import VISIBLE, open_directions
 from ..result import Shrink
 from ..unseen.folds import posture_regions
 from ..unseen.unseen_stretches import Unseen

@@ -26,8 +26,7 @@ from ..algebra.definite import outside, span_of
 from ..algebra.fit import HUBER
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
-from ..hypotheses.library import plain_causes
-from ..hypotheses.still_joints import moved_most
+from ..algebra.still_joints import moved_most, plain_causes
 from .lag import KEPT
 from .limits import FEW, TINY, WIDER
 

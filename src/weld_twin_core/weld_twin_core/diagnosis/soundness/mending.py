@@ -277,27 +277,3 @@ def replayed(entries: Sequence[Mapping[str, Any]], given: Given, which: int = 0)
         except (TypeError, ValueError, KeyError, IndexError, DataError) as error:
             raise ModelError(f'a correction of data cannot be made again: {error}') from None
     return given
-
-
-def reading_map(entries: Sequence[Mapping[str, Any]], count: int) -> tuple[Array, Array]:
-    """
-    Return what corrections make of joint positions as they were recorded.
-
-    Returns
-    -------
-    matrix, offset : array, shape (n, n) and (n,) [rad or m]
-        Mended positions are q matrix' + offset.
-
-    """
-    matrix, offset = np.eye(count), np.zeros(count)
-    for entry in entries:
-        if entry.get('do') == 'joints':
-            turn = np.asarray(entry['matrix'], dtype=float)
-            matrix, offset = turn @ matrix, turn @ offset + np.asarray(entry['offset'])
-    return matrix, offset
-
-
-def turned_joints(entries: Sequence[Mapping[str, Any]], robot: Robot) -> tuple[str, ...]:
-    """Return the joints whose readings were recorded with the other sign; see `reading_map`."""
-    matrix, _ = reading_map(entries, robot.n)
-    return tuple(robot.joint_names[k] for k in np.flatnonzero(np.diag(matrix) < 0.0).tolist())

@@ -17,7 +17,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ...arrays import Array
 from ...errors import DataError
 from ...recording import Recording
-from ..frames.open_directions import shown
+from ..algebra.open_directions import shown
 from .evidence import Case, Finding, note, warning
 from .lengths import length, listed
 from .limits import ENOUGH, FEW, MOVED, NOISE, RUN, STRAY, TINY

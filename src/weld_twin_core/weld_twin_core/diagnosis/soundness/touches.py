@@ -24,8 +24,8 @@ from ...recording import Recording
 from ..algebra.fit import robust_fit, robust_scale
 from ..algebra.independent_rows import robust_spread
 from ..algebra.problem import Model, Problem
+from ..algebra.still_joints import plain_causes
 from ..frames.aligned import FEWEST, aligned
-from ..hypotheses.library import plain_causes
 from ..result import Unsound
 from .evidence import Finding, mistake
 from .limits import CLEAR, FEW, LARGE, ROWS, RUN, STRAY, TINY, UNDONE, WORTH

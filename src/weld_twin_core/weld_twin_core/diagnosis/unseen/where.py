@@ -10,8 +10,7 @@ model, the residual has structure, and the groups that bring it say what it depe
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from ..algebra.fit import Fit, trusted
 from ..algebra.problem import Model, Problem
 from ..beliefs import Beliefs
 from ..hypotheses.search import Search
-from ..result import Cause, Where
+from ..result import Cause, Structure, Where
 from .chance import Candidates, chance_gain, may_be_chance
 from .folds import Gain
 from .groups import FIELD, FINE, KNOTS, Group, all_groups
@@ -146,23 +145,6 @@ def _direction(problem: Problem, model: Model, good: list[np.ndarray]) -> dict[s
 
 TOLD = 3
 """Things that what remains depends on, told at the most; further ones are echoes of these."""
-
-
-@dataclass(frozen=True, eq=False)
-class Structure:
-    """What groups of columns without a formula find."""
-
-    rms_m: float
-    """RMS error on unseen stretches with the best of them beside the model, [m]."""
-    gain: float
-    """Share of the squared error on unseen stretches that it takes away."""
-    sure: float
-    """The gain over its standard error between stretches."""
-    depends_on: tuple[str, ...]
-    chance: float = 0.0
-    """Share that the best of them hardly ever takes off noise alone; 0 where rows are many."""
-    of_gap: Mapping[tuple[str, str], float] = field(default_factory=dict)
-    """By joint and dependence: share of the squared gap, no effect fitted, that one takes off."""
 
 
 def structure(unseen: Unseen, model: Model, baseline: Fit, beliefs: Beliefs) -> Structure:

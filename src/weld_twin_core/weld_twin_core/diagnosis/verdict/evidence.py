@@ -14,21 +14,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeVar
 
-import numpy as np
-
-from ...arm.robot import Robot
-from ...effects.effect import Effect
-from ...effects.plausible import beyond
 from ...effects.registry import REGISTRY
-from ..algebra.noise_floor import NoiseFloor
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
-from ..hypotheses.search import Search
-from ..result import Family, Shrink, Site
-from ..unseen.chance import chance_ratio, may_be_chance
-from ..unseen.folds import ways_to_divide
-from ..unseen.unseen_stretches import Unseen
-from ..unseen.where import Structure
+from ..result import Family, Site, Structure
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,73 +65,6 @@ class Evidence:
     """How far every joint moves [rad, m]."""
     stations: bool = False
     """Whether the arm stood still where it was measured."""
-
-
-def gathered(
-    result: Search,
-    unseen: Unseen,
-    leftover: Structure,
-    shrink: Shrink,
-    floor: NoiseFloor,
-    families: tuple[Family, ...] | None,
-) -> Evidence:
-    """
-    Return the evidence for a verdict.
-
-    found, unseen: the search, and unseen stretches under its final model.
-    leftover: what generic columns still find beside it.
-    shrink: on held-out recordings or on stretches taking their turn.
-    families: what each kind accounts for, where many small errors were fitted together.
-    """
-    robot, parts = result.final.model.robot, unseen.targets[1:]
-    total = parts.sum(axis=0)
-    whole = max(float(total @ total), 1e-300)
-    recordings = result.problem.recordings
-    return Evidence(
-        slots=result.slots,
-        structure=leftover,
-        gap=shrink.rms_before_m,
-        after=shrink.rms_after_m,
-        floor=floor.rms_m,
-        independent=floor.independent,
-        parts=tuple(float(part @ part) / whole for part in parts),
-        refused=tuple(_refused(robot, e) for e in result.refused if beyond(robot, e)),
-        lacking=tuple(
-            f'{Site.of(e)}, which was taken out of the library' for e in lacking(result)
-        ),
-        families=families,
-        leverage=_leverage(unseen, floor),
-        sizes=tuple(unseen.rms(part) for part in parts),
-        wandered=() if result.dense else tuple(unseen.wandered().tolist()),
-        rows=result.effective(result.small),
-        travel=tuple(np.max([np.ptp(r.joints.q, axis=0) for r in recordings], axis=0).tolist()),
-        stations=recordings[0].joints.static,
-    )
-
-
-def lacking(result: Search) -> tuple[Effect, ...]:
-    """Return what was taken out of the library and fits clearly better than what was found."""
-    robot = result.final.model.robot
-    return tuple(effect for effect in result.refused if not beyond(robot, effect))
-
-
-def _leverage(unseen: Unseen, floor: NoiseFloor) -> float:
-    """Return the ratio to the floor that noise hardly ever exceeds; one where there are many rows."""
-    if not may_be_chance(unseen.residual.size, 0.0):
-        return 1.0
-    ways = ways_to_divide(unseen.problem)
-    columns = unseen.columns.written_out()
-    return chance_ratio(columns, unseen.precision, ways, known=floor.independent)
-
-
-def _refused(robot: Robot, effect: Effect) -> str:
-    """Return an effect that no machine has, with the values that say so."""
-    units = {parameter.name: parameter.unit for parameter in effect.parameters}
-    values = ', '.join(
-        f'{name} {value:.3g} {units[name]} (the limit of machines is {limit:.3g})'
-        for name, value, limit in beyond(robot, effect)
-    )
-    return f'{Site.of(effect)} with {values}'
 
 
 Key = TypeVar('Key')

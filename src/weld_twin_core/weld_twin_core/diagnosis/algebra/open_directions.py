@@ -16,10 +16,10 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
-from ..algebra.fit import Fit, coordinates, design, fit, solve_scaled, stepped
-from ..algebra.independent_rows import effective_share
-from ..algebra.prior import frame_offset, frame_prior
-from ..algebra.problem import Model, Problem, Scale
+from .fit import Fit, coordinates, design, fit, solve_scaled, stepped
+from .independent_rows import effective_share
+from .prior import frame_offset, frame_prior
+from .problem import Model, Problem, Scale
 
 VISIBLE = (1e-3, 5e-3)
 """A frame error [m, rad] that the data should show."""

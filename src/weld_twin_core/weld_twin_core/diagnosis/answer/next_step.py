@@ -15,19 +15,19 @@ from ...arrays import Array
 from ...effects import REGISTRY
 from ...effects.curves import JointCurve, basis
 from ...effects.effect import Effect
+from ..advice.chosen_pieces import DECIDES
+from ..advice.experiment import confirming, next_experiment
+from ..advice.next_touches import next_touches
+from ..advice.postures import Limits, Room
 from ..algebra.fit import fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Scale
+from ..algebra.still_joints import narrow
 from ..hypotheses.search import Search
-from ..hypotheses.still_joints import narrow
 from ..levels.curved import Curved
 from ..levels.free_form import Part
 from ..unseen.groups import Group
 from ..verdict.decision import Verdict
-from .chosen_pieces import DECIDES
-from .experiment import confirming, next_experiment
-from .next_touches import next_touches
-from .postures import Limits, Room
 
 _TOUCHED = 4
 """The same where contacts measured: every touch that could be made is tried with each."""

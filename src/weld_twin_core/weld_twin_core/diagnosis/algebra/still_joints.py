@@ -1,18 +1,20 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How far joints move, and what that can show of them: of one at rest nothing but a constant."""
+"""How far joints move and what that can show: of one at rest a constant; and what joints may have."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.hooks import highest_order
+from ...effects.registry import REGISTRY
+from ...effects.view import View
 from ...recording import Recording
-from ...twin.features import Features
+from ...twin.features import Features, joints_of
 
 STILL = 0.04
 """Travel [rad] below which a joint stands still: a scale of 0.1 % moves by 0.04 mrad over it."""
@@ -71,3 +73,20 @@ def moved_most(features: Sequence[Features], joint: str | None) -> int:
         steps = np.abs(np.diff(maker.recording.joints.q[:, chosen], axis=0))
         ways.append((np.minimum(steps, most) if at_rest else steps).sum())
     return int(np.argmax(ways))
+
+
+def plain_causes(robot: Robot, view: View, on: Collection[str]) -> list[Effect]:
+    """
+    Return causes in joints and links that depend on nothing but some quantities, at zero.
+
+    view: the samples that reach them.
+    on: what they may depend on: 'constant', 'load'.
+    """
+    out: dict[tuple[str, ...], Effect] = {}
+    for kind in REGISTRY.values():
+        if kind.of not in ('joint', 'link') or not kind.traits.cause or kind.traits.dated:
+            continue
+        for joint in joints_of(kind, robot):
+            if kind.applicable(view, joint) is None:
+                out |= {e.key: e for e in kind.search.small(view, joint, 1) if e.on in on}
+    return list(out.values())

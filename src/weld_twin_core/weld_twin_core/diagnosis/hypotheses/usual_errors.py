@@ -25,8 +25,7 @@ from ..algebra.definite import EMPTY
 from ..algebra.fit import Fit, design, solve_scaled
 from ..algebra.learned_sizes import learned_precision, projected
 from ..algebra.problem import Problem, Scale
-from ..algebra.still_joints import hardly_moves, moved_most
-from ..algebra.still_joints import plain_causes
+from ..algebra.still_joints import hardly_moves, moved_most, plain_causes
 
 ON = ('constant', 'angle', 'load')
 """What they depend on: on the posture alone. What hangs on how a joint moves is none of these."""

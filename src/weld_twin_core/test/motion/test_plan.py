@@ -26,8 +26,20 @@ def pinocchio_gaps(model, q, poses):
     return np.array(out)
 
 
-@pytest.mark.parametrize('kind', KINDS)
-def test_every_robot_follows_every_bundled_seam_without_jumps(robot, kind, pinocchio_model):
+EACH = [
+    (name, kind)
+    for k, name in enumerate(('ur5', 'abb_irb120', 'abb_irb1600', 'kuka_kr6_r900', 'fanuc_m10ia'))
+    for kind in (KINDS if name == 'ur5' else (KINDS[k % 6], KINDS[(k + 3) % 6]))
+]
+"""One arm on every seam, and every build on two of them."""
+
+
+@pytest.mark.parametrize(
+    ('robot', 'kind'),
+    [*EACH, ('ur10', 'weave'), ('franka_panda', 'weave'), ('franka_panda', 'spline')],
+    indirect=['robot'],
+)
+def test_every_build_follows_bundled_seams_without_jumps(robot, kind, pinocchio_model):
     seam = default_seam(robot, kind)
     planned = plan(robot, seam, 'aggressive', 60.0, fit=True)
     q = planned.motion.q

@@ -218,19 +218,6 @@ def test_derivatives_by_errors_of_a_cell_are_slopes_of_their_draws(cell, entry):
         np.testing.assert_allclose(slopes[:, :3, k], found, atol=1e-6 * scale)
 
 
-def test_live_steps_of_a_cell_give_the_poses_of_the_batch(cell):
-    t = np.linspace(0.0, 2.0, 41)
-    q = np.sin(t[:, None] * np.arange(1.0, 1.0 + cell.n)) * 0.8
-    for entries in ([], EVERY):
-        twin = Twin(cell, effects_from_list(entries, cell))
-        motion = JointMotion(t, q)
-        whole, live = twin.poses(Recording('motion', motion)), twin.live()
-        for k in range(t.size):
-            pose = live.step(t[k], q[k], motion.velocity[k])[1]
-            np.testing.assert_allclose(pose.position, whole.position[k], atol=1e-12)
-            np.testing.assert_allclose(pose.rotation, whole.rotation[k], atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ('entry', 'robot', 'sentence'),
     [

@@ -49,53 +49,12 @@ def table(path, header, *blocks, delimiter=','):
 # The two published formats -------------------------------------------------------------------
 
 
-def test_target_plus_difference_in_mm_and_degrees(data, ur5):
-    raw = columns_of(data / 'ur5_like.csv', ',')
-    recording, said = read_table(data / 'ur5_like.csv', ur5)
-    target = stacked(raw, 'x_t', 'y_t', 'z_t')
-    difference = stacked(raw, 'x_dif', 'y_dif', 'z_dif')
-    expected = (target + difference) / 1000
-    np.testing.assert_allclose(recording.measured.position, expected, atol=1e-15)
-    q = stacked(raw, *(f'joint_{k}' for k in range(1, 7)))
-    np.testing.assert_allclose(recording.joints.q, np.deg2rad(q), atol=1e-15)
-    np.testing.assert_array_equal(recording.joints.t, np.arange(24.0))
-    assert recording.joints.static
-    assert recording.measured.rotation is None
-    assert said[:4] == (
-        "columns are separated by ','",
-        'joint columns are joint_1, joint_2, joint_3, joint_4, joint_5, joint_6',
-        f'joint angles are in degrees (up to {abs(q).max():.4g})',
-        'measured = target (x_t, y_t, z_t) plus difference (x_dif, y_dif, z_dif); '
-        '--difference decides',
-    )
-    assert any(sentence.startswith('positions are in mm') for sentence in said)
-
-
 def test_the_sign_of_the_difference_is_the_users(data, ur5):
     raw = columns_of(data / 'ur5_like.csv', ',')
     options = TableOptions(difference='subtract')
     recording, _ = read_table(data / 'ur5_like.csv', ur5, options)
     expected = (raw['x_t'] - raw['x_dif']) / 1000
     np.testing.assert_allclose(recording.measured.position[:, 0], expected, atol=1e-15)
-
-
-def test_decimal_comma_euler_angles_sigmas_and_temperature(data):
-    raw = columns_of(data / 'ur10_like.csv', ';')
-    recording, said = read_table(data / 'ur10_like.csv', catalog.load('ur10'))
-    m = recording.measured
-    position = stacked(raw, 'measurement_x', 'measurement_y', 'measurement_z') / 1000
-    np.testing.assert_allclose(m.position, position, atol=1e-15)
-    angles = stacked(raw, 'measurement_rx', 'measurement_ry', 'measurement_rz')
-    x, y, z = (Rotation.from_euler(axis, angles[:, [k]], True) for k, axis in enumerate('xyz'))
-    np.testing.assert_allclose(m.rotation, (x * y * z).as_matrix(), atol=1e-14)
-    std = stacked(raw, *(f'measurement_std_{axis}' for axis in 'xyz')) / 1000
-    np.testing.assert_allclose(m.sigma, np.sqrt((std**2).mean(axis=1)), rtol=1e-14)
-    np.testing.assert_allclose(recording.temperature.value, raw['measurement_temperature'])
-    np.testing.assert_allclose(recording.joints.q[:, 1], raw['shoulder_lift_joint'])
-    text = '\n'.join(said)
-    assert 'the decimal sign is a comma' in text
-    assert 'measured angles are Euler XYZ (intrinsic)' in text
-    assert "stamps in 'Timestamp' do not increase from row to row; rows are taken in their" in text
 
 
 def test_an_imported_table_survives_the_bag(data, tmp_path):

@@ -82,9 +82,14 @@ def page(browser):
     return browser.open(report_page(THREE))
 
 
-@pytest.mark.parametrize('mended', [(), (0,), (2,), (0, 1), (0, 1, 2)])
-def test_the_figures_follow_the_switches_and_are_the_same_wherever_they_stand(page, mended):
-    page.get_by_role('button', name='as it is').click()
+def test_the_figures_follow_the_switches_and_are_the_same_wherever_they_stand(page):
+    for mended in ((), (0,), (2,), (0, 1), (0, 1, 2)):
+        page.get_by_role('button', name='as it is').click()
+        figures_of(page, mended)
+
+
+def figures_of(page, mended):
+    """Switch some causes off, and hold the figures of the page against the rest's."""
     for k in mended:
         page.locator(f'.switches input[data-switch="{k}"]').check()
     assert page.locator('.card input:checked').count() == len(mended)

@@ -259,7 +259,7 @@ class _Columns:
                 mine = here == label
                 target[mine] -= target[mine].mean(axis=0)
                 design[:, mine] -= design[:, mine].mean(axis=1, keepdims=True)
-        return target.reshape(-1), design.reshape(design.shape[0], -1)
+        return target.reshape(-1), design.reshape(design.shape[0], target.size)
 
 
 def _ends(robot: Robot, effect: Effect, k: int) -> tuple[tuple[list[Effect], list[Effect]], float]:

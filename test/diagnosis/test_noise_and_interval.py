@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from diagnosis_cells import SIGMA
 
-from weld_twin_core.diagnosis.algebra.noise_floor import noise_floor
+from weld_twin_core.diagnosis.algebra.noise_floor import WIDEST, noise_floor
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.unseen.held_out_shrink import ratio_interval
 from weld_twin_core.recording import JointMotion, Measurements, Recording
@@ -54,6 +54,15 @@ def test_at_rest_repeated_stations_see_the_noise_whatever_the_gap():
     sigma, independent = noise_floor(problem, [(white(1200) + gap)[:, order]])
     assert independent
     assert sigma == pytest.approx(SIGMA, rel=0.06)
+
+
+def test_noise_read_off_a_misfit_is_no_wider_than_an_instrument_has_and_never_than_the_gap():
+    problem = Problem((resting(np.random.default_rng(3).uniform(-2.0, 2.0, (150, 6))),))
+    heap = np.where(np.arange(150) < 75, 8e-3, -8e-3) * np.ones((3, 1))
+    floor = noise_floor(problem, [heap])
+    assert not floor.independent and floor.sigma <= WIDEST
+    small = 0.02 * heap
+    assert noise_floor(problem, [small]).sigma <= np.sqrt((small**2).mean())
 
 
 def test_without_repeats_the_floor_at_rest_is_no_more_than_what_the_model_leaves():

@@ -147,12 +147,7 @@ def _explained(
     limits: Limits | None,
     progress: Progress,
 ) -> Diagnosis:
-    """
-    Return the diagnosis of recordings that were found sound.
-
-    Where a few effects leave the cause unknown, and that is rather wrong than right, and all kinds
-    together predict as well, kinds that unseen data need are told in their place.
-    """
+    """Return the diagnosis of recordings that were found sound."""
     assert examined.posed is not None
     result = search(*examined.posed, exclude, beliefs, progress)
     result = fitted_together(result, exclude, beliefs, progress)

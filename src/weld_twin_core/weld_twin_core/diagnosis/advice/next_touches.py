@@ -61,11 +61,7 @@ _BELOW = 0.05
 
 @dataclass(frozen=True, eq=False)
 class _Touchable:
-    """
-    Touches that could be made, and what each sees of all unknowns, whitened, shape (N, 3, P).
-
-    Rows that a kind of contact does not have are zero.
-    """
+    """Touches that could be made, and what each sees of all unknowns, whitened, (N, 3, P)."""
 
     recording: Recording
     rows: Array
@@ -339,11 +335,7 @@ def next_touches(
 
 
 class _Option(NamedTuple):
-    """
-    Touches of what is there, or of one new place [m], in the order in which they are worth making.
-
-    ``known`` is what is known before, and after each.
-    """
+    """Touches of one place [m] in the order they are worth making in; known before, after each."""
 
     touches: list[_Touchable]
     place: Array | None

@@ -186,12 +186,7 @@ class _Point:
     def at(
         cls, problem: Problem, model: Model, scale: Scale, prior: Array, share: float = 1.0
     ) -> _Point:
-        """
-        Return the cost of a model under a prior precision about zero, shape (K,).
-
-        prior: prior precision of every effect coordinate, about zero, shape (K,).
-        share: how much of all priors counts.
-        """
+        """Return the cost of a model under a prior about zero, (K,), of which a share counts."""
         residual = problem.whitened(problem.residuals(model), scale)
         frames, off = frame_prior(problem, model)
         ridge = share * np.concatenate([frames, prior])

@@ -94,11 +94,7 @@ def _first_variances(labels: Array, usual: Array) -> tuple[Array, Array]:
 def _solved(
     normal: Array, right: Array, noise: float, precision: Array, room: Array
 ) -> tuple[Array, Array]:
-    """
-    Return mean and variance of the coordinates under a prior about zero, shapes (K,).
-
-    ``room``, shape (K, K), is worked in. As much is put on the diagonal as columns that repeat need.
-    """
+    """Return mean and variance of the coordinates, (K,), under a prior about zero."""
     diagonal = room.reshape(-1)[:: len(room) + 1]
     for more in JITTER:
         np.divide(normal, noise, out=room)

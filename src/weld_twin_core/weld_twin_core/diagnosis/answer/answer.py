@@ -232,11 +232,7 @@ def _unexplained(
     shrink: Shrink,
     placing: FreeForm,
 ) -> Unexplained:
-    """
-    Return what remains after the verdict, and what that or the gap itself depends on.
-
-    The places of an unknown gap are told by ``placing``, so that this says what the causes say.
-    """
+    """Return what remains after the verdict, and what that, or an unknown gap itself, depends on."""
     case = Left(evidence, beliefs)
     names = evidence.structure.depends_on if case.structured else ()
     if placing.parts:

@@ -52,12 +52,7 @@ def contact_spreads(result: Search, unseen: Unseen) -> ContactResult | None:
 
 
 def _not_seen(result: Search) -> tuple[str, ...]:
-    """
-    Return what no contact shows, in words: errors that would hide below the noise of all together.
-
-    Each constant error of a joint or a link is taken as large as machines have it; what its
-    columns move is counted once places and tool are fitted.
-    """
+    """Return in words what no contact shows: errors as machines have them, below the noise."""
     problem, model, scale = result.problem, result.final.model, result.scale
     features = problem.features(model)
     frames = problem.whitened(problem.frame_columns(features)[0], scale)

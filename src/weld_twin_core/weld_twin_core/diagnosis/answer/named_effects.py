@@ -236,12 +236,7 @@ def _tries(result: Search, unseen: Unseen, floor: float) -> Array:
 
 
 def _coordinates(rng: np.random.Generator, result: Search, missed: float) -> Array:
-    """
-    Return how far the coordinates of all effects may be off, (DRAWS, K).
-
-    A share of what is left is missed and no noise: it spreads over as many directions as what
-    formulas are believed to miss.
-    """
+    """Return how far coordinates may be off by noise and by what is missed, (DRAWS, K)."""
     rows = result.small.residual.size
     doubt = (
         1.0 / max(result.effective(result.small), 1.0)

@@ -121,13 +121,7 @@ def _parting(
 
 
 def _as_weighed(result: Search) -> Scale:
-    """
-    Return the noise, as much larger as rows count less in a diagnosis.
-
-    A large effect whose formula errs a little leaves something that any other may pick up, so what
-    is learned beside it counts less (`effective`). That neighbours in time say the same is taken
-    into account where pieces of motion are foreseen.
-    """
+    """Return the noise, as much larger as rows count less beside large effects (`effective`)."""
     fit, problem, scale = result.small, result.work.problem, result.work.scale
     apart = effective_share(fit.residual, problem.rows, problem.samples) * fit.residual.size
     wider = float(np.sqrt(max(apart / max(result.effective(fit), 1e-9), 1.0)))
@@ -135,12 +129,7 @@ def _as_weighed(result: Search) -> Scale:
 
 
 def _promise(verdict: Verdict, wanted: Mapping[str, Any]) -> float | None:
-    """
-    Return how probable it is that an experiment decides what it is asked for; None if it asks nothing.
-
-    It has to part its explanations by as much as a decision needs, and one of the two has to be
-    near the truth: where nothing of the library is believed, that is not to be expected.
-    """
+    """Return how probable it is that an experiment decides; None if it asks nothing."""
     sigma = wanted['expected_separation_sigma']
     if wanted['between'] is None or wanted['motion'] is None or sigma is None:
         return None
@@ -182,11 +171,7 @@ def _beside(result: Search) -> list[tuple[Effect, ...]]:
 def _without_names(
     result: Search, alternative: Curved | None, low: Array, high: Array
 ) -> list[_Explanation]:
-    """
-    Return the free-form explanation and the nearest other ones, likeliest first, or none.
-
-    Curves over an angle go on, free to bend, to what the joints may reach, from low to high, (n,).
-    """
+    """Return the free-form explanation and those nearest; curves go on from low to high."""
     if alternative is None:
         return []
     fitted = alternative.found.final.model.found

@@ -172,12 +172,7 @@ def _filled(recording: Recording, model: Model, k: int) -> Recording:
 
 
 def _tool(recordings: Sequence[Recording], model: Model) -> Array:
-    """
-    Return the tool frame whose point rests at the contacts: the many-point tool calibration.
-
-    The turn of the tool is not seen by a point and stays as given. Only contacts of points tell;
-    without them, or where the given point is near already, it stays.
-    """
+    """Return the tool frame whose point rests at contacts of points, its turn as given."""
     given = model.robot.T_flange_tool
     if _off(recordings, model) < NEAR:
         return given

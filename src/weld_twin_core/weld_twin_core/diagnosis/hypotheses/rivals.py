@@ -115,11 +115,7 @@ def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> t
 def _near(
     work: Workspace, ranked: Sequence[Choice], role: Role, taken: Sequence[Site]
 ) -> list[Choice]:
-    """
-    Return the choices of a role that the model does not have, near the best of them.
-
-    What may not be in the model has to be near the best of all: else it is not the same on these data.
-    """
+    """Return the choices of a role near the best of them; of what may not be in the model, of all."""
     choices = [c for c in ranked if c.unit.role is role and c.unit.site not in taken]
     best = max((c.nats for c in (choices if role is Role.FOUND else ranked)), default=0.0)
     least = max(best - max(work.beliefs.rival_nats, work.beliefs.rival_share * best), 0.0)
@@ -174,11 +170,7 @@ def _same_anywhere(now: Fit, effect: Effect, other: Rival) -> bool:
 
 
 def _lead(work: Workspace, now: Fit, other: Rival) -> Array | None:
-    """
-    Return by how much evidence something taken out is ahead of each effect found, where it clearly is.
-
-    Several effects may imitate one: those that are worth nothing beside it are replaced as well.
-    """
+    """Return how far something taken out is clearly ahead of all that it replaces, or None."""
     own = backward(work, other.fit)
     kept = sites(own)
     if other.site not in kept:

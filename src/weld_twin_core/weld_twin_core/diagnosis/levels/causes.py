@@ -120,12 +120,7 @@ def covering(cause: Cause) -> Cause:
 def _as_placed(
     whole: Array, spread: Array, given: Array, placing: FreeForm
 ) -> tuple[Array, Array]:
-    """
-    Return shares and their errors with those of places as the groups take the gap off.
-
-    Curves that are carried stand for a place as well as curves can; what a place is worth its own
-    groups say, whether or not a curve carries them.
-    """
+    """Return shares and their errors with those of places as their own groups take the gap off."""
     of_groups, parts = ~np.isnan(given), np.nan_to_num(given)
     if not of_groups.any():
         return whole, spread
@@ -197,13 +192,7 @@ def _nameless(
 
 
 def _stand_in(taken_out: Effect, members: Members, model: Sequence[Effect]) -> Cause:
-    """
-    Return what has no name where something that was taken out of the library fits clearly better.
-
-    Its formula says more of the place, and of what it depends on, than curves do.
-
-    members: the effects of the model that stand in for it; none where nothing could.
-    """
+    """Return what has no name where something taken out fits clearly better: at its place."""
     curves = {Site.of(model[k]): 1.0 for k in members if model[k].traits.bends}
     return _cause(members, {taken_out.at: 1.0}, {taken_out.on: 1.0}, curves)
 

@@ -191,12 +191,7 @@ def scatter(result: Search, unseen: Unseen) -> list[Scatter]:
 
 
 def _ways(maker: Features) -> Array:
-    """
-    Return the ways along which noise may lie, shape (K, 6, M), the joints last.
-
-    Each coordinate; along the line of sight, beside and above it; the velocity of the tool; and
-    every joint while it moves.
-    """
+    """Return ways along which noise may lie, (K, 6, M): axes, sight, velocity, joints last."""
     view, count = maker.run.view, maker.at.size
     coordinates = np.broadcast_to(np.eye(6)[:, :, None], (6, 6, count))
     sight = np.zeros((3, 6, count))

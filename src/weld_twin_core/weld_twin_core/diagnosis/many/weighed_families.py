@@ -127,11 +127,7 @@ class _Case:
         return float((self.left(kept) ** 2).mean())
 
     def growth(self, kept: Iterable[int], less: Iterable[int]) -> Array:
-        """
-        Return by what share the error of every part grows from one model to a lesser one.
-
-        It shrinks where that is beyond its standard error: a part of a few stations varies by chance.
-        """
+        """Return by what share the error of every part grows to a lesser model, chance aside."""
         out = self.left(less) / np.maximum(self.left(kept), TINY) - 1.0
         more = self.squares(less) - self.squares(kept)
         mean = self._mean(more)

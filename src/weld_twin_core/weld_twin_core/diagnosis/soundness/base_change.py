@@ -202,11 +202,7 @@ def _of_arm(problem: Problem, model: Model, features: list[Features]) -> list[Ar
 
 
 def _scale(parts: list[Array]) -> Scale:
-    """
-    Return a scale wide enough to keep both sides of a step.
-
-    A robust fit sides with the longer part, and a median with it; nine samples in ten do not.
-    """
+    """Return a scale wide enough for both sides of a step: a robust one sides with the longer."""
     size = [
         float(np.quantile(np.abs(np.concatenate([p[rows].ravel() for p in parts])), 1.0 - FEW))
         / ndtri(1.0 - FEW / 2.0)

@@ -74,11 +74,7 @@ def _left(case: Case, k: int) -> float | None:
 
 
 def _paired(case: Case, k: int) -> Iterator[Recording]:
-    """
-    Yield the measurements as stations: with the joints at their stamps, before, after, in order.
-
-    A pose that was computed belongs to one joint state, whatever its own stamp says.
-    """
+    """Yield the measurements as stations: with the joints at their stamps, before, after, in order."""
     recording = case.recordings[k]
     joints, seen = recording.joints, recording.seen
     each = [case.motions[k]]

@@ -37,11 +37,7 @@ for; and of the squared difference, that one cause may leave beside what all cau
 
 @dataclass(frozen=True)
 class _Loads:
-    """
-    Load by the statics and as measured, (n, N) each; what may add to it, (K, n, N).
-
-    ``payload`` is of 1 kg and of 1 kg m along each axis of the tool, ``links`` of every link's mass.
-    """
+    """Statics and measured load, (n, N); what payload, links and more add, (K, n, N)."""
 
     robot: Robot
     statics: Array

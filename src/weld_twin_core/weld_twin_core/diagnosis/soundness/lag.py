@@ -100,23 +100,14 @@ def _polished(start: Lag, joints: Array, path: Array, t: Array, seen: Array, fre
 
 
 def _misfits(seen: Array, paths: Array) -> Array:
-    """
-    Return the RMS gap to each of several paths, (L,).
-
-    That is after the best turn and shift, without the worst samples. ``seen`` is (M, 3), ``paths``
-    (L, M, 3).
-    """
+    """Return the RMS gap of (M, 3) to paths, (L, M, 3), aligned, worst samples left out."""
     turn, keep = _aligned(seen, paths)
     square = (_off(seen, paths, turn, keep) ** 2).sum(axis=-1)
     return np.asarray(np.sqrt((square * keep).sum(axis=-1) / keep.sum(axis=-1)))
 
 
 def _aligned(seen: Array, path: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """
-    Return the turn from a path to measurements, and which samples agree with it best.
-
-    For a path (..., M, 3) the turn is (..., 3, 3), the samples are (..., M).
-    """
+    """Return turns from paths (..., M, 3) to measurements, and which samples agree best."""
     keep = np.ones(path.shape[:-1], dtype=bool)
     for _ in range(2):
         here = _centred(path, keep) * keep[..., None]

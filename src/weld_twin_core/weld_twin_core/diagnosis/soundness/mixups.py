@@ -124,12 +124,7 @@ def _explains(shot: Snapshot, start: Arm, trial: Snapshot, arm: Arm) -> bool:
 
 
 def _best(shot: Snapshot, before: Arm, tries: Iterable[Finding]) -> _Tried | None:
-    """
-    Return the mix-up whose undoing leaves least, from a rough ranking and a fit of the best.
-
-    Of those that do as well, the one that leaves the frames as they were given: a wrist turned
-    round by half a turn of its outer joints is one whose middle joint counts the other way.
-    """
+    """Return the mix-up whose undoing leaves least; of those alike, what leaves the frames."""
     tried = [(each, shot.mended(each.mend)) for each in tries if each.mend is not None]
     if not tried:  # one joint, and nothing that could be swapped with it
         return None

@@ -120,11 +120,7 @@ def _inside(recording: Recording, start: int, end: int) -> NDArray[np.bool_]:
 
 
 def _freed(model: Model, recording: Recording, k: int, i: int, inside: NDArray[np.bool_]) -> float:
-    """
-    Return the median gap [m] when joint i may stand anywhere at every measurement.
-
-    By itself it moves the tool along a line, or round a circle about its axis.
-    """
+    """Return the median gap [m] when joint i may stand anywhere at every measurement."""
     seen, twin = recording.seen.take(inside), model.twin(k)
     column = Features(twin, recording, seen.t).column(('q', i)).T
     away = seen.position - twin.poses(recording, seen.t).position

@@ -85,12 +85,7 @@ def _plain_fit(problem: Problem, model: Model) -> Model:
 
 
 def _loose(problem: Problem, rows: list[Array]) -> tuple[float, ...]:
-    """
-    Return the noise of every recording in that of the surest, where an instrument and contacts are.
-
-    A ball in its socket and a tracker differ by several times. What an arm as wrong as machines are
-    leaves of each tells; the places of contacts took their share of it.
-    """
+    """Return the noise of every recording in that of the surest."""
     of: dict[object, list[int]] = {}
     for k in range(len(rows)):
         touched = problem.contact(k) is not None

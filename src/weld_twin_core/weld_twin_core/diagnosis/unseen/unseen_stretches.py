@@ -239,12 +239,7 @@ class Unseen:
         return solved
 
     def _asked(self, kept: Sequence[int]) -> tuple[Index, Array, Array]:
-        """
-        Return the columns of the frames and of some effects, and what a model of them is to explain.
-
-        That is the final residual with what the other effects take off it: which of the targets, (1 +
-        K,), and their sum, (rows,).
-        """
+        """Return the columns of frames and some effects, the targets they explain, and the sum."""
         parts = [np.arange(self.parts[k].start, self.parts[k].stop) for k in sorted(kept)]
         index = np.concatenate([np.arange(self.frames), *parts]).astype(int)
         mix = np.ones(1 + len(self.parts))
@@ -292,11 +287,7 @@ class Unseen:
         return np.asarray(total)
 
     def _system(self, b: int, index: Index) -> Array:
-        """
-        Return the normal matrix of some columns on all stretches but one.
-
-        What a column shows on that stretch alone is nothing but rounding elsewhere; it stays put.
-        """
+        """Return the normal matrix of some columns on all stretches but one."""
         total, many = self._total, self.columns.count > MANY
         own = self.stretches[b].chosen(index).normal() if many else self.normals[b]
         if index.size < self.columns.count:
@@ -450,11 +441,7 @@ def _spread(normal: Array) -> Array:
 
 
 def _tether(model: Model) -> Array:
-    """
-    Return a weak prior precision, shape (K,), that keeps what a few stretches cannot show.
-
-    A vibration that only the first stretch excites has no frequency in the others.
-    """
+    """Return a weak prior precision, (K,), that keeps what a few stretches cannot show."""
     sizes = [
         np.maximum(np.abs(e.fit.coordinates()), e.fit.coordinate_scales()) for e in model.found
     ]

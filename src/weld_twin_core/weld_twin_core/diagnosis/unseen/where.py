@@ -118,11 +118,7 @@ def _path(
 
 
 def _direction(problem: Problem, model: Model, good: list[np.ndarray]) -> dict[str, float]:
-    """
-    Return the RMS gap along the path, across it, and along the tool's axis (stick-out), [m].
-
-    Along is the direction of travel; stations have none and count as across.
-    """
+    """Return the RMS gap along the path, across it, and along the tool's axis, [m]."""
     sums = np.zeros(3)
     for recording, part, maker, kept in zip(
         problem.recordings, problem.residuals(model), problem.features(model), good, strict=True

@@ -61,10 +61,10 @@ def test_a_joint_that_was_mastered_anew(robot, align):
         robot, [day(robot, 1), day(robot, 2, JointOffset('elbow_joint', 1e-3))], ALL[:2], align
     )
     (only,) = found
-    assert (only.change.recording, only.change.effect.site) == (1, 'elbow_joint')
-    std = float(np.sqrt(only.covariance[0, 0]))
+    assert (only.recording, only.effect.site) == (1, 'elbow_joint')
+    std = only.std['offset']
     assert 1e-6 < std < 1e-4
-    assert only.change.effect.offset == pytest.approx(1e-3, abs=4 * std)
+    assert only.effect.offset == pytest.approx(1e-3, abs=4 * std)
 
 
 def test_another_tool(robot):
@@ -72,22 +72,22 @@ def test_another_tool(robot):
     (only,) = seen(robot, [day(robot, 1), day(robot, 2, ToolPose((5e-2, 0, 2e-3)))], ALL, 'base')[
         :1
     ]
-    assert only.change.effect.name == 'tool_pose'
-    assert only.change.effect.xyz == pytest.approx((5e-2, 0.0, 2e-3), abs=1e-4)
+    assert only.effect.name == 'tool_pose'
+    assert only.effect.xyz == pytest.approx((5e-2, 0.0, 2e-3), abs=1e-4)
 
 
 def test_bases_that_are_fitted_are_compared(robot):
     """The instrument stood elsewhere: told by how much, although bases are fitted anyway."""
     (only,) = seen(robot, [day(robot, 1), day(robot, 2, base=(2e-3, 0, 1e-3))], ALL, 'base')
-    assert only.change.effect.name == 'base_pose'
-    assert only.change.effect.xyz == pytest.approx((2e-3, 0.0, 1e-3), abs=1e-4)
+    assert only.effect.name == 'base_pose'
+    assert only.effect.xyz == pytest.approx((2e-3, 0.0, 1e-3), abs=1e-4)
 
 
 def test_the_third_recording_alone(robot):
     """What changed is put to the recording that has it."""
     days = [day(robot, 1), day(robot, 2), day(robot, 3, JointOffset('wrist_1_joint', -8e-4))]
     (only,) = seen(robot, days, ALL)
-    assert (only.change.recording, only.change.effect.site) == (2, 'wrist_1_joint')
+    assert (only.recording, only.effect.site) == (2, 'wrist_1_joint')
 
 
 def test_what_cannot_be_told_is_listed(robot):

@@ -144,15 +144,7 @@ def _changed(result: Search, families: Sequence[str]) -> tuple[Changed, ...]:
     """Return what differs between the recordings beyond noise, by recording."""
     if not families:
         return ()
-    items = told(result.problem, result.final.model, result.scale, result.precision, families)
-    return tuple(
-        Changed(
-            item.change.recording,
-            item.change.effect,
-            item.change.effect.fit.errors(np.sqrt(np.diag(item.covariance))),
-        )
-        for item in items
-    )
+    return told(result.problem, result.final.model, result.scale, result.precision, families)
 
 
 def _untold_check(result: Search, families: Sequence[str]) -> tuple[Check, ...]:

@@ -11,7 +11,7 @@ frames, in every hypothesis.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -33,7 +33,7 @@ from ..algebra.spread import BLOCKS, covariance, unit_inverse
 from ..beliefs import Beliefs
 from ..hypotheses.any_motion import constant, of_no_size
 from ..hypotheses.search import Search
-from ..result import Site
+from ..result import Changed, Site
 
 ROWS = 9000
 """Rows on which changes are chosen."""
@@ -44,21 +44,6 @@ REWEIGHTED = 6
 """Fits with the weights of the last: so many until an outlier of a hundred noises has lost its own."""
 UNTOLD = 0.9
 """A coordinate whose spread after the data is this share of that before is not shown by them."""
-
-
-@dataclass(frozen=True, eq=False)
-class Told:
-    """A change with its standard errors, in the shape of its parameters."""
-
-    change: Change
-    covariance: Array
-
-    @property
-    def sure(self) -> bool:
-        """Return whether it stands out of the noise."""
-        value = self.change.effect.fit.coordinates()
-        chi = float(value @ np.linalg.pinv(self.covariance, hermitian=True) @ value)
-        return chi > SURE**2 * value.size
 
 
 def families_named(given: str | Iterable[str], what: str = 'may_change') -> tuple[str, ...]:
@@ -249,9 +234,9 @@ def _site(change: Change) -> tuple[int, str, str | None]:
 
 def told(
     problem: Problem, model: Model, scale: Scale, precision: Array, families: Sequence[str]
-) -> tuple[Told, ...]:
+) -> tuple[Changed, ...]:
     """
-    Return what differs between the recordings, with covariances; what noise may do is left out.
+    Return what differs between the recordings beyond noise, by recording.
 
     problem, model, scale: a model fitted to all measurements.
     precision: prior precision of the coordinates of the found effects, shape (K,).
@@ -262,19 +247,30 @@ def told(
     share = effective_share(residual, problem.rows, problem.samples)
     whole = covariance(columns, ridge, residual, problem.block_labels(BLOCKS), share)
     parts = _places(problem, model)
-    out = [
-        Told(change, whole[np.ix_(part, part)])
-        for change, part in zip(model.changes, parts, strict=True)
-    ]
+    pairs = zip(model.changes, parts, strict=True)
+    out = [(change, whole[np.ix_(part, part)]) for change, part in pairs]
     for kind in (REGISTRY[name] for name in families):
         if kind.traits.fitted_with == 'base' and 'base' in problem.align:
             out += _bases(kind, problem, model, whole)
-    result = sorted(out, key=lambda each: each.change.recording)
-    return tuple(each for each in result if each.sure)
+    out.sort(key=lambda each: each[0].recording)
+    return tuple(
+        Changed(change.recording, change.effect, change.effect.fit.errors(np.sqrt(np.diag(own))))
+        for change, own in out
+        if _sure(change, own)
+    )
 
 
-def _bases(kind: type[Effect], problem: Problem, model: Model, whole: Array) -> list[Told]:
-    """Return how every base differs from the first."""
+def _sure(change: Change, covariance: Array) -> bool:
+    """Return whether a change stands out of the noise."""
+    value = change.effect.fit.coordinates()
+    chi = float(value @ np.linalg.pinv(covariance, hermitian=True) @ value)
+    return chi > SURE**2 * value.size
+
+
+def _bases(
+    kind: type[Effect], problem: Problem, model: Model, whole: Array
+) -> list[tuple[Change, Array]]:
+    """Return how every base differs from the first, with covariances."""
     out = []
     first, *others = (group[0] for group in problem.stands)
     for i, k in enumerate(others, 1):
@@ -283,7 +279,7 @@ def _bases(kind: type[Effect], problem: Problem, model: Model, whole: Array) -> 
         mix[:, :6], mix[:, 6 * i : 6 * i + 6] = -np.eye(6), np.eye(6)
         effect = kind().fit.with_coordinates(step)
         own = problem.given[k] if problem.given else k
-        out.append(Told(Change(own, effect), mix @ whole @ mix.T))
+        out.append((Change(own, effect), mix @ whole @ mix.T))
     return out
 
 

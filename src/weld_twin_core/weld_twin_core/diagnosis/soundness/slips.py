@@ -145,12 +145,7 @@ def changes(
 
 
 class _Trial(NamedTuple):
-    """
-    A change of a recording, its evidence, and its shape in time (M,).
-
-    Of a step also what it is, the sample that it comes before, and what explains it as well; of a smooth
-    change the time constant as a share of the recording, if it settles.
-    """
+    """A change in time, shape (M,): a step of something before a sample, or settling or not."""
 
     sure: float
     change: Change
@@ -272,14 +267,10 @@ class _Seen:
 
 
 def _simplest(trials: Sequence[_Trial]) -> _Trial | None:
-    """
-    Return the step with most evidence, or one of fewer numbers that explains nearly as much.
-
-    What a model leaves for other reasons lets six numbers explain a little more than one, always;
-    where hardly anything is left for other reasons, that little counts.
-    """
+    """Return the step with most evidence, or one of fewer numbers that explains nearly as much."""
     if not trials:
         return None
+    # What a model leaves lets six numbers explain a little more than one; where it is little, it counts.
     most = max(trial.gain for trial in trials)
     whole = float((trials[0].change.rest.residual ** 2).sum())
     least = max((1.0 - FEW) * most, whole - 2.0 * (whole - most))

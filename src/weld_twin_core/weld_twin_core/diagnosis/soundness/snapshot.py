@@ -76,11 +76,7 @@ class Snapshot:
 
     @cached_property
     def collapsed(self) -> float:
-        """
-        Return by what factor the measurements spread less than any such motion lets them, or 1.
-
-        Whatever is shrunk to a point leaves no gap: that explains nothing.
-        """
+        """Return by what factor measurements spread less than motion lets them: a point, no gap."""
         twins = [
             self.model.twin(k).poses(recording, recording.seen.t).position
             for k, recording in enumerate(self.recordings)

@@ -157,14 +157,6 @@ def test_what_is_left_makes_a_gap_unknown_where_it_is_more_than_what_is_named(pa
         assert (verdict.status, verdict.sets) == (status, ((PLAY,),))
 
 
-@pytest.mark.parametrize(('at', 'sets'), [(ELBOW, ((OFFSET,),)), ('instrument', ())])
-def test_a_name_does_not_count_where_something_free_predicts_what_it_should(at, sets):
-    pair = SURE, slot((OFFSET, 1.0))
-    verdict = decide(evidence(*pair, parts=(0.9, 0.1), missed=((at, 'a free curve'),)))
-    assert (verdict.status, verdict.sets) == ('unknown', sets)
-    assert verdict.reasons == ('a free curve',)
-
-
 @pytest.mark.parametrize('left', [0.6, 0.9])
 def test_what_is_found_stays_told_beside_what_is_left(left):
     pair = slot((OFFSET, 0.5), (GEAR, 0.5))

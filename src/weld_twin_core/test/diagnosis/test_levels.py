@@ -14,7 +14,6 @@ import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.columns import Columns, Piece
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.levels.curved import no_noise
-from weld_twin_core.diagnosis.levels.formulas import Missed
 from weld_twin_core.diagnosis.levels.free_form import Choosing, Member, chosen, worth
 from weld_twin_core.diagnosis.unseen.folds import posture_regions, steadiness
 from weld_twin_core.diagnosis.unseen.groups import Group
@@ -180,7 +179,7 @@ def test_a_gap_that_something_predicts_is_no_noise(gain, steady, status):
     part = SimpleNamespace(group='tool, depending on load')
     rival = SimpleNamespace(form=SimpleNamespace(parts=(part,), gain=gain, steady=steady))
     nothing = Verdict('none')
-    verdict = no_noise(nothing, rival, Missed(), Beliefs())
+    verdict = no_noise(nothing, rival, (), Beliefs())
     assert verdict.status == status
     assert (verdict == nothing) or 'tool, depending on load' in verdict.reasons[0]
 

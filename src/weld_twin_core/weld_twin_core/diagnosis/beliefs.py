@@ -46,11 +46,6 @@ class Beliefs:
     """RMS change of the residual [noise] below which an effect beside a larger one is not told
     from that one's misfit. A judgement."""
 
-    misfit_share: float = 0.06
-    """RMS that a free form takes off, as a share of the largest effect named at its place, from which
-    on it is more than what formulas miss. On 12 development cases (seed 960001) with an effect too
-    many, such took 0.015 to 0.09; of 15 whose small cause was real one took less than 0.03."""
-
     hope: float = 0.3
     """Exponent by which autocorrelation is believed while causes are still missing, 0 to 1: the
     residual is then the causes' own, and looks far more correlated than the noise is."""
@@ -193,12 +188,6 @@ class Beliefs:
 
     beaten_steady: float = 2.0
     """The same in standard errors between stretches."""
-
-    field_misses: float = 0.03
-    """RMS that a smooth field over the workspace takes off on unseen stretches, as a share of the
-    largest effect named, from which on the names do not hold. Geometry and instruments have exact
-    formulas: on 78 development cases (seed 990001) named rightly it took off nothing that was
-    steady, on 6 with a cause of another formula 0.04 to 0.1."""
 
     scatter_sure: float = 5.0
     """Standard errors from which on noise is said to come from a joint. Chance reaches 3 of a

@@ -22,8 +22,8 @@ from .frames.changes import families_named, settled_between
 from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
 from .levels.curved import carried, curved, no_noise, placed
-from .levels.formulas import missed
 from .levels.gathered import gathered
+from .levels.scatter import scattered
 from .many.fitted_together import fitted_together
 from .many.weighed_families import weighed_families
 from .predicting.allowed import allowed, elsewhere
@@ -188,15 +188,15 @@ def _told(
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
     families = weighed_families(result, unseen, beliefs) if result.dense else None
     evidence = gathered(result, unseen, leftover, shrink, floor, families)
-    remaining = missed(result, unseen, beliefs)
     table = tuple(Row.of(slot, beliefs) for slot in result.slots)
     statements = stated(evidence, table, beliefs)
-    evidence = statements.put_to(replace(evidence, missed=remaining.in_words))
+    evidence = statements.put_to(evidence)
     verdict = decide(evidence, beliefs)
     alternative = curved(result, verdict, beliefs)
-    verdict = no_noise(verdict, alternative, remaining, beliefs)
+    loose = scattered(result, unseen, beliefs)
+    verdict = no_noise(verdict, alternative, loose, beliefs)
     unseen.forget_other_parts()
-    places = placed(result, verdict, alternative, remaining, beliefs)
+    places = placed(result, verdict, alternative, loose, beliefs)
     progress('held against curves without a formula')
     which = verdict, alternative, holdout, beliefs
     result, unseen, shrink, verdict = carried(result, unseen, shrink, *which)

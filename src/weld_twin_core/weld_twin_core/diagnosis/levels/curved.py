@@ -20,8 +20,8 @@ from ..unseen.groups import Group
 from ..unseen.held_out_shrink import held_out_shrink
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
-from .formulas import Missed, Scatter
 from .free_form import FreeForm, Part, free_form
+from .scatter import Scatter
 
 ROWS = 6000
 """Rows that groups are chosen on; the curves are fitted on all."""
@@ -127,7 +127,7 @@ def _worth(named: Unseen, alternative: Curved, verdict: Verdict, beliefs: Belief
 
 
 def no_noise(
-    verdict: Verdict, alternative: Curved | None, remaining: Missed, beliefs: Beliefs
+    verdict: Verdict, alternative: Curved | None, loose: Sequence[Scatter], beliefs: Beliefs
 ) -> Verdict:
     """
     Return 'unknown' in the place of 'none' where what looks like noise follows something.
@@ -140,7 +140,7 @@ def no_noise(
     reasons = [
         f'what remains is no noise of the instrument: {100.0 * one.share:.0f} % of it lies along '
         f'the motion of {one.joint}'
-        for one in remaining.scattered
+        for one in loose
     ]
     form = None if alternative is None else alternative.form
     if form and form.gain >= beliefs.beaten_share and form.steady >= beliefs.beaten_steady:
@@ -161,7 +161,7 @@ def placed(
     result: Search,
     verdict: Verdict,
     alternative: Curved | None,
-    missed: Missed,
+    loose: Sequence[Scatter],
     beliefs: Beliefs,
 ) -> FreeForm:
     """
@@ -171,8 +171,7 @@ def placed(
 
     result: the effects found, before curves take their place.
     alternative: the free-form explanation beside what is told.
-    missed: what the formulas miss. Joints that noise comes from are places, too, where no group
-    finds any.
+    loose: joints that noise comes from; places, too, where no group finds any.
     """
     if verdict.status != 'unknown':
         return FreeForm(())
@@ -182,7 +181,7 @@ def placed(
         form = free_form(result.problem, result.scale, bare, beliefs)
     else:
         form = FreeForm(()) if alternative is None else alternative.form
-    return _with_scatter(form, missed.scattered)
+    return _with_scatter(form, loose)
 
 
 def _with_scatter(form: FreeForm, scattered: Sequence[Scatter]) -> FreeForm:

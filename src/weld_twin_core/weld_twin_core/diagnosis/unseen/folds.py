@@ -93,8 +93,6 @@ class Gain(NamedTuple):
     """Share of it."""
     steady: float
     """The same in standard errors between parts."""
-    fall: float
-    """[m^2]"""
     rms_m: float
     """What is left, RMS [m]."""
 
@@ -111,20 +109,12 @@ def gain(before: Array, after: Array, labels: Array, after_labels: Array | None 
     names = np.intersect1d(labels, others)
     one, two = _means(before, labels)[names], _means(after, others)[names]
     was, remaining = float(before.mean()), float(after.mean())
-    return Gain(
-        (was - remaining) / max(was, 1e-300), steadiness(one, two), was - remaining, remaining**0.5
-    )
+    return Gain((was - remaining) / max(was, 1e-300), steadiness(one, two), remaining**0.5)
 
 
 def _means(values: Array, labels: Array) -> Array:
     """Return the mean of every part, by its number; those of parts that are not there mean nothing."""
     return np.asarray(np.bincount(labels, values) / np.maximum(np.bincount(labels), 1))
-
-
-def least_gain(ways: Sequence[Gain]) -> Gain:
-    """Return the least that is gained over the ways to divide the data, and the most left."""
-    shares, steadies, falls, remaining = zip(*ways, strict=True)
-    return Gain(min(shares), min(steadies), min(falls), max(remaining))
 
 
 def steadiness(before: Array, after: Array) -> float:

@@ -109,18 +109,10 @@ def all_groups(
         parts = [problem.effect_columns(features, curve, atoms=False) for curve in curves]
         joined = [np.concatenate(blocks) for blocks in zip(*parts, strict=True)]
         yield from _spanned(problem, scale, at, on, joined, curves=tuple(curves))
-    yield from plain_groups(problem, model, scale, wandering=wandering)
-
-
-def plain_groups(
-    problem: Problem, model: Model, scale: Scale, *, wandering: bool = False
-) -> Iterator[Group]:
-    """Yield those that no curve spans."""
-    features = problem.features(model)
     plain = [*_of_joints(problem, features, wandering=wandering), *_of_all(problem, features)]
     for at, on, blocks, carriers in plain:
-        parts = [problem.seen(k, block) for k, block in enumerate(blocks)]
-        yield from _spanned(problem, scale, at, on, parts, carriers=carriers)
+        seen = [problem.seen(k, block) for k, block in enumerate(blocks)]
+        yield from _spanned(problem, scale, at, on, seen, carriers=carriers)
 
 
 def _spanned(

@@ -158,10 +158,6 @@ class Unseen:
         """Return the residual on every stretch with all effects, (rows,)."""
         return self.predict(range(len(self.parts)))
 
-    def bases(self) -> list[Base]:
-        """Return all effects, ready for further columns, for each way to divide the data."""
-        return [each.base(range(len(self.parts))) for each in self.every_way()]
-
     def every_way(self) -> list[Unseen]:
         """Return the same for each way to divide the data, this one first."""
         return [self, *(self.by(labels) for labels in ways_to_divide(self.problem)[1:])]

@@ -3,10 +3,9 @@
 """
 From the table of answers to a verdict: what is told, and is it more than what has no name?
 
-One rule decides. An effect counts as named where its name is likelier right than wrong, and nothing
-free at its place predicts what its formula should. What the others explain, and what nothing
-explains, has no name. Where that is more, or where a cause that has no name is likelier at work than
-not, the gap is unknown; what counts as named is told all the same.
+One rule decides. An effect counts as named where its name is likelier right than wrong. What the
+others explain, and what nothing explains, has no name. Where that is more, or where a cause that has
+no name is likelier at work than not, the gap is unknown; what counts as named is told all the same.
 """
 
 from __future__ import annotations
@@ -19,8 +18,6 @@ from ..beliefs import Beliefs
 from ..result import Family, Site
 from .evidence import Evidence, named_together
 
-FIELD = 'instrument'
-"""A free field over the workspace speaks against every formula: it is what each of them bends to."""
 LIKELIER = 0.5
 """Probability from which on a cause counts as named: it is likelier right than wrong."""
 TINY = 1e-18
@@ -129,10 +126,7 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
     if not evidence.slots:
         return _of_nothing(remaining)
     sets = tuple(named_together(slot, remaining.beliefs) for slot in evidence.slots)
-    likely = [
-        p > LIKELIER and _holds(group, evidence)
-        for p, group in zip(evidence.believed, sets, strict=True)
-    ]
+    likely = [p > LIKELIER for p in evidence.believed]
     named = remaining.explained * _share_of(likely, evidence)
     more = remaining.share + remaining.explained * _share_of([not one for one in likely], evidence)
     reported = tuple(group for group, holds in zip(sets, likely, strict=True) if holds)
@@ -145,13 +139,6 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
         if len(group) > 1
     )
     return Verdict('ambiguous' if reasons else 'identified', reported, reasons)
-
-
-def _holds(group: tuple[Site, ...], evidence: Evidence) -> bool:
-    """Return whether nothing free predicts what the formulas of a set should."""
-    return not any(
-        at == FIELD or at in [site.joint for site in group] for at, _ in evidence.missed
-    )
 
 
 def _share_of(some: list[bool], evidence: Evidence) -> float:
@@ -168,11 +155,10 @@ def _why_unknown(
     """Return why something has no name, the gravest first."""
     evidence = remaining.evidence
     out = [_absurd(evidence)] if evidence.refused or evidence.lacking else []
-    out += [sentence for _, sentence in evidence.missed]
     if remaining.share > remaining.beliefs.unexplained:
         out.append(_depends(evidence))
     doubted = [group[0] for group, holds in zip(sets, likely, strict=True) if not holds]
-    if doubted and not evidence.missed:
+    if doubted:
         names = ', '.join(map(str, doubted))
         out.append(
             f'what would fit best is {names}, and where the evidence was like this, such a name '

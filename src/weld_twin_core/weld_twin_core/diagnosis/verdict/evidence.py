@@ -51,9 +51,6 @@ class Evidence:
     nameless: float = 0.0
     """How probable it is that a cause is at work that has no name in the library, as the
     calibration has it."""
-    missed: tuple[tuple[str, str], ...] = ()
-    """Places at which something free predicts beyond doubt what the formula of a name should, and
-    that in words; at 'instrument' it speaks against every name."""
     sizes: tuple[float, ...] = ()
     """RMS by which every effect moves the tool [m]."""
     wandered: tuple[float, ...] = ()

@@ -19,7 +19,13 @@ from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.features import Features
-from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior, pose_covariances
+from weld_twin_core.twin.posterior import (
+    Directions,
+    Discrepancy,
+    Posterior,
+    expected_poses,
+    pose_covariances,
+)
 from weld_twin_core.twin.twin import Twin
 
 
@@ -79,12 +85,9 @@ def test_the_covariance_is_that_of_poses_of_drawn_models():
     mean = 1e-4 * rng.normal(size=what.count)
     mean[14] *= 0.02
     recording = motion(robot)
-    got = pose_covariances(
-        posterior(robot, what, half @ half.T, mean),
-        Twin(robot, effects),
-        recording,
-        recording.joints.t,
-    )
+    known, twin = posterior(robot, what, half @ half.T, mean), Twin(robot, effects)
+    got = pose_covariances(known, twin, recording, recording.joints.t)
+    expected, about = expected_poses(known, twin, recording, recording.joints.t)
     middle = Twin(robot, effects).poses(recording)
     # Either way along each column: points whose mean and covariance are exactly those given.
     reach = np.sqrt(what.count) * half.T
@@ -95,7 +98,12 @@ def test_the_covariance_is_that_of_poses_of_drawn_models():
         off.append(np.hstack([poses.position - middle.position, turn.as_rotvec()]))
     off = np.array(off)
     sampled = np.einsum('dmi,dmj->mij', off, off) / len(steps)
-    for mine, theirs in zip(got, sampled, strict=True):
+    shift = off.mean(axis=0)
+    np.testing.assert_allclose(expected.position - middle.position, shift[:, :3], atol=1e-6)
+    turn = Rotation.from_matrix(expected.rotation) * Rotation.from_matrix(middle.rotation).inv()
+    np.testing.assert_allclose(turn.as_rotvec(), shift[:, 3:], atol=1e-6)
+    spread = sampled - np.einsum('mi,mj->mij', shift, shift)
+    for mine, theirs in [*zip(got, sampled, strict=True), *zip(about, spread, strict=True)]:
         size = np.sqrt(np.diag(theirs))
         assert np.abs((mine - theirs) / np.outer(size, size)).max() < 0.02
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Array
 from ..recording import JointMotion, JointSignal, Recording, Signal
 from .features import Features
-from .posterior import Posterior
+from .posterior import Expected, Posterior
 from .twin import Twin
 
 EVERY = 0.1
@@ -24,14 +24,14 @@ motion."""
 
 
 class LivePosterior:
-    """The covariance of the twin's pose while joint states come in."""
+    """Where the models allowed have the tool, and how sure that is, while joint states come in."""
 
     def __init__(self, posterior: Posterior) -> None:
         self.posterior = posterior
         self._time = -np.inf
         self._q: Array | None = None
         self._moving = False
-        self._covariance = np.zeros((6, 6))
+        self._expected = Expected(np.zeros(6), np.zeros((6, 6)))
         self._outside: tuple[str, ...] = ()
 
     @property
@@ -39,7 +39,7 @@ class LivePosterior:
         """Return why the latest posture looked at lies outside what was recorded."""
         return self._outside
 
-    def covariance(
+    def expected(
         self,
         twin: Twin,
         t: float,
@@ -48,9 +48,9 @@ class LivePosterior:
         wrench_frame: str = 'tool',
         temperature: float | None = None,
         effort: Array | None = None,
-    ) -> Array:
+    ) -> Expected:
         """
-        Return the covariance of the true pose, shape (6, 6), held between two looks.
+        Return what `Posterior.expected` does, of one pose, held between two looks.
 
         t: stamp of the joint state [s].
         q: shape (n,).
@@ -65,7 +65,7 @@ class LivePosterior:
             speed = (q - self._q) / since
             self._moving = bool(np.abs(q - self._q).max() > MOVED)
         else:
-            return self._covariance
+            return self._expected
         self._time, self._q = t, np.array(q)
         now = LEAD[-1:]
         pull = None if wrench is None else wrench[None]
@@ -79,7 +79,8 @@ class LivePosterior:
             None if warm is None else Signal(now, warm),
             effort=None if effort is None else JointSignal(now, effort[None]),
         )
-        self._covariance = self.posterior.pose_covariance(Features(twin, recording, now))[0]
+        shift, covariance = self.posterior.expected(Features(twin, recording, now))
+        self._expected = Expected(shift[0], covariance[0])
         outside = self.posterior.domain.outside(q[None], speed[None], pull, warm)
         self._outside = tuple(item.why for item in outside)
-        return self._covariance
+        return self._expected

@@ -39,6 +39,10 @@ class Poses(NamedTuple):
         """Return ``T_world_tool``, shape (..., M, 4, 4)."""
         return transform(self.rotation, self.position)
 
+    def displaced(self, by: Array) -> Poses:
+        """Return the poses shifted and turned about the world's axes, ``by`` (..., M, 6) [m, rad]."""
+        return Poses(self.position + by[..., :3], rotation_matrix(by[..., 3:]) @ self.rotation)
+
 
 def posed(view: View, chain: Poses | None = None) -> Poses:
     """Return the poses of a chain, left out the view's own, displaced on 'pose' channels."""

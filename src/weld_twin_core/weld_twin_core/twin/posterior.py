@@ -31,6 +31,7 @@ from ..sequences import halton
 from .compensation import commandable
 from .domain import Domain
 from .features import Features, with_expected_effort
+from .poses import Poses
 from .reversals import just_turned
 from .twin import Twin
 
@@ -162,6 +163,15 @@ def _hats(q: Array, knots: Array) -> Array:
     return np.asarray(np.maximum(0.0, 1.0 - np.abs(q - knots[:, None]) / max(width, 1e-9)))
 
 
+class Expected(NamedTuple):
+    """Where models have the tool, all together."""
+
+    shift: Array
+    """Of their middle from the twin's pose, shape (M, 6) [m, rad], turns about the world's axes."""
+    covariance: Array
+    """Of the true pose about that, shape (M, 6, 6)."""
+
+
 class Where(NamedTuple):
     """Where samples of a motion are, as far as a discrepancy asks."""
 
@@ -287,15 +297,28 @@ class Posterior:
 
     def pose_covariance(self, features: Features, setup: int = 0) -> Array:
         """
-        Return the covariance of the true pose about the twin's, shape (M, 6, 6).
+        Return the second moment of the true pose about the twin's, shape (M, 6, 6).
 
         Position first [m^2], then turns about the world's fixed axes [rad^2]; without the noise
         of the instrument that will measure it.
 
         Raises ModelError: there is no such base frame.
         """
-        moved, rest = self._ways(features, setup)
-        return np.asarray(np.einsum('rim,rjm->mij', moved, moved, optimize=True) + rest)
+        moved, rest, grown = self._ways(features, setup)
+        whole = np.einsum('rim,rjm->mij', moved, moved, optimize=True) + rest
+        return np.asarray(whole * grown[:, None, None] ** 2)
+
+    def expected(self, features: Features, setup: int = 0) -> Expected:
+        """
+        Return where the models allowed have the tool, all together, counted from the twin's pose.
+
+        The twin has what is named. Their middle has a little of all else besides, and errs less.
+
+        Raises ModelError: there is no such base frame.
+        """
+        moved, rest, grown = self._ways(features, setup)
+        whole = np.einsum('rim,rjm->mij', moved[:-1], moved[:-1], optimize=True) + rest
+        return Expected(moved[-1].T, np.asarray(whole * grown[:, None, None] ** 2))
 
     def position_ways(self, features: Features, setup: int = 0) -> tuple[Array, Array]:
         """
@@ -308,16 +331,16 @@ class Posterior:
             more measurements would take away. The rest, shape (M, 3, 3) [m^2].
 
         """
-        moved, rest = self._ways(features, setup)
-        return moved[:, :3].transpose(2, 1, 0), rest[:, :3, :3]
+        moved, rest, grown = self._ways(features, setup)
+        ways = (moved[:, :3] * grown).transpose(2, 1, 0)
+        return ways, rest[:, :3, :3] * grown[:, None, None] ** 2
 
-    def _ways(self, features: Features, setup: int) -> tuple[Array, Array]:
-        # A model that is not the middle of what is allowed is off by that much too.
+    def _ways(self, features: Features, setup: int) -> tuple[Array, Array, Array]:
+        # A twin that is not the middle of what is allowed is off by that much too: the last way.
         ways = np.column_stack([self.factor, self.mean])
         moved = np.tensordot(ways, self._columns(features, setup), axes=(0, 0))
         here = self._where(features)
-        grown = self.discrepancy.grown(here)
-        return moved * grown, self.discrepancy.covariance(here) * grown[:, None, None] ** 2
+        return moved, self.discrepancy.covariance(here), self.discrepancy.grown(here)
 
     def doubt(self, effect: Effect, instead: Collection[tuple[str, str]] = ()) -> Array:
         """
@@ -557,6 +580,20 @@ def pose_covariances(
         posterior.pose_covariance(Features(twin, recording, piece), setup) for piece in _pieces(at)
     ]
     return np.concatenate([np.zeros((0, 6, 6)), *parts])
+
+
+def expected_poses(
+    posterior: Posterior, twin: Twin, recording: Recording, at: Array, setup: int = 0
+) -> tuple[Poses, Array]:
+    """
+    Return where `Posterior.expected` has the tool on a long motion, and the covariance about it.
+
+    twin, at, setup: as `pose_covariances` takes them.
+    """
+    parts = [posterior.expected(Features(twin, recording, piece), setup) for piece in _pieces(at)]
+    shift = np.concatenate([np.zeros((0, 6)), *(part.shift for part in parts)])
+    covariance = np.concatenate([np.zeros((0, 6, 6)), *(part.covariance for part in parts)])
+    return twin.poses(recording, at).displaced(shift), covariance
 
 
 def _pieces(at: Array) -> Iterator[Array]:

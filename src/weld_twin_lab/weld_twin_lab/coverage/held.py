@@ -15,7 +15,7 @@ from weld_twin_core.diagnosis import Diagnosis
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects.dated import seen_from
 from weld_twin_core.recording import Measurements, Recording
-from weld_twin_core.twin.posterior import largest_sigma, pose_covariances
+from weld_twin_core.twin.posterior import expected_poses, largest_sigma
 from weld_twin_core.twin.twin import Twin
 
 from ..transfer.unseen import flagged
@@ -58,8 +58,8 @@ def held(
     twin = twin_for(diagnosis.model, train, other)
     use = within(other, measured) if good is None else good & within(other, measured)
     t = measured.t[use]
-    errors = measured.position[use] - twin.poses(other, t).position
-    covariances = pose_covariances(posterior, twin, other, t)
+    expected, covariances = expected_poses(posterior, twin, other, t)
+    errors = measured.position[use] - expected.position
     regions = inside_region(errors, covariances[:, :3, :3], sigma[use])
     flags = flagged(posterior, other, t)
     size = np.linalg.norm(errors, axis=1)

@@ -55,7 +55,7 @@ def write_recording(
     *,
     actual: Array | None = None,
     twin: tuple[Array, Array] | None = None,
-    covariance: Array | None = None,
+    expected: tuple[tuple[Array, Array], Array] | None = None,
     deviation: Array | None = None,
     storage: str = 'mcap',
     provenance: Mapping[str, Any] | None = None,
@@ -76,8 +76,9 @@ def write_recording(
         Joint positions with the joint-space effects, for ``/actual/joint_states``.
     twin : tuple of arrays, shapes (N, 3) and (N, 3, 3), optional
         Twin poses at the joint stamps, for ``/twin/tool_pose``.
-    covariance : array, shape (N, 6, 6), optional
-        Of the twin poses, for ``/twin/tool_pose_with_covariance`` [m^2, rad^2].
+    expected : tuple, optional
+        Poses in the middle of the models allowed, shapes (N, 3) and (N, 3, 3), and their covariance,
+        shape (N, 6, 6), for ``/twin/tool_pose_with_covariance`` [m^2, rad^2].
     deviation : array, shape (M, 3), optional
         Measured minus twin at the measurement stamps, for ``/deviation``.
     storage : str
@@ -109,9 +110,10 @@ def write_recording(
         parts.append(entries.joints(ACTUAL_JOINT_STATES.name, robot, actual, None))
     if twin is not None:
         parts.append(entries.poses(TWIN_POSE.name, recording.joints.t, *twin))
-    if twin is not None and covariance is not None:
-        topic = TWIN_COVARIANCE.name
-        parts.append(entries.sure_poses(topic, recording.joints.t, *twin, covariance))
+    if expected is not None:
+        (position, rotation), covariance = expected
+        where = TWIN_COVARIANCE.name, recording.joints.t
+        parts.append(entries.sure_poses(*where, position, rotation, covariance))
     if deviation is not None and recording.measured is not None and len(deviation):
         parts.append(entries.vectors(DEVIATION.name, recording.measured.t, deviation))
     with BagWriter(path, storage=storage, provenance=made, beside=beside) as bag:

@@ -43,7 +43,7 @@ class ForwardKinematicsTwin(ModelNode):
         self._pose.publish(self._encode(sample.pose_stamp, position, rotation))
         if self._sureness is None:
             return
-        covariance = self._sureness.covariance(
+        shift, covariance = self._sureness.expected(
             self.stream.twin,
             sample.stamp / NANOSECONDS,
             sample.q,
@@ -55,7 +55,7 @@ class ForwardKinematicsTwin(ModelNode):
         why = '; '.join(self._sureness.outside)
         self.keep(OUTSIDE, f'{OUTSIDE}: {why}' if why else '', logged=False)
         self._sure_pose.publish(
-            self._encode_sure(sample.pose_stamp, position, rotation, covariance)
+            self._encode_sure(sample.pose_stamp, *sample.poses.displaced(shift), covariance)
         )
 
     def on_twin(self, twin: Twin) -> None:

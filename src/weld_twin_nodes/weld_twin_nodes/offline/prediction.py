@@ -26,7 +26,13 @@ from weld_twin_core.metrics.deviation import deviation
 from weld_twin_core.recording import JointMotion, Recording
 from weld_twin_core.twin.compensation import Compensation, compensate
 from weld_twin_core.twin.domain import as_seen
-from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covariances
+from weld_twin_core.twin.poses import Poses
+from weld_twin_core.twin.posterior import (
+    Posterior,
+    expected_poses,
+    largest_sigma,
+    pose_covariances,
+)
 from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly.whole_recording import refuse_apart
 from weld_twin_msgs_py.bags import write_recording
@@ -71,13 +77,11 @@ class Predictor(NamedTuple):
     to be."""
     told: str = ''  # what is to be said of that
 
-    def covariances(self, recording: Recording) -> Array | None:
-        """Return the covariance of the true pose at every joint state, shape (N, 6, 6)."""
+    def expected(self, recording: Recording) -> tuple[Poses, Array] | None:
+        """Return where all models allowed have the tool at every joint state, and how sure that is."""
         if self.posterior is None:
             return None
-        return pose_covariances(
-            self.posterior, self.twin, recording, recording.joints.t, self.setup
-        )
+        return expected_poses(self.posterior, self.twin, recording, recording.joints.t, self.setup)
 
     def outside(self, recording: Recording) -> list[Stretch]:
         """Return the stretches of a motion that lie outside what was recorded."""
@@ -165,7 +169,7 @@ def write_prediction(
     """
     twin = model.twin
     poses = twin.poses(recording, recording.joints.t)
-    covariances, outside = model.covariances(recording), model.outside(recording)
+    expected, outside = model.expected(recording), model.outside(recording)
     deviation = _deviation(twin, recording)
     made = {'twin_effects': [effect.to_mapping() for effect in twin.effects]}
     write_recording(
@@ -173,7 +177,7 @@ def write_prediction(
         recording,
         twin.robot,
         twin=(poses.position, poses.rotation),
-        covariance=covariances,
+        expected=expected,
         deviation=deviation,
         storage=storage,
         provenance={**made, **(provenance or {})},
@@ -182,7 +186,7 @@ def write_prediction(
     return Written(
         None if deviation is None else float(np.sqrt((deviation**2).sum(axis=1).mean())),
         outside,
-        None if covariances is None else float(np.median(largest_sigma(covariances))),
+        None if expected is None else float(np.median(largest_sigma(expected[1]))),
     )
 
 
@@ -211,7 +215,7 @@ def sureness_sentences(model: Predictor, got: Written) -> list[str]:
             'diagnosis.json written by this version has'
         ]
     out = [
-        f'the tool is where the twin says within {got.sigma_m * 1e3:.3g} mm '
+        f'the tool is where the models allowed have it within {got.sigma_m * 1e3:.3g} mm '
         '(one standard deviation in the worst direction, median)'
     ]
     if got.outside:
@@ -253,13 +257,11 @@ def compensated(robot: Robot, path: Path | str, recording: Recording) -> Compens
         # Its clocks are its own, and commands need none.
         recording, reported = mended_source(stored, robot, given, -1)
     nominal, real = Twin(twin.robot).poses(recording), twin.poses(recording)
-    covariances = model.covariances(recording)
     share = None
-    if model.posterior is not None and covariances is not None:
+    if model.posterior is not None:
+        about = pose_covariances(model.posterior, twin, recording, recording.joints.t)
         share = model.posterior.domain.trust(
-            recording.joints.q,
-            real.position - nominal.position,
-            covariances[:, :3, :3],
+            recording.joints.q, real.position - nominal.position, about[:, :3, :3]
         )
     result = compensate(twin.robot, twin.effects, recording, trust=share)
     least = 1.0 if share is None else float(share.min())
@@ -293,7 +295,7 @@ def write_compensated(
         replace(commands, joints=made.motion),
         twin.robot,
         twin=(poses.position, poses.rotation),
-        covariance=made.model.covariances(commands),
+        expected=made.model.expected(commands),
         storage=storage,
         provenance={'compensated_with': [effect.to_mapping() for effect in twin.effects]},
         beside=beside_bag(made.model, made.outside),
@@ -366,23 +368,24 @@ SIGMA = 'sigma_x_m,sigma_y_m,sigma_z_m,sigma_rx_rad,sigma_ry_rad,sigma_rz_rad,ou
 
 def write_prediction_table(path: Path | str, model: Predictor, recording: Recording) -> None:
     """
-    Write the twin's pose at every joint state as CSV.
+    Write the pose at every joint state as CSV.
 
-    Where the model knows how sure it is, standard deviations along and about the world's axes
-    follow, and whether the pose lies outside what was recorded (1) or not (0).
+    Where the model knows how sure it is, it is the one of all models allowed, and standard
+    deviations along and about the world's axes follow, and whether the pose lies outside what was
+    recorded (1) or not (0).
 
     ``path``: must not exist. Raises DataError: the file exists or cannot be written.
     """
     t = recording.joints.t
-    poses = model.twin.poses(recording, t)
+    expected = model.expected(recording)
+    poses = model.twin.poses(recording, t) if expected is None else expected[0]
     columns = [t, poses.position, quaternion_from_matrix(poses.rotation)]
-    covariances = model.covariances(recording)
     head = POSE
-    if covariances is not None:
+    if expected is not None:
         flags = np.zeros(t.size)
         for start, end, _ in model.outside(recording):
             flags[(t - t[0] >= start) & (t - t[0] <= end)] = 1.0
-        columns += [np.sqrt(covariances[:, range(6), range(6)]), flags]
+        columns += [np.sqrt(expected[1][:, range(6), range(6)]), flags]
         head = f'{POSE},{SIGMA}'
     text = io.StringIO()
     np.savetxt(text, np.column_stack(columns), delimiter=',', header=head, comments='', fmt='%.9g')

@@ -339,12 +339,14 @@ def test_predict_says_how_sure_it_is_at_every_pose(cell, found, tmp_path, capsys
     ns, position = twin_poses(out)
     sure_ns, sure_position, covariance = covariances(out)
     assert np.array_equal(ns, sure_ns)
-    assert np.array_equal(position, sure_position)
+    # What is promised is the middle of the models allowed: beside the twin's pose, but not far.
+    apart = np.linalg.norm(position - sure_position, axis=1)
+    assert 0.0 < apart.max() < 1e-4
     np.testing.assert_allclose(covariance, np.swapaxes(covariance, 1, 2), rtol=1e-9)
     assert np.linalg.eigvalsh(covariance).min() > -1e-18
     # The true pose is that of the cell without the instrument's noise of 0.02 mm per axis.
     measured = read_recording(out, load('ur5')).measured.position
-    off = measured - position
+    off = measured - sure_position
     whole = covariance[:, :3, :3] + 2e-5**2 * np.eye(3)
     squared = np.einsum('mi,mi->m', off, np.linalg.solve(whole, off[..., None])[..., 0])
     assert np.mean(squared < 6.2514) >= 0.85

@@ -67,13 +67,15 @@ def allowed(
     recordings = problem.recordings
     problem, scale = _thinned(problem, _noisy(scale))
     what = _directions(problem, model)
-    rows, prior = _rows(problem, model, scale, what), _prior(what, model)
+    prior = _prior(what, model)
+    rows = _rows(problem, model, scale, what, prior)
     models = weighed(rows, prior, _expected(problem, scale))
     system = Conditioning(rows, prior, models.shown, models.noise)
     fit = Fit(model, rows.residual)
     regions = Unseen.of(problem, scale, fit, precision).by(posture_regions(problem))
     levers = _levers(problem, model, scale)
-    foretold = Foretold.of(regions, rows.columns, levers, system.given)
+    whole = models.mean, models.covariance
+    foretold = Foretold.of(regions, rows.columns, levers, system.given, whole)
     noise, turning = told_noise(problem, floor), ~np.asarray(model.robot.prismatic)
     lost = _lost(problem, model)
     remaining = leftover(problem, foretold, turning, noise, models.rough, lost)
@@ -157,17 +159,22 @@ def _joints(recording: Recording) -> Array:
     return recording.joints.at(recording.joints.t if measured is None else measured.t)[0]
 
 
-def _rows(problem: Problem, model: Model, scale: Scale, what: Directions) -> Rows:
+def _rows(problem: Problem, model: Model, scale: Scale, what: Directions, prior: Prior) -> Rows:
     features = problem.features(model)
     whole = [what.columns(maker, k) for k, maker in enumerate(features)]
     parts = [problem.seen(k, part) for k, part in enumerate(whole)]
     residual = problem.whitened(problem.residuals(model), scale)
-    share = effective_share(residual, problem.rows, problem.samples)
+    columns, left = problem.whitened(parts, scale), residual
+    if not problem.at_rest:
+        # What hangs together because an arm has small errors is no noise: coordinates take it.
+        free = Conditioning(Rows(columns, residual, 1.0), prior, prior.width, 1.0)
+        left = residual - free.given()[0] @ columns
+    share = effective_share(left, problem.rows, problem.samples)
     moved = None
     if problem.touched:
         moved = np.sqrt(sum((part[:, :3] ** 2).sum(axis=(1, 2)) for part in whole))
         moved /= scale.position
-    return Rows(problem.whitened(parts, scale), residual, share, moved)
+    return Rows(columns, residual, share, moved)
 
 
 def _levers(problem: Problem, model: Model, scale: Scale) -> Array:

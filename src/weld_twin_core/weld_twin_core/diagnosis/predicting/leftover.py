@@ -39,8 +39,13 @@ real arms under a tracker it is 0.3 to 0.6, and their stations repeat better tha
 NEIGHBOURS = (2, 8, 32, 128)
 """Samples that are looked at together for what they have in common: two show what changes from one to
 the next, a hundred what is a tenth of the noise."""
+AGREED = 2.5
+"""Standard errors from which on what neighbours have in common is no chance: of four numbers of them,
+agreeing or not, chance gets so far once in twenty at the most."""
 SURE = 2.0
-"""Standard errors from which on what neighbours have in common is no chance."""
+"""Standard errors of a gain from region to region from which on it is none."""
+HIDDEN = 0.8
+"""Standard errors of a variance that shows nothing which it has on the average: a half normal's mean."""
 ROUNDING = 1e-10
 """Added to a covariance of unit diagonal, so that it stays definite where its inverse hardly is."""
 MOST = 800
@@ -91,25 +96,32 @@ class Foretold:
     """Samples that are no outliers, shape (N,)."""
     middle: float
     """How far to go from the fitted model to the middle of those allowed to foretell best."""
+    at_rest: bool
+    """Whether all are stations."""
+    left: Array
+    """What is left of a sample, shape (N, 6). Of stations, which many coordinates follow closely, it is
+    the error. Of a motion it is what the middle of the models leaves that all regions allow."""
+    own: Array
+    """The ways that belong to it, shape (R, N, 6): a middle that followed the samples hides so much."""
 
     @classmethod
-    def of(cls, unseen: Unseen, columns: Array, levers: Array, given: Given) -> Foretold:
+    def of(
+        cls,
+        unseen: Unseen,
+        columns: Array,
+        levers: Array,
+        given: Given,
+        whole: tuple[Array, Array],
+    ) -> Foretold:
         """
         Return what a model foretells of samples that it was not fitted to.
 
         unseen: of the fitted model, with regions of posture left out in turn.
         columns, levers: whitened, of the coordinates that are uncertain and of all joints.
+        whole: mean and covariance of the coordinates given all rows.
         """
-        labels, error = unseen.labels, unseen.whole
-        ways = np.empty((len(columns) + 1, labels.size))
-        for region in np.unique(labels):
-            out = labels == region
-            mean, covariance = given(out)
-            scaled, size = unit_diagonal(covariance, ROUNDING)
-            ways[:-1, out] = (np.linalg.cholesky(scaled).T * size) @ columns[:, out]
-            # The mean is counted from the fit to all rows, the error from the fit to the others.
-            ways[-1, out] = mean @ columns[:, out] + error[out] - unseen.residual[out]
-        problem, scale = unseen.problem, unseen.scale
+        error, ways = unseen.whole, _by_others(unseen, columns, given)
+        problem, scale, labels = unseen.problem, unseen.scale, unseen.labels
         weights, counts = np.concatenate(scale.weights), np.repeat(problem.rows, problem.samples)
         seen = np.arange(6) < counts[:, None]
         place = np.nonzero(seen)
@@ -118,10 +130,14 @@ class Foretold:
         )
 
         def by_sample(rows: Array) -> Array:
-            whole = np.zeros((*rows.shape[:-1], *seen.shape))
-            whole[..., place[0], place[1]] = rows * unit
-            return whole
+            out = np.zeros((*rows.shape[:-1], *seen.shape))
+            out[..., place[0], place[1]] = rows * unit
+            return out
 
+        left, own = error, ways
+        if not problem.at_rest:
+            left = unseen.residual - whole[0] @ columns
+            own = _ways(whole[1], columns)
         good = np.concatenate(trusted(scale.weights))
         use = good[place[0]]
         return cls(
@@ -132,14 +148,39 @@ class Foretold:
             labels[np.flatnonzero(place[1] == 0)].astype(int),
             good,
             _middle(error[use], ways[-1, use], labels[use]),
+            problem.at_rest,
+            by_sample(left),
+            by_sample(own),
         )
 
     def axes(self, part: slice) -> tuple[Array, Array, Array]:
         """Return errors (K, c), moments (K, c, c) and levers (K, c, n) of samples that have rows."""
         some = self.good & self.seen[:, part].all(axis=1)
-        ways, levers = self.ways[:, some, part], self.levers[:, some, part]
-        moments = np.einsum('rki,rkj->kij', ways, ways, optimize=True)
-        return self.error[some, part], moments, levers.transpose(1, 2, 0)
+        left, levers = self.left[some, part], self.levers[:, some, part]
+        moments = np.zeros((*left.shape, left.shape[1]))
+        if self.at_rest:
+            own = self.own[:, some, part]
+            moments = np.einsum('rki,rkj->kij', own, own, optimize=True)
+        return left, moments, levers.transpose(1, 2, 0)
+
+
+def _by_others(unseen: Unseen, columns: Array, given: Given) -> Array:
+    """Return in which ways each region may be off what the others foretell, shape (P + 1, rows)."""
+    labels = unseen.labels
+    ways = np.empty((len(columns) + 1, labels.size))
+    for region in np.unique(labels):
+        out = labels == region
+        mean, covariance = given(out)
+        ways[:-1, out] = _ways(covariance, columns[:, out])
+        # The mean is counted from the fit to all rows, the error from the fit to the others.
+        ways[-1, out] = mean @ columns[:, out] + unseen.whole[out] - unseen.residual[out]
+    return ways
+
+
+def _ways(covariance: Array, columns: Array) -> Array:
+    """Return in which ways rows may be off, each of one standard deviation, shape (P, rows)."""
+    scaled, size = unit_diagonal(covariance, ROUNDING)
+    return np.asarray((np.linalg.cholesky(scaled).T * size) @ columns)
 
 
 class Rest(NamedTuple):
@@ -347,16 +388,18 @@ def _in_common(problem: Problem, foretold: Foretold) -> float:
     Return the share of what is left that neighbours have in common, beyond open directions and chance.
 
     What the instrument does differs from one sample to the next, what the arm does does not. Over few
-    neighbours what changes fast shows, over many what is small. Samples that err against each other
-    have no white noise either. Shifts count, or all that a contact sees.
+    neighbours what changes fast shows, over many what is small: the number counts at which it is
+    surest. Samples that err against each other have no white noise either. Where none shows anything, a
+    motion may still hide some. Shifts count, or all that a contact sees.
     """
-    best, regions = 0.0, np.unique(foretold.region)
+    best, hidden, regions = (AGREED, 0.0), 1.0, np.unique(foretold.region)
+    sign = 1.0 if foretold.at_rest else -1.0
     sums: dict[int, list[Array]] = {}
     foreseen = np.sqrt(2.0 / regions.size)  # how far a variance of so many draws may be off
     for region in regions:
         here = np.flatnonzero((foretold.region == region) & foretold.good)
         for size, order, starts in _neighbours(problem, here):
-            error, ways = foretold.error[order, :3], foretold.ways[:, order, :3]
+            error, ways = foretold.left[order, :3], foretold.own[:, order, :3]
             alone = np.stack([error**2, (ways**2).sum(axis=0), foretold.seen[order, :3]])
             each = np.add.reduceat(alone, starts, axis=1)
             together = [
@@ -368,13 +411,14 @@ def _in_common(problem: Problem, foretold: Foretold) -> float:
             pairs = (np.stack(together) - each).sum(axis=(1, 2))
             sums.setdefault(size, []).append(np.concatenate([pairs, each.sum(axis=(1, 2))]))
     for total in (np.sum(parts, axis=0) for parts in sums.values()):
-        agree, open_ = total[:2] / max(total[2], 1.0)
-        square, own = total[3:5] / max(total[5], 1.0)
-        chance = SURE * np.hypot(square * np.sqrt(2.0 / max(total[2], 1.0)), open_ * foreseen)
-        common = max(agree - open_, 0.0) if agree - open_ > chance else 0.0
-        common = -agree if -agree > chance else common
-        best = max(best, common / max(square - own, common, 1e-300))
-    return best
+        agree, open_ = total[:2] / max(total[2], 1.0) * (1.0, sign)
+        square, each_open = total[3:5] / max(total[5], 1.0) * (1.0, sign)
+        chance = np.hypot(square * np.sqrt(2.0 / max(total[2], 1.0)), open_ * foreseen)
+        common = max(agree - open_, min(open_, 0.0) - agree)
+        whole = max(square - each_open, common, 1e-300)
+        best = max(best, (common / max(chance, 1e-300), common / whole))
+        hidden = min(hidden, HIDDEN * chance / whole)
+    return hidden if best[0] == AGREED and not foretold.at_rest else best[1]
 
 
 def _neighbours(

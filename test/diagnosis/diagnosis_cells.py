@@ -11,8 +11,7 @@ from small_arm import small_arm
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.diagnosis import diagnose
-from weld_twin_core.diagnosis.algebra.fit import design
-from weld_twin_core.diagnosis.algebra.prior import effect_precision, frame_prior
+from weld_twin_core.diagnosis.algebra.fit import design, effect_precision, frame_prior
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem, Scale
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal

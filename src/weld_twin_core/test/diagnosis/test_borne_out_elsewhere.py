@@ -10,8 +10,8 @@ import pytest
 from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
 from weld_twin_core.diagnosis.result import Site
-from weld_twin_core.diagnosis.unseen import elsewhere as room
-from weld_twin_core.diagnosis.unseen.elsewhere import borne_out
+from weld_twin_core.diagnosis.unseen import held_out_shrink as room
+from weld_twin_core.diagnosis.unseen.held_out_shrink import borne_out
 
 TWIST, BASE, PLAY = Site('link_twist', 'a'), Site('base_pose', None), Site('backlash', 'b')
 

@@ -11,9 +11,8 @@ import pytest
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
-from weld_twin_core.diagnosis.algebra.fit import fit, robust_scale
+from weld_twin_core.diagnosis.algebra.fit import effect_precision, fit, robust_scale
 from weld_twin_core.diagnosis.algebra.noise_floor import noise_floor
-from weld_twin_core.diagnosis.algebra.prior import effect_precision
 from weld_twin_core.diagnosis.algebra.problem import Model, Problem
 from weld_twin_core.diagnosis.predicting.allowed import allowed
 from weld_twin_core.effects import effect_from_mapping

@@ -33,8 +33,7 @@ from .soundness.efforts import with_sign
 from .soundness.gate import Examined, examine
 from .soundness.mending import Given
 from .soundness.richness import refuse_reused
-from .unseen.elsewhere import borne_out
-from .unseen.held_out_shrink import held_out_shrink
+from .unseen.held_out_shrink import borne_out, held_out_shrink
 from .unseen.unseen_stretches import Unseen
 from .unseen.where import structure
 from .verdict.decision import LIKELIER, decide

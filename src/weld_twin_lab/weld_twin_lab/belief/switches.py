@@ -60,7 +60,7 @@ MECHANISMS = {
     'many_lines': Mechanism('many.small_errors', 'with_lines', second),
     'many_setup': Mechanism('many.small_errors', 'with_setup', second),
     'many_frames': Mechanism('many.small_errors', '_apart_from_frames', third),
-    'held_out_likes': Mechanism('unseen.elsewhere', '_exchanged', first),
+    'held_out_likes': Mechanism('unseen.held_out_shrink', '_exchanged', first),
     'scatter': Mechanism('levels.scatter', 'scatter', nothing),
     'whole_arm': Mechanism('unseen.groups', '_of_all', nothing),
     'none_against_curves': Mechanism('pipeline', 'no_noise', first),

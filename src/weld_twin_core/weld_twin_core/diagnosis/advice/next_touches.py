@@ -30,7 +30,7 @@ from ...motion.inverse.newton import reaching
 from ...recording import JointMotion, Measurements, Recording
 from ...sequences import halton
 from ...twin.features import Features
-from ..algebra.prior import effect_precision, frame_prior
+from ..algebra.fit import effect_precision, frame_prior
 from ..algebra.problem import PLACES, Model, Problem, Scale
 from ..algebra.still_joints import plain_causes
 from .experiment import motion_entry

@@ -27,8 +27,7 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...recording import Measurements, Recording
 from ...twin.features import with_expected_effort
-from ..algebra.fit import design, with_weights
-from ..algebra.prior import effect_precision
+from ..algebra.fit import design, effect_precision, with_weights
 from ..algebra.problem import Model, Problem, Scale
 from .candidates import Candidate, Piece
 

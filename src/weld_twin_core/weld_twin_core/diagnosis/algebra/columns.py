@@ -21,7 +21,7 @@ from ...arm.channels import Shift
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.features import Features
-from .definite import Index
+from .definite import Index, inverted, unit_diagonal, well_conditioned
 from .problem import Model, Problem, Scale
 
 Rows = slice | Index
@@ -279,3 +279,59 @@ def designed(problem: Problem, model: Model, scale: Scale) -> Columns:
     maker = Maker(problem, features, scale)
     each = (maker.piece(effect, atoms=False) for effect in model.found)
     return Columns.joined([frames, *each])
+
+
+BLOCKS = 24
+"""Stretches whose scores are held apart: enough to tell a variance to a third."""
+SINGULAR = 1e-12
+"""Share of the largest eigenvalue below which a direction is one that columns repeat."""
+TINY = 1e-300
+"""Keeps a division by the variance of a coordinate that nothing moves finite."""
+
+
+def columns_covariance(
+    columns: Columns, ridge: Array, residual: Array, labels: Array, share: float
+) -> Array:
+    """
+    Return the covariance of all columns' coefficients, shape (P, P).
+
+    It holds where the model is not quite the arm: as wide as the noise makes it, or as scores do that
+    hang together within a stretch of time or differ between stretches [1]_, each coefficient by the
+    larger; they hang together as their columns do.
+
+    columns: p whitened columns.
+    ridge: prior precision, shape (P,).
+    residual: what the fit leaves, whitened, shape (rows,).
+    labels: stretch of every row, some `BLOCKS` in all, shape (rows,).
+    share: of the rows that count as independent.
+
+    References
+    ----------
+    .. [1] H. White, "Maximum likelihood estimation of misspecified models", Econometrica 50, 1982.
+
+    """
+    inverse, size = unit_inverse(columns, ridge)
+    stretches = rows_of(np.unique(labels, return_inverse=True)[1].astype(float))
+    each = [columns.within(rows).times(residual[rows]) / size for rows in stretches]
+    scores = inverse @ np.stack(each, axis=1)
+    blocks = max(len(each), 2)
+    together = (scores**2).sum(axis=1) * blocks / (blocks - 1)
+    own = np.diag(inverse)
+    wider = np.sqrt(np.maximum(own / share, together) / np.maximum(own, TINY)) / size
+    return np.asarray(inverse * np.outer(wider, wider))
+
+
+def unit_inverse(columns: Columns, ridge: Array) -> tuple[Array, Array]:
+    """
+    Return the inverse of the normal matrix with ones on its diagonal, and the norms of its columns.
+
+    ridge: prior precision, shape (P,).
+    """
+    normal = columns.normal()
+    normal[np.diag_indices_from(normal)] += ridge
+    scaled, size = unit_diagonal(normal)
+    if not size.size:
+        return scaled, size  # LAPACK complains of a matrix of no columns.
+    if well_conditioned(scaled, SINGULAR):
+        return inverted(scaled), size
+    return np.asarray(np.linalg.pinv(scaled, rcond=SINGULAR, hermitian=True)), size

@@ -16,9 +16,8 @@ import numpy as np
 
 from ...arm.robot import Robot
 from ...arrays import Array
-from .fit import Fit, coordinates, design, fit, solve_scaled, stepped
+from .fit import Fit, coordinates, design, fit, frame_offset, frame_prior, solve_scaled, stepped
 from .independent_rows import effective_share
-from .prior import frame_offset, frame_prior
 from .problem import Model, Problem, Scale
 
 VISIBLE = (1e-3, 5e-3)

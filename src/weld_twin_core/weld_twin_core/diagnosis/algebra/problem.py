@@ -58,7 +58,7 @@ class Problem:
     align: frozenset[str] = field(default_factory=frozenset)
     """Frames fitted as nuisance in every hypothesis: 'base' (one per recording), 'tool'."""
     anchor: Anchor | None = None
-    """Where those frames are believed to be; see `prior`."""
+    """Where those frames are believed to be; see `fit.frame_prior`."""
     dated: tuple[Effect, ...] = ()
     """What may have set in at an instant that was found: hypotheses beside the library's."""
     changes: tuple[Change, ...] = ()

@@ -3,7 +3,7 @@
 """
 The effects that a verdict names, with their standard errors, and how sure the shares of causes are.
 
-A standard error is the largest of what four reasons give: the covariance of `algebra.spread`; other
+A standard error is the largest of what four reasons give: the covariance of `algebra.columns`; other
 optima that fit nearly as well; formulas that are idealised; and the models that the recordings allow
 besides, in which an arm has a little of every small error.
 
@@ -25,13 +25,10 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...twin.posterior import Posterior
-from ..algebra import spread
-from ..algebra.columns import Columns, designed
-from ..algebra.fit import coordinates, trusted
+from ..algebra.columns import BLOCKS, Columns, columns_covariance, designed
+from ..algebra.fit import coordinates, frame_prior, trusted
 from ..algebra.independent_rows import effective_share
-from ..algebra.prior import frame_prior
 from ..algebra.problem import Model, Problem, Scale
-from ..algebra.spread import BLOCKS
 from ..hypotheses.search import Search
 from ..hypotheses.starts import profile
 from ..levels.causes import covering
@@ -143,7 +140,7 @@ def covariance(
     residual = problem.whitened(problem.residuals(model), scale)
     out = np.full((live.size, live.size), np.nan)
     labels = problem.block_labels(BLOCKS)
-    out[np.ix_(live, live)] = spread.covariance(columns, ridge, residual, labels, share)
+    out[np.ix_(live, live)] = columns_covariance(columns, ridge, residual, labels, share)
     return out[live.size - count :, live.size - count :]
 
 

@@ -23,13 +23,21 @@ from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...errors import ModelError
 from ...twin.features import joints_of
-from ..algebra.columns import Columns, designed
+from ..algebra.columns import BLOCKS, Columns, columns_covariance, designed, unit_inverse
 from ..algebra.definite import unit_diagonal
-from ..algebra.fit import coordinates, design, fit, robust_fit, robust_scale, with_weights
+from ..algebra.fit import (
+    coordinates,
+    design,
+    effect_precision,
+    fit,
+    frame_offset,
+    frame_prior,
+    robust_fit,
+    robust_scale,
+    with_weights,
+)
 from ..algebra.independent_rows import effective_share
-from ..algebra.prior import effect_precision, frame_offset, frame_prior
 from ..algebra.problem import Change, Model, Problem, Scale
-from ..algebra.spread import BLOCKS, covariance, unit_inverse
 from ..beliefs import Beliefs
 from ..hypotheses.any_motion import constant, of_no_size
 from ..hypotheses.search import Search
@@ -245,7 +253,7 @@ def told(
     columns, ridge = _columns(problem, model, scale, precision)
     residual = problem.whitened(problem.residuals(model), scale)
     share = effective_share(residual, problem.rows, problem.samples)
-    whole = covariance(columns, ridge, residual, problem.block_labels(BLOCKS), share)
+    whole = columns_covariance(columns, ridge, residual, problem.block_labels(BLOCKS), share)
     parts = _places(problem, model)
     pairs = zip(model.changes, parts, strict=True)
     out = [(change, whole[np.ix_(part, part)]) for change, part in pairs]

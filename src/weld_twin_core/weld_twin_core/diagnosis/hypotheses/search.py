@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
-from ..algebra.fit import Fit, fit, robust_fit, robust_scale
-from ..algebra.prior import effect_precision
+from ..algebra.fit import Fit, effect_precision, fit, robust_fit, robust_scale
 from ..algebra.problem import Model, Problem, Scale
 from ..beliefs import Beliefs
 from ..result import Site

@@ -26,9 +26,17 @@ from ...effects.effect import Effect, Stage
 from ...twin.features import Features, joints_of
 from ..algebra.columns import Maker, Piece, designed
 from ..algebra.definite import outside, share_outside, span_of
-from ..algebra.fit import Fit, coordinates, fit, robust_scale, solve_scaled, stepped
+from ..algebra.fit import (
+    Fit,
+    coordinates,
+    effect_precision,
+    fit,
+    frame_prior,
+    robust_scale,
+    solve_scaled,
+    stepped,
+)
 from ..algebra.learned_sizes import learned_precision, projected
-from ..algebra.prior import effect_precision, frame_prior
 from ..algebra.problem import Model, Problem, Scale
 from ..algebra.still_joints import hardly_moves, moved_most, orders_told
 from ..beliefs import Beliefs

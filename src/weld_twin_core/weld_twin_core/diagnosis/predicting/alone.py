@@ -25,8 +25,7 @@ from ...effects.frame_errors import FrameError
 from ...effects.geometry import ChannelError
 from ...twin.corrected import corrected
 from ...twin.features import joints_of
-from ..algebra.fit import fit, robust_scale, trusted
-from ..algebra.prior import effect_precision, frame_offset
+from ..algebra.fit import effect_precision, fit, frame_offset, robust_scale, trusted
 from ..algebra.problem import Alone, Model, Problem
 from ..result import Shrink
 from ..unseen.unseen_stretches import Unseen

@@ -19,8 +19,7 @@ from ...effects.frame_errors import BasePose, RootPose, ToolPose
 from ...effects.geometry import JointOffset, LinkLength, LinkOffset, LinkTwist
 from ...effects.plausible import ranges
 from ...recording import JointMotion, Recording
-from ..algebra.fit import fit, robust_scale
-from ..algebra.prior import effect_precision
+from ..algebra.fit import effect_precision, fit, robust_scale
 from ..algebra.problem import Anchor, Model, Problem, Scale
 from ..frames.alignment import initial_frames, refined, rough_frames, tracks
 from .lengths import middle

@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ..algebra.columns import Columns, Piece, Rows, designed, rows_of
 from ..algebra.definite import Index, factored, inverted, unit_diagonal
-from ..algebra.fit import Fit, trusted
-from ..algebra.prior import frame_prior
+from ..algebra.fit import Fit, frame_prior, trusted
 from ..algebra.problem import Model, Problem, Scale
 from .folds import STRETCHES, Gain, gain, ways_to_divide
 

@@ -79,21 +79,6 @@ def test_growth_with_temperature_is_named_on_another_kind_of_arm():
     assert all(near(answer.effects[0], {'coefficient': 5e-5}).values())
 
 
-def test_two_causes_at_once_are_both_named():
-    play = dict(joint='elbow_joint', width=8e-4)
-    spring = dict(joint='shoulder_lift_joint', compliance=1.2e-5)
-    answer = solved(flaw('backlash', **play), flaw('joint_compliance', **spring))
-    assert answer.status == 'identified'
-    assert {frozenset(group) for group in sites(answer)} == {
-        frozenset({('backlash', 'elbow_joint')}),
-        frozenset({('joint_compliance', 'shoulder_lift_joint')}),
-    }
-    truth = {'backlash': play, 'joint_compliance': spring}
-    for found in answer.effects:
-        right = near(found, truth[found.effect.name])
-        assert all(right.values()), found.as_dict()
-
-
 def test_without_a_flaw_nothing_is_named():
     answer = solved()
     assert (answer.status, answer.effects, answer.indistinguishable) == ('none', (), ())
@@ -147,13 +132,6 @@ def test_stations_at_rest_are_enough_for_a_soft_joint():
     assert answer.status == 'identified'
     assert sites(answer) == [{('joint_compliance', 'shoulder_lift_joint')}]
     assert all(near(answer.effects[0], truth).values())
-
-
-def test_the_same_data_give_the_same_answer():
-    truth = dict(joint='shoulder_lift_joint', compliance=1.2e-5)
-    recording = recorded(small_arm(), [{'effect': 'joint_compliance', **truth}], static=60)
-    again = diagnose([recording], small_arm(), experiment=False)
-    assert again.as_dict() == solved(flaw('joint_compliance', **truth), static=60).as_dict()
 
 
 def test_what_stands_in_for_two_causes_gives_way_once_one_of_them_is_found():

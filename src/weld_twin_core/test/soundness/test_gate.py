@@ -62,9 +62,8 @@ def test_one_joint_in_degrees_believed_for_all(ur5, cell):
     assert only(ur5, rejointed(cell, q)) == ('units', ('wrist_1_joint',))
 
 
-@pytest.mark.parametrize('factor', [[1e3, 1, 1], [1, 1e-3, 1e-3]])
-def test_one_axis_in_millimetres(ur5, cell, factor):
-    bad = remeasured(cell, position=cell.measured.position * factor)
+def test_one_axis_in_millimetres(ur5, cell):
+    bad = remeasured(cell, position=cell.measured.position * [1e3, 1, 1])
     assert only(ur5, bad) == ('units', ('instrument',))
 
 

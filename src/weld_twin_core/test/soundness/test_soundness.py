@@ -88,22 +88,6 @@ def test_two_joints_that_count_the_other_way_are_both_named(ur5, placed):
     assert 'shoulder_lift_joint' in found and 'wrist_2_joint' in found
 
 
-def test_the_alphabetical_order_of_ros_is_named_as_the_swap_it_is(ur5, placed):
-    names = ur5.joint_names
-    alphabet = [names.index(name) for name in sorted(names)]
-    bad = rejointed(placed, placed.joints.q[:, alphabet])
-    assert "'shoulder_pan_joint' and 'elbow_joint' are swapped" in wrong(
-        ur5, 'joints_swapped', bad
-    )
-
-
-def test_another_zero_position_is_named(ur5, placed):
-    bad = rejointed(placed, placed.joints.q + [0, np.pi / 2, 0, 0, 0, 0])
-    assert "zero of joint 'shoulder_lift_joint' lies -90 degrees" in wrong(
-        ur5, 'constant_angle', bad
-    )
-
-
 def test_the_robot_that_fits_better_is_named(placed):
     assert (
         'the robot is a ur5, not a abb_irb120'
@@ -163,13 +147,6 @@ def test_clocks_that_are_not_synchronised_are_named_with_the_lag(ur5, run, late,
     found = wrong(ur5, 'clock', bad)
     said = float(found.split(' ms')[0].split()[-1])
     assert words in found and said == pytest.approx(abs(late) * 1e3, abs=8.0)
-
-
-def test_a_clock_that_was_late_is_late_in_that_recording_alone(ur5, run):
-    """What is mended of all recordings of a cell is mended of others too: `test_mended_source`."""
-    late = remeasured(run, t=run.measured.t + 0.3)
-    (other,) = looked_at(ur5, late, apply=True).mended((run,))
-    np.testing.assert_array_equal(other.joints.t, run.joints.t)
 
 
 @pytest.mark.parametrize(('joint', 'sweep', 'back'), [(1, -0.08, 2.4), (2, 0.07, 2.1)])

@@ -93,9 +93,8 @@ def test_draws_that_once_ended_in_a_traceback(seed):
 
 
 @pytest.mark.filterwarnings('ignore')
-@pytest.mark.parametrize('seed', [383, 1329], ids=['frames put back', 'many at once'])
-def test_nothing_is_told_beyond_what_machines_have(seed):
-    assert tried(drawn(seed))['wrong'] == []
+def test_many_causes_at_once_are_none_beyond_what_machines_have():
+    assert tried(drawn(1329))['wrong'] == []
 
 
 def test_a_draw_is_what_it_says():

@@ -25,6 +25,8 @@ def test_every_station_makes_it_surer(plan):
     assert (np.diff(plan.within) >= 0.0).all()
     assert plan.within[0] == 0.0, 'nothing is known before base and tool are'
     assert plan.within[-1] > 0.95
+    assert (np.diff(plan.elsewhere) <= 0.0).all()
+    assert plan.elsewhere[-1] > plan.sigma[-1] > 3e-5, "a diagnosis counts noise as the arm's"
 
 
 def test_stations_are_all_different_and_clear_of_the_floor(plan):

@@ -34,10 +34,14 @@ def page(entries: Sequence[Entry]) -> str:
 def of_plans(plans: Sequence[Entry]) -> dict[str, float]:
     """Return how plans of a first measurement compare with what came of them."""
     ratio = [e['kept_sigma_m'] / e['promised_sigma_m'] for e in plans]
+    warned = [e['warned_sigma_m'] / e['promised_sigma_m'] for e in plans]
+    beyond = [e['warned_elsewhere_m'] / e['promised_elsewhere_m'] for e in plans]
     return {
         'plans': len(plans),
         'kept over promised': float(np.median(ratio)),
         'worst': max(ratio),
+        'warned over promised': float(np.median(warned)),
+        'the same elsewhere': float(np.median(beyond)),
         'promised within tolerance': float(np.mean([e['promised_within'] for e in plans])),
         'kept': float(np.mean([e['kept_within'] for e in plans])),
     }

@@ -20,6 +20,7 @@ from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.programs import Context
 
 from .exporting import SLOW
+from .exports import NOTHING_KNOWN
 
 STATIONS, TABLE = 'stations.yaml', 'measurements.csv'
 """Files of a plan: the stations as a path file, and a table to write the measurements into."""
@@ -47,6 +48,7 @@ class Planned:
     minutes: Array  # shape (M + 1,), that 0, 1, ... stations take
     sigma: Array
     within: Array
+    elsewhere: Array
     """Shape (M + 1,): as `MeasurementPlan` has them, up to the most that fit into the time."""
     needed: int | None
     """Stations after which the tolerance is kept; None where not even all that fit do."""
@@ -88,7 +90,10 @@ def planned(
     needed = int(max(enough[0], least)) if enough.size else None
     count = needed or most
     q = plan.q[:count][_way(robot, plan.q[:count])]
-    return Planned(q, took[: most + 1], plan.sigma[: most + 1], plan.within[: most + 1], needed)
+    took, sigma, within, elsewhere = (
+        each[: most + 1] for each in (took, plan.sigma, plan.within, plan.elsewhere)
+    )
+    return Planned(q, took, sigma, within, elsewhere, needed)
 
 
 def _so_many(
@@ -110,7 +115,7 @@ def _so_many(
             f'{count} postures take {took[-1]:.1f} minutes, and there is time for {minutes:g}; '
             'give more time or fewer postures'
         )
-    return Planned(q, took, plan.sigma, plan.within, count)
+    return Planned(q, took, plan.sigma, plan.within, plan.elsewhere, count)
 
 
 def _took(robot: Robot, q: Array, seconds: float) -> Array:
@@ -147,6 +152,9 @@ def plan_table(plan: Planned, tolerance: float) -> list[str]:
         f'{k:5d}  {plan.minutes[k]:7.1f}  {plan.sigma[k] * 1e3:13.3f} mm  {plan.within[k]:8.0%}'
         for k in sorted(step for step in steps if step <= most)
     ]
+    far = plan.elsewhere[count]
+    beyond = f'may still be off by {far * 1e3:.2g} mm' if far < NOTHING_KNOWN else 'is not known'
+    out.append(f'elsewhere in its reach the corrected robot {beyond} after {count} poses')
     if plan.needed is None:
         out.append(
             f'all {most} poses that fit into the time keep {wanted} at {plan.within[-1]:.0%} of '

@@ -32,9 +32,10 @@ from ...recording import JointMotion, Recording
 from ...sequences import halton
 from ...twin.domain import Domain
 from ...twin.features import Features
-from ...twin.posterior import Directions, Discrepancy, Posterior
+from ...twin.posterior import Directions, Discrepancy, Posterior, postures_within_limits
 from ...twin.twin import Twin
 from . import plausible_arm
+from .allowed import USUAL_NOISE
 
 SPREAD = np.radians(75.0)
 """Half the range of every joint about the posture of a usual seam [rad]: wide enough to show every
@@ -79,6 +80,8 @@ class MeasurementPlan:
     postures, after that many stations, shape (N + 1,) [m]."""
     within: Array
     """Probability that the tool is within the tolerance at such a posture, shape (N + 1,)."""
+    elsewhere: Array
+    """As ``sigma``, of postures anywhere in the arm's reach: what a diagnosis will warn of."""
 
 
 def plan_stations(
@@ -103,18 +106,26 @@ def plan_stations(
             'column; give a smaller --spread'
         )
     region = clear[:JUDGED], clear[JUDGED : JUDGED + max(CANDIDATES, count)]
-    before = _before_any(robot, region[1])
-    return _planned(before, Twin(robot), region, count, Wanted(tolerance, noise), CHOICE)
+    own = min(noise, USUAL_NOISE)
+    before = _before_any(robot, region[1], own)
+    given = Wanted(tolerance, float(np.sqrt(noise**2 - own**2)))
+    return _planned(before, Twin(robot), region, count, given, CHOICE)
 
 
-def _before_any(robot: Robot, q: Array) -> Posterior:
-    """Return how sure an arm is before anything is measured of it, its frames not known."""
+def _before_any(robot: Robot, q: Array, own: float) -> Posterior:
+    """
+    Return how sure an arm is before anything is measured of it, its frames not known.
+
+    own: what the arm itself scatters [m]. Of an arm that has all small errors a diagnosis counts as its
+    own what nothing tells from it (`leftover.ROUGH`), and so does the plan of one.
+    """
     effects = plausible_arm.directions(robot, ())
     what = Directions(('base', 'tool'), 1, effects, plausible_arm.fine_knots([q]))
-    none = Discrepancy(0.0, 0.0, np.zeros(robot.n), np.zeros(robot.n), 1.0)
+    fine = np.full(robot.n, plausible_arm.FINE) * ~np.asarray(robot.prismatic)
+    rest = Discrepancy(own, own, np.zeros(robot.n), fine, plausible_arm.SPACING)
     covariance = np.diag(plausible_arm.widths(robot, what) ** 2)
     stations = Recording('stations', JointMotion(np.arange(float(len(q))), q, static=True))
-    return Posterior(what, np.zeros(what.count), covariance, none, Domain.of([stations], robot))
+    return Posterior(what, np.zeros(what.count), covariance, rest, Domain.of([stations], robot))
 
 
 def plan_more(
@@ -150,19 +161,20 @@ def _planned(
     choice: float,
 ) -> MeasurementPlan:
     """Return the plan after a posterior; ``choice`` is as `CHOICE`."""
-    judged = len(region[0])
-    still = posterior.at_rest(twin, np.concatenate(region))
+    anywhere = postures_within_limits(twin.robot, JUDGED)
+    still = posterior.at_rest(twin, np.concatenate([*region, anywhere]))
     ways, rest = posterior.position_ways(Features(twin, still, still.joints.t))
-    seen, offered = ways[:judged], ways[judged:]
-    noise = rest[judged:] + given.noise**2 * np.eye(3)
+    ends = np.cumsum([len(region[0]), len(region[1])])
+    (seen, offered, far), (own, more, rest_far) = np.split(ways, ends), np.split(rest, ends)
+    noise = more + given.noise**2 * np.eye(3)
     draws = np.random.default_rng(1).standard_normal((DRAWS, 3))
 
-    def sure(factor: float) -> tuple[float, float]:
-        """Return the usual standard deviation, and how probably the tool is within the tolerance."""
-        spread = seen @ np.swapaxes(seen, 1, 2) + rest[:judged]
-        size = factor * np.sqrt(np.maximum(np.linalg.eigvalsh(spread), 0.0))
+    def sure(factor: float) -> tuple[float, float, float]:
+        """Return what `MeasurementPlan` has of a number of stations."""
+        size, beyond = _sizes(factor * seen, own), _sizes(factor * far, rest_far)
         length = np.linalg.norm(draws[:, None] * size, axis=-1)
-        return float(np.median(size[:, -1])), float((length < given.tolerance).mean())
+        within = float((length < given.tolerance).mean())
+        return float(np.median(size[:, -1])), within, float(np.median(beyond[:, -1]))
 
     taken: list[int] = []
     told = [sure(1.0)]
@@ -174,10 +186,16 @@ def _planned(
         shown = rows.T @ np.linalg.solve(rows @ rows.T + noise[taken[-1]], rows)
         # What is still open of every way, as ways of one standard deviation again.
         root = np.linalg.cholesky(np.eye(len(shown)) - shown)
-        seen, offered = seen @ root, offered @ root
-        sigma, within = sure(1.0 + (choice / number) ** 3)
-        told.append((min(sigma, told[0][0]), within))
+        seen, offered, far = seen @ root, offered @ root, far @ root
+        sigma, within, beyond = sure(1.0 + (choice / number) ** 3)
+        told.append((min(sigma, told[0][0]), within, min(beyond, told[0][2])))
     return MeasurementPlan(region[1][taken], *np.array(told).T)
+
+
+def _sizes(ways: Array, rest: Array) -> Array:
+    """Return standard deviations of position along its axes, the largest last, shape (K, 3) [m]."""
+    spread = ways @ np.swapaxes(ways, 1, 2) + rest
+    return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(spread), 0.0)))
 
 
 def _gains(seen: Array, offered: Array, noise: Array) -> Array:

@@ -59,7 +59,7 @@ def pytest_collection_modifyitems(items):
     )
 
 
-FIRST_LINE = ('/recording/', '/install/', '/test_compensator')
+FIRST_LINE = ('/recording/', '/install/', '/cli/', '/live/test_l')
 """Places whose cells stand in the first of two lines; both take about two minutes."""
 BESIDE = 5
 """How much less the other tests weigh for the scheduler than those of cells, which stand in line one

@@ -22,10 +22,6 @@ def python(code: str, *words: object) -> subprocess.CompletedProcess[str]:
     )
 
 
-def weld_twin_alone(*words: object) -> subprocess.CompletedProcess[str]:
-    return python('from weld_twin_nodes.cli import main; sys.exit(main())', *words)
-
-
 def test_every_module_of_the_nodes_is_imported_without_the_pages():
     pytest.importorskip('rclpy', reason='needs ROS 2')
     done = python(
@@ -45,16 +41,19 @@ def test_every_module_of_the_nodes_is_imported_without_the_pages():
 
 
 def test_the_command_line_has_the_commands_that_write_no_page(tmp_path):
-    listed = weld_twin_alone('--help')
-    assert listed.returncode == 0, listed.stderr
-    assert ' simulate ' in listed.stdout
-    assert ' bag ' in listed.stdout
-    assert not {name for name in PAGES if f' {name} ' in listed.stdout}
-    words = ('--robot', 'ur5', '--rate', 20, '--path', 'line', '--out', tmp_path / 'bag')
-    made = weld_twin_alone('simulate', *words)
-    assert made.returncode == 0, made.stderr
-    shown = weld_twin_alone('bag', tmp_path / 'bag')
-    assert 'usable for a diagnosis' in shown.stdout, shown.stderr
+    done = python(
+        'from weld_twin_nodes.cli.in_process import weld_twin\n'
+        'bag, *words = sys.argv[1:]\n'
+        'for each in (["--help"], ["simulate", *words, "--out", bag], ["bag", bag]):\n'
+        '    said = weld_twin(*each)\n'
+        '    print(said.code, said.out, said.err, "<end>")\n',
+        *(tmp_path / 'bag', '--robot', 'ur5', '--rate', 20, '--path', 'line'),
+    )
+    listed, made, shown = done.stdout.split('<end>\n')[:-1]
+    assert [text[:2] for text in (listed, made, shown)] == ['0 '] * 3, done.stdout
+    assert ' simulate ' in listed and ' bag ' in listed
+    assert not {name for name in PAGES if f' {name} ' in listed}
+    assert 'usable for a diagnosis' in shown
 
 
 def test_a_command_that_is_missing_says_which_package_brings_it():

@@ -13,7 +13,6 @@ from scipy.spatial.transform import Rotation
 from weld_twin_core.diagnosis.algebra.open_directions import shown
 from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.frames.alignment import chord
-from weld_twin_core.diagnosis.levels.curved import _tilt
 from weld_twin_core.diagnosis.predicting.leftover import _middle, _shared
 from weld_twin_core.diagnosis.predicting.sizes import Prior, Rows, weighed
 from weld_twin_core.diagnosis.soundness.computed import _noise, _paired
@@ -53,16 +52,6 @@ def test_a_turned_base_is_told_by_its_axis(turn, told):
     pairs = [(each.mend.keywords['turn'], each.sentence) for each in turned_bases()]
     (sentence,) = (words for other, words in pairs if np.allclose(other, matrix))
     assert told in sentence
-
-
-def test_a_tool_turned_by_its_last_joint_alone_is_not_tilted():
-    problem, model = tiny(count=30)
-    (whole,) = problem.recordings
-    q = np.tile(whole.joints.q[0], (30, 1))
-    q[:, -1] = np.linspace(-1.0, 1.0, 30)
-    turned = replace(whole, joints=JointMotion(whole.joints.t, q, static=True))
-    assert _tilt(Problem((turned,), frozenset()), model) == pytest.approx(0.0, abs=1e-9)
-    assert _tilt(problem, model) > 0.5
 
 
 def test_a_computed_pose_is_held_against_the_joints_before_and_after_it():

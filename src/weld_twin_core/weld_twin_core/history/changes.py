@@ -351,11 +351,9 @@ def _told(
     }
     place = max(odds, key=lambda j: odds[j])
     shape = shapes[at[place]]
-    mean, information = system.sizes(shape)
     near = [shapes[k].begin for k in same if gain[k, place] > most[place] - _DATED]
     ranked = sorted(odds, key=lambda j: -odds[j])
     others = [j for j in ranked if j != place and odds[j] > odds[place] - 0.5 * _ALIKE]
-    season = kind == 'season'
     return Found(shape, place), Change(
         series.names[place],
         kind,
@@ -364,12 +362,30 @@ def _told(
             float(series.days[max(min(near) - (kind == 'step'), 0)]),
             float(series.days[max(near)]),
         ),
-        float(np.hypot(*mean[place])) if season else float(mean[place, 0]),
-        float(np.sqrt(scatter / np.linalg.eigvalsh(information[place])[0])),
+        *_size(system, [shapes[k] for k in same], gain[same, place], place, scatter),
         0.5 * float(most[place]),
         tuple(series.names[k] for k in others),
         _slowly(series, shapes, gain[:, place], top) if kind == 'step' else None,
     )
+
+
+def _size(
+    system: _System, shapes: Sequence[_Shape], gain: Array, place: int, scatter: float
+) -> tuple[float, float]:
+    """Return the size of a change on a coordinate and its standard error, whenever it began."""
+    weight = np.exp(0.5 * (gain - gain.max()))
+    weight /= weight.sum()
+    sizes, variances = [], []
+    for shape in shapes:
+        mean, information = system.sizes(shape)
+        # Of a season, how far it swings; the worse known of its two parts says how well.
+        sizes.append(
+            float(np.hypot(*mean[place])) if mean.shape[1] == 2 else float(mean[place, 0])
+        )
+        variances.append(scatter / max(float(np.linalg.eigvalsh(information[place])[0]), 1e-300))
+    middle = float(weight @ sizes)
+    spread = weight @ (np.array(variances) + (np.array(sizes) - middle) ** 2)
+    return middle, float(np.sqrt(spread))
 
 
 def _slowly(series: Series, shapes: Sequence[_Shape], gain: Array, top: float) -> float | None:

@@ -135,3 +135,11 @@ def test_the_place_of_a_cause_that_was_taken_out_is_where_its_formula_fits():
     assert first.dependence[0][0] == 'angle'
     assert 'joint_coupling' not in {site.effect for site, _ in first.name}
     assert not any(cause.place[0][1] > 0.5 for cause in others if cause.place)
+
+
+def test_a_curve_of_the_base_over_the_time_is_one_cause_and_not_two_of_one_share():
+    wandered = ('drift', 'xyz_rate', (2e-5, -1e-5, 3e-5))
+    answer = solved(wandered, exclude=('drift',), seconds=20.0)
+    held = [cause.members for cause in answer.causes]
+    assert answer.status == 'unknown' and any(held), answer.reasons
+    assert len({k for members in held for k in members}) == sum(map(len, held))

@@ -177,8 +177,9 @@ def _nameless(
         beside = tuple(k for k in range(len(model)) if k not in taken and curved is not None)
         stand_in = _stand_in(taken_out[0], beside, model)
         return ([*claims, stand_in], _rest([], beliefs)) if beside else (claims, stand_in)
+    by_curves = {at for members in held.values() for at in members}
     for k, effect in enumerate(model if curved is not None else ()):
-        if k not in taken and not effect.traits.bends:
+        if k not in taken | by_curves and not effect.traits.bends:
             claims.append(_cause((k,), {effect.at: 1.0}, {effect.on: 1.0}, {Site.of(effect): 1.0}))
     for place, own in places.items():
         if not held[place]:

@@ -206,10 +206,8 @@ def ahead(work: Workspace, own: Fit, now: Fit) -> float:
         return sum(trials.get(place, 0.0) + work.beliefs.enter_nats for place in sites(result))
 
     more = float(own.coordinates.size - now.coordinates.size)
-    differing = {family for family, _ in set(sites(own)) ^ set(sites(now))}
-    count = work.independent((now, own), differing)
-    before, after = (work.left(one, differing) for one in (now, own))
-    return evidence(before, before - after, more, count) - cost(own) + cost(now)
+    count = work.independent((now, own))
+    return evidence(now.rss, now.rss - own.rss, more, count) - cost(own) + cost(now)
 
 
 def _columns(chosen: Sequence[Choice]) -> list[int]:

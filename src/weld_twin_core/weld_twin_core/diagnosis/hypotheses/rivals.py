@@ -87,8 +87,7 @@ def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> t
         for choice in _near(work, ranked, role, sites(now))
         if not implausible((other := work.fitted_with(start, choice.effect())).model)
     ]
-    about = [place.effect]
-    count = work.independent([now, *(f for _, f in tried)], about)
+    count = work.independent([now, *(f for _, f in tried)])
 
     def nats(full: Fit, choice: Choice | None) -> float:
         freedom, trials = float(full.coordinates.size - rest.coordinates.size), 1.0
@@ -96,8 +95,7 @@ def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> t
             # Unused components of a vector effect buy nothing and cost nothing.
             freedom -= max(choice.unit.columns[choice.seed].size - choice.columns.size, 0)
             trials = max(choice.unit.trials, 1.0)
-        before, after = work.left(rest, about), work.left(full, about)
-        return evidence(before, before - after, freedom, count) - float(np.log(trials))
+        return evidence(rest.rss, rest.rss - full.rss, freedom, count) - float(np.log(trials))
 
     out = [Rival(place, nats(now, own), now)]
     for choice, other in tried:

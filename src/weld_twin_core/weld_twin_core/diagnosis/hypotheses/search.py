@@ -90,7 +90,6 @@ def search(
     slots: tuple[tuple[Rival, ...], ...] = ()
     if not crowded:
         now = possible(work, now, refused)
-        work = work.beside_usual(now)
         now, slots = settled(work, now, progress)
         slots, better = with_leads(work, now, slots)
         refused += better

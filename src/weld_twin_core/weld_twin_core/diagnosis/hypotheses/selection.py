@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -14,7 +14,6 @@ import numpy as np
 from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
-from ...effects.registry import REGISTRY
 from ..algebra.fit import Fit, design, fit
 from ..algebra.independent_rows import effective_share
 from ..algebra.problem import Model, Problem, Scale
@@ -23,7 +22,6 @@ from ..result import Site
 from .library import Library
 from .seed_systems import Choice, Role, SeedSystems, evidence, ranking
 from .starts import started
-from .usual_errors import UsualErrors, usual
 
 SHORTLIST = 4
 """Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
@@ -51,11 +49,6 @@ class Workspace:
     beliefs: Beliefs
     bare_rss: float
     """Whitened sum of squares before any effect was found."""
-    errors: UsualErrors | None = None
-    """What every arm is off by a little, once it is known how much that is."""
-    _left: WeakKeyDictionary[Fit, float] = field(
-        default_factory=WeakKeyDictionary, init=False, repr=False
-    )
     _less: WeakKeyDictionary[Fit, dict[int, Less]] = field(
         default_factory=WeakKeyDictionary, init=False, repr=False
     )
@@ -80,42 +73,14 @@ class Workspace:
         explained = max(self.bare_rss - result.rss, 0.0) / max(result.rss, 1e-300) * count
         return float(count / (1.0 + misfit**2 * explained / beliefs.misfit_directions))
 
-    def beside_usual(self, now: Fit) -> Workspace:
-        """Return the same with the errors that every arm has a little of, as a fit shows them."""
-        if usual(now.model.found):
-            return self
-        return replace(
-            self, errors=UsualErrors.beside(self.problem, self.scale, now, self.effective)
-        )
-
-    def _errors(self, about: Iterable[str]) -> UsualErrors | None:
-        """Return the errors beside which some families are weighed; none if they are such."""
-        return None if usual(REGISTRY[name] for name in about) else self.errors
-
-    def left(self, result: Fit, about: Iterable[str]) -> float:
+    def independent(self, fits: Sequence[Fit]) -> float:
         """
-        Return what a fit leaves, whitened squares, to weigh some families by.
+        Return the number of independent rows by which fits are weighed against each other.
 
-        Beside the errors that every arm has a little of, unless the families are such themselves.
-
-        about: the families.
+        One count for all, that of the one which leaves least: a worse model explains less and would
+        otherwise be allowed more rows.
         """
-        errors = self._errors(about)
-        if errors is None:
-            return result.rss
-        if result not in self._left:
-            self._left[result] = errors.left(result)
-        return self._left[result]
-
-    def independent(self, fits: Sequence[Fit], about: Iterable[str]) -> float:
-        """
-        Return the number of independent rows by which some families are weighed.
-
-        One count for all fits, that of the one which leaves least: a worse model explains less and
-        would otherwise be allowed more rows.
-        """
-        errors = self._errors(about)
-        return self.effective(min(fits, key=lambda f: f.rss)) if errors is None else errors.count
+        return self.effective(min(fits, key=lambda f: f.rss))
 
     def without(self, now: Fit, k: int) -> Less:
         """Return the fit without found effect k of another, made once."""

@@ -5,11 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ...effects.apart import way
+from ...effects.curves import JointCurve, basis
 from ...effects.effect import Effect
 from ...errors import TwinError
 from ...recording import JointMotion
@@ -24,6 +26,8 @@ _WORTH = 0.8
 _NEAR = 0.5
 """Minutes within which measurements take equally long."""
 _Explanation = tuple[Effect, ...]
+_MOST_KNOTS = 40
+"""Knots of a curve that is carried on over the whole range of an experiment."""
 _PACE = 0.1
 """Time [s] between the samples of a path as it is written: a spline through them is the path."""
 
@@ -242,3 +246,17 @@ def motion_entry(joints: JointMotion, names: Sequence[str]) -> dict[str, Any]:
         't': t.round(6).tolist(),
         'q': q.round(7).tolist(),
     }
+
+
+def carried_on(effect: Effect, ends: dict[str, tuple[float, float]]) -> Effect:
+    """Return a curve over an angle with knots as dense as they are over all that may be reached."""
+    if not isinstance(effect, JointCurve) or effect.over != 'angle':
+        return effect
+    knots = np.asarray(effect.knots, dtype=float)
+    low, high = ends[effect.joint]
+    low, high = min(low, knots[0]), max(high, knots[-1])
+    step = float(np.diff(knots).mean())
+    count = min(int(np.ceil((high - low) / step)) + 1, _MOST_KNOTS)
+    wide = np.linspace(low, high, count)
+    values = np.asarray(effect.values, dtype=float) @ basis(effect.knots, wide)
+    return replace(effect, values=tuple(values.tolist()), knots=tuple(wide.tolist()))

@@ -13,10 +13,9 @@ import numpy as np
 
 from ...arrays import Array
 from ...effects import REGISTRY
-from ...effects.curves import JointCurve, basis
 from ...effects.effect import Effect
 from ..advice.chosen_pieces import DECIDES
-from ..advice.experiment import confirming, next_experiment
+from ..advice.experiment import carried_on, confirming, next_experiment
 from ..advice.next_touches import next_touches
 from ..advice.postures import Limits, Room
 from ..algebra.fit import fit
@@ -51,8 +50,6 @@ _RIVALS = 2
 """Other places or dependences that are compared with the one that fits best."""
 _ROWS = 2000
 """Rows that a rival's curves are fitted on: only its shape counts."""
-_MOST_KNOTS = 40
-"""Knots of a curve that is carried on over the whole range of an experiment."""
 
 _Explanation = tuple[Effect, ...]
 
@@ -189,7 +186,7 @@ def _without_names(
             for c in (group if p is parts[0] else p.group).carried
         ]
         out.append(_fitted(alternative.found, (*kept, *curves)))
-    return [tuple(_wide(effect, ends) for effect in effects) for effects in out]
+    return [tuple(carried_on(effect, ends) for effect in effects) for effects in out]
 
 
 def _others(parts: Sequence[Part]) -> list[Group]:
@@ -208,17 +205,3 @@ def _fitted(result: Search, effects: _Explanation) -> _Explanation:
     few = result.problem.thinned(_ROWS)
     scale = replace(result.scale, weights=tuple(np.ones(m) for m in few.samples))
     return fit(few, result.final.model.with_found(effects), scale, None, 3).model.found
-
-
-def _wide(effect: Effect, ends: dict[str, tuple[float, float]]) -> Effect:
-    """Return a curve over an angle with knots as dense as they are over all that may be reached."""
-    if not isinstance(effect, JointCurve) or effect.over != 'angle':
-        return effect
-    knots = np.asarray(effect.knots, dtype=float)
-    low, high = ends[effect.joint]
-    low, high = min(low, knots[0]), max(high, knots[-1])
-    step = float(np.diff(knots).mean())
-    count = min(int(np.ceil((high - low) / step)) + 1, _MOST_KNOTS)
-    wide = np.linspace(low, high, count)
-    values = np.asarray(effect.values, dtype=float) @ basis(effect.knots, wide)
-    return replace(effect, values=tuple(values.tolist()), knots=tuple(wide.tolist()))

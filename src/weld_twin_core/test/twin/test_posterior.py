@@ -17,15 +17,11 @@ from weld_twin_core.diagnosis.result import Shrink
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.errors import DataError, ModelError
 from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.twin.directions import Directions
+from weld_twin_core.twin.discrepancy import Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.features import Features
-from weld_twin_core.twin.posterior import (
-    Directions,
-    Discrepancy,
-    Posterior,
-    expected_poses,
-    pose_covariances,
-)
+from weld_twin_core.twin.posterior import Posterior, expected_poses, pose_covariances
 from weld_twin_core.twin.twin import Twin
 
 

@@ -17,10 +17,12 @@ from weld_twin_core.diagnosis.algebra.problem import Model, Problem
 from weld_twin_core.diagnosis.predicting.allowed import allowed
 from weld_twin_core.effects import effect_from_mapping
 from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.twin.directions import Directions
+from weld_twin_core.twin.discrepancy import Discrepancy
 from weld_twin_core.twin.domain import Domain
 from weld_twin_core.twin.goal_correction import Start, corrected_goal
 from weld_twin_core.twin.goal_motion import Goal
-from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior, pose_covariances
+from weld_twin_core.twin.posterior import Posterior, pose_covariances
 from weld_twin_core.twin.program_model import ProgramModel
 from weld_twin_core.twin.reversals import just_turned
 

@@ -14,7 +14,7 @@ for a model's own account is of the causes that it has.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -29,6 +29,8 @@ from ..errors import DataError, ModelError
 from ..recording import JointMotion, Recording, Signal
 from ..sequences import halton
 from .compensation import commandable
+from .directions import Directions
+from .discrepancy import Discrepancy, Where
 from .domain import Domain
 from .features import Features, with_expected_effort
 from .poses import Poses
@@ -48,119 +50,8 @@ SEED = 0
 """Of the draws: every promise is made of the same models."""
 CHUNK = 2000
 """Samples at once; a hundred coordinates of so many poses take some ten megabytes."""
-ELSEWHERE = 2.0
-"""A model is off by so many times as much as its own account where nothing was recorded, for its account
-is of the causes that it has: on two arms under a tracker, and on sealed cases, by 1.0 to 3.0."""
 SETTLED = 1e-13
 """Share of the largest variance, coordinates at unit size, below which a direction is certain."""
-AXES = ('x', 'y', 'z', 'turn_x', 'turn_y', 'turn_z')
-CURVE = 'curve of '
-"""How the names of a curve's heights begin."""
-
-
-@dataclass(frozen=True, eq=False)
-class Directions:
-    """What may differ between the models that the recordings allow."""
-
-    frames: tuple[str, ...]
-    """Of 'base' and 'tool', those that were fitted; six coordinates each (xyz, rotvec), the base
-    once for every set-up."""
-    setups: int
-    """Number of base frames."""
-    effects: tuple[Effect, ...]
-    """Each with all its fit coordinates, as instances at which derivatives are taken."""
-    knots: tuple[Array, ...] = ()
-    """For every joint, where the heights of a curve of its own angle are coordinates: straight
-    lines between, nothing beyond [rad or m]. Evenly spaced; none for no curve."""
-
-    def __post_init__(self) -> None:
-        knots = tuple(readonly(k, (None,), 'knots') for k in self.knots)
-        object.__setattr__(self, 'knots', knots)
-
-    @property
-    def frame_count(self) -> int:
-        """Return the number of frame coordinates."""
-        return 6 * (('base' in self.frames) * self.setups + ('tool' in self.frames))
-
-    @cached_property
-    def sizes(self) -> tuple[int, ...]:
-        """Return the number of coordinates of every effect."""
-        return tuple(effect.fit.coordinates().size for effect in self.effects)
-
-    @property
-    def own(self) -> list[slice]:
-        """Return where the coordinates of every effect are, behind those of the frames."""
-        ends = self.frame_count + np.cumsum(self.sizes, dtype=int)
-        return [slice(end - size, end) for end, size in zip(ends, self.sizes, strict=True)]
-
-    @property
-    def count(self) -> int:
-        """Return the number of coordinates."""
-        return self.frame_count + sum(self.sizes) + sum(k.size for k in self.knots)
-
-    def names(self) -> list[str]:
-        """
-        Return a name for every coordinate: 'base 0.x', 'joint_offset elbow_joint 0'.
-
-        Waves are named by their order and curves by their place, so that a name means the same in
-        every diagnosis of an arm.
-        """
-        out = []
-        if 'base' in self.frames:
-            out += [f'base {k}.{axis}' for k in range(self.setups) for axis in AXES]
-        if 'tool' in self.frames:
-            out += [f'tool.{axis}' for axis in AXES]
-        for effect, size in zip(self.effects, self.sizes, strict=True):
-            where = f' {effect.site}' if effect.site else ''
-            # Two couplings of one joint differ in the joint that they come from.
-            source = effect.to_mapping().get('source')
-            where += f'<{source}' if source else ''
-            parts: list[str] = [str(k) for k in range(size)]
-            if effect.traits.waves is not None:
-                parts = [f'{n:g} {of}' for n in effect.search.orders() for of in ('sin', 'cos')]
-            out += [f'{effect.name}{where} {part}' for part in parts]
-        for joint, knots in enumerate(self.knots):
-            step = f' by {knots[1] - knots[0]:g}' if knots.size > 1 else ''
-            out += [f'{CURVE}joint {joint + 1} at {place:.3f}{step}' for place in knots]
-        return out
-
-    def fitted(self) -> Array:
-        """Return the coordinates of the fitted model; those of frames and curves are zero."""
-        curves = sum(k.size for k in self.knots)
-        own = [effect.fit.coordinates() for effect in self.effects]
-        return np.concatenate([np.zeros(self.frame_count), *own, np.zeros(curves)])
-
-    def columns(self, features: Features, setup: int) -> Array:
-        """
-        Return d pose / d coordinate, shape (P, 6, M), linear part first [m, rad].
-
-        Effects that the recording cannot show (no load, no temperature) have columns of zero.
-        """
-        out = np.zeros((self.count, 6, features.at.size))
-        at = 0
-        if 'base' in self.frames:
-            for k in range(6):
-                out[6 * setup + k] = features.column(('base', k))
-            at += 6 * self.setups
-        if 'tool' in self.frames:
-            for k in range(6):
-                out[at + k] = features.column(('tool', k))
-        for effect, here in zip(self.effects, self.own, strict=True):
-            if effect.applicable(features.view, effect.site) is None:
-                out[here] = features.columns(effect, atoms=False)
-        at = self.frame_count + sum(self.sizes)
-        for joint, knots in enumerate(self.knots):
-            if knots.size:
-                hats = _hats(features.run.view.joint(joint), knots)
-                out[at : at + knots.size] = hats[:, None] * features.column(('q', joint))
-            at += knots.size
-        return out
-
-
-def _hats(q: Array, knots: Array) -> Array:
-    """Return the straight-line interpolation from heights at knots, shape (K, M)."""
-    width = knots[1] - knots[0] if knots.size > 1 else 1.0
-    return np.asarray(np.maximum(0.0, 1.0 - np.abs(q - knots[:, None]) / max(width, 1e-9)))
 
 
 class Expected(NamedTuple):
@@ -170,74 +61,6 @@ class Expected(NamedTuple):
     """Of their middle from the twin's pose, shape (M, 6) [m, rad], turns about the world's axes."""
     covariance: Array
     """Of the true pose about that, shape (M, 6, 6)."""
-
-
-class Where(NamedTuple):
-    """Where samples of a motion are, as far as a discrepancy asks."""
-
-    q: Array
-    """Shape (M, n) [rad or m]."""
-    levers: Array
-    """d pose / d joint, shape (n, 6, M)."""
-    beyond: Array
-    """How far every joint is from where it was recorded, shape (M, n)."""
-    margins: Array
-    """How far it may be and still counts as recorded there, shape (n,)."""
-    unlike: NDArray[np.bool_]
-    """What else was not recorded, as `Domain.unlike` has it, shape (M,)."""
-    turned: NDArray[np.bool_]
-    """Joints that have just turned around, shape (M, n)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Discrepancy:
-    """What no parameter explains."""
-
-    position: float
-    """Standard deviation per axis of what is left over at the tool, alike everywhere [m]."""
-    orientation: float
-    """The same about each axis [rad]."""
-    gears: Array
-    """What is left over in every joint where it was recorded, shape (n,) [rad or m]; it reaches
-    the tool by the joint's lever."""
-    curves: Array
-    """How far every joint may be off its reading, on top of that, where it was never seen: gear
-    errors too fine to be carried over, shape (n,) [rad or m]."""
-    reach: float
-    """Distance beyond what was recorded at which a curve counts in full [rad or m]."""
-    turns: Array | None = None
-    """How far every joint may be off, on top of that, where it has just turned around: laws of
-    lost motion differ there alone, shape (n,) [rad or m]. None for nothing."""
-    peaks: Array = field(default_factory=lambda: np.zeros(0))
-    """By how much each stretch of the recordings was off at its worst, beyond what chance makes of
-    what is usually left there, shape (K,) [m]: a tool strays farther than a normal law has it."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, 'gears', readonly(self.gears, (None,), 'gears'))
-        object.__setattr__(self, 'curves', readonly(self.curves, (None,), 'curves'))
-        turns = np.zeros_like(self.gears) if self.turns is None else self.turns
-        object.__setattr__(self, 'turns', readonly(turns, (None,), 'turns'))
-        object.__setattr__(self, 'peaks', readonly(self.peaks, (None,), 'peaks'))
-
-    def covariance(self, here: Where) -> Array:
-        """Return its part of the covariance where it was recorded, shape (M, 6, 6)."""
-        moved = here.levers * self.joints(here)[:, None]
-        out = np.einsum('nim,njm->mij', moved, moved)
-        out[:, np.arange(6), np.arange(6)] += np.repeat([self.position, self.orientation], 3) ** 2
-        return np.asarray(out)
-
-    def joints(self, here: Where) -> Array:
-        """Return the standard deviation in every joint, shape (n, M) [rad or m]."""
-        assert self.turns is not None
-        beyond = np.minimum(here.beyond.T / self.reach, 1.0)
-        parts = self.gears[:, None], self.curves[:, None] * beyond, (here.turned * self.turns).T
-        return np.asarray(np.sqrt(sum(part**2 for part in parts)))
-
-    def grown(self, here: Where) -> Array:
-        """Return how many times as large all is, up to `ELSEWHERE` where nothing was recorded, (M,)."""
-        outside = (here.beyond - here.margins).max(axis=1, initial=0.0)
-        apart = np.maximum(np.minimum(outside / self.reach, 1.0), here.unlike)
-        return np.asarray(1.0 + (ELSEWHERE - 1.0) * apart)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,14 +17,10 @@ from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import Recording
+from weld_twin_core.twin.directions import Directions
+from weld_twin_core.twin.discrepancy import Discrepancy
 from weld_twin_core.twin.domain import Domain
-from weld_twin_core.twin.posterior import (
-    Directions,
-    Discrepancy,
-    Posterior,
-    largest_sigma,
-    pose_covariances,
-)
+from weld_twin_core.twin.posterior import Posterior, largest_sigma, pose_covariances
 
 from ..blind.making import SealedCase
 from .held import HOLD, twin_for

@@ -13,15 +13,15 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.predicting import plausible_arm
+from weld_twin_core.diagnosis.predicting.allowed import corrected_sigma
 from weld_twin_core.diagnosis.predicting.planned import (
     JUDGED,
     SPREAD,
     clear_postures,
     plan_stations,
 )
-from weld_twin_core.effects.dated import of_the_robot
 from weld_twin_core.recording import JointMotion, Measurements, Recording
-from weld_twin_core.twin.posterior import largest_sigma, usual_sigma
+from weld_twin_core.twin.posterior import largest_sigma
 from weld_twin_core.twin.twin import Twin
 
 from ..blind.cause_sizes import Cause
@@ -63,9 +63,7 @@ def carried_out(seed: int) -> dict[str, Any]:
     assert true.measured is not None
     off = true.measured.position - _twin(found, others).position
     length = np.linalg.norm(off, axis=1)
-    posterior, model = found.posterior, found.model
-    assert posterior is not None
-    twin = Twin(model.twin(0).robot, of_the_robot(model.known + model.found))
+    assert found.posterior is not None
     judged = clear_postures(robot, SPREAD)[:JUDGED]
     return {
         'seed': seed,
@@ -74,8 +72,8 @@ def carried_out(seed: int) -> dict[str, Any]:
         'status': found.status,
         'promised_sigma_m': float(plan.sigma[-1]),
         'promised_elsewhere_m': float(plan.elsewhere[-1]),
-        'warned_sigma_m': usual_sigma(posterior, twin, judged),
-        'warned_elsewhere_m': posterior.anywhere_m,
+        'warned_sigma_m': corrected_sigma(found.posterior, found.model, judged),
+        'warned_elsewhere_m': found.posterior.anywhere_m,
         'promised_within': float(plan.within[-1]),
         'kept_sigma_m': float(largest_sigma(np.einsum('mi,mj->ij', off, off)[None] / len(off))[0]),
         'kept_within': float((length < TOLERANCE).mean()),

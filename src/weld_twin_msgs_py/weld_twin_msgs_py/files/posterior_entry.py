@@ -14,8 +14,10 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.effects import effects_from_list
 from weld_twin_core.errors import DataError, ModelError
+from weld_twin_core.twin.directions import Directions
+from weld_twin_core.twin.discrepancy import Discrepancy
 from weld_twin_core.twin.domain import Domain
-from weld_twin_core.twin.posterior import Directions, Discrepancy, Posterior
+from weld_twin_core.twin.posterior import Posterior
 from weld_twin_core.twin.spots import Spots
 
 from .diagnosis_model import read_diagnosis

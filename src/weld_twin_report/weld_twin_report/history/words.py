@@ -15,7 +15,7 @@ from weld_twin_core.arm.rotation import rotation_vector
 from weld_twin_core.arrays import Array
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.history import Change, Observation, changes, outlook, reaches
-from weld_twin_core.twin.posterior import CURVE
+from weld_twin_core.twin.directions import CURVE
 from weld_twin_nodes.wording.quantities import display_unit, millimetres, odds, uncertain
 from weld_twin_nodes.wording.words import cause
 

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from ...arrays import Array
 from ...effects.dated import of_the_robot
 from ...recording import Recording
+from ...twin.directions import Directions
 from ...twin.domain import Domain
-from ...twin.posterior import Directions, Posterior, postures_within_limits, usual_sigma
+from ...twin.posterior import Posterior, postures_within_limits, usual_sigma
 from ...twin.reversals import is_play, lost_motion
 from ...twin.twin import Twin
 from ..algebra.definite import inverted
@@ -133,13 +134,24 @@ def _with_usual_sigma(posterior: Posterior, model: Model, problem: Problem) -> P
     """Return the posterior with its usual size where it was recorded, and anywhere."""
     seen = np.concatenate([_joints(r) for r in problem.recordings])
     spread = np.linspace(0, seen.shape[0] - 1, min(seen.shape[0], POSTURES)).round().astype(int)
-    twin = Twin(model.twin(0).robot, of_the_robot(model.known + model.found))
     anywhere = postures_within_limits(model.robot, POSTURES)
     return replace(
         posterior,
-        recorded_m=usual_sigma(posterior, twin, seen[spread]),
-        anywhere_m=usual_sigma(posterior, twin, anywhere),
+        recorded_m=corrected_sigma(posterior, model, seen[spread]),
+        anywhere_m=corrected_sigma(posterior, model, anywhere),
     )
+
+
+def corrected_sigma(posterior: Posterior, model: Model, q: Array) -> float:
+    """
+    Return how far a robot may be off that is corrected by a model, at postures at rest [m].
+
+    What a diagnosis warns of and what `planned` promises. `usual_sigma` says which number.
+
+    q: shape (M, n).
+    """
+    twin = Twin(model.twin(0).robot, of_the_robot(model.known + model.found))
+    return usual_sigma(posterior, twin, q)
 
 
 def _expected(problem: Problem, scale: Scale) -> float:

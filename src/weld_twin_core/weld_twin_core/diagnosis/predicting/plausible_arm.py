@@ -15,8 +15,9 @@ from ...arrays import Array
 from ...effects.effect import Effect
 from ...effects.plausible import spreads
 from ...effects.registry import REGISTRY
+from ...twin.directions import Directions
+from ...twin.discrepancy import Discrepancy
 from ...twin.features import joints_of
-from ...twin.posterior import Directions, Discrepancy
 from .leftover import Rest
 
 FRAME_WIDTHS = (0.05, 0.05)

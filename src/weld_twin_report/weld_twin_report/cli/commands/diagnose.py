@@ -207,14 +207,11 @@ def _read(
 
 def _in_region(result: Diagnosis, reported: str, judged: Array) -> Diagnosis:
     """Return the diagnosis with what to expect in a region that was asked for."""
-    from weld_twin_core.effects.dated import of_the_robot
-    from weld_twin_core.twin.posterior import usual_sigma
-    from weld_twin_core.twin.twin import Twin
+    from weld_twin_core.diagnosis.predicting.allowed import corrected_sigma
 
     if result.posterior is None:
         return result
-    twin = Twin(result.model.twin(0).robot, of_the_robot(result.model.known + result.model.found))
-    sigma = usual_sigma(result.posterior, twin, judged)
+    sigma = corrected_sigma(result.posterior, result.model, judged)
     return replace(result, posterior=replace(result.posterior, region=(reported, sigma)))
 
 

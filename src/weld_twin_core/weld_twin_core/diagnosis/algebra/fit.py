@@ -22,7 +22,7 @@ from scipy.linalg import LinAlgError
 from ...arm.rotation import rotation_vector
 from ...arrays import Array
 from ...effects.plausible import spreads
-from .columns import designed
+from .columns import Columns, designed
 from .definite import factored, unit_diagonal
 from .independent_rows import measured_axes, robust_spread
 from .problem import Model, Problem, Scale
@@ -30,6 +30,8 @@ from .problem import Model, Problem, Scale
 STRAIGHT = 1e-6
 """Share of what is left by which a step may miss what its equations foretold, for it to be the last:
 where the residual is as good as linear, another step finds nothing."""
+STEADY = 1e-3
+"""The same share up to which columns serve for the next step, too: they have hardly turned."""
 DAMPING, DAMPED = 1e-9, 1e6
 """Least and greatest damping of a step, in units of the columns: from Gauss-Newton to none."""
 HUBER = 3.0
@@ -154,11 +156,24 @@ def fit(
     return Fit(here.model, here.residual)
 
 
+def foretold(
+    problem: Problem, model: Model, scale: Scale, columns: Columns
+) -> tuple[Array, float]:
+    """
+    Return the whitened residual of a model, and about the sum of squares that its fit will leave.
+
+    columns: of its frames and found effects, at a model close by.
+    """
+    start = _Point.at(problem, model, scale, effect_precision(model))
+    normal, right = start.normal_equations(columns)
+    return start.residual, start.cost - float(right @ solve_scaled(normal, right, DAMPING))
+
+
 def _descended(start: _Point, iterations: int, tolerance: float) -> _Point:
     """Return the place that Levenberg and Marquardt lead to."""
-    here, damping = start, DAMPING
+    here, damping, columns = start, DAMPING, start.columns()
     for _ in range(iterations):
-        there, (normal, right) = None, here.normal_equations
+        there, (normal, right) = None, here.normal_equations(columns)
         while damping < DAMPED:
             step = solve_scaled(normal, right, damping)
             there = here.stepped(step)
@@ -168,10 +183,12 @@ def _descended(start: _Point, iterations: int, tolerance: float) -> _Point:
         if there is None:
             break
         gain = (here.cost - there.cost) / max(here.cost, 1e-300)
-        foretold = here.cost - float((2.0 * right - normal @ step) @ step)
+        missed = abs(there.cost - here.cost + float((2.0 * right - normal @ step) @ step))
         here, damping = there, max(damping * 0.01, DAMPING)
-        if gain < tolerance or abs(there.cost - foretold) < STRAIGHT * there.cost:
+        if gain < tolerance or missed < STRAIGHT * there.cost:
             break
+        if missed > STEADY * there.cost:
+            columns = here.columns()
     return here
 
 
@@ -201,10 +218,12 @@ class _Point:
         cost = float(residual @ residual + ridge @ x**2)
         return cls(problem, scale, prior, model, residual, ridge, x, cost, share)
 
-    @cached_property
-    def normal_equations(self) -> tuple[Array, Array]:
-        """Return normal matrix and right-hand side of a step, the priors included."""
-        columns = designed(self.problem, self.model, self.scale)
+    def columns(self) -> Columns:
+        """Return the columns of frames and effects here."""
+        return designed(self.problem, self.model, self.scale)
+
+    def normal_equations(self, columns: Columns) -> tuple[Array, Array]:
+        """Return normal matrix and right-hand side of a step by columns, the priors included."""
         right = columns.times(self.residual) - self.ridge * self.x
         normal = columns.normal()
         normal[np.diag_indices_from(normal)] += self.ridge

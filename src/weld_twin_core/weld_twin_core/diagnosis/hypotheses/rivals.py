@@ -76,7 +76,7 @@ def rivals(work: Workspace, now: Fit, k: int, others: Sequence[Other] = ()) -> t
     others: sets that do without something found: what takes its place may need company.
     """
     place = Site.of(now.model.found[k])
-    rest = work.without(now, k).fit
+    rest = work.without(now, k)
     ranked = work.ranked(rest, work.effective(now), roles=Role)
     own = next((c for c in ranked if c.unit.site == place), None)
     # Started from what the others are beside the found effect: without it they may have gone far off.

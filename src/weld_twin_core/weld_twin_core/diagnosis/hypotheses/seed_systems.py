@@ -117,7 +117,9 @@ class SeedSystems:
         return SeedSystems(tuple(alike), rss)
 
 
-def grown(alike: Alike, rss: float, effective: float) -> tuple[NDArray[np.bool_], Array]:
+def grown(
+    alike: Alike, rss: float, effective: float, least: float = -np.inf
+) -> tuple[NDArray[np.bool_], Array]:
     """
     Return which columns of every seed are worth it, bool (S, K), and their evidence [nats], (S,).
 
@@ -126,6 +128,7 @@ def grown(alike: Alike, rss: float, effective: float) -> tuple[NDArray[np.bool_]
 
     rss: sum of squares of the residual.
     effective: number of independent rows.
+    least: evidence [nats] up to which it does not matter which columns are worth it.
     """
     diagonal, eye = np.einsum('sii->si', alike.normal), np.eye(alike.right.shape[1])
     live = diagonal > FLAT * alike.size
@@ -134,11 +137,15 @@ def grown(alike: Alike, rss: float, effective: float) -> tuple[NDArray[np.bool_]
     remaining = np.where(both, alike.normal / (unit[:, :, None] * unit[:, None]), eye)
     remaining, pull = remaining + SINGULAR * eye, np.where(live, alike.right / unit, 0.0)
     count, together = live.sum(axis=1, dtype=np.float64), np.full(len(live), -np.inf)
+    hopeful = np.ones(len(live), bool)
     if (several := count > 1).any():
         all_at_once = np.linalg.solve(remaining[several], pull[several, :, None])[..., 0]
         gains = (pull[several] * all_at_once).sum(axis=1)
         together[several] = evidences(rss, gains, count[several], effective)
-    rest, chosen, growing = live.copy(), np.zeros(live.shape, bool), np.arange(len(live))
+        # No choice of columns explains more than all of them, nor costs less than one.
+        hopeful[several] = evidences(rss, gains, 1.0, effective) > least
+    rest, chosen, growing = live.copy(), np.zeros(live.shape, bool), np.flatnonzero(hopeful)
+    remaining, pull = remaining[growing], pull[growing]
     worth, gain = np.full(len(live), -np.inf), np.zeros(len(live))
     for step in range(live.shape[1]):
         falls = np.where(rest[growing], pull**2 / np.einsum('sii->si', remaining), -1.0)
@@ -241,7 +248,7 @@ def ranking(
     least: evidence [nats] that a choice must exceed.
     roles: which units are asked.
     """
-    each = [grown(alike, systems.rss, effective) for alike in systems.alike]
+    each = [grown(alike, systems.rss, effective, least) for alike in systems.alike]
     first = np.cumsum([0, *(len(unit.seeds) for unit in units)])
     log_bayes_factor, group = np.full(first[-1], -np.inf), np.zeros(first[-1], int)
     row = np.zeros(first[-1], int)

@@ -27,6 +27,8 @@ MANY = 5000
 """Joint positions from which `forward` leaves the work to `bulk`..."""
 _MOST_JOINTS = 8
 """... and joints up to which it does: there the work grows threefold with every other joint."""
+_RIGHT = 1e-15
+"""Cosine up to which an angle is a right one, as most twists of links are: rounding."""
 
 
 class _RowAxes(NamedTuple):
@@ -118,6 +120,8 @@ def _turn(first: Array, second: Array, angle: Array) -> tuple[Array, Array]:
     if _nothing(angle):
         return first, second
     cosine, sine = np.cos(angle), np.sin(angle)
+    if isinstance(angle, float) and abs(cosine) < _RIGHT:
+        return second * sine, first * -sine
     return first * cosine + second * sine, second * cosine - first * sine
 
 

@@ -23,8 +23,9 @@ from .poses import Poses, posed
 _CLOCK_ROUNDS = 3
 """Rounds that find the stamp of an instant: each leaves a ten-thousandth, the rate of a clock."""
 _POINTWISE = (Stage.JOINT, Stage.LOAD, Stage.ELASTIC, Stage.LINK, Stage.POSE)
-_SETTLING_ROUNDS = 3
-"""Rounds in which springs settle: each leaves a hundredth, how much a sag changes its own load."""
+_SETTLING_ROUNDS = 2
+"""Rounds in which springs settle: each leaves a hundredth, how much a sag changes its own load, so
+that a millionth of the sag is left."""
 
 
 @dataclass(frozen=True, eq=False)

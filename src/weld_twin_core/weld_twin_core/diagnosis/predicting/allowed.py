@@ -246,10 +246,14 @@ class Conditioning:
 
     def __init__(self, rows: Rows, prior: Prior, width: Array, noise: float) -> None:
         self._prior, self._width = prior, width
-        self._unit = np.sqrt(rows.share / noise) * rows.columns * width[:, None]
-        self._wanted = np.sqrt(rows.share / noise) * rows.residual
-        self._system = self._unit @ self._unit.T
-        self._right = self._unit @ self._wanted
+        self._rows, self._sure = rows, rows.share / noise
+        self._system, self._right = self._of(slice(None))
+
+    def _of(self, some: slice | NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Return normal matrix and right-hand side of some rows, coordinates in their widths."""
+        columns, width = self._rows.columns[:, some], self._width
+        normal = self._sure * np.outer(width, width) * (columns @ columns.T)
+        return normal, self._sure * width * (columns @ self._rows.residual[some])
 
     def given(self, but: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
         """
@@ -259,8 +263,8 @@ class Conditioning:
         """
         system, right, width = self._system, self._right, self._width
         if but is not None:
-            less = self._unit[:, but]
-            system, right = system - less @ less.T, right - less @ self._wanted[but]
+            less, pull = self._of(but)
+            system, right = system - less, right - pull
         inverse = inverted(with_prior(system.copy()))
         right = right - system @ (self._prior.middle / width)
         mean = self._prior.middle + width * (inverse @ right)

@@ -85,7 +85,8 @@ class Foretold:
     error: Array
     """What was measured less what was foretold, shape (N, 6)."""
     ways: Array
-    """In which what was foretold may be off, each of one standard deviation, shape (R, N, 6)."""
+    """In which what was foretold may be off, each of one standard deviation, shape (R, N, 6);
+    (R, N, 3) of points."""
     levers: Array
     """d pose / d joint, shape (n, N, 6)."""
     seen: NDArray[np.bool_]
@@ -102,7 +103,7 @@ class Foretold:
     """What is left of a sample, shape (N, 6). Of stations, which many coordinates follow closely, it is
     the error. Of a motion it is what the middle of the models leaves that all regions allow."""
     own: Array
-    """The ways that belong to it, shape (R, N, 6): a middle that followed the samples hides so much."""
+    """The ways that belong to it, shaped alike: a middle that followed the samples hides so much."""
 
     @classmethod
     def of(
@@ -129,8 +130,11 @@ class Foretold:
             weights[place[0]]
         )
 
-        def by_sample(rows: Array) -> Array:
-            out = np.zeros((*rows.shape[:-1], *seen.shape))
+        # The ways are the most numbers of all: points have no turns to be kept.
+        wide = 3 if max(problem.rows) <= 3 else 6
+
+        def by_sample(rows: Array, width: int = 6) -> Array:
+            out = np.zeros((*rows.shape[:-1], len(seen), width))
             out[..., place[0], place[1]] = rows * unit
             return out
 
@@ -142,7 +146,7 @@ class Foretold:
         use = good[place[0]]
         return cls(
             by_sample(error),
-            by_sample(ways),
+            by_sample(ways, wide),
             by_sample(levers),
             seen,
             labels[np.flatnonzero(place[1] == 0)].astype(int),
@@ -150,7 +154,7 @@ class Foretold:
             _middle(error[use], ways[-1, use], labels[use]),
             problem.at_rest,
             by_sample(left),
-            by_sample(own),
+            by_sample(own, wide),
         )
 
     def axes(self, part: slice) -> tuple[Array, Array, Array]:
@@ -272,7 +276,8 @@ def _at_turns(problem: Problem, foretold: Foretold, lost: Array) -> Array:
     use = foretold.good & foretold.seen[:, :3].all(axis=1)
     if not lost.any() or problem.at_rest or not use.any():
         return out
-    open_ = (foretold.ways[:, use, :3] ** 2).sum(axis=0)
+    ways = foretold.ways[:, use, :3]
+    open_ = np.einsum('rki,rki->ki', ways, ways)
     excess = (foretold.error[use, :3] ** 2 - open_).mean(axis=1)
     near = np.concatenate([_turned(problem, k) for k in range(len(problem.recordings))])[use]
     for i in np.flatnonzero(lost):
@@ -400,7 +405,7 @@ def _in_common(problem: Problem, foretold: Foretold) -> float:
         here = np.flatnonzero((foretold.region == region) & foretold.good)
         for size, order, starts in _neighbours(problem, here):
             error, ways = foretold.left[order, :3], foretold.own[:, order, :3]
-            alone = np.stack([error**2, (ways**2).sum(axis=0), foretold.seen[order, :3]])
+            alone = np.stack([error**2, np.einsum('rki,rki->ki', ways, ways), foretold.seen[order, :3]])
             each = np.add.reduceat(alone, starts, axis=1)
             together = [
                 np.add.reduceat(error, starts) ** 2,

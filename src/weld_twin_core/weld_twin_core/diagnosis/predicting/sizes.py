@@ -139,9 +139,10 @@ def hidden(rows: Rows, frames: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """
     columns = rows.columns
     basis = np.linalg.svd(columns[frames], full_matrices=False)[2]
-    own = np.linalg.norm(columns, axis=1) if rows.moved is None else rows.moved
-    remaining = np.linalg.norm(columns - (columns @ basis.T) @ basis, axis=1)
-    return np.asarray(~frames & (remaining <= OPEN * own))
+    square = np.einsum('ij,ij->i', columns, columns)
+    own = square if rows.moved is None else rows.moved**2
+    remaining = square - ((columns @ basis.T) ** 2).sum(axis=1)
+    return np.asarray(~frames & (remaining <= OPEN**2 * own))
 
 
 @dataclass
@@ -168,8 +169,9 @@ class _Chain:
 
     def __post_init__(self) -> None:
         rows, prior = self.rows, self.prior
-        unit = rows.columns * prior.width[:, None]
-        self.normal, self.right = rows.share * unit @ unit.T, rows.share * unit @ rows.residual
+        width = prior.width
+        self.normal = rows.share * np.outer(width, width) * (rows.columns @ rows.columns.T)
+        self.right = rows.share * width * (rows.columns @ rows.residual)
         self.middle = prior.middle / prior.width
         self.hidden = hidden(rows, prior.group < 0)
         self.small = (prior.group >= 0) & ~self.hidden

@@ -42,7 +42,7 @@ def test_alternatives_are_fitted_from_what_the_others_are_beside_what_was_found(
     problem, model = tiny(TRUE)
     work, now = search.workspace(problem, model.with_found(TRUE), (), Beliefs())
     beside = now.model.found[1]
-    alone = work.without(now, 0).fit.model.found[0]
+    alone = work.without(now, 0).model.found[0]
     assert abs(alone.number('da') - beside.number('da')) > 1e-5
     starts = []
     monkeypatch.setattr(

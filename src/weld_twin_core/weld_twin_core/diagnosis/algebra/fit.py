@@ -30,7 +30,7 @@ from .problem import Model, Problem, Scale
 STRAIGHT = 1e-6
 """Share of what is left by which a step may miss what its equations foretold, for it to be the last:
 where the residual is as good as linear, another step finds nothing."""
-STEADY = 1e-3
+STEADY = 1e-4
 """The same share up to which columns serve for the next step, too: they have hardly turned."""
 DAMPING, DAMPED = 1e-9, 1e6
 """Least and greatest damping of a step, in units of the columns: from Gauss-Newton to none."""
@@ -133,6 +133,7 @@ def fit(
     precision: Array | None = None,
     iterations: int = 12,
     tolerance: float = 1e-5,
+    most: float = np.inf,
 ) -> Fit:
     """
     Return the most probable nuisance frames and coordinates of the found effects.
@@ -144,15 +145,18 @@ def fit(
     precision: prior precision of every effect coordinate, about zero, in whitened units, shape
     (K,); that of machines at large when left out.
     tolerance: stops when the objective falls by less than this share.
+    most: stops where a step is foretold to leave more than this, whitened squares.
     """
     prior = effect_precision(model) if precision is None else precision
-    here = _descended(_Point.at(problem, model, scale, prior), iterations, tolerance)
+    here = _descended(_Point.at(problem, model, scale, prior), iterations, tolerance, most)
     if problem.at_rest and here.believed > STRAINED and scale.position > LEAST_NOISE:
         # What a cause that is not fitted yet leaves was taken for noise, beside which few stations
         # weigh less than a belief.
         share = (LEAST_NOISE / scale.position) ** 2
         start = _Point.at(problem, model, scale, prior, share)
-        here = min(here, _descended(start, iterations, tolerance), key=lambda one: one.surprise)
+        here = min(
+            here, _descended(start, iterations, tolerance, most), key=lambda one: one.surprise
+        )
     return Fit(here.model, here.residual)
 
 
@@ -169,13 +173,16 @@ def foretold(
     return start.residual, start.cost - float(right @ solve_scaled(normal, right, DAMPING))
 
 
-def _descended(start: _Point, iterations: int, tolerance: float) -> _Point:
+def _descended(start: _Point, iterations: int, tolerance: float, most: float) -> _Point:
     """Return the place that Levenberg and Marquardt lead to."""
     here, damping, columns = start, DAMPING, start.columns()
     for _ in range(iterations):
         there, (normal, right) = None, here.normal_equations(columns)
         while damping < DAMPED:
             step = solve_scaled(normal, right, damping)
+            foretold = here.cost - float((2.0 * right - normal @ step) @ step)
+            if foretold > most:
+                return here
             there = here.stepped(step)
             if there.cost <= here.cost:
                 break
@@ -183,7 +190,7 @@ def _descended(start: _Point, iterations: int, tolerance: float) -> _Point:
         if there is None:
             break
         gain = (here.cost - there.cost) / max(here.cost, 1e-300)
-        missed = abs(there.cost - here.cost + float((2.0 * right - normal @ step) @ step))
+        missed = abs(there.cost - foretold)
         here, damping = there, max(damping * 0.01, DAMPING)
         if gain < tolerance or missed < STRAIGHT * there.cost:
             break

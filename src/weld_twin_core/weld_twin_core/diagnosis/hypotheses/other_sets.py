@@ -177,7 +177,7 @@ def _others(work: Workspace, now: Fit, sets: Sets) -> list[Other]:
         other = sets.without([c for c in chosen if c.unit.site != place], place)
         if other and sets.worth(other) > least:
             own = _fitted(work, now, other)
-            if not implausible(own.model):
+            if own.rss < work.hopeless(now) and not implausible(own.model):
                 out.append(Other(place, own, ahead(work, own, now)))
     return out
 
@@ -189,7 +189,7 @@ def _fitted(work: Workspace, now: Fit, chosen: Sequence[Choice]) -> Fit:
     for choice in chosen:
         if choice.unit.site not in known:
             result = merged(result, choice.effect())
-    return work.fitted(now.model.with_found(result), 8)
+    return work.fitted(now.model.with_found(result), 8, work.hopeless(now))
 
 
 def ahead(work: Workspace, own: Fit, now: Fit) -> float:

@@ -25,9 +25,9 @@ from .starts import started
 
 SHORTLIST = 4
 """Units tried with a full nonlinear fit at every step, where the linear ranking may mislead."""
-CLEARLY = 10.0
-"""Times the evidence to enter from which on an effect is needed for certain, foretold by a linear step
-without it: others that bend take over some of it, but not nine tenths."""
+FAR, FAR_SHARE = 60.0, 1.5
+"""Evidence [nats] behind, and times what is left, from which on a fit that a linear step foretells is
+not worth doing: others that bend take over some of what is missing, but not a third."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,14 +102,18 @@ class Workspace:
             place = end
         return out
 
-    def fitted(self, model: Model, iterations: int = 4) -> Fit:
-        """Return the fit of a model that is nearly there."""
-        return fit(self.problem, model, self.scale, None, iterations)
+    def fitted(self, model: Model, iterations: int = 4, most: float = np.inf) -> Fit:
+        """Return the fit of a model that is nearly there; of one that leaves too much, a sketch."""
+        return fit(self.problem, model, self.scale, None, iterations, most=most)
 
     def fitted_with(self, model: Model, effect: Effect) -> Fit:
         """Return the fit of a model with one more effect, merged where its kind can merge."""
         effect = started(self.problem, model, self.scale, effect)
         return self.fitted(model.with_found(merged(model.found, effect)), 5)
+
+    def hopeless(self, now: Fit) -> float:
+        """Return the sum of squares from which on nothing can take the place of what was found."""
+        return now.rss * max(float(np.exp(2.0 * FAR / self.effective(now))), FAR_SHARE)
 
     def beside(self, now: Fit) -> SeedSystems:
         """Return the normal equations of all seeds given a fit: its frames and effects fitted."""
@@ -230,20 +234,14 @@ def backward(work: Workspace, now: Fit) -> Fit:
     beliefs = work.beliefs
     while now.model.found:
         less, count = work.foretold_without(now), work.effective(now)
-        freedoms = [effect.fit.coordinates().size for effect in now.model.found]
+        worth = dict[int, float]()
         most = beliefs.negligible if len(less) > 1 else beliefs.invisible
-
-        def worth(k: int, rss: float) -> float:
-            return evidence(rss, rss - now.rss, freedoms[k], count)  # noqa: B023
-
-        least = CLEARLY * beliefs.enter_nats
-        doubtful = {
-            k: worth(k, work.without(now, k).rss)
-            for k, (rss, _) in enumerate(less)
-            if worth(k, rss) < least
-        }
-        k = min(doubtful, key=doubtful.__getitem__, default=-1)
-        if k < 0 or doubtful[k] >= beliefs.enter_nats:
+        for k in (k for k, (rss, _) in enumerate(less) if rss < work.hopeless(now)):
+            one = work.without(now, k)
+            freedom = now.coordinates.size - one.coordinates.size
+            worth[k] = evidence(one.rss, one.rss - now.rss, freedom, count)
+        k = min(worth, key=worth.__getitem__, default=-1)
+        if k < 0 or worth[k] >= beliefs.enter_nats:
             k = int(np.argmin([size for _, size in less]))
             if less[k][1] > most:
                 break

@@ -123,15 +123,10 @@ class Foretold:
         """
         error, ways = unseen.whole, _by_others(unseen, columns, given)
         problem, scale, labels = unseen.problem, unseen.scale, unseen.labels
-        weights, counts = np.concatenate(scale.weights), np.repeat(problem.rows, problem.samples)
-        seen = np.arange(6) < counts[:, None]
-        place = np.nonzero(seen)
-        unit = np.repeat([scale.position, scale.orientation], 3)[place[1]] / np.sqrt(
-            weights[place[0]]
-        )
-
-        # The ways are the most numbers of all: points have no turns to be kept.
-        wide = 3 if max(problem.rows) <= 3 else 6
+        seen = np.arange(6) < np.repeat(problem.rows, problem.samples)[:, None]
+        place, wide = np.nonzero(seen), 3 if max(problem.rows) <= 3 else 6
+        unit = np.repeat([scale.position, scale.orientation], 3)[place[1]]
+        unit /= np.sqrt(np.concatenate(scale.weights)[place[0]])
 
         def by_sample(rows: Array, width: int = 6) -> Array:
             out = np.zeros((*rows.shape[:-1], len(seen), width))
@@ -405,7 +400,9 @@ def _in_common(problem: Problem, foretold: Foretold) -> float:
         here = np.flatnonzero((foretold.region == region) & foretold.good)
         for size, order, starts in _neighbours(problem, here):
             error, ways = foretold.left[order, :3], foretold.own[:, order, :3]
-            alone = np.stack([error**2, np.einsum('rki,rki->ki', ways, ways), foretold.seen[order, :3]])
+            alone = np.stack(
+                [error**2, np.einsum('rki,rki->ki', ways, ways), foretold.seen[order, :3]]
+            )
             each = np.add.reduceat(alone, starts, axis=1)
             together = [
                 np.add.reduceat(error, starts) ** 2,

@@ -182,9 +182,9 @@ class Beliefs:
     hundreds the difference of real physics from every group decides, no longer the noise."""
 
     beaten_share: float = 0.15
-    """Share of the squared error left by the effects named that a free form must take away on
-    unseen stretches for the names to be doubted. A cause named rightly leaves noise, of which no
-    curve predicts any; the share leaves room for what real gears are beyond their formulas."""
+    """Share of the squared error left that a free form must take away on unseen stretches to be
+    carried beside names, or to show that it is no noise. A cause named rightly leaves noise, of which
+    no curve predicts any; the share leaves room for what real gears are beyond their formulas."""
 
     beaten_steady: float = 2.0
     """The same in standard errors between stretches."""

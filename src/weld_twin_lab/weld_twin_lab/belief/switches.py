@@ -61,7 +61,7 @@ MECHANISMS = {
     'many_setup': Mechanism('many.small_errors', 'with_setup', second),
     'many_frames': Mechanism('many.small_errors', '_apart_from_frames', third),
     'held_out_likes': Mechanism('unseen.held_out_shrink', '_exchanged', first),
-    'scatter': Mechanism('levels.scatter', 'scatter', nothing),
+    'formulas_scatter': Mechanism('levels.scatter', 'scatter', nothing),
     'whole_arm': Mechanism('unseen.groups', '_of_all', nothing),
     'none_against_curves': Mechanism('pipeline', 'no_noise', first),
     'open_frames': Mechanism('pipeline', '_held', first),

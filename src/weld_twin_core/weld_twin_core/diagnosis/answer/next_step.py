@@ -57,8 +57,8 @@ _Explanation = tuple[Effect, ...]
 def next_step(
     result: Search,
     verdict: Verdict,
-    limits: Limits | None = None,
-    alternative: Curved | None = None,
+    limits: Limits,
+    alternative: Curved | None,
 ) -> dict[str, Any] | None:
     """
     Return the next experiment as `next_experiment` does, None when the question is closed.
@@ -66,7 +66,6 @@ def next_step(
     The verdict has the confidence that it has earned; ``alternative`` explains the gap without a
     formula.
     """
-    limits = limits or Limits()
     if result.problem.untracked:
         return _touches(result, verdict)
     wanted = _parting(result, verdict, limits, alternative)

@@ -51,8 +51,6 @@ class Scatter(NamedTuple):
     joint: str
     share: float
     """Of the squared noise."""
-    size: float
-    """RMS in units of noise."""
     steady: float
     """The share in its standard errors between stretches."""
 
@@ -93,8 +91,7 @@ def scatter(result: Search, unseen: Unseen) -> list[Scatter]:
     return [
         Scatter(
             joint,
-            float(whole[at] * sizes[at] / sizes[-2]),
-            float(np.sqrt(whole[at] * sizes[at] / sizes[-1])),
+            float(whole[at] * sizes[at] / sizes[-1]),
             float(whole[at] / max(error[at], 1e-300)),
         )
         for at, joint in enumerate(names, start=whole.size - len(names))
@@ -119,9 +116,9 @@ def _ways(maker: Features) -> Array:
 
 def _products(remaining: Array, ways: Array) -> tuple[Array, Array, Array]:
     """
-    Return the variances' normal equations, (stretches, K, K) and (stretches, K), and sizes, (K + 2,).
+    Return the variances' normal equations, (stretches, K, K) and (stretches, K), and sizes, (K + 1,).
 
-    Sizes are the sums of squares of each way and of the differences, and the number of rows.
+    Sizes are the sums of squares of each way and of the differences.
 
     remaining: differences in units of noise, shape (M, c).
     ways: shape (K, c, M).
@@ -132,9 +129,7 @@ def _products(remaining: Array, ways: Array) -> tuple[Array, Array, Array]:
     return (
         np.moveaxis(np.add.reduceat(cross, ends, axis=-1), -1, 0),
         np.moveaxis(np.add.reduceat(along, ends, axis=-1), -1, 0),
-        np.array(
-            [*(ways**2).sum(axis=(1, 2)), float((remaining**2).sum()), float(remaining.size)]
-        ),
+        np.append((ways**2).sum(axis=(1, 2)), (remaining**2).sum()),
     )
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Literal
@@ -394,9 +395,14 @@ class Recording:
     def _at_measured(self) -> tuple[Array, Array, Array | None, Array | None, Array | None]:
         assert self.measured is not None
         result = self._looked_up(self.measured.t)
-        for value in result:
-            if value is not None:
-                value.setflags(write=False)
+        _kept(result)
+        return result
+
+    @cached_property
+    def sides_at_joints(self) -> list[Array | None]:
+        """Return wrench, temperature and effort at the joint stamps, worked out once."""
+        result = [None if side is None else side.at(self.joints.t) for side in self.sides]
+        _kept(result)
         return result
 
     def _looked_up(
@@ -502,3 +508,10 @@ class Recording:
             )
             out = replace(out, joints=kept, notes=(*out.notes, note))
         return out
+
+
+def _kept(values: Iterable[Array | None]) -> None:
+    """Make arrays that are handed out again and again read-only."""
+    for value in values:
+        if value is not None:
+            value.setflags(write=False)

@@ -215,7 +215,9 @@ class Twin(EffectStages):
     def joint_view(self, recording: Recording) -> View:
         """Return what effects with memory see: the commanded motion on its own stamps."""
         motion = recording.joints
-        return self._seen(recording, motion.t, motion.q, motion.causal_velocity, _sides(recording))
+        return self._seen(
+            recording, motion.t, motion.q, motion.causal_velocity, recording.sides_at_joints
+        )
 
     def _seen(
         self, recording: Recording, t: Array, q: Array, qd: Array, sides: Sequence[Array | None]
@@ -236,7 +238,7 @@ class Twin(EffectStages):
         moved, tangents = run_all(self.effects, self.joint_view(recording), want)
         if at is None:
             t, q, qd = motion.t, motion.q, motion.causal_velocity
-            sides = _sides(recording)
+            sides = recording.sides_at_joints
             picker = None
         else:
             t = np.asarray(at, dtype=np.float64)
@@ -264,9 +266,3 @@ class Twin(EffectStages):
     def live(self) -> LiveTwin:
         """Return a stepper that gives the same poses one joint state at a time."""
         return LiveTwin(self)
-
-
-def _sides(recording: Recording) -> list[Array | None]:
-    """Return wrench, temperature and effort at the joint stamps."""
-    t = recording.joints.t
-    return [side if side is None else side.at(t) for side in recording.sides]

@@ -26,8 +26,9 @@ from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View
 from .wording import number
 
-_CHANGED = 0.2
-"""Share of the largest moment by which it must change: with less, a lean is a base pose."""
+_CHANGED = 1e-6
+"""Share of the largest moment by which it must change, above rounding: without any, a lean is a base
+pose. Whether the data show a small change, the fits of both say."""
 
 
 @register
@@ -82,7 +83,7 @@ class PedestalTilt(LinearEffect):
         moment = np.stack(_moments(view))
         change = np.linalg.norm(np.ptp(moment, axis=-1))
         if change <= _CHANGED * np.linalg.norm(moment, axis=0).max(initial=0.0):
-            return 'the moment on the pedestal hardly changes'
+            return 'the moment on the pedestal does not change'
         return None
 
     def remedy(self, robot: Robot) -> str:

@@ -13,22 +13,35 @@ from weld_twin_core.effects import REGISTRY, Backlash, GearRatio, LinkLength
 ROBOT = wt.load('abb_irb120')
 SIZES = (40, 61, 23)
 KINDS = ('backlash', 'gear_ratio', 'link_length', 'joint_offset')
+NAMES = ROBOT.joint_names
+CAUSES = (Backlash(NAMES[0], 6e-4), GearRatio(NAMES[4], 1e-3), LinkLength(NAMES[1], 4e-4))
+
+
+def measured(name, t, q, *, static, rng):
+    """Return a recording of the arm with its causes."""
+    commanded = wt.Recording(name, wt.JointMotion(t, q, static=static))
+    seen = wt.Twin(ROBOT, CAUSES).poses(commanded, t).position
+    noise = 2e-5 * rng.standard_normal(seen.shape)
+    return commanded.with_measured(wt.Measurements(t, seen + noise))
 
 
 @pytest.fixture(scope='module')
 def recordings():
     """Return stations of an arm in three visits of its own postures, some visited each time."""
-    rng, names = np.random.default_rng(4), ROBOT.joint_names
-    causes = (Backlash(names[0], 6e-4), GearRatio(names[4], 1e-3), LinkLength(names[1], 4e-4))
+    rng = np.random.default_rng(4)
     same, out = rng.uniform(-0.6, 0.6, (8, 6)), []
     for k, count in enumerate(SIZES):
         q = np.concatenate([same, 0.2 * k + rng.uniform(-0.5, 0.5, (count - 8, 6))])
-        t = 5.0 * np.arange(count)
-        commanded = wt.Recording(f'visit {k}', wt.JointMotion(t, q, static=True))
-        seen = wt.Twin(ROBOT, causes).poses(commanded, t).position
-        noise = 2e-5 * rng.standard_normal(seen.shape)
-        out.append(commanded.with_measured(wt.Measurements(t, seen + noise)))
+        out.append(measured(f'visit {k}', 5.0 * np.arange(count), q, static=True, rng=rng))
     return out
+
+
+@pytest.fixture(scope='module')
+def swing():
+    """Return a recording of the arm in motion."""
+    t = np.arange(0.0, 8.0, 0.02)
+    q = 0.4 * np.sin(np.outer(t, 0.5 + 0.2 * np.arange(6)) + np.arange(6))
+    return measured('swing', t, q, static=False, rng=np.random.default_rng(5))
 
 
 @pytest.mark.parametrize('order', [(2, 1, 0), (1, 2, 0)])
@@ -44,13 +57,15 @@ def test_parts_left_out_are_the_same_in_any_order(recordings, order):
             np.testing.assert_array_equal(one[k], two[k])
 
 
-def test_a_diagnosis_says_the_same_in_any_order(recordings):
+@pytest.mark.parametrize('moving', [False, True])
+def test_a_diagnosis_says_the_same_in_any_order(recordings, swing, moving):
+    every = [*recordings[:2], swing] if moving else recordings
     rest = [name for name in REGISTRY if name not in KINDS]
     one, other = (
         wt.diagnose(given, ROBOT, align='tool', exclude=rest, experiment=False).as_dict()[
             'verdict'
         ]
-        for given in (recordings, recordings[::-1])
+        for given in (every, every[::-1])
     )
     assert [c['name'] for c in one['causes']]
     assert one['indistinguishable'] == other['indistinguishable']

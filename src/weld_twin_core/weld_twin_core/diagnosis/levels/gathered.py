@@ -54,7 +54,7 @@ def gathered(
         wandered=() if result.dense else tuple(unseen.wandered().tolist()),
         rows=result.effective(result.small),
         travel=tuple(np.max([np.ptp(r.joints.q, axis=0) for r in recordings], axis=0).tolist()),
-        stations=recordings[0].joints.static,
+        stations=any(recording.joints.static for recording in recordings),
     )
 
 

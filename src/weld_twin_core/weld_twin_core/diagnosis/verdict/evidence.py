@@ -61,7 +61,7 @@ class Evidence:
     travel: tuple[float, ...] = ()
     """How far every joint moves [rad, m]."""
     stations: bool = False
-    """Whether the arm stood still where it was measured."""
+    """Whether the arm stood still where it was measured, in one of the recordings at least."""
 
 
 Key = TypeVar('Key')

@@ -253,8 +253,8 @@ def forward(robot: Robot, q: ArrayLike, shift: Shift = NO_SHIFT) -> Array:
     >>> import numpy as np
     >>> import weld_twin_core as wt
     >>> pose = wt.forward(wt.load('ur5'), [0.0, -np.pi / 2, 0.0, 0.0, 0.0, 0.0])
-    >>> print(pose[:3, 3].round(4), 'm')
-    [-0.0947 -0.1914  0.9064] m
+    >>> print(pose[:3, 3].round(5), 'm')
+    [-0.09465 -0.19145  0.90641] m
 
     """
     q = positions(robot, q)

@@ -80,7 +80,7 @@ STEPS = 12
 
 OPEN = (
     {'effect': 'backlash', 'joint': 'shoulder_pan_joint', 'width': 8e-4},
-    {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': 3e-4},
+    {'effect': 'joint_offset', 'joint': 'elbow_joint', 'offset': -3e-4},
 )
 """Errors of another robot on the same seam: what the elbow has, its zero or play that the load takes
 up, moves the tool alike there."""

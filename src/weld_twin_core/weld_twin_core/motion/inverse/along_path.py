@@ -34,6 +34,8 @@ _NUDGE = 1e-3
 """Share of the way to a neighbour by which a singular pose is moved to see its postures."""
 _COMFORTABLE = 0.5
 """Distance from a joint limit [rad] beyond which more of it is worth nothing."""
+_SAME = 9
+"""Decimals in which the room of mirrored postures agrees; rounding shows in the fifteenth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +129,7 @@ def solve_path(robot: Robot, poses: Array, seed: Array | None = None) -> PathSol
     good = np.flatnonzero(failures == len(poses))
     if not good.size:
         raise ReachError(_explain(robot, tracks, failures, poses))
-    best = good[np.argmin(_ranks(robot, tracks[good], seed))]
+    best = good[_best_first(robot, tracks[good], seed)[0]]
     q = polish(robot, tracks[best], poses)[0]
     return PathSolution(robot, poses, q, kind or 'search')
 
@@ -185,7 +187,7 @@ def _followed(robot: Robot, poses: Array, seed: Array | None) -> Array:
             f'{robot.name} cannot reach sample 0 at {where(poses[0])}: the nearest the tool gets '
             f'is {gap(lacking)}; move the seam or turn the torch'
         )
-    best = np.argsort(_ranks(robot, starts[:, None], seed), kind='stable')
+    best = _best_first(robot, starts[:, None], seed)
     starts = starts[best[:_TRACKED]]
     index = np.unique(np.linspace(0, len(poses) - 1, _KNOTS).round().astype(int))
     knots = _track(robot, starts, poses[index])
@@ -226,16 +228,22 @@ def _first_failures(robot: Robot, q: Array, poses: Array) -> NDArray[np.intp]:
     return np.where(fails.any(axis=1), fails.argmax(axis=1), len(poses))
 
 
-def _ranks(robot: Robot, q: Array, seed: Array | None) -> Array:
-    """Return numbers (K,) that are smaller for better tracks (K, N, n)."""
+def _best_first(robot: Robot, q: Array, seed: Array | None) -> NDArray[np.intp]:
+    """
+    Return the order of tracks (K, N, n), the best first.
+
+    Mirrored postures have the same room. Of these the one that turns the joints least comes first:
+    rounding, which differs from machine to machine, must not decide.
+    """
     if seed is not None:
-        return np.asarray(np.linalg.norm(q[:, 0] - seed, axis=-1))
+        return np.argsort(np.linalg.norm(q[:, 0] - seed, axis=-1), kind='stable')
     some = q[:, :: max(1, q.shape[1] // 100)]
     chain = frames(robot, some)
     condition, _, margin = _posture(robot, some, chain)
     room = np.minimum(margin.min(axis=-1) / _COMFORTABLE, 1.0)
     suits = np.where(_above_base(robot, chain), 1.0, 0.1)
-    return np.asarray(-room / condition.max(axis=-1) * suits)
+    better = np.round(room / condition.max(axis=-1) * suits, _SAME)
+    return np.lexsort((np.linalg.norm(q[:, 0], axis=-1), -better))
 
 
 def _above_base(robot: Robot, chain: Frames) -> Mask:

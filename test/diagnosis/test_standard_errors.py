@@ -9,6 +9,7 @@ import pytest
 from diagnosis_cells import SIGMA, effect, known_scale, tiny
 from scipy.signal import lfilter
 
+import weld_twin_core as wt
 from weld_twin_core.diagnosis.algebra.fit import fit
 from weld_twin_core.diagnosis.answer.named_effects import standard_errors
 
@@ -74,3 +75,18 @@ def test_modes_that_fit_as_well_widen_the_error_of_a_frequency(slow):
     problem, model = tiny((true,), static=False, count=120)
     _, (std,) = errors(problem, model.with_found((true,)))
     assert (std['frequency'] > 1.0) is slow
+
+
+def test_a_spring_that_is_named_for_sure_is_known_to_more_than_its_own_size():
+    # What every arm has a little of can stand in for it, but so much of it at once is no likelier.
+    robot = wt.load('ur5')
+    motion = wt.plan(robot, wt.default_seam(robot, 'polyline'), 'smooth', rate_hz=50.0).motion
+    play = wt.effects.Backlash('shoulder_pan_joint', width=8e-4)
+    spring = wt.effects.JointCompliance('shoulder_lift_joint', compliance=8e-6)
+    commanded = wt.Recording('seam', motion)
+    real = wt.Twin(robot, [play, spring]).poses(commanded)
+    noise = np.random.default_rng(1).normal(scale=2e-5, size=real.position.shape)
+    seen = wt.Measurements(motion.t, real.position + noise, real.rotation)
+    told = wt.diagnose(commanded.with_measured(seen), robot, experiment=False)
+    (found,) = (e for e in told.effects if e.effect.name == 'joint_compliance')
+    assert abs(found.effect.compliance - 8e-6) < 2.0 * found.std['compliance'] < 4e-6

@@ -175,7 +175,10 @@ class _Chain:
         self.middle = prior.middle / prior.width
         self.hidden = hidden(rows, prior.group < 0)
         self.small = (prior.group >= 0) & ~self.hidden
-        self.size, self.noise = np.where(self.small, SIZES[2], 1.0), self.expected
+        # What was found is as large as it was found, or the chain may never come upon it.
+        off = np.log(np.maximum(np.abs(self.middle), 1e-300))[:, None] - np.log(SIZES)
+        start = np.where(self.middle == 0.0, SIZES[2], SIZES[np.abs(off).argmin(axis=1)])
+        self.size, self.noise = np.where(self.small, start, 1.0), self.expected
         self.belief = np.tile(BELIEF, (prior.gears.size, 1))
         n = prior.width.size
         zeros = (np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(2))

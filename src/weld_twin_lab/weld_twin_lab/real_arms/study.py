@@ -135,6 +135,8 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def table(entries: Sequence[Mapping[str, Any]]) -> str:
     """Return all rows and the figures as a page of Markdown."""
     lines = [
+        '# Real arms',
+        '',
         '| row | status | reported; borne out against all that is reported: bold | left beside '
         '| error over the best plain fit |',
         '|---|---|---|---|---|',

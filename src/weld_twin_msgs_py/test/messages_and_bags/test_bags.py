@@ -4,6 +4,7 @@ import os
 import shutil
 import tracemalloc
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -253,11 +254,11 @@ def test_a_bag_cut_short_gives_one_sentence_and_no_open_file(
     file = next(path for path in (tmp_path / 'bag').iterdir() if path.suffix != '.yaml')
     whole = file.read_bytes()
     file.write_bytes(whole[: int(share * len(whole))])
-    before = len(os.listdir('/proc/self/fd'))
     with pytest.raises(DataError, match=r"^bag '.*' is damaged or was cut short \(") as caught:
         read_recording(tmp_path / 'bag', robot)
     assert '\n' not in str(caught.value)
-    assert len(os.listdir('/proc/self/fd')) == before
+    opened = (Path(f'/proc/self/fd/{number}') for number in os.listdir('/proc/self/fd'))
+    assert file.resolve() not in {one.resolve() for one in opened}
 
 
 def test_damaged_metadata_is_refused(tmp_path, robot, recording):

@@ -171,14 +171,12 @@ class _Look(NamedTuple):
         The first was found while nothing else was known: a step may have stood for a trend. What
         is no more than chance beside the others goes.
         """
-        out = list(taken)
-        if len(out) < 2:
-            return out
-        for one in taken:
-            k = next(i for i, each in enumerate(out) if each is one)
-            rest = [result for i, (result, _) in enumerate(out) if i != k]
-            again = self.next(rest)
-            out[k : k + 1] = [again] if again else []
+        if len(taken) < 2:
+            return list(taken)
+        out: list[tuple[Found, Change]] = []
+        for k in range(len(taken)):
+            again = self.next([result for result, _ in (*out, *taken[k + 1 :])])
+            out += [again] if again else []
         return out
 
 

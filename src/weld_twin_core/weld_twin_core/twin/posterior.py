@@ -127,9 +127,7 @@ class Posterior:
 
         Raises ModelError: there is no such base frame.
         """
-        moved, rest, grown = self._ways(features, setup)
-        whole = np.einsum('rim,rjm->mij', moved, moved, optimize=True) + rest
-        return np.asarray(whole * grown[:, None, None] ** 2)
+        return _spread(*self._ways(features, setup))
 
     def expected(self, features: Features, setup: int = 0) -> Expected:
         """
@@ -140,8 +138,7 @@ class Posterior:
         Raises ModelError: there is no such base frame.
         """
         moved, rest, grown = self._ways(features, setup)
-        whole = np.einsum('rim,rjm->mij', moved[:-1], moved[:-1], optimize=True) + rest
-        return Expected(moved[-1].T, np.asarray(whole * grown[:, None, None] ** 2))
+        return Expected(moved[-1].T, _spread(moved[:-1], rest, grown))
 
     def position_ways(self, features: Features, setup: int = 0) -> tuple[Array, Array]:
         """
@@ -345,6 +342,12 @@ class Posterior:
         beyond, margins = self.domain.beyond(q), np.array(self.domain.margins)
         unlike = self.domain.unlike(recording, at)
         return Where(q, np.stack(joints), beyond, margins, unlike, turned)
+
+
+def _spread(moved: Array, rest: Array, grown: Array) -> Array:
+    """Return the second moment of poses, shape (M, 6, 6), of ways, what no parameter has, and growth."""
+    whole = np.einsum('rim,rjm->mij', moved, moved, optimize=True) + rest
+    return np.asarray(whole * grown[:, None, None] ** 2)
 
 
 def _bends(q: Array) -> Array:

@@ -29,6 +29,12 @@ Rows = slice | Index
 MANY = 32
 """Coordinates of one effect in a model from which on they are kept as amounts: products of fewer are
 as quick written out."""
+BLOCKS = 24
+"""Stretches whose scores are held apart: enough to tell a variance to a third."""
+SINGULAR = 1e-12
+"""Share of the largest eigenvalue below which a direction is one that columns repeat."""
+TINY = 1e-300
+"""Keeps a division by the variance of a coordinate that nothing moves finite."""
 
 
 def rows_of(labels: Array) -> list[Rows]:
@@ -279,14 +285,6 @@ def designed(problem: Problem, model: Model, scale: Scale) -> Columns:
     maker = Maker(problem, features, scale)
     each = (maker.piece(effect, atoms=False) for effect in model.found)
     return Columns.joined([frames, *each])
-
-
-BLOCKS = 24
-"""Stretches whose scores are held apart: enough to tell a variance to a third."""
-SINGULAR = 1e-12
-"""Share of the largest eigenvalue below which a direction is one that columns repeat."""
-TINY = 1e-300
-"""Keeps a division by the variance of a coordinate that nothing moves finite."""
 
 
 def columns_covariance(

@@ -27,6 +27,11 @@ from .definite import factored, unit_diagonal
 from .independent_rows import measured_axes, robust_spread
 from .problem import Model, Problem, Scale
 
+FRAME_SHIFT = 0.02
+"""Spread [m] of a frame's origin about where the alignment put it: alignment starts a fit within
+2 cm, or says so."""
+FRAME_TURN = 0.05
+"""Spread [rad] of a frame's turn: 2 cm at an arm's reach of 0.4 m."""
 STRAIGHT = 1e-6
 """Share of what is left by which a step may miss what its equations foretold, for it to be the last:
 where the residual is as good as linear, another step finds nothing."""
@@ -180,8 +185,8 @@ def _descended(start: _Point, iterations: int, tolerance: float, most: float) ->
         there, (normal, right) = None, here.normal_equations(columns)
         while damping < DAMPED:
             step = solve_scaled(normal, right, damping)
-            foretold = here.cost - float((2.0 * right - normal @ step) @ step)
-            if foretold > most:
+            expected = here.cost - float((2.0 * right - normal @ step) @ step)
+            if expected > most:
                 return here
             there = here.stepped(step)
             if there.cost <= here.cost:
@@ -190,7 +195,7 @@ def _descended(start: _Point, iterations: int, tolerance: float, most: float) ->
         if there is None:
             break
         gain = (here.cost - there.cost) / max(here.cost, 1e-300)
-        missed = abs(there.cost - foretold)
+        missed = abs(there.cost - expected)
         here, damping = there, max(damping * 0.01, DAMPING)
         if gain < tolerance or missed < STRAIGHT * there.cost:
             break
@@ -359,13 +364,6 @@ def robust_fit(
 def with_weights(scale: Scale, problem: Problem) -> Scale:
     """Return the scale with unit weights for another problem's samples."""
     return replace(scale, weights=tuple(np.ones(m) for m in problem.samples))
-
-
-FRAME_SHIFT = 0.02
-"""Spread [m] of a frame's origin about where the alignment put it: alignment starts a fit within
-2 cm, or says so."""
-FRAME_TURN = 0.05
-"""Spread [rad] of a frame's turn: 2 cm at an arm's reach of 0.4 m."""
 
 
 def effect_precision(model: Model) -> Array:

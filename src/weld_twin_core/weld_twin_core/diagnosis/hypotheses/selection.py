@@ -233,10 +233,10 @@ def backward(work: Workspace, now: Fit) -> Fit:
     """
     beliefs = work.beliefs
     while now.model.found:
-        less, count = work.foretold_without(now), work.effective(now)
+        less, count, hopeless = work.foretold_without(now), work.effective(now), work.hopeless(now)
         worth = dict[int, float]()
         most = beliefs.negligible if len(less) > 1 else beliefs.invisible
-        for k in (k for k, (rss, _) in enumerate(less) if rss < work.hopeless(now)):
+        for k in (k for k, (rss, _) in enumerate(less) if rss < hopeless):
             one = work.without(now, k)
             freedom = now.coordinates.size - one.coordinates.size
             worth[k] = evidence(one.rss, one.rss - now.rss, freedom, count)

@@ -246,14 +246,13 @@ class Conditioning:
 
     def __init__(self, rows: Rows, prior: Prior, width: Array, noise: float) -> None:
         self._prior, self._width = prior, width
-        self._rows, self._sure = rows, rows.share / noise
-        self._system, self._right = self._of(slice(None))
+        self._sure = rows.share / noise
+        self._rows, (self._system, self._right) = rows, self._of(rows)
 
-    def _of(self, some: slice | NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Return normal matrix and right-hand side of some rows, coordinates in their widths."""
-        columns, width = self._rows.columns[:, some], self._width
-        normal = self._sure * np.outer(width, width) * (columns @ columns.T)
-        return normal, self._sure * width * (columns @ self._rows.residual[some])
+    def _of(self, rows: Rows) -> tuple[Array, Array]:
+        """Return normal matrix and right-hand side of rows, coordinates in their widths."""
+        width = self._width
+        return self._sure * np.outer(width, width) * rows.products, self._sure * width * rows.pull
 
     def given(self, but: NDArray[np.bool_] | None = None) -> tuple[Array, Array]:
         """
@@ -263,7 +262,10 @@ class Conditioning:
         """
         system, right, width = self._system, self._right, self._width
         if but is not None:
-            less, pull = self._of(but)
+            own = self._rows
+            less, pull = self._of(
+                replace(own, columns=own.columns[:, but], residual=own.residual[but])
+            )
             system, right = system - less, right - pull
         inverse = inverted(with_prior(system.copy()))
         right = right - system @ (self._prior.middle / width)

@@ -20,6 +20,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -78,6 +79,16 @@ class Rows:
     residual: Array
     share: float
     moved: Array | None = None
+
+    @cached_property
+    def products(self) -> Array:
+        """Return the products of all columns with each other, shape (P, P)."""
+        return self.columns @ self.columns.T
+
+    @cached_property
+    def pull(self) -> Array:
+        """Return their products with what the model leaves, shape (P,)."""
+        return np.asarray(self.columns @ self.residual)
 
 
 class Weighed(NamedTuple):
@@ -170,8 +181,8 @@ class _Chain:
     def __post_init__(self) -> None:
         rows, prior = self.rows, self.prior
         width = prior.width
-        self.normal = rows.share * np.outer(width, width) * (rows.columns @ rows.columns.T)
-        self.right = rows.share * width * (rows.columns @ rows.residual)
+        self.normal = rows.share * np.outer(width, width) * rows.products
+        self.right = rows.share * width * rows.pull
         self.middle = prior.middle / prior.width
         self.hidden = hidden(rows, prior.group < 0)
         self.small = (prior.group >= 0) & ~self.hidden
@@ -217,9 +228,9 @@ class _Chain:
         """Draw the variance of a row, given what the coordinates leave."""
         rows = self.rows
         rss = rows.share * float(rows.residual @ rows.residual)
-        remaining = max(rss - 2.0 * self.right @ drawn + drawn @ self.normal @ drawn, 0.0)
+        left = float(rss - 2.0 * self.right @ drawn + drawn @ self.normal @ drawn)
         freedom = rows.share * rows.residual.size + NOISE_TRUST
-        self.noise = float(remaining + NOISE_TRUST * self.expected) / self.rng.chisquare(freedom)
+        self.noise = (max(left, 0.0) + NOISE_TRUST * self.expected) / self.rng.chisquare(freedom)
 
     def _sizes(self, off: Array) -> None:
         """Draw the size of every small error, and how often each comes in every family."""

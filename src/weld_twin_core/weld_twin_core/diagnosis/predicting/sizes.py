@@ -83,7 +83,7 @@ class Rows:
     @cached_property
     def products(self) -> Array:
         """Return the products of all columns with each other, shape (P, P)."""
-        return self.columns @ self.columns.T
+        return np.asarray(self.columns @ self.columns.T)
 
     @cached_property
     def pull(self) -> Array:

@@ -13,9 +13,11 @@ import json
 import os
 import signal
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
+from defusedxml.ElementTree import parse
 
 pytest.importorskip('rclpy', reason='needs ROS 2')
 
@@ -49,6 +51,7 @@ from weld_twin_nodes.live import compensator
 
 pytestmark = pytest.mark.cells
 
+POLICY = Path(__file__).parents[2] / 'src/weld_twin_nodes/security/weld_twin.policy.xml'
 ROBOT = load('ur5')
 NAMES = list(ROBOT.joint_names)
 HOME = np.array([0.1, -1.2, 1.5, -1.8, -1.5, 0.3])
@@ -206,6 +209,34 @@ def points(goal):
 def seen(cell, seconds):
     end = time.monotonic() + seconds
     cell.wait(lambda: time.monotonic() > end, 'a while')
+
+
+ACTION_TOPICS = ('feedback', 'status')
+ACTION_SERVICES = ('cancel_goal', 'get_result', 'send_goal')
+"""What `ros2 security create_permission` makes of the name of an action (sros2, permissions.xsl)."""
+
+
+def test_the_policy_allows_both_actions_all_that_they_open_and_no_other(shared):
+    profile = parse(POLICY).find(".//profile[@node='compensator']")
+    graph = shared.cell.node
+    for permission, topics, services in (
+        (
+            'execute',
+            'get_publisher_names_and_types_by_node',
+            'get_service_names_and_types_by_node',
+        ),
+        ('call', 'get_subscriber_names_and_types_by_node', 'get_client_names_and_types_by_node'),
+    ):
+        item = profile.find(f"actions[@{permission}='ALLOW']/action")
+        name = item.text.replace('~', '/compensator').lstrip('/')
+        allowed = {f'/{name}/_action/{part}' for part in (*ACTION_TOPICS, *ACTION_SERVICES)}
+        opened = {
+            each
+            for query in (topics, services)
+            for each, _ in getattr(graph, query)('compensator', '/')
+            if '/_action/' in each
+        }
+        assert opened == allowed, permission
 
 
 def test_inactive_it_refuses_goals_and_an_order_to_stop_passes(inactive):

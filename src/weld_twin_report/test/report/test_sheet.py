@@ -235,9 +235,14 @@ def test_nothing_hinders_reading_light_dark_phone_or_print(name, browser):
 
 
 @pytest.mark.parametrize('name', ['circle', 'calibration', 'unknown', 'unsound', 'long_names'])
-def test_it_prints_on_one_or_two_sides_to_sign(name, browser):
-    pdf = browser.open(report_page(CASES[name]())).pdf(prefer_css_page_size=True)
-    assert 1 <= len(re.findall(rb'/Type /Page\b', pdf)) <= 2
+def test_it_prints_on_one_or_two_sides_to_sign_from_a_screen_and_from_a_phone(name, browser):
+    page, sides = browser.open(report_page(CASES[name]())), []
+    for width in (1100, 390):
+        page.set_viewport_size({'width': width, 'height': 900})
+        page.wait_for_timeout(60)
+        pdf = page.pdf(prefer_css_page_size=True)
+        sides.append(len(re.findall(rb'/Type /Page\b', pdf)))
+    assert 1 <= sides[0] <= 2 and sides[1] == sides[0]
 
 
 def test_shares_with_the_rest_and_the_noise_make_a_whole():

@@ -128,8 +128,12 @@ window.charts = (() => {
     for (const { chart } of drawn) chart.redraw(false);
   }
 
-  // Canvases are drawn before the rules of a print hold: this class has its colours at once.
-  const printing = (on) => document.documentElement.classList.toggle('printing', on);
+  // Canvases are drawn before the rules of a print hold: this class has its colours and the widths of
+  // its charts at once.
+  function printing(on) {
+    document.documentElement.classList.toggle('printing', on);
+    drawn.forEach(fit);
+  }
   window.addEventListener('beforeprint', () => printing(true), { capture: true });
   window.addEventListener('afterprint', () => printing(false), { capture: true });
 

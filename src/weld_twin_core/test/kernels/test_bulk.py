@@ -15,7 +15,7 @@ from weld_twin_core.arm import chain
 from weld_twin_core.arm.bulk import bulk_kernel as bulk
 from weld_twin_core.arm.bulk.buffers import aligned
 from weld_twin_core.arm.bulk.bulk_kernel import LENGTHS, BulkKernel, kernel_of
-from weld_twin_core.arm.bulk.half_angle import COSINE, SINE, HalfAngle, sincos
+from weld_twin_core.arm.bulk.half_angle import COSINE, SINE, HalfAngle
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import ModelError
 from weld_twin_core.kernels.single_pose import SinglePose
@@ -26,6 +26,11 @@ TURNS = ('theta', 'a', 'alpha', 'beta')
 
 def positions(robot: Robot, count: int) -> np.ndarray:
     return np.random.default_rng(count).uniform(-3.2, 3.2, (count, robot.n))
+
+
+def sincos(angles: np.ndarray, by_tangent: bool) -> tuple[np.ndarray, np.ndarray]:
+    u, v = HalfAngle(*angles.shape, by_tangent=by_tangent)(angles)
+    return 2.0 * u, 1.0 - 2.0 * v
 
 
 both_ways = pytest.mark.parametrize('by_tangent', [True, False])

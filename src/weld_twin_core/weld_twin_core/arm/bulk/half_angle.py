@@ -113,12 +113,3 @@ class HalfAngle:
         np.multiply(sine, r, out=sine)
         np.multiply(cosine, sine, out=cosine)
         np.multiply(sine, sine, out=sine)
-
-
-def sincos(angles: Array, by_tangent: bool = _BY_TANGENT) -> tuple[Array, Array]:
-    """Return sine and cosine of angles of any shape [rad]."""
-    sine, cosine = HalfAngle(*angles.shape, by_tangent=by_tangent)(angles)
-    sine *= 2.0
-    cosine *= -2.0
-    cosine += 1.0
-    return sine, cosine

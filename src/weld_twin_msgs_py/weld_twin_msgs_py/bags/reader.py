@@ -230,10 +230,6 @@ class BagReader:
                     whole = unzstd(data) if self._packed else data
                     yield connection.topic, connection.msgtype, log_ns, whole
 
-    def plain_readers(self) -> tuple[Reader, ...]:
-        """Return the readers of the storage files, none where each message is packed."""
-        return () if self._packed else tuple(self._readers)
-
     def stamps(self) -> Iterator[tuple[str, int, bool]]:
         """
         Yield topic, stamp [ns] and whether it is the header's, of every message, undecoded.

@@ -37,7 +37,7 @@ from .curves import load
 from .effect import Effect, LinearEffect, MemoryEffect
 from .hooks import FitHooks, Hooked, SearchHooks, Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 
 _FORMS = ('play', 'reversal', 'coast')
 _CLOSED = 1e-5
@@ -87,18 +87,10 @@ class Backlash(MemoryEffect):
     of = 'joint'
     stage = Stage.PLAY
     parameters = (
-        Parameter(
-            'width',
-            'rad',
-            typical=5e-4,
-            lower=0.0,
-            linear=False,
-            range=Plausible(
-                5e-4, 0.0, 2e-2, f'{RV}; range derived: a degree is a gear that is broken'
-            ),
-            sliding=Plausible(
-                5e-5, 0.0, 5e-3, 'derived: nuts have hundredths of a millimetre of play'
-            ),
+        Parameter('width', 'rad', typical=5e-4, lower=0.0, linear=False)
+        .plausible((5e-4, 0.0, 2e-2), f'{RV}; range derived: a degree is a gear that is broken')
+        .plausible_sliding(
+            (5e-5, 0.0, 5e-3), 'derived: nuts have hundredths of a millimetre of play'
         ),
     )
     options = ('form',)
@@ -229,15 +221,10 @@ class LoadedPlay(LinearEffect):
     of = 'joint'
     stage = Stage.LINK
     parameters = (
-        Parameter(
-            'width',
-            'rad',
-            typical=5e-4,
-            lower=0.0,
-            range=Plausible(5e-4, 0.0, 2e-2, f'{RV}; see backlash'),
-            sliding=Plausible(
-                5e-5, 0.0, 5e-3, 'derived: nuts have hundredths of a millimetre of play'
-            ),
+        Parameter('width', 'rad', typical=5e-4, lower=0.0)
+        .plausible((5e-4, 0.0, 2e-2), f'{RV}; see backlash')
+        .plausible_sliding(
+            (5e-5, 0.0, 5e-3), 'derived: nuts have hundredths of a millimetre of play'
         ),
     )
     options = ('torque',)

@@ -34,7 +34,7 @@ from .effect import LinearEffect
 from .hooks import Hooked, SearchHooks, Traits
 from .pedestal_tilt import base_leans
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import turn
 
 
@@ -79,27 +79,13 @@ class BearingTilt(LinearEffect):
     of = 'joint'
     stage = Stage.LINK
     parameters = (
-        Parameter(
-            'lean',
-            'rad',
-            size=4,
-            typical=2e-4,
-            range=Plausible.even(
-                2e-4,
-                3e-3,
-                'derived: two hundredths of a millimetre of run-out on a bearing of 0.1 m',
-            ),
+        Parameter('lean', 'rad', size=4, typical=2e-4).plausible(
+            (2e-4, 3e-3),
+            'derived: two hundredths of a millimetre of run-out on a bearing of 0.1 m',
         ),
-        Parameter(
-            'second',
-            'rad',
-            size=0,
-            typical=2e-4,
-            range=Plausible.even(
-                1e-4,
-                1.5e-3,
-                'derived: an oval race leans less than one that is off centre; half of lean',
-            ),
+        Parameter('second', 'rad', size=0, typical=2e-4).plausible(
+            (1e-4, 1.5e-3),
+            'derived: an oval race leans less than one that is off centre; half of lean',
         ),
     )
     search = Hooked(_Search)

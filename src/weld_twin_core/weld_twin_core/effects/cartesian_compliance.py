@@ -12,7 +12,7 @@ from ..arm.robot import Robot
 from .effect import LinearEffect
 from .hooks import Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import number
 
 
@@ -33,14 +33,8 @@ class CartesianCompliance(LinearEffect):
     of = 'robot'
     stage = Stage.POSE
     parameters = (
-        Parameter(
-            'compliance',
-            'm/N',
-            size=3,
-            typical=1e-6,
-            range=Plausible(
-                5e-6, -1e-6, 1e-4, 'derived: 10 mm under 100 N is the softest arm that still welds'
-            ),
+        Parameter('compliance', 'm/N', size=3, typical=1e-6).plausible(
+            (5e-6, -1e-6, 1e-4), 'derived: 10 mm under 100 N is the softest arm that still welds'
         ),
     )
     needs = frozenset({'wrench'})

@@ -7,7 +7,7 @@ from ..arm.robot import Robot
 from .effect import Effect
 from .hooks import Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View, single
+from .view import Parameter, Stage, Value, View, single
 from .wording import size
 
 
@@ -29,15 +29,9 @@ class TimeDelay(Effect):
     of = 'robot'
     stage = Stage.CLOCK
     parameters = (
-        Parameter(
-            'delay',
-            's',
-            typical=5e-3,
-            range=Plausible.even(
-                2e-2,
-                0.5,
-                'derived: buses and filters take milliseconds; half a second is another clock',
-            ),
+        Parameter('delay', 's', typical=5e-3).plausible(
+            (2e-2, 0.5),
+            'derived: buses and filters take milliseconds; half a second is another clock',
         ),
     )
     needs = frozenset({'velocity', 'time'})
@@ -81,20 +75,11 @@ class ClockRate(Effect):
     of = 'robot'
     stage = Stage.CLOCK
     parameters = (
-        Parameter(
-            'rate',
-            's/s',
-            typical=1e-5,
-            lower=-0.5,
-            upper=0.5,
-            idealised=0.03,
-            range=Plausible.even(
-                2e-5,
-                1e-4,
-                'oscillators are rated to 10 to 20 ppm (doi.org/10.1186/s40462-024-00512-7, table 1), a '
-                'computer gained 14 ppm (ntp.org, NTP-s-sw-clocks-quality); range derived: what '
-                'the checks of the data let pass as a clock',
-            ),
+        Parameter('rate', 's/s', typical=1e-5, lower=-0.5, upper=0.5, idealised=0.03).plausible(
+            (2e-5, 1e-4),
+            'oscillators are rated to 10 to 20 ppm (doi.org/10.1186/s40462-024-00512-7, table 1), a '
+            'computer gained 14 ppm (ntp.org, NTP-s-sw-clocks-quality); range derived: what '
+            'the checks of the data let pass as a clock',
         ),
     )
     needs = frozenset({'velocity', 'time'})

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar, TypeVar
 
 import numpy as np
@@ -106,17 +106,11 @@ class JointSlip(Sudden, ChannelError):
     stage = Stage.JOINT
     channel = 'q'
     parameters = (
-        Parameter(
-            'offset',
-            'rad',
-            typical=5e-4,
-            range=Plausible.even(
-                5e-3,
-                0.13,
-                'derived: a tooth of a belt or the mark of a mastering; see joint_offset',
-            ),
-            sliding=Plausible.even(5e-3, 0.1, 'derived: a tooth of a belt or a rack'),
-        ),
+        Parameter('offset', 'rad', typical=5e-4)
+        .plausible(
+            (5e-3, 0.13), 'derived: a tooth of a belt or the mark of a mastering; see joint_offset'
+        )
+        .plausible_sliding((5e-3, 0.1), 'derived: a tooth of a belt or a rack'),
     )
     twin = Hooked(_Twin)
 
@@ -130,8 +124,11 @@ class JointSlip(Sudden, ChannelError):
         )
 
 
+@dataclass(frozen=True, eq=False)
 class _SuddenFrame(Sudden, FrameError):
     """A frame that stands elsewhere from an instant on."""
+
+    time: float = 0.0
 
     traits = replace(Sudden.traits, of_setup=True)
 
@@ -139,10 +136,6 @@ class _SuddenFrame(Sudden, FrameError):
 @register
 class ToolSlip(_SuddenFrame):
     """The tool is displaced by xyz of the flange and turned by rotvec from ``time`` [s] on."""
-
-    xyz: Value = (0.0, 0.0, 0.0)
-    rotvec: Value = (0.0, 0.0, 0.0)
-    time: float = 0.0
 
     name = 'tool_slip'
     traits = replace(
@@ -169,10 +162,6 @@ class ToolSlip(_SuddenFrame):
 @register
 class InstrumentKnock(_SuddenFrame):
     """The base is displaced by xyz in the world and turned by rotvec from ``time`` [s] on."""
-
-    xyz: Value = (0.0, 0.0, 0.0)
-    rotvec: Value = (0.0, 0.0, 0.0)
-    time: float = 0.0
 
     name = 'instrument_knock'
     traits = replace(
@@ -206,8 +195,6 @@ class _SetupMotion(_Timed, FrameError):
 class SetupStep(_SetupMotion):
     """Displacement and turn of the base before the instant ``time`` [s]; then it is as aligned."""
 
-    xyz: Value = (0.0, 0.0, 0.0)
-    rotvec: Value = (0.0, 0.0, 0.0)
     time: float = 0.0
 
     name = 'setup_step'
@@ -240,8 +227,6 @@ class SetupStep(_SetupMotion):
 class SetupSettling(_SetupMotion):
     """Displacement and turn of the base at ``start`` [s], gone with ``time_constant`` [s]."""
 
-    xyz: Value = (0.0, 0.0, 0.0)
-    rotvec: Value = (0.0, 0.0, 0.0)
     time_constant: float = 600.0
     start: float = 0.0
 

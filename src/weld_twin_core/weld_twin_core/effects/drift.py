@@ -9,7 +9,7 @@ from ..arm.robot import Robot
 from .effect import LinearEffect
 from .hooks import Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import number
 
 
@@ -31,17 +31,10 @@ class Drift(LinearEffect):
     of = 'robot'
     stage = Stage.POSE
     parameters = (
-        Parameter(
-            'xyz_rate',
-            'm/s',
-            size=3,
-            typical=1e-6,
-            range=Plausible.even(
-                5e-6,
-                1e-4,
-                'derived: 6 mm in a minute is a fixture that falls; trackers drift by tenths of a '
-                'millimetre in two hours (akjournals.com, 606/15/3 p. 60)',
-            ),
+        Parameter('xyz_rate', 'm/s', size=3, typical=1e-6).plausible(
+            (5e-6, 1e-4),
+            'derived: 6 mm in a minute is a fixture that falls; trackers drift by tenths of a '
+            'millimetre in two hours (akjournals.com, 606/15/3 p. 60)',
         ),
     )
     needs = frozenset({'time'})

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -31,8 +31,12 @@ def frame_parameters(
     )
 
 
+@dataclass(frozen=True, eq=False)
 class FrameError(Effect):
     """A constant error of the base or tool frame: a displacement and a turn."""
+
+    xyz: Value = (0.0, 0.0, 0.0)
+    rotvec: Value = (0.0, 0.0, 0.0)
 
     channel: ClassVar[str]
     of = 'robot'
@@ -52,9 +56,6 @@ class FrameError(Effect):
 @register
 class BasePose(FrameError):
     """The base is displaced by xyz in the world and turned by rotvec about its own origin."""
-
-    xyz: Value = (0.0, 0.0, 0.0)
-    rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'base_pose'
     traits = replace(
@@ -103,9 +104,6 @@ def _of_the_origin(step: Array, robot: Robot) -> Array:
 class ToolPose(FrameError):
     """The tool point is displaced by xyz of the flange; the tool turns by rotvec of itself."""
 
-    xyz: Value = (0.0, 0.0, 0.0)
-    rotvec: Value = (0.0, 0.0, 0.0)
-
     name = 'tool_pose'
     traits = replace(
         FrameError.traits,
@@ -142,9 +140,6 @@ class _Search(SearchHooks):
 @register
 class RootPose(FrameError):
     """The positioner is displaced by xyz along the robot's base axes, and turned about its root."""
-
-    xyz: Value = (0.0, 0.0, 0.0)
-    rotvec: Value = (0.0, 0.0, 0.0)
 
     name = 'root_pose'
     traits = replace(

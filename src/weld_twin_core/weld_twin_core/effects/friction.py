@@ -28,7 +28,7 @@ from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, MemoryEffect
 from .hooks import FitHooks, Hooked, Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 
 SHORTEST, LONGEST = 3e-5, 1.8e-3
 """Pre-sliding travels [rad] that a search considers: a longer one is a loop, `hysteresis`."""
@@ -89,61 +89,33 @@ class Friction(MemoryEffect):
     of = 'joint'
     stage = Stage.PLAY
     parameters = (
-        Parameter(
-            'windup',
-            'rad',
-            typical=2e-4,
-            lower=0.0,
-            idealised=0.03,
-            range=Plausible(
-                2e-4,
-                0.0,
-                5e-3,
-                'derived: a loop of 10 Hz lets a robot joint trail by tenths of a milliradian; range '
-                'derived: a third of a degree stops a motion',
-            ),
-            sliding=Plausible(
-                2e-5,
-                0.0,
-                1e-3,
-                'a servo axis trails by 11.8 um (recording EMPS, docs/transfer.md); range derived: a '
-                'millimetre is stuck',
-            ),
+        Parameter('windup', 'rad', typical=2e-4, lower=0.0, idealised=0.03)
+        .plausible(
+            (2e-4, 0.0, 5e-3),
+            'derived: a loop of 10 Hz lets a robot joint trail by tenths of a milliradian; range '
+            'derived: a third of a degree stops a motion',
+        )
+        .plausible_sliding(
+            (2e-5, 0.0, 1e-3),
+            'a servo axis trails by 11.8 um (recording EMPS, docs/transfer.md); range derived: a '
+            'millimetre is stuck',
         ),
         Parameter(
-            'asymmetry',
-            '-',
-            typical=0.1,
-            lower=-_UNEVEN,
-            upper=_UNEVEN,
-            linear=False,
-            range=Plausible.even(
-                0.2,
-                0.6,
-                'a servo axis trails by 11.8 um with 2.3 um between its two ways (recording EMPS, '
-                'docs/transfer.md), 0.2; range derived: beyond, one way hardly rubs at all',
-            ),
+            'asymmetry', '-', typical=0.1, lower=-_UNEVEN, upper=_UNEVEN, linear=False
+        ).plausible(
+            (0.2, 0.6),
+            'a servo axis trails by 11.8 um with 2.3 um between its two ways (recording EMPS, '
+            'docs/transfer.md), 0.2; range derived: beyond, one way hardly rubs at all',
         ),
-        Parameter(
-            'travel',
-            'rad',
-            typical=3e-4,
-            lower=1e-7,
-            linear=False,
-            idealised=0.3,
-            range=Plausible(
-                1e-3,
-                1e-6,
-                2e-3,
-                'derived: contacts of bearings and seals bend by micrometres on centimetres; a longer '
-                'travel is a loop of the gear, hysteresis',
-            ),
-            sliding=Plausible(
-                1e-4,
-                1e-7,
-                2e-4,
-                'derived: rolling guides bend by micrometres to a tenth of a millimetre',
-            ),
+        Parameter('travel', 'rad', typical=3e-4, lower=1e-7, linear=False, idealised=0.3)
+        .plausible(
+            (1e-3, 1e-6, 2e-3),
+            'derived: contacts of bearings and seals bend by micrometres on centimetres; a longer '
+            'travel is a loop of the gear, hysteresis',
+        )
+        .plausible_sliding(
+            (1e-4, 1e-7, 2e-4),
+            'derived: rolling guides bend by micrometres to a tenth of a millimetre',
         ),
     )
     options = ('release',)

@@ -25,7 +25,7 @@ from .associative_scan import last_true, play
 from .effect import Effect, LinearEffect, MemoryEffect
 from .hooks import Hooked, Traits, TwinHooks
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View, single
+from .view import Parameter, Stage, Value, View, single
 from .wording import number, size
 
 
@@ -58,16 +58,10 @@ class GearRatio(LinearEffect):
     of = 'joint'
     stage = Stage.JOINT
     parameters = (
-        Parameter(
-            'scale',
-            '-',
-            typical=3e-4,
-            range=Plausible.even(
-                1e-3,
-                2e-2,
-                'derived: tooth numbers are exact, what is left is belts and scales of encoders; '
-                'one tooth in fifty is the coarsest wrong ratio',
-            ),
+        Parameter('scale', '-', typical=3e-4).plausible(
+            (1e-3, 2e-2),
+            'derived: tooth numbers are exact, what is left is belts and scales of encoders; '
+            'one tooth in fifty is the coarsest wrong ratio',
         ),
     )
     twin = Hooked(_Twin)
@@ -120,34 +114,18 @@ class GearRatioByDirection(MemoryEffect):
     of = 'joint'
     stage = Stage.PLAY
     parameters = (
-        Parameter(
-            'difference',
-            '-',
-            typical=3e-4,
-            idealised=0.05,
-            range=Plausible.even(
-                1e-3,
-                2e-2,
-                'derived: as gear_ratio; at a radian from zero the flanks are then as far apart '
-                'as the play of a gear that is broken',
-            ),
+        Parameter('difference', '-', typical=3e-4, idealised=0.05).plausible(
+            (1e-3, 2e-2),
+            'derived: as gear_ratio; at a radian from zero the flanks are then as far apart '
+            'as the play of a gear that is broken',
         ),
-        Parameter(
-            'travel',
-            'rad',
-            typical=1e-4,
-            lower=1e-6,
-            linear=False,
-            idealised=0.3,
-            range=Plausible(
-                1e-3,
-                1e-6,
-                2e-3,
-                'derived: teeth change flanks as friction builds up; a longer travel is '
-                'a loop of the gear, hysteresis',
-            ),
-            sliding=Plausible(1e-4, 1e-7, 2e-4, 'derived: as the travel of friction'),
-        ),
+        Parameter('travel', 'rad', typical=1e-4, lower=1e-6, linear=False, idealised=0.3)
+        .plausible(
+            (1e-3, 1e-6, 2e-3),
+            'derived: teeth change flanks as friction builds up; a longer travel is '
+            'a loop of the gear, hysteresis',
+        )
+        .plausible_sliding((1e-4, 1e-7, 2e-4), 'derived: as the travel of friction'),
     )
     needs = frozenset({'order'})
 

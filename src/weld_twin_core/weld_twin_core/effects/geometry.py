@@ -19,7 +19,7 @@ from ..arm.channels import Shift
 from ..arm.robot import Robot
 from .effect import Effect
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View, single
+from .view import Parameter, Stage, Value, View, single
 from .wording import metres, radians, stands, to_mend
 
 _URS = (
@@ -80,19 +80,14 @@ class JointOffset(ChannelError):
     stage = Stage.JOINT
     channel = 'q'
     parameters = (
-        Parameter(
-            'offset',
-            'rad',
-            typical=5e-4,
-            range=Plausible.even(
-                5e-3,
-                0.13,
-                'a mastering 16 degrees of the motor off is 0.2 degrees (3.5 mrad) of the joint; arms '
-                'mastered on wrong marks were 5 to 7 degrees off (industrialmonitordirect.com, KR16 '
-                'mastering deviation and KR3 mastering error)',
-            ),
-            sliding=Plausible.even(5e-3, 0.1, 'derived: a reference switch, by hand'),
-        ),
+        Parameter('offset', 'rad', typical=5e-4)
+        .plausible(
+            (5e-3, 0.13),
+            'a mastering 16 degrees of the motor off is 0.2 degrees (3.5 mrad) of the joint; arms '
+            'mastered on wrong marks were 5 to 7 degrees off (industrialmonitordirect.com, KR16 '
+            'mastering deviation and KR3 mastering error)',
+        )
+        .plausible_sliding((5e-3, 0.1), 'derived: a reference switch, by hand'),
     )
 
     def remedy(self, robot: Robot) -> str:
@@ -123,15 +118,9 @@ class LinkLength(_LinkError):
     )
     channel = 'a'
     parameters = (
-        Parameter(
-            'da',
-            'm',
-            typical=2e-4,
-            range=Plausible.even(
-                5e-4,
-                1e-2,
-                f'{_URS}: 0.02 to 0.28 mm; range derived: beyond a centimetre it is another arm',
-            ),
+        Parameter('da', 'm', typical=2e-4).plausible(
+            (5e-4, 1e-2),
+            f'{_URS}: 0.02 to 0.28 mm; range derived: beyond a centimetre it is another arm',
         ),
     )
 
@@ -151,15 +140,9 @@ class LinkOffset(_LinkError):
     )
     channel = 'd'
     parameters = (
-        Parameter(
-            'dd',
-            'm',
-            typical=2e-4,
-            range=Plausible.even(
-                5e-4,
-                1e-2,
-                f'{_URS}: 0.09 to 0.32 mm; range derived: beyond a centimetre it is another arm',
-            ),
+        Parameter('dd', 'm', typical=2e-4).plausible(
+            (5e-4, 1e-2),
+            f'{_URS}: 0.09 to 0.32 mm; range derived: beyond a centimetre it is another arm',
         ),
     )
 
@@ -180,11 +163,8 @@ class LinkTwist(_LinkError):
     channel = 'alpha'
     off = 'the axes are twisted by'
     parameters = (
-        Parameter(
-            'dalpha',
-            'rad',
-            typical=5e-4,
-            range=Plausible.even(2e-3, 2e-2, f'{_URS}: 0.4 to 3.9 mrad'),
+        Parameter('dalpha', 'rad', typical=5e-4).plausible(
+            (2e-3, 2e-2), f'{_URS}: 0.4 to 3.9 mrad'
         ),
     )
 
@@ -205,12 +185,7 @@ class AxisParallelism(_LinkError):
     channel = 'beta'
     off = 'the axes are out of parallel by'
     parameters = (
-        Parameter(
-            'dbeta',
-            'rad',
-            typical=5e-4,
-            range=Plausible.even(
-                2e-3, 2e-2, 'derived: a tilt of the same kind as link_twist, of the same size'
-            ),
+        Parameter('dbeta', 'rad', typical=5e-4).plausible(
+            (2e-3, 2e-2), 'derived: a tilt of the same kind as link_twist, of the same size'
         ),
     )

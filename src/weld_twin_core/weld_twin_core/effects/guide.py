@@ -21,7 +21,7 @@ from ..arrays import Array
 from .effect import LinearEffect
 from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import number, size
 
 
@@ -85,14 +85,8 @@ class GuideTilt(_GuideError):
     )
     stage = Stage.POSE
     parameters = (
-        Parameter(
-            'rate',
-            'rad/m',
-            size=3,
-            typical=2e-4,
-            range=Plausible.even(
-                2e-4, 5e-3, 'derived: rails laid to 0.1 mm on a metre, half a metre apart'
-            ),
+        Parameter('rate', 'rad/m', size=3, typical=2e-4).plausible(
+            (2e-4, 5e-3), 'derived: rails laid to 0.1 mm on a metre, half a metre apart'
         ),
     )
 
@@ -125,17 +119,10 @@ class GuideBend(_GuideError):
     )
     stage = Stage.POSE
     parameters = (
-        Parameter(
-            'curvature',
-            '1/m',
-            size=2,
-            typical=2e-4,
-            range=Plausible.even(
-                2e-4,
-                5e-3,
-                'derived: a rail laid to 0.1 mm on a metre; range derived: 2.5 mm on a metre is '
-                'seen by the eye',
-            ),
+        Parameter('curvature', '1/m', size=2, typical=2e-4).plausible(
+            (2e-4, 5e-3),
+            'derived: a rail laid to 0.1 mm on a metre; range derived: 2.5 mm on a metre is '
+            'seen by the eye',
         ),
     )
 

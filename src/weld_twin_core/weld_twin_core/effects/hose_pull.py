@@ -29,7 +29,7 @@ from ..arrays import Array
 from .effect import Effect
 from .hooks import Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import number
 
 
@@ -52,27 +52,14 @@ class HosePull(Effect):
     of = 'robot'
     stage = Stage.LOAD
     parameters = (
-        Parameter(
-            'force',
-            'N',
-            size=3,
-            typical=10.0,
-            range=Plausible.even(
-                20.0,
-                200.0,
-                'derived: as much as the load that a payload may be off by, 2 kg; range derived: ten '
-                'times that lifts a small arm',
-            ),
+        Parameter('force', 'N', size=3, typical=10.0).plausible(
+            (20.0, 200.0),
+            'derived: as much as the load that a payload may be off by, 2 kg; range derived: ten '
+            'times that lifts a small arm',
         ),
-        Parameter(
-            'stiffness',
-            'N/m',
-            typical=10.0,
-            range=Plausible.even(
-                20.0,
-                200.0,
-                'derived: the same pull over a metre of way; a hose that pushes sags instead',
-            ),
+        Parameter('stiffness', 'N/m', typical=10.0).plausible(
+            (20.0, 200.0),
+            'derived: the same pull over a metre of way; a hose that pushes sags instead',
         ),
     )
 

@@ -32,7 +32,7 @@ from .associative_scan import bristle, bristle_tangent
 from .effect import Effect, MemoryEffect
 from .hooks import FitHooks, Hooked, Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 
 SHORTEST, LONGEST = 4e-3, 0.3
 """Travels [rad] that a search considers: shorter is a gap, longer a wrong gear ratio."""
@@ -72,40 +72,23 @@ class Hysteresis(MemoryEffect):
     of = 'joint'
     stage = Stage.PLAY
     parameters = (
-        Parameter(
-            'amplitude',
-            'rad',
-            typical=2e-4,
-            lower=0.0,
-            idealised=0.03,
-            range=Plausible(
-                2e-4,
-                0.0,
-                3e-3,
-                'loops of strain-wave joints are 20 arcsec to 1 arcmin wide at 2 % of their torque '
-                '(robotics.zhinno.com, robot-joint-backlash-explained); range derived: a gear worn out',
-            ),
-            sliding=Plausible(
-                2e-5, 0.0, 1e-3, 'derived: guides and nuts lose hundredths of a millimetre'
-            ),
+        Parameter('amplitude', 'rad', typical=2e-4, lower=0.0, idealised=0.03)
+        .plausible(
+            (2e-4, 0.0, 3e-3),
+            'loops of strain-wave joints are 20 arcsec to 1 arcmin wide at 2 % of their torque '
+            '(robotics.zhinno.com, robot-joint-backlash-explained); range derived: a gear worn out',
+        )
+        .plausible_sliding(
+            (2e-5, 0.0, 1e-3), 'derived: guides and nuts lose hundredths of a millimetre'
         ),
-        Parameter(
-            'travel',
-            'rad',
-            typical=0.03,
-            lower=1e-5,
-            linear=False,
-            idealised=0.3,
-            range=Plausible(
-                0.1,
-                2e-3,
-                0.5,
-                'derived: a shorter loop is a gap, backlash; a longer one a gear ratio that differs by '
-                'direction',
-            ),
-            sliding=Plausible(
-                1e-2, 2e-4, 0.05, 'derived: a shorter loop is a gap, a longer one a wrong scale'
-            ),
+        Parameter('travel', 'rad', typical=0.03, lower=1e-5, linear=False, idealised=0.3)
+        .plausible(
+            (0.1, 2e-3, 0.5),
+            'derived: a shorter loop is a gap, backlash; a longer one a gear ratio that differs by '
+            'direction',
+        )
+        .plausible_sliding(
+            (1e-2, 2e-4, 0.05), 'derived: a shorter loop is a gap, a longer one a wrong scale'
         ),
     )
     needs = frozenset({'order'})

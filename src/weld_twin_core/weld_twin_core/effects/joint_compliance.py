@@ -24,7 +24,7 @@ from ..errors import DataError, ModelError
 from .effect import Effect, LinearEffect
 from .hooks import Hooked, SearchHooks, Traits, TwinHooks
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import metres, radians, size
 
 LOAD_OF_EFFORT = {'effort': -1.0, 'effort_reversed': 1.0}
@@ -74,19 +74,13 @@ class JointCompliance(LinearEffect):
     of = 'joint'
     stage = Stage.ELASTIC
     parameters = (
-        Parameter(
-            'compliance',
-            'rad/(N m)',
-            typical=1e-5,
-            range=Plausible(
-                3e-5,
-                -1e-5,
-                3e-4,
-                'derived: 3,000 N m/rad is the softest gear of a small cobot; a little below zero is a '
-                'controller that mends too much',
-            ),
-            sliding=Plausible(1e-6, -1e-7, 1e-4, 'derived: 10 mm under 100 N is the softest axis'),
-        ),
+        Parameter('compliance', 'rad/(N m)', typical=1e-5)
+        .plausible(
+            (3e-5, -1e-5, 3e-4),
+            'derived: 3,000 N m/rad is the softest gear of a small cobot; a little below zero is a '
+            'controller that mends too much',
+        )
+        .plausible_sliding((1e-6, -1e-7, 1e-4), 'derived: 10 mm under 100 N is the softest axis'),
     )
     needs = frozenset({'load'})
     options = ('statics',)

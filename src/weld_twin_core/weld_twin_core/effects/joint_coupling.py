@@ -13,7 +13,7 @@ from ..errors import ModelError
 from .effect import Effect, LinearEffect
 from .hooks import Hooked, SearchHooks, Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import number
 
 
@@ -46,16 +46,10 @@ class JointCoupling(LinearEffect):
     of = 'joint'
     stage = Stage.JOINT
     parameters = (
-        Parameter(
-            'ratio',
-            '-',
-            typical=3e-4,
-            range=Plausible.even(
-                1e-3,
-                2e-2,
-                'motion that leaks through a wrist is divided by its reduction of 50:1 to 120:1 '
-                '(industrialmonitordirect.com, KR16 mastering deviation): at most 1/50',
-            ),
+        Parameter('ratio', '-', typical=3e-4).plausible(
+            (1e-3, 2e-2),
+            'motion that leaks through a wrist is divided by its reduction of 50:1 to 120:1 '
+            '(industrialmonitordirect.com, KR16 mastering deviation): at most 1/50',
         ),
     )
     options = ('source',)

@@ -18,7 +18,7 @@ from ..arrays import Array
 from .effect import Effect, LinearEffect
 from .hooks import Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import number
 
 
@@ -40,16 +40,10 @@ class MeasurementScale(LinearEffect):
     of = 'robot'
     stage = Stage.POSE
     parameters = (
-        Parameter(
-            'scale',
-            '-',
-            typical=5e-5,
-            range=Plausible.even(
-                1e-4,
-                2e-3,
-                'trackers are within 6 um/m across the beam (user manual of an AT9xx, section 2.8.2); '
-                'range derived: 2 mm/m is a wrong length, not an instrument',
-            ),
+        Parameter('scale', '-', typical=5e-5).plausible(
+            (1e-4, 2e-3),
+            'trackers are within 6 um/m across the beam (user manual of an AT9xx, section 2.8.2); '
+            'range derived: 2 mm/m is a wrong length, not an instrument',
         ),
     )
 

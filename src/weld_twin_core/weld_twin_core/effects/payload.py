@@ -75,15 +75,8 @@ class Payload(Effect):
                 by_robot=mass_range,
             ),
         ),
-        Parameter(
-            'com',
-            'm',
-            size=3,
-            typical=0.05,
-            linear=False,
-            range=Plausible.even(
-                0.1, 0.5, 'derived: centres of torches and grippers lie within half a metre'
-            ),
+        Parameter('com', 'm', size=3, typical=0.05, linear=False).plausible(
+            (0.1, 0.5), 'derived: centres of torches and grippers lie within half a metre'
         ),
     )
     twin = Hooked(_Twin)

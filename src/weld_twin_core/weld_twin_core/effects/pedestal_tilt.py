@@ -23,7 +23,7 @@ from ..arrays import Array
 from .effect import LinearEffect
 from .hooks import Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import number
 
 _CHANGED = 1e-6
@@ -49,19 +49,11 @@ class PedestalTilt(LinearEffect):
     of = 'robot'
     stage = Stage.LINK
     parameters = (
-        Parameter(
-            'compliance',
-            'rad/(N m)',
-            size=2,
-            typical=2e-6,
-            range=Plausible(
-                1e-5,
-                -1e-5,
-                1e-4,
-                'a foundation shall swing above 30 Hz with the arm on it (ABB IRB 4400, 3HAC022032-001, '
-                'p. 39, easymanua.ls): 1e-5 under a small arm of 3 kg m^2 about its foot; range '
-                'derived: at 10 Hz it swings to the eye; see joint_compliance for the lower end',
-            ),
+        Parameter('compliance', 'rad/(N m)', size=2, typical=2e-6).plausible(
+            (1e-5, -1e-5, 1e-4),
+            'a foundation shall swing above 30 Hz with the arm on it (ABB IRB 4400, 3HAC022032-001, '
+            'p. 39, easymanua.ls): 1e-5 under a small arm of 3 kg m^2 about its foot; range '
+            'derived: at 10 Hz it swings to the eye; see joint_compliance for the lower end',
         ),
     )
     needs = frozenset({'load'})

@@ -14,7 +14,7 @@ from ..arrays import Array
 from .effect import Effect
 from .hooks import FitHooks, Hooked, SearchHooks, Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 
 FINEST, COARSEST = 1e-4, 2e-2
 """Steps that a search considers [rad]."""
@@ -81,21 +81,11 @@ class Quantization(Effect):
     of = 'joint'
     stage = Stage.JOINT
     parameters = (
-        Parameter(
-            'step',
-            'rad',
-            typical=2e-4,
-            lower=0.0,
-            differentiable=False,
-            linear=False,
-            range=Plausible(
-                1e-3,
-                0.0,
-                1e-2,
-                'derived: 12 bits a turn are 1.5 mrad; a centiradian is no encoder',
-            ),
-            sliding=Plausible(1e-5, 0.0, 1e-3, 'derived: a millimetre is no scale'),
-        ),
+        Parameter('step', 'rad', typical=2e-4, lower=0.0, differentiable=False, linear=False)
+        .plausible(
+            (1e-3, 0.0, 1e-2), 'derived: 12 bits a turn are 1.5 mrad; a centiradian is no encoder'
+        )
+        .plausible_sliding((1e-5, 0.0, 1e-3), 'derived: a millimetre is no scale'),
     )
     search = Hooked(_Search)
     fit = Hooked(_Fit)

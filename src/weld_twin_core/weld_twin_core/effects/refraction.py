@@ -28,7 +28,7 @@ from ..errors import ModelError
 from .effect import LinearEffect
 from .hooks import Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import number
 
 _BEND = 7.86e-4 * 101.325 / 293.15**2
@@ -64,18 +64,11 @@ class Refraction(LinearEffect):
     of = 'robot'
     stage = Stage.POSE
     parameters = (
-        Parameter(
-            'warming',
-            'K/m',
-            size=3,
-            typical=1.0,
-            range=Plausible.even(
-                3.0,
-                30.0,
-                'in still air a line of sight bends by 0.2 mm over 12 m (0.008 in over 40 ft; '
-                'Hamar Laser, Stealth series, appendix D, manualshive.com), 3 K/m; range '
-                'derived: ten times that is air beside a furnace',
-            ),
+        Parameter('warming', 'K/m', size=3, typical=1.0).plausible(
+            (3.0, 30.0),
+            'in still air a line of sight bends by 0.2 mm over 12 m (0.008 in over 40 ft; '
+            'Hamar Laser, Stealth series, appendix D, manualshive.com), 3 K/m; range '
+            'derived: ten times that is air beside a furnace',
         ),
     )
     options = ('instrument',)

@@ -25,7 +25,7 @@ from .associative_scan import linear
 from .effect import MemoryEffect
 from .hooks import FitHooks, Hooked, Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import size
 
 _DAMPINGS = (0.3, 0.4, 0.55, 0.75)
@@ -92,18 +92,9 @@ class ServoLag(MemoryEffect):
     of = 'joint'
     stage = Stage.SERVO
     parameters = (
-        Parameter(
-            'time_constant',
-            's',
-            typical=5e-3,
-            lower=0.0,
-            linear=False,
-            range=Plausible(
-                2e-2,
-                0.0,
-                0.3,
-                'derived: the loop of a machine that follows a path closes within 0.3 s',
-            ),
+        Parameter('time_constant', 's', typical=5e-3, lower=0.0, linear=False).plausible(
+            (2e-2, 0.0, 0.3),
+            'derived: the loop of a machine that follows a path closes within 0.3 s',
         ),
     )
     options = ('damping',)

@@ -23,7 +23,7 @@ from ..errors import DataError, ModelError
 from .effect import Effect, LinearEffect
 from .hooks import FitHooks, Hooked, Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import number
 
 
@@ -52,17 +52,10 @@ class ThermalGrowth(LinearEffect):
     of = 'links'
     stage = Stage.LINK
     parameters = (
-        Parameter(
-            'coefficient',
-            '1/K',
-            typical=1.2e-5,
-            range=Plausible(
-                2.4e-5,
-                -2.4e-5,
-                7.2e-5,
-                'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K, cast iron by 11e-6 (amesweb.info); '
-                'range derived: an arm may warm up three times as much as the place of the sensor',
-            ),
+        Parameter('coefficient', '1/K', typical=1.2e-5).plausible(
+            (2.4e-5, -2.4e-5, 7.2e-5),
+            'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K, cast iron by 11e-6 (amesweb.info); '
+            'range derived: an arm may warm up three times as much as the place of the sensor',
         ),
     )
     options = ('reference', 'links', 'warmup')
@@ -161,33 +154,17 @@ class LinkWarmUp(Effect):
     of = 'link'
     stage = Stage.LINK
     parameters = (
-        Parameter(
-            'strain',
-            '-',
-            typical=1e-4,
-            idealised=0.05,
-            range=Plausible(
-                2.4e-4,
-                -2.4e-4,
-                1.2e-3,
-                'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K (amesweb.info); range '
-                'derived: beside its motor a link gets 50 K warmer than it was, or 10 K cooler '
-                'where a fan blows',
-            ),
+        Parameter('strain', '-', typical=1e-4, idealised=0.05).plausible(
+            (2.4e-4, -2.4e-4, 1.2e-3),
+            'aluminium alloys grow by 21.5e-6 to 23.8e-6 per K (amesweb.info); range '
+            'derived: beside its motor a link gets 50 K warmer than it was, or 10 K cooler '
+            'where a fan blows',
         ),
         Parameter(
-            'warming_time',
-            's',
-            typical=60.0,
-            lower=0.1,
-            linear=False,
-            idealised=0.1,
-            range=Plausible(
-                np.inf,
-                1.0,
-                2e4,
-                'derived: no metal warms within a second; beyond five hours it is the hall',
-            ),
+            'warming_time', 's', typical=60.0, lower=0.1, linear=False, idealised=0.1
+        ).plausible(
+            (np.inf, 1.0, 2e4),
+            'derived: no metal warms within a second; beyond five hours it is the hall',
         ),
     )
     options = ('follows',)

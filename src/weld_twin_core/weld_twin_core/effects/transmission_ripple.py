@@ -18,7 +18,7 @@ from .backlash import RV
 from .effect import Effect
 from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks, Waves, highest_order
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import size
 
 _MAX_ORDER = 100
@@ -133,17 +133,10 @@ class TransmissionRipple(Effect):
     of = 'joint'
     stage = Stage.JOINT
     parameters = (
-        Parameter(
-            'amplitude',
-            'rad',
-            size=0,
-            typical=2e-4,
-            range=Plausible.even(
-                2e-4, 3e-3, f'{RV}; range derived: ten times that, a gear that is worn out'
-            ),
-            sliding=Plausible.even(
-                2e-5, 1e-3, 'derived: a turn of a screw repeats within hundredths of a millimetre'
-            ),
+        Parameter('amplitude', 'rad', size=0, typical=2e-4)
+        .plausible((2e-4, 3e-3), f'{RV}; range derived: ten times that, a gear that is worn out')
+        .plausible_sliding(
+            (2e-5, 1e-3), 'derived: a turn of a screw repeats within hundredths of a millimetre'
         ),
         Parameter('order', '1/rev', size=0, lower=0.0, differentiable=False, linear=False),
         Parameter('phase', 'rad', size=0, linear=False),

@@ -21,7 +21,7 @@ from .associative_scan import linear
 from .effect import Effect, MemoryEffect
 from .hooks import FitHooks, Hooked, Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 
 _FREQUENCIES = np.geomspace(1.0, 40.0, 64)
 """Modes [Hz] that a fit may start from, and"""
@@ -76,37 +76,17 @@ class Vibration(MemoryEffect):
     stage = Stage.SERVO
     parameters = (
         Parameter(
-            'frequency',
-            'Hz',
-            typical=10.0,
-            lower=1e-3,
-            linear=False,
-            idealised=0.015,
-            range=Plausible(
-                np.inf, 1.0, 100.0, 'derived: softer is a swing, stiffer does not reach the tool'
-            ),
+            'frequency', 'Hz', typical=10.0, lower=1e-3, linear=False, idealised=0.015
+        ).plausible(
+            (np.inf, 1.0, 100.0), 'derived: softer is a swing, stiffer does not reach the tool'
         ),
         Parameter(
-            'damping',
-            '-',
-            typical=0.05,
-            lower=0.0,
-            upper=0.999,
-            linear=False,
-            idealised=0.03,
-            range=Plausible(
-                np.inf,
-                1e-3,
-                0.7,
-                'derived: steel rings longest at 0.001; beyond 0.7 nothing swings',
-            ),
+            'damping', '-', typical=0.05, lower=0.0, upper=0.999, linear=False, idealised=0.03
+        ).plausible(
+            (np.inf, 1e-3, 0.7), 'derived: steel rings longest at 0.001; beyond 0.7 nothing swings'
         ),
-        Parameter(
-            'gain',
-            '-',
-            typical=0.3,
-            idealised=0.04,
-            range=Plausible.even(1.0, 5.0, 'derived: one is the whole inertia on one spring'),
+        Parameter('gain', '-', typical=0.3, idealised=0.04).plausible(
+            (1.0, 5.0), 'derived: one is the whole inertia on one spring'
         ),
     )
     needs = frozenset({'velocity', 'time'})

@@ -84,6 +84,13 @@ class Plausible:
         """Return a range that reaches as far to either side."""
         return cls(sd, -most, most, source)
 
+    @classmethod
+    def of(cls, numbers: tuple[float, ...], source: str) -> Plausible:
+        """Return spread, least and most as a range; of two, spread and the most to either side."""
+        sd, *_, high = numbers
+        low = -high if len(numbers) == 2 else numbers[1]
+        return cls(sd, low, high, source)
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -121,6 +128,33 @@ class Parameter:
     """What a machine can have of it; left out, nothing is known."""
     sliding: Plausible | None = None
     """The same where its joint slides, in m instead of rad."""
+
+    def plausible(self, numbers: tuple[float, ...], source: str) -> Parameter:
+        """
+        Return the same with its `range`.
+
+        Parameters
+        ----------
+        numbers : tuple of 3 or 2 float
+            Spread, least and most; or spread, and the most to either side.
+        source : str
+            A publication that was read, or an argument that starts with 'derived'.
+
+        """
+        return replace(self, range=Plausible.of(numbers, source))
+
+    def plausible_sliding(self, numbers: tuple[float, ...], source: str) -> Parameter:
+        """
+        Return the same with what holds of it where its joint slides; see `plausible`.
+
+        Parameters
+        ----------
+        numbers : tuple of 3 or 2 float
+            In m instead of rad.
+        source : str
+
+        """
+        return replace(self, sliding=Plausible.of(numbers, source))
 
 
 @dataclass(frozen=True, eq=False)

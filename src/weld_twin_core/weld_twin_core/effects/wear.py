@@ -17,7 +17,7 @@ from ..arrays import Array
 from .effect import Effect
 from .hooks import Traits
 from .registry import register
-from .view import Parameter, Plausible, Stage, Value, View
+from .view import Parameter, Stage, Value, View
 from .wording import number
 
 _SLOWED = (0.0, 0.5)
@@ -46,29 +46,14 @@ class Wear(Effect):
     of = 'robot'
     stage = Stage.LINK
     parameters = (
-        Parameter(
-            'rate',
-            'm/s',
-            typical=1e-6,
-            range=Plausible.even(
-                2e-6,
-                1e-4,
-                'derived: a tip that loses a millimetre in ten minutes; 6 mm in a minute is cut',
-            ),
+        Parameter('rate', 'm/s', typical=1e-6).plausible(
+            (2e-6, 1e-4),
+            'derived: a tip that loses a millimetre in ten minutes; 6 mm in a minute is cut',
         ),
-        Parameter(
-            'slowing',
-            '1/s',
-            typical=0.01,
-            lower=0.0,
-            linear=False,
-            range=Plausible(
-                0.02,
-                0.0,
-                0.2,
-                'derived: a sharp tip is blunt, and wears half as fast, after a minute or so; '
-                'within some seconds it is chipped, not worn',
-            ),
+        Parameter('slowing', '1/s', typical=0.01, lower=0.0, linear=False).plausible(
+            (0.02, 0.0, 0.2),
+            'derived: a sharp tip is blunt, and wears half as fast, after a minute or so; '
+            'within some seconds it is chipped, not worn',
         ),
     )
     needs = frozenset({'time'})

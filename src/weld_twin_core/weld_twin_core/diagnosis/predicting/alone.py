@@ -133,5 +133,5 @@ def _changes(constants: Model, own: Model) -> tuple[Effect, ...]:
     for kind in REGISTRY.values():
         moved = frames.get(str(kind.traits.fitted_with))
         if issubclass(kind, FrameError) and moved is not None and np.abs(moved).max() > 0.0:
-            out.append(kind(xyz=moved[:3], rotvec=moved[3:]))  # type: ignore[call-arg]
+            out.append(kind(xyz=moved[:3], rotvec=moved[3:]))
     return tuple(out)

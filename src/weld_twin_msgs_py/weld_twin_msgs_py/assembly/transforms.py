@@ -26,7 +26,7 @@ from weld_twin_core.arm.rotation import (
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-from ..messages.from_messages import NANOSECONDS
+from ..messages.from_messages import NANOSECONDS, time_ns
 
 KEPT = 10.0
 """Seconds of a moving frame that are kept, as tf2 keeps them."""
@@ -123,15 +123,13 @@ def _between(before: Placed, after: Placed, stamp: int) -> Array:
 
 def _placed(each: Any) -> Placed:
     """Return where a TransformStamped has its frame."""
-    p, q, stamp = each.transform.translation, each.transform.rotation, each.header.stamp
-    child = each.child_frame_id
+    p, q, child = each.transform.translation, each.transform.rotation, each.child_frame_id
     if not isfinite(p.x + p.y + p.z):
         raise DataError(f'the transform of {child!r} is not finite')
     quaternion = q.x, q.y, q.z, q.w
     if not abs(hypot(*quaternion) - 1.0) < UNIT:
         matrix_from_quaternion(quaternion, f'rotation of {child!r}')  # has the sentence, the bound
-    ns = int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
-    return Placed(ns, (p.x, p.y, p.z), quaternion)
+    return Placed(time_ns(each.header.stamp), (p.x, p.y, p.z), quaternion)
 
 
 class TransformTree:

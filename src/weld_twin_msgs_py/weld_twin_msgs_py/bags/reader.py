@@ -19,7 +19,6 @@ import shutil
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from struct import unpack_from
 from tempfile import TemporaryDirectory
 from traceback import clear_frames
 from types import TracebackType
@@ -31,7 +30,7 @@ from rosbags.rosbag2 import Reader, storage_mcap
 
 from weld_twin_core.errors import DataError, TwinError
 
-from ..messages.from_messages import NANOSECONDS
+from ..messages.cdr_read import first_time_ns
 from ..messages.typestore import PROVENANCE_PREFIX, TYPES, decode, types_with
 from .storage import PACKED, look
 
@@ -139,10 +138,6 @@ def _bomb() -> DataError:
 guard_rosbags()
 
 
-CDR_HEADER = 4
-"""Bytes before the first field of a serialised message; the second gives the byte order."""
-
-
 class BagMessage(NamedTuple):
     """One message: its topic, its type, when it was recorded [ns], and itself."""
 
@@ -244,9 +239,7 @@ class BagReader:
                 for connection, log_ns, data in reader.messages():
                     if stamped[connection.id]:
                         whole = unzstd(data) if self._packed else data
-                        order = '<' if whole[1] else '>'
-                        sec, nanosec = unpack_from(order + 'iI', whole, CDR_HEADER)
-                        yield connection.topic, sec * NANOSECONDS + nanosec, True
+                        yield connection.topic, first_time_ns(whole), True
                     else:
                         yield connection.topic, log_ns, False
 

@@ -23,12 +23,11 @@ from mcap.records import Chunk, Footer, Message, Schema
 from mcap.stream_reader import StreamReader
 from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import parse_qos
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from weld_twin_core.errors import DataError
 
 from ..files.whole_files import followed
-from ..messages.typestore import TYPES, decode
+from ..messages.typestore import TYPES, decode, types_with
 from .growing import NOTES, UNFINISHED, is_growing, lock, unfinished
 from .reader import unlz4, unzstd
 from .segment import SUFFIXES, Channel, Segments, clear_write_errors, sync
@@ -57,9 +56,8 @@ def channel_of(topic: str, kind: str, definition: str, qos: Any) -> Channel:
     if kind in TYPES.types:
         return Channel(topic, kind, qos=_qos(qos))
     try:
-        store = get_typestore(Stores.ROS2_JAZZY)
-        store.register(get_types_from_msg(definition, kind))
-        return Channel(topic, kind, definition, store.hash_rihs01(kind), _qos(qos))
+        digest = types_with(kind, definition).hash_rihs01(kind)
+        return Channel(topic, kind, definition, digest, _qos(qos))
     except Exception:  # a grammar and a type system, each with its own errors
         return Channel(topic, kind)
 

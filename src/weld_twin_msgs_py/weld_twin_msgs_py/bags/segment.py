@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
-from struct import Struct
 from typing import Any, NamedTuple
 from zlib import crc32
 
@@ -55,8 +54,6 @@ OFFERED, TYPE_HASH = 'offered_qos_profiles', 'topic_type_hash'
 """Keys under which rosbag2 keeps these in a channel of an mcap."""
 _CRC_AT = 1 + 8 + 8 + 8 + 8
 """Where in a chunk record its checksum is: after opcode, length, two times and a size."""
-_MESSAGE_HEAD = Struct('<BQHIQQ')
-"""Of a message record in an mcap: kind, length, channel, number, when logged and published."""
 _NEVER = QosTime(9223372036, 854775807)
 """A duration that stands for none at all in the profiles of rosbag2."""
 _DEFAULT_QOS = TopicQos(RELIABLE, 10)
@@ -70,26 +67,7 @@ class _Sqlite3Writer(Sqlite3Writer):
 
 
 class _McapWriter(McapWriter):
-    """
-    Writes the hash of the type beside the quality of service, as rosbag2 does.
-
-    A message is packed in one step instead of ten, for bags are written by the million messages.
-    """
-
-    def write(self, connection: Connection, timestamp: int, data: bytes | memoryview) -> None:
-        """Write a message."""
-        chunk, number = self.chunk, connection.id
-        chunk.msgs[number].append((timestamp, chunk.bio.tell()))
-        if timestamp < chunk.message_start_time:
-            chunk.message_start_time = timestamp
-            self.message_start_time = min(timestamp, self.message_start_time)
-        if timestamp > chunk.message_end_time:
-            chunk.message_end_time = timestamp
-            self.message_end_time = max(timestamp, self.message_end_time)
-        self.channel_stats[number] += 1
-        size = len(data) + _MESSAGE_HEAD.size - 9
-        chunk.bio.write(_MESSAGE_HEAD.pack(5, size, number, 0, timestamp, timestamp))
-        chunk.bio.write(data)
+    """Writes the hash of the type beside the quality of service, as rosbag2 does."""
 
     def add_connection(self, connection: Connection, offered_qos_profiles: str) -> None:
         """Add a connection."""
@@ -114,18 +92,6 @@ class _Writer(Writer):
         StoragePlugin.SQLITE3: _Sqlite3Writer,
         StoragePlugin.MCAP: _McapWriter,
     }
-
-    def write(self, connection: Connection, timestamp: int, data: bytes | memoryview) -> None:
-        """Write a message as it is; a segment knows its connections, and asks nothing again."""
-        if not self.storage:
-            super().write(connection, timestamp, data)
-            return
-        self.storage.write(connection, timestamp, data)
-        self.counts[connection.id] += 1
-        if timestamp < self.min_timestamp:
-            self.min_timestamp = timestamp
-        if timestamp > self.max_timestamp:
-            self.max_timestamp = timestamp
 
 
 class Channel(NamedTuple):

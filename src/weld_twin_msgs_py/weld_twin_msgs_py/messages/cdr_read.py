@@ -17,11 +17,13 @@ References
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from struct import Struct, error, unpack_from
 from typing import Any, NamedTuple
 
 from weld_twin_core.errors import DataError
+
+from .from_messages import NANOSECONDS
 
 Time = namedtuple('Time', 'sec nanosec')
 """Or a duration."""
@@ -53,6 +55,15 @@ TrajectoryPoint = namedtuple(
 JointTrajectory = namedtuple('JointTrajectory', 'header joint_names points')
 
 
+NUMBERS: Mapping[str, int] = {
+    'geometry_msgs/msg/PoseStamped': 7,
+    'geometry_msgs/msg/PoseWithCovarianceStamped': 43,
+    'geometry_msgs/msg/PointStamped': 3,
+    'geometry_msgs/msg/Vector3Stamped': 3,
+    'geometry_msgs/msg/WrenchStamped': 6,
+    'sensor_msgs/msg/Temperature': 2,
+}
+"""Types that are a header and so many doubles."""
 HEADER = 4
 """Bytes of encapsulation before the first field; alignment counts from behind them."""
 _MORE = 12
@@ -104,10 +115,6 @@ class _Cursor:
 
     def header(self) -> Header:
         return Header(self.time(), self.string())
-
-    def pose_stamped(self) -> PoseStamped:
-        header, v = self.header(), self.doubles(7)
-        return PoseStamped(header, Pose(Xyz(*v[:3]), Xyzw(*v[3:])))
 
 
 class _Kept(NamedTuple):
@@ -185,35 +192,28 @@ class JointStateDecoder:
 _STAMP = Struct('<iI')
 
 
-def _point(c: _Cursor) -> PointStamped:
-    return PointStamped(c.header(), Xyz(*c.doubles(3)))
+def first_time_ns(data: bytes | bytearray | memoryview) -> int:
+    """Return the stamp [ns] of a serialised message that begins with a header."""
+    sec, nanosec = unpack_from('<iI' if data[1] else '>iI', data, HEADER)
+    return int(sec) * NANOSECONDS + int(nanosec)
 
 
-def _sure_pose(c: _Cursor) -> PoseWithCovarianceStamped:
-    pose = c.pose_stamped()
-    return PoseWithCovarianceStamped(pose.header, PoseWithCovariance(pose.pose, c.doubles(36)))
+def _stamped(kind: str, make: Callable[[Header, tuple[float, ...]], Any]) -> dict[str, Any]:
+    """Return what reads a type that is a header and so many doubles, by its name."""
+    return {kind: lambda c: make(c.header(), c.doubles(NUMBERS[kind]))}
 
 
-def _transform(c: _Cursor) -> TransformStamped:
-    header, child, v = c.header(), c.string(), c.doubles(7)
-    return TransformStamped(header, child, Transform(Xyz(*v[:3]), Xyzw(*v[3:])))
+def _pose(v: tuple[float, ...]) -> Pose:
+    return Pose(Xyz(*v[:3]), Xyzw(*v[3:7]))
 
 
 def _transforms(c: _Cursor) -> TFMessage:
     return TFMessage(tuple(_transform(c) for _ in range(c.count(64))))
 
 
-def _vector(c: _Cursor) -> Vector3Stamped:
-    return Vector3Stamped(c.header(), Xyz(*c.doubles(3)))
-
-
-def _wrench(c: _Cursor) -> WrenchStamped:
-    header, v = c.header(), c.doubles(6)
-    return WrenchStamped(header, Wrench(Xyz(*v[:3]), Xyz(*v[3:])))
-
-
-def _temperature(c: _Cursor) -> Temperature:
-    return Temperature(c.header(), *c.doubles(2))
+def _transform(c: _Cursor) -> TransformStamped:
+    header, child, v = c.header(), c.string(), c.doubles(7)
+    return TransformStamped(header, child, Transform(Xyz(*v[:3]), Xyzw(*v[3:])))
 
 
 def _trajectory(c: _Cursor) -> JointTrajectory:
@@ -226,17 +226,24 @@ def _trajectory(c: _Cursor) -> JointTrajectory:
 
 
 def _path(c: _Cursor) -> Path:
-    return Path(c.header(), tuple(c.pose_stamped() for _ in range(c.count(64))))
+    pose = READERS['geometry_msgs/msg/PoseStamped']
+    return Path(c.header(), tuple(pose(c) for _ in range(c.count(64))))
 
 
 READERS: dict[str, Callable[[_Cursor], Any]] = {
-    'geometry_msgs/msg/PoseStamped': _Cursor.pose_stamped,
-    'geometry_msgs/msg/PoseWithCovarianceStamped': _sure_pose,
-    'geometry_msgs/msg/PointStamped': _point,
+    **_stamped('geometry_msgs/msg/PoseStamped', lambda h, v: PoseStamped(h, _pose(v))),
+    **_stamped(
+        'geometry_msgs/msg/PoseWithCovarianceStamped',
+        lambda h, v: PoseWithCovarianceStamped(h, PoseWithCovariance(_pose(v), v[7:])),
+    ),
+    **_stamped('geometry_msgs/msg/PointStamped', lambda h, v: PointStamped(h, Xyz(*v))),
+    **_stamped('geometry_msgs/msg/Vector3Stamped', lambda h, v: Vector3Stamped(h, Xyz(*v))),
+    **_stamped(
+        'geometry_msgs/msg/WrenchStamped',
+        lambda h, v: WrenchStamped(h, Wrench(Xyz(*v[:3]), Xyz(*v[3:]))),
+    ),
+    **_stamped('sensor_msgs/msg/Temperature', lambda h, v: Temperature(h, *v)),
     'geometry_msgs/msg/TransformStamped': _transform,
-    'geometry_msgs/msg/Vector3Stamped': _vector,
-    'geometry_msgs/msg/WrenchStamped': _wrench,
-    'sensor_msgs/msg/Temperature': _temperature,
     'trajectory_msgs/msg/JointTrajectory': _trajectory,
     'nav_msgs/msg/Path': _path,
     'tf2_msgs/msg/TFMessage': _transforms,

@@ -29,6 +29,11 @@ VARIANCES = (0, 7, 14)
 """Where the covariance of a pose has the variances of its position."""
 
 
+def time_ns(time: Any) -> int:
+    """Return a Time in nanoseconds."""
+    return int(time.sec) * NANOSECONDS + int(time.nanosec)
+
+
 class Unstamped(DataError):
     """The header stamp of a message was never set."""
 
@@ -39,8 +44,7 @@ def stamp_ns(message: Any) -> int:
 
     Raises Unstamped: the stamp was never set, or is not a time.
     """
-    stamp = message.header.stamp
-    ns = int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
+    ns = time_ns(message.header.stamp)
     if ns <= 0:
         raise Unstamped(
             f'header.stamp is {ns} ns: the publisher left it unset, so the sample has no place in '

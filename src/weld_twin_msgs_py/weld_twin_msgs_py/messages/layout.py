@@ -15,25 +15,16 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from weld_twin_core.arrays import Array
 
-from .cdr_read import HEADER
+from .cdr_read import HEADER, NUMBERS
 from .from_messages import NANOSECONDS
 
-NUMBERS: Mapping[str, int] = {
-    'geometry_msgs/msg/PoseStamped': 7,
-    'geometry_msgs/msg/PoseWithCovarianceStamped': 43,
-    'geometry_msgs/msg/PointStamped': 3,
-    'geometry_msgs/msg/Vector3Stamped': 3,
-    'geometry_msgs/msg/WrenchStamped': 6,
-    'sensor_msgs/msg/Temperature': 2,
-}
-"""Types that are a header and so many doubles."""
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 _LITTLE_ENDIAN = b'\x00\x01'
 """How plain CDR with the low byte first begins; all senders in use write it."""

@@ -17,7 +17,7 @@ PROVENANCE_PREFIX = 'weld_twin/'
 
 
 @lru_cache(maxsize=32)
-def types_with(kind: str, definition: str, idl: bool) -> Typestore:
+def types_with(kind: str, definition: str, idl: bool = False) -> Typestore:
     """
     Return a store of types that knows one more, as a bag defines it.
 

@@ -22,6 +22,7 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import DataError, ModelError, TwinError
 from weld_twin_msgs_py.assembly import Intake
 from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, FedBack, plain_messages
+from weld_twin_msgs_py.messages.from_messages import time_ns
 from weld_twin_msgs_py.messages.topics import (
     BY_NAME,
     DIAGNOSTICS,
@@ -227,8 +228,7 @@ class CellNode(TellingNode):
                 state.used = state.last
             finally:  # whoever waits for the answer does not wait for the books
                 if counted:
-                    at = message.header.stamp
-                    state.stamped(at.sec * 1_000_000_000 + at.nanosec)
+                    state.stamped(time_ns(message.header.stamp))
 
         def guarded(kind: str, data: bytes) -> None:
             state.arrived()

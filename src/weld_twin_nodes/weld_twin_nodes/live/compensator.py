@@ -415,8 +415,7 @@ class Compensator(ManagedNode):
 
     def _tell_added(self, header: Any, result: CorrectedGoal) -> None:
         """Publish what is added at every point, at the time when the arm is to be there."""
-        begun = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
-        begun = begun or self.get_clock().now().nanoseconds
+        begun = from_messages.time_ns(header.stamp) or self.get_clock().now().nanoseconds
         encode = self._encoder(base_frame(self))[1]
         for t, added in zip(result.goal.t, result.added, strict=True):
             self._correction.publish(encode(begun + round(float(t) * 1e9), added))

@@ -20,6 +20,7 @@ from weld_twin_core.twin.goal_correction import (
     corrected_goal,
 )
 from weld_twin_core.twin.program_model import ProgramModel
+from weld_twin_msgs_py.messages.from_messages import time_ns
 from weld_twin_msgs_py.messages.goals import GoalPoints, beyond_tolerance, read_goal
 from weld_twin_msgs_py.messages.topics import AUDIT
 
@@ -162,9 +163,8 @@ class GoalJudge:
 
     def _read(self, goal: Any, names: tuple[str, ...]) -> GoalPoints:
         """Return the points of a goal; refuse one that should have begun already."""
-        stamp = goal.trajectory.header.stamp
         given = read_goal(goal.trajectory, names)
-        at = stamp.sec * 1_000_000_000 + stamp.nanosec
+        at = time_ns(goal.trajectory.header.stamp)
         late = (self._node.get_clock().now().nanoseconds - at) * 1e-9 - float(given.goal.t[0])
         if at and late > LATE:
             raise DataError(f'the goal should have begun {late:.2f} s ago, by its stamp')

@@ -8,18 +8,16 @@ import json
 import time
 from collections import deque
 from math import inf, isfinite
-from struct import unpack_from
 from typing import Any
 
 from rclpy.duration import Duration
 
+from weld_twin_msgs_py.messages.cdr_read import first_time_ns
+from weld_twin_msgs_py.messages.from_messages import time_ns
 from weld_twin_msgs_py.messages.to_messages import Status
 
 from ..streams.stamp_watch import StampWatch
 from .words import HEARD, NODE, REACHED, RUN, SENT, Sent
-
-CDR_HEADER = 4
-"""Bytes before the first field of a serialised message."""
 
 
 class Output:
@@ -71,11 +69,8 @@ class Output:
 def header_stamp(message: Any) -> int:
     """Return the header stamp of a message, or of the bytes of one [ns]."""
     if isinstance(message, bytes | bytearray | memoryview):
-        order = '<' if message[1] else '>'
-        sec, nanosec = unpack_from(order + 'iI', message, CDR_HEADER)
-    else:
-        sec, nanosec = message.header.stamp.sec, message.header.stamp.nanosec
-    return int(sec) * 1_000_000_000 + int(nanosec)
+        return first_time_ns(message)
+    return time_ns(message.header.stamp)
 
 
 OK, WARN, ERROR, STALE = range(4)

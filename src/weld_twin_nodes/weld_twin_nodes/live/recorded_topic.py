@@ -13,14 +13,14 @@ from typing import Any
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from rosbags.interfaces import Qos as BagQos
 from rosbags.interfaces import QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from weld_twin_core.errors import DataError, TwinError
 from weld_twin_msgs_py.bags.reader import has_header
 from weld_twin_msgs_py.bags.segment import Channel
 from weld_twin_msgs_py.messages.cdr_read import checked
+from weld_twin_msgs_py.messages.from_messages import NANOSECONDS
 from weld_twin_msgs_py.messages.topics import BY_NAME, LATCHED, RELIABLE, VOLATILE, Qos
-from weld_twin_msgs_py.messages.typestore import TYPES
+from weld_twin_msgs_py.messages.typestore import TYPES, types_with
 
 from .cell_node import CellNode
 from .health import header_stamp
@@ -88,7 +88,6 @@ def _short(kind: str) -> str:
     return kind.replace('/msg/', '/')
 
 
-NANOSECONDS = 1_000_000_000
 UNTOLD = 'RIHS01_' + 64 * '0'
 """Hash of a type that nobody could be asked for any more."""
 
@@ -100,19 +99,12 @@ def offered_channel(topic: str, kind: str, publishers: Sequence[Any]) -> Channel
     if kind not in TYPES.types:
         try:
             text = definition(kind)
-            digest = digest or type_hash(kind, text)
+            digest = digest or types_with(kind, text).hash_rihs01(kind)
         except DataError:  # the messages are worth keeping without
             text = '# the definition of this type was not installed where it was recorded\n'
             digest = digest or UNTOLD
     qos = tuple(_profile(info.qos_profile) for info in publishers)
     return Channel(topic, kind, text, digest, qos)
-
-
-def type_hash(kind: str, text: str) -> str:
-    """Return the hash of a type by its definition."""
-    store = get_typestore(Stores.EMPTY)
-    store.register(get_types_from_msg(text, kind))
-    return store.hash_rihs01(kind)
 
 
 def _profile(offered: Any) -> BagQos:

@@ -5,6 +5,7 @@
 import fcntl
 import gc
 import os
+import re
 import shutil
 import sys
 from contextlib import suppress
@@ -228,10 +229,12 @@ class Browser:
         self.tab.goto(place.as_uri())
         return self.tab
 
-    def hindrances(self, text):
-        """Return what hinders reading a page: light, dark, on a phone, in print; or on its console."""
+    def hindrances(self, text, sides=None):
+        """Return what hinders reading a page: light, dark, on a phone, on paper; or on its console."""
         axe = pytest.importorskip('axe_playwright_python.sync_playwright').Axe()
         page, out = self.open(text), []
+        count = self.sides() if sides else 0
+        out += [f'{count} sides'] * (count > (sides or 0))
         page.evaluate(axe.axe_script)
         # Contrasts are those of a scheme, and take longest where a page is narrow.
         shape, colours = {'rules': {CONTRAST: {'enabled': False}}}, {'runOnly': [CONTRAST]}
@@ -246,9 +249,15 @@ class Browser:
             for found in page.evaluate(AXE, rules | told_alone):
                 if found['impact'] in ('serious', 'critical'):
                     told += [f'{found["id"]}: {node["html"][:90]}' for node in found['nodes'][:4]]
+            if sides and width < 1100 and self.sides() != count:
+                told.append('it is printed on more sides from here')
             out += [f'{width} {scheme}: {item}' for item in told]
         page.emulate_media(media='print', color_scheme='light')
         return [*out, *(f'print: {item}' for item in page.evaluate(CLIPPED)), *self.console]
+
+    def sides(self):
+        """Return on how many sides of paper the open page is printed."""
+        return len(re.findall(rb'/Type /Page\b', self.tab.pdf(prefer_css_page_size=True)))
 
     def _only_files(self, url):
         if not url.startswith(('file:', 'data:')):

@@ -2,13 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Images made by a pinhole written out here become the poses they were made of."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from weld_twin_core.bundle import adjusted
+from weld_twin_core.bundle import adjusted, seen_by
 from weld_twin_core.cameras import Camera, Lens, Sightings, Target
 from weld_twin_core.errors import DataError
+from weld_twin_core.recording import JointMotion, Recording
 
 FOCAL, CENTRE = 1500.0, np.array([900.0, 600.0])
 BOARD = np.array([[c, r, 0.0] for r in range(4) for c in range(6)]) * 0.03
@@ -23,8 +26,8 @@ def board_before_camera(rng):
     return out
 
 
-def seen(poses, lens=LENS, mounts=('world', 'tool'), noise=None):
-    there = BOARD @ np.swapaxes(poses[:, :3, :3], 1, 2) + poses[:, None, :3, 3]
+def seen(poses, lens=LENS, mounts=('world', 'tool'), noise=None, real=BOARD):
+    there = real @ np.swapaxes(poses[:, :3, :3], 1, 2) + poses[:, None, :3, 3]
     pixel = (FOCAL * there[..., :2] / there[..., 2:] + CENTRE).reshape(-1, 2)
     if noise is not None:
         pixel = pixel + noise
@@ -83,3 +86,54 @@ def test_a_lens_that_is_one_per_cent_off_is_found_out():
 def test_what_hangs_on_the_same_side_tells_nothing_of_the_arm():
     with pytest.raises(DataError, match='both on the tool'):
         seen(board_before_camera(np.random.default_rng(2)), mounts=('tool', 'tool'))
+
+
+EYES, BOARDS = np.tile(np.eye(4), (2, 1, 1)), np.tile(np.eye(4), (2, 1, 1))
+EYES[1, :3, :3] = Rotation.from_rotvec([0.1, 0.3, -0.2]).as_matrix()
+EYES[1, :3, 3], BOARDS[1, :3, 3] = [-0.3, 0.05, 0.1], [0.05, -0.1, 0.02]
+BOARDS[1, :3, :3] = Rotation.from_rotvec([0.2, -0.3, 0.4]).as_matrix()
+
+
+def by_two(poses, shown):
+    """Return what two cameras see of two boards, of each pair in the stamps given."""
+    rows = []
+    for (c, t), stamps in shown.items():
+        for k in stamps:
+            board = np.linalg.inv(EYES[c]) @ poses[k] @ BOARDS[t]
+            there = BOARD @ board[:3, :3].T + board[:3, 3]
+            places = FOCAL * there[:, :2] / there[:, 2:] + CENTRE
+            rows += [(k, c, t, i, *place) for i, place in enumerate(places)]
+    image, camera, target, point, *pixel = np.array(rows).T
+    numbers = [each.astype(int) for each in (image, camera, target, point)]
+    names = tuple(map(str, range(len(BOARD))))
+    cameras = tuple(Camera(name, LENS, 'world') for name in ('left', 'right'))
+    targets = tuple(Target(name, names, BOARD, 'tool', 5e-5) for name in ('near', 'far'))
+    return Sightings(cameras, targets, np.arange(14.0), *numbers, np.transpose(pixel))
+
+
+def test_what_shares_a_stamp_is_found_beside_each_other_and_tells_the_other_stamps():
+    poses = board_before_camera(np.random.default_rng(2))
+    shown = {(0, 0): range(9), (1, 0): range(6, 12), (0, 1): range(7, 14)}
+    found = adjusted(by_two(poses, shown)).measured
+    np.testing.assert_allclose(found.position, poses[:, :3, 3], atol=1e-6)
+    np.testing.assert_allclose(found.rotation, poses[:, :3, :3], atol=1e-6)
+
+
+def test_what_shares_no_stamp_is_named():
+    poses = board_before_camera(np.random.default_rng(2))
+    with pytest.raises(DataError, match="^camera 'right' is in no image of a stamp that shows"):
+        adjusted(by_two(poses, {(0, 0): range(9), (1, 1): range(9, 14)}))
+
+
+def test_a_board_that_is_less_exact_than_was_said_is_told_and_by_how_much():
+    rng = np.random.default_rng(5)
+    poses = np.concatenate([board_before_camera(rng) for _ in range(3)])
+    real = BOARD + rng.normal(0.0, 4e-4, BOARD.shape)
+    images = seen(poses, lens=Lens([1.01 * FOCAL] * 2, CENTRE, []), real=real)
+    motion = JointMotion(images.t, np.zeros((len(images.t), 6)), static=True)
+    notes = seen_by(Recording('run', motion), images).notes
+    off = re.search(r"of target 'board' are off by ([\d.]+) mm, not by 0\.05 mm", ' '.join(notes))
+    assert off is not None and float(off[1]) == pytest.approx(0.4, rel=0.2)
+    assert '42 of 42 images tell a pose' in notes[0]
+    longer = re.search(r'focal length (\S+) %', ' '.join(notes))
+    assert float(longer[1]) == pytest.approx(100.0 * (1.0 / 1.01 - 1.0), abs=0.1)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core.arm.chain import forward, jacobian
+from weld_twin_core.arm.chain import forward
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie
+from weld_twin_core.motion.inverse.newton import reaching
 
 OFFSET = 0.002
 BLOCK = Artefact(
@@ -20,13 +21,7 @@ BLOCK = Artefact(
 
 def reached(robot, points, rng, most):
     """Return postures in which the tool point is at each of some points, at most so many."""
-    q = rng.uniform(-2.0, 2.0, (len(points), robot.n))
-    for _ in range(80):
-        turn = jacobian(robot, q)[:, :3]
-        inverse = np.linalg.inv(turn @ np.swapaxes(turn, 1, 2) + 1e-6 * np.eye(3))
-        off = points - forward(robot, q)[:, :3, 3]
-        q = q + np.clip(np.einsum('mji,mjk,mk->mi', turn, inverse, off), -0.2, 0.2)
-    good = np.linalg.norm(points - forward(robot, q)[:, :3, 3], axis=1) < 1e-9
+    q, good = reaching(robot, points, rng.uniform(-2.0, 2.0, (len(points), 6)))
     return q[good][:most]
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import weld_twin_core as wt
-from weld_twin_core.arm.chain import forward, jacobian
 from weld_twin_core.contacts import Artefact, Contact, Contacts, Tie
 from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.soundness.touches import touches
 from weld_twin_core.diagnosis.unseen.groups import all_groups
+from weld_twin_core.motion.inverse.newton import reaching
 
 SOCKETS = {'a': [0.45, 0.1, 0.3], 'b': [0.45, 0.15, 0.3], 'c': [-0.1, 0.5, 0.4]}
 EACH = 14
@@ -24,26 +24,12 @@ def sound(robot):
     rng = np.random.default_rng(11)
     q, labels = [], []
     for label, place in SOCKETS.items():
-        found = postures(robot, np.array(place), rng)[:EACH]
-        assert len(found) == EACH
-        q.append(found + rng.normal(0.0, 5e-5, found.shape))
+        found, good = reaching(robot, np.tile(place, (80, 1)), rng.uniform(-2.0, 2.0, (80, 6)))
+        q.append(found[good][:EACH] + rng.normal(0.0, 5e-5, (EACH, 6)))
         labels += [label] * EACH
     artefact = Artefact(tuple(Contact(label) for label in SOCKETS), (Tie(('a', 'b'), 0.05, 1e-4),))
     motion = wt.JointMotion(np.arange(3.0 * EACH), np.concatenate(q), static=True)
     return wt.Recording('touches', motion, contacts=Contacts(artefact, tuple(labels)))
-
-
-def postures(robot, place, rng):
-    """Return postures in which the tool point rests at a place, by damped Newton steps."""
-    q = rng.uniform(-2.0, 2.0, (400, robot.n))
-    for _ in range(60):
-        off = place - forward(robot, q)[:, :3, 3]
-        turn = jacobian(robot, q)[:, :3]
-        inverse = np.linalg.inv(turn @ np.swapaxes(turn, 1, 2) + 1e-6 * np.eye(3))
-        step = np.einsum('mji,mjk,mk->mi', turn, inverse, off)
-        q = q + np.clip(step, -0.2, 0.2)
-    good = np.linalg.norm(place - forward(robot, q)[:, :3, 3], axis=1) < 1e-9
-    return q[good & (np.abs(q) < 3.0).all(axis=1)]
 
 
 def told(recording, robot):

@@ -16,6 +16,7 @@ from weld_twin_core.diagnosis.frames.aligned import aligned
 from weld_twin_core.diagnosis.unseen import where
 from weld_twin_core.diagnosis.unseen.unseen_stretches import Unseen
 from weld_twin_core.errors import DataError
+from weld_twin_core.motion.inverse.newton import reaching
 
 SIGMA = 1e-4
 
@@ -84,33 +85,13 @@ def test_the_shoulder_offset_is_not_seen_by_a_pin():
     np.testing.assert_allclose(off[0], off[1], atol=1e-12)
 
 
-def postures_at(robot, tool, target, count, rng):
-    """Return postures in which the tool point rests at a target."""
-    from scipy.optimize import least_squares
-
-    placed = robot.with_frames(tool=tool)
-    out = []
-    while len(out) < count:
-        start = rng.uniform(-1.5, 1.5, robot.n)
-
-        def off(q):
-            motion = wt.JointMotion([0.0], [q], static=True)
-            return (
-                wt.Twin(placed).poses(wt.Recording('', motion), np.zeros(1)).position[0] - target
-            )
-
-        found = least_squares(off, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
-        if np.abs(found.fun).max() < 1e-8:
-            out.append(found.x)
-    return np.array(out)
-
-
 def test_four_point_tool_calibration_is_a_special_case_with_its_uncertainty():
     robot, rng = wt.load('ur5'), np.random.default_rng(3)
     tool = np.array(robot.T_flange_tool)
     tool[:3, 3] = [0.02, -0.05, 0.19]
-    postures = postures_at(robot, tool, [0.45, 0.1, 0.3], 4, rng)
-    recording = touching(robot, postures, ['spike'] * 4)
+    placed, spike = robot.with_frames(tool=tool), np.tile([0.45, 0.1, 0.3], (20, 1))
+    postures, good = reaching(placed, spike, rng.uniform(-1.5, 1.5, (20, 6)))
+    recording = touching(robot, postures[good][:4], ['spike'] * 4)
     flange = wt.Twin(robot.with_frames(tool=np.eye(4))).poses(recording, recording.joints.t)
 
     # What a controller does with four postures: rotations times tip, minus one point, is minus
@@ -123,9 +104,8 @@ def test_four_point_tool_calibration_is_a_special_case_with_its_uncertainty():
     np.testing.assert_allclose(tip, tool[:3, 3], atol=1e-6)
     np.testing.assert_allclose(aligned_fit.model.robot.T_flange_tool[:3, 3], tip, atol=1e-6)
 
-    near = robot.with_frames(tool=tool)
     free = [wt.effects.ToolPose(xyz=np.zeros(3), rotvec=np.zeros(3))]
-    problem, told = fitted(recording, near, free)
+    problem, told = fitted(recording, placed, free)
     scale = Scale(SIGMA, 1.0, tuple(np.ones(m) for m in problem.samples))
     inverse = np.linalg.pinv(design(problem, told.model, scale).T)
     np.testing.assert_allclose(np.linalg.norm(inverse, axis=1)[:3], deviation, rtol=1e-3)

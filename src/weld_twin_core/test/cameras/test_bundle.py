@@ -121,7 +121,7 @@ def test_what_shares_a_stamp_is_found_beside_each_other_and_tells_the_other_stam
 
 def test_what_shares_no_stamp_is_named():
     poses = board_before_camera(np.random.default_rng(2))
-    with pytest.raises(DataError, match="^camera 'right' is in no image of a stamp that shows"):
+    with pytest.raises(DataError, match=r"^camera 'right' is in no image of a stamp that shows"):
         adjusted(by_two(poses, {(0, 0): range(9), (1, 1): range(9, 14)}))
 
 

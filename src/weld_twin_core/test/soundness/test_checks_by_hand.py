@@ -11,9 +11,8 @@ from measured_cells import asked, moving, recorded, rejointed, stations
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.cameras.sightings import Fitted
-from weld_twin_core.diagnosis.algebra.problem import Problem
 from weld_twin_core.diagnosis.soundness.base_change import rest_of
-from weld_twin_core.diagnosis.soundness.computed import _gap, _rounding
+from weld_twin_core.diagnosis.soundness.computed import _gap
 from weld_twin_core.diagnosis.soundness.evidence import Case, _believed
 from weld_twin_core.diagnosis.soundness.gate import CHECKS, Examined, _gave_way
 from weld_twin_core.diagnosis.soundness.images import _undone
@@ -29,7 +28,7 @@ from weld_twin_core.diagnosis.soundness.richness import (
 )
 from weld_twin_core.diagnosis.soundness.slips import Settling, Slip, changes
 from weld_twin_core.diagnosis.soundness.snapshot import FRAMES, Snapshot
-from weld_twin_core.diagnosis.soundness.stamps import _stream, streams, written
+from weld_twin_core.diagnosis.soundness.stamps import _stream, written
 from weld_twin_core.diagnosis.soundness.stuck import _freed, _inside, _runs, _whole
 from weld_twin_core.diagnosis.soundness.suspicions import (
     doubles,
@@ -258,15 +257,6 @@ def test_what_is_said_of_stamps_is_what_they_are(rng):
     assert 'give or take' in told(t + rng.uniform(0.0, 0.015, t.size))[0][1]
 
 
-def test_streams_of_one_length_without_common_time_can_be_brought_together(ur5, rng):
-    run = recorded(ur5, moving(ur5, rng), rng, points=True)
-    for part, mended in ((1.0, True), (0.5, False)):
-        seen = run.measured.take(run.measured.t <= part * run.measured.t[-1])
-        far = run.with_measured(replace(seen, t=seen.t + 900.0))
-        (found,) = streams(Given((far,), ur5))
-        assert found.kind == 'clock' and (found.mend is not None) is mended
-
-
 # Repeats and strays -----------------------------------------------------------------------------
 
 
@@ -369,17 +359,6 @@ def test_constant_errors_of_an_arm_leave_nothing_that_changed(ur5, rng):
     both = rest_of([problem.residuals(model)[0] + off], problem, model)
     alone = rest_of([problem.residuals(model)[0]], problem, model)
     assert both.left(0) < 1.2 * alone.left(0)
-
-
-def test_rounding_is_as_coarse_as_the_numbers_are(ur5, rng):
-    run = recorded(ur5, stations(ur5, rng, 80), rng, points=True)
-    rounded = []
-    for digits in (5, 6, 9):
-        seen = replace(run.measured, position=run.measured.position.round(digits))
-        problem = Problem((run.with_measured(seen),), FRAMES)
-        rounded.append(_rounding(problem, asked(ur5, run)[1]))
-    coarse, fine, none = rounded
-    assert 4e-6 < coarse < 1e-5 and fine == pytest.approx(0.1 * coarse) and none == 0.0
 
 
 SIDE = np.array([[1.0], [-1.0], [0.5]])

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from measured_cells import asked, moving, recorded, rejointed, remeasured, stations
+from measured_cells import asked, moving, recorded, rejointed, stations
 
 from weld_twin_core.diagnosis.algebra.problem import Change
 from weld_twin_core.diagnosis.frames.aligned import aligned
@@ -25,7 +25,7 @@ from weld_twin_core.diagnosis.soundness.stamps import streams
 from weld_twin_core.diagnosis.soundness.suspicions import suspicions
 from weld_twin_core.effects import JointOffset
 from weld_twin_core.effects.dated import InstrumentKnock, JointSlip
-from weld_twin_core.effects.frame_errors import BasePose, ToolPose
+from weld_twin_core.effects.frame_errors import ToolPose
 from weld_twin_core.recording import JointMotion
 
 ELBOW_TURNED = [1, 1, -1, 1, 1, 1]
@@ -194,9 +194,10 @@ def test_twice_as_many_numbers_as_are_fitted_tell_that_poses_were_computed(
 
 
 def test_a_number_that_is_rounded_is_off_by_a_step_over_the_root_of_twelve(ur5, still):
-    seen = replace(still.measured, position=still.measured.position.round(6))
-    problem, model = asked(ur5, still.with_measured(seen))
-    assert _rounding(problem, model) == pytest.approx(1e-6 * np.sqrt(3.0 / 12.0) / 0.7)
+    for digits, step in ((5, 1e-5), (6, 1e-6), (9, 0.0)):
+        seen = replace(still.measured, position=still.measured.position.round(digits))
+        problem, model = asked(ur5, still.with_measured(seen))
+        assert _rounding(problem, model) == pytest.approx(step * np.sqrt(3.0 / 12.0) / 0.7)
 
 
 def test_stations_have_no_lag(ur5, still):
@@ -222,7 +223,7 @@ def test_streams_nearly_as_long_as_each_other_were_started_together(ur5, rng, sh
     part = run.measured.take(run.measured.t <= t[0] + share * np.ptp(t))
     far = run.with_measured(replace(part, t=part.t + 900.0))
     (found,) = streams(Given((far,), ur5))
-    assert (found.mend is not None) is mended
+    assert found.kind == 'clock' and (found.mend is not None) is mended
     if mended:
         assert found.mend.keywords['late'] == pytest.approx(900.0 + part.t[0] - t[0])
     inside = run.with_measured(replace(part, t=part.t + (t[-1] - part.t[0])))
@@ -241,12 +242,3 @@ def test_a_small_step_of_the_set_up_is_warned_of_and_one_of_a_joint_is_not(ur5, 
     vars(case).update(changes=[before])
     (found,) = setup(case)
     assert found.sentence.startswith('The set-up moved by 0.2 mm before run')
-
-
-def test_frames_elsewhere_are_told_by_the_fewest_that_explain_it(ur5, rng):
-    base = BasePose((1.2, -0.7, 0.3), (0.4, 0.9, -0.5))
-    seen = recorded(ur5, stations(ur5, rng, 40), rng, [base], points=True)
-    (found,) = judged(ur5, seen)
-    assert (found.kind, found.at) == ('other', ('base',))
-    assert found.mend.keywords['frames'] == {'base'} and 'with the base fitted' in found.sentence
-    assert not judged(ur5, remeasured(seen), align=('base',))

@@ -95,7 +95,7 @@ def test_a_job_in_pulses_is_refused_without_their_size(tmp_path):
 
 
 @pytest.mark.parametrize('language', CELLS)
-def test_the_real_tool_goes_where_the_program_meant(language, tmp_path):
+def test_the_real_tool_goes_where_the_program_meant_and_only_digits_change(language, tmp_path):
     name, files, reader, near = CELLS[language]
     robot = wt.load(name)
     (tmp_path / 'found.yaml').write_text(effects(robot))
@@ -118,21 +118,11 @@ def test_the_real_tool_goes_where_the_program_meant(language, tmp_path):
     assert errors[1][led].max() < ROUNDING.get(language, 4e-6)
     expected = json.loads((tmp_path / 'out' / 'correction.json').read_text())['expected']
     assert expected['after']['rms_m'] < 0.05 * expected['before']['rms_m']
-
-
-@pytest.mark.parametrize('language', CELLS)
-def test_only_digits_of_points_change(language, tmp_path):
-    name, files, _, _ = CELLS[language]
-    (tmp_path / 'found.yaml').write_text(effects(wt.load(name)))
-    weld_twin(
-        *('correct', MADE / files[0], '--robot', name, '--out', tmp_path / 'out'),
-        *('--model', tmp_path / 'found.yaml', *OPTIONS.get(language, [])),
-    )
-    for old, new in zip(texts(MADE, files), texts(tmp_path / 'out', files), strict=True):
-        bare = [''.join(readers.re.split(readers.NUMBER, text)) for text in (old, new)]
-        assert bare[0] == bare[1]
-        comments = [readers.re.findall(r'(?:;|!|#)[^\n]*', text) for text in (old, new)]
-        assert comments[0] == comments[1]
+    for pair in zip(texts(MADE, files), texts(tmp_path / 'out', files), strict=True):
+        old, new = (''.join(readers.re.split(readers.NUMBER, text)) for text in pair)
+        assert old == new
+        old, new = (readers.re.findall(r'(?:;|!|#)[^\n]*', text) for text in pair)
+        assert old == new
 
 
 def corrected(tmp_path, text, *more, name='seam.script', robot='ur5', offset=8e-4):

@@ -110,16 +110,6 @@ def test_quaternions_are_read_by_their_names(tmp_path, ur5):
     np.testing.assert_allclose(recording.measured.rotation, T[:, :3, :3], atol=1e-12)
 
 
-def test_units_in_the_header_are_believed(tmp_path, ur5):
-    q, T = poses(ur5)
-    header = [*(f'{joint} [deg]' for joint in JOINTS), 'x [mm]', 'y [mm]', 'z [mm]']
-    path = table(tmp_path / 't.csv', header, np.rad2deg(q), T[:, :3, 3] * 1000)
-    recording, said = read_table(path, ur5)
-    np.testing.assert_allclose(recording.joints.q, q, atol=1e-14)
-    np.testing.assert_allclose(recording.measured.position, T[:, :3, 3], atol=1e-14)
-    assert not any('positions are in' in sentence for sentence in said)
-
-
 def test_joints_with_their_own_names_may_stand_in_any_order(tmp_path, ur5):
     q, T = poses(ur5)
     header = [*reversed(ur5.joint_names), 'x', 'y', 'z']

@@ -33,11 +33,3 @@ def test_commands_take_it_and_info_lists_it(weld_twin, cell7, tmp_path):
     assert heights['cell7'] - heights['kuka_kr16_2'] == pytest.approx(0.75, abs=1e-9)
     listed = weld_twin('bag', '--robots').out
     assert listed.splitlines()[-1].split() == ['cell7', 'your', 'own', str(cell7)]
-
-
-def test_a_name_that_became_two_robots_is_an_error_of_input(weld_twin, cell7, tmp_path):
-    cell7.rename(cell7.with_name('kuka_kr16_2.yaml'))
-    said = weld_twin('simulate', '--robot', 'kuka_kr16_2', '--out', tmp_path / 'bag')
-    assert said.code == 2
-    assert 'is the name of several robots' in said.err
-    assert not (tmp_path / 'bag').exists()

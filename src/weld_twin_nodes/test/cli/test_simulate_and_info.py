@@ -206,13 +206,6 @@ def test_help_is_quick_because_it_imports_little():
     subprocess.run([sys.executable, '-c', code], check=True, capture_output=True)
 
 
-def test_every_subcommand_has_help(weld_twin):
-    listed = weld_twin('--help').out
-    for name in ('demo', 'simulate', 'bag', 'import'):
-        assert f' {name} ' in listed
-        assert weld_twin(name, '--help').code == 0
-
-
 def simulated_with(weld_twin, folder, effect, *more):
     """Return what the command says of a short motion with one effect."""
     (folder / 'e.yaml').write_text(f'- {effect}\n')

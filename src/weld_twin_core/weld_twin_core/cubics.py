@@ -26,12 +26,11 @@ def hermite(x: Array, y: Array, slope: Array, at: Array) -> tuple[Array, Array]:
     return y[low] + s * (first + s * (c2 + s * c3)), first + s * (2.0 * c2 + 3.0 * s * c3)
 
 
-def spline_slopes(x: Array, y: Array, *, natural: bool = False) -> Array:
+def natural_slopes(x: Array, y: Array) -> Array:
     """
-    Return slopes (N, n) that make a curve of cubic pieces bend without a jump, for few knots (N,).
+    Return slopes (N, n) of the natural spline: no jump in its bend, and none at its ends.
 
-    A ``natural`` one is straight at its ends; of another, of four knots or more, the first two and
-    the last two pieces are one. The equations are solved as a full matrix.
+    For few knots (N,): the equations are solved as a full matrix.
     """
     h, count = np.diff(x), x.size
     chord = np.diff(y, axis=0) / h[:, None]
@@ -40,22 +39,17 @@ def spline_slopes(x: Array, y: Array, *, natural: bool = False) -> Array:
     system[inner, inner - 1], system[inner, inner + 1] = h[1:], h[:-1]
     system[inner, inner] = 2.0 * (h[:-1] + h[1:])
     wanted[1:-1] = 3.0 * (h[1:, None] * chord[:-1] + h[:-1, None] * chord[1:])
-    if natural:
-        system[0, :2], system[-1, -2:] = (2.0, 1.0), (1.0, 2.0)
-        wanted[0], wanted[-1] = 3.0 * chord[0], 3.0 * chord[-1]
-    else:
-        for row, a, b, c in ((0, 0, 1, 2), (-1, -1, -2, -3)):
-            one, other = abs(x[b] - x[a]), abs(x[c] - x[b])
-            both = one + other
-            system[row, a], system[row, b] = other, both
-            near = (y[b] - y[a]) / (x[b] - x[a])
-            far = (y[c] - y[b]) / (x[c] - x[b])
-            wanted[row] = ((one + 2.0 * both) * other * near + one**2 * far) / both
+    system[0, :2], system[-1, -2:] = (2.0, 1.0), (1.0, 2.0)
+    wanted[0], wanted[-1] = 3.0 * chord[0], 3.0 * chord[-1]
     return np.asarray(np.linalg.solve(system, wanted))
 
 
 def slopes_of_many(x: Array, y: Array) -> Array:
-    """Return what `spline_slopes` does, for thousands of knots: no row of it is stored whole."""
+    """
+    Return slopes (N, n) of a spline of thousands of knots (N,), four at the least.
+
+    The first two and the last two pieces are one. No row of the equations is stored whole.
+    """
     from scipy.linalg import solve_banded
 
     h = np.diff(x)
@@ -63,7 +57,6 @@ def slopes_of_many(x: Array, y: Array) -> Array:
     band, wanted = np.zeros((3, x.size)), np.empty(y.shape)
     band[0, 2:], band[1, 1:-1], band[2, :-2] = h[:-1], 2.0 * (h[:-1] + h[1:]), h[1:]
     wanted[1:-1] = 3.0 * (h[1:, None] * chord[:-1] + h[:-1, None] * chord[1:])
-    # The first two and the last two pieces are one.
     for row, beside, one, other in ((0, (0, 1), 0, 1), (-1, (2, -2), -1, -2)):
         both = h[one] + h[other]
         band[1, row], band[beside] = h[other], both

@@ -12,7 +12,7 @@ from measured_cells import asked, moving, recorded, stations
 
 import weld_twin_core as wt
 from weld_twin_core.arm import catalog
-from weld_twin_core.arm.clearance import free
+from weld_twin_core.arm.clearance import Space
 from weld_twin_core.diagnosis.advice import Limits, chosen_pieces, experiment, next_experiment
 from weld_twin_core.diagnosis.advice.candidates import candidates
 from weld_twin_core.diagnosis.algebra.fit import fit
@@ -223,7 +223,7 @@ def test_the_way_from_station_to_station_is_free_too(ur5):
     share = np.linspace(0.0, 1.0, 9)[:, None]
     ways = np.concatenate([a + share * (b - a) for a, b in pairwise(q)])
     seen = problem.recordings[0].joints.q
-    assert free(ur5, ways, seen, box).all()
+    assert Space(ur5, seen, box).free(ways).all()
 
 
 def test_a_seam_that_was_recorded_may_be_run_backward_and_slower(ur5):

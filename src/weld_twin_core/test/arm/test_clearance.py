@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.arm.clearance import body, clearances, free
+from weld_twin_core.arm.clearance import Space, body, clearances
 from weld_twin_core.arm.robot import Robot
 
 UPRIGHT = np.array([0.0, -1.4, 1.4, -1.6, -1.5, 0.0])
@@ -16,26 +16,26 @@ DOWN = np.array([0.0, 0.5, 0.2, -1.6, -1.5, 0.0])
 
 def test_a_folded_arm_hits_itself_and_a_usual_posture_does_not(ur5):
     seen = UPRIGHT[None]
-    assert free(ur5, UPRIGHT[None], seen).tolist() == [True]
-    assert free(ur5, FOLDED[None], seen).tolist() == [False]
+    assert Space(ur5, seen).free(UPRIGHT[None]).tolist() == [True]
+    assert Space(ur5, seen).free(FOLDED[None]).tolist() == [False]
 
 
 def test_an_upright_arm_stays_above_its_foot_and_within_a_box(ur5):
     seen = UPRIGHT[None]
-    assert not free(ur5, DOWN[None], seen)[0]
+    assert not Space(ur5, seen).free(DOWN[None])[0]
     everything = np.array([[-3.0] * 3, [3.0] * 3])
-    assert free(ur5, DOWN[None], seen, everything)[0]
-    assert not free(ur5, UPRIGHT[None], seen, np.array([[-0.1] * 3, [0.1] * 3]))[0]
+    assert Space(ur5, seen, everything).free(DOWN[None])[0]
+    assert not Space(ur5, seen, np.array([[-0.1] * 3, [0.1] * 3])).free(UPRIGHT[None])[0]
 
 
 def test_where_the_arm_was_is_no_collision(ur5):
-    assert free(ur5, FOLDED[None], FOLDED[None])[0]
+    assert Space(ur5, FOLDED[None]).free(FOLDED[None])[0]
 
 
 def test_an_axis_without_extent_is_free_anywhere():
     axis = Robot.from_mapping({'name': 'axis', 'joints': [{'name': 'x', 'type': 'prismatic'}]})
-    assert free(axis, np.zeros((2, 1)), np.zeros((1, 1))).all()
-    assert free(axis, np.array([[0.1]]), np.zeros((1, 1))).all()
+    assert Space(axis, np.zeros((1, 1))).free(np.zeros((2, 1))).all()
+    assert Space(axis, np.zeros((1, 1))).free(np.array([[0.1]])).all()
 
 
 def test_links_are_as_far_apart_as_points_on_them_are(ur5):

@@ -17,8 +17,8 @@ from weld_twin_core.arm.bulk.buffers import aligned
 from weld_twin_core.arm.bulk.bulk_kernel import LENGTHS, BulkKernel, kernel_of
 from weld_twin_core.arm.bulk.half_angle import COSINE, SINE, HalfAngle
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.single_pose import SinglePose
 from weld_twin_core.errors import ModelError
-from weld_twin_core.kernels.single_pose import SinglePose
 
 EXACT = 1e-13
 TURNS = ('theta', 'a', 'alpha', 'beta')

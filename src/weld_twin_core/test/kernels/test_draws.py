@@ -15,8 +15,8 @@ from SALib.sample import sobol as salib_sample
 from weld_twin_core.arm import chain
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import ModelError
-from weld_twin_core.kernels.draws import DhDraws, SeamDraws
-from weld_twin_core.kernels.saltelli import base_pair, mixed, sobol_estimates, sobol_half_widths
+from weld_twin_core.sensitivity.dh_draws import DhDraws, SeamDraws
+from weld_twin_core.sensitivity.sobol import base_pair, mixed, sobol_estimates, sobol_half_widths
 
 EXACT = 1e-13
 

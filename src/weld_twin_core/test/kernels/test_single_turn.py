@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from weld_twin_core.arm.single_pose import quaternion_matrix, turn_between, turn_matrix
 from weld_twin_core.errors import DataError
-from weld_twin_core.kernels.single_pose import quaternion_matrix, turn_between, turn_matrix
 
 RNG = np.random.default_rng(8)
 SIZES = (0.0, 1e-9, 1e-5, 0.999e-4, 1.001e-4, 1e-2, 1.0, 1.6, 3.1, np.pi)

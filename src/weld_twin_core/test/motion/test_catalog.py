@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from geometric_channels import geometric_channels
 from source_chains import CHAINS, chain_poses
 
 from weld_twin_core.arm import catalog
@@ -15,7 +16,6 @@ from weld_twin_core.arm.chain import (
     column,
     forward,
     frames,
-    identification_channels,
     jacobian,
 )
 from weld_twin_core.arm.dynamics import gravity_torque
@@ -144,7 +144,7 @@ def test_every_geometric_column_is_the_finite_difference(robot, configurations):
     q = configurations(robot, 5)
     at = frames(robot, q)
     step = 1e-6
-    for channel in identification_channels(robot):
+    for channel in geometric_channels(robot):
         high, low = (forward(robot, q, {channel: np.array(sign * step)}) for sign in (1, -1))
         linear = (high[:, :3, 3] - low[:, :3, 3]) / (2 * step)
         turn = angle_between(high[:, :3, :3], low[:, :3, :3]) / (2 * step)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from scipy.stats.qmc import Halton
 
 from weld_twin_core.arm import rotation
-from weld_twin_core.cubics import hermite, slopes_of_many, spline_slopes
+from weld_twin_core.cubics import hermite, natural_slopes, slopes_of_many
 from weld_twin_core.sequences import halton
 
 
@@ -32,10 +32,9 @@ def test_pieces_with_given_slopes(knots):
     same(x, y, slopes, at, CubicHermiteSpline(x, y, slopes, axis=0))
 
 
-@pytest.mark.parametrize(('natural', 'ends'), [(True, 'natural'), (False, 'not-a-knot')])
-def test_splines_bend_without_a_jump(knots, natural, ends):
+def test_a_natural_spline_bends_without_a_jump(knots):
     x, y, at = knots
-    same(x, y, spline_slopes(x, y, natural=natural), at, CubicSpline(x, y, bc_type=ends))
+    same(x, y, natural_slopes(x, y), at, CubicSpline(x, y, bc_type='natural'))
 
 
 def test_a_spline_through_many_knots_is_the_same(knots):
@@ -46,7 +45,7 @@ def test_a_spline_through_many_knots_is_the_same(knots):
 
 def test_a_natural_spline_through_two_knots_is_a_line():
     x, y = np.array([0.0, 2.0]), np.array([[1.0], [5.0]])
-    np.testing.assert_allclose(spline_slopes(x, y, natural=True), [[2.0], [2.0]], atol=1e-14)
+    np.testing.assert_allclose(natural_slopes(x, y), [[2.0], [2.0]], atol=1e-14)
 
 
 def test_points_that_fill_a_box_are_those_of_halton():

@@ -110,11 +110,6 @@ def _nothing(value: Any) -> bool:
     return isinstance(value, float) and value == 0.0
 
 
-def _slid(point: Array, axis: Array, length: Any) -> Array:
-    """Return points moved along an axis."""
-    return point if _nothing(length) else point + length * axis
-
-
 def _turn(first: Array, second: Array, angle: Array) -> tuple[Array, Array]:
     """Turn the pair of axes (first, second) by an angle in their plane."""
     if _nothing(angle):
@@ -198,8 +193,8 @@ def _row(
         if kind in TURNS:
             i, j = (k + 1) % 3, (k + 2) % 3
             moving[i], moving[j] = _turn(moving[i], moving[j], values[kind])
-        else:
-            p = _slid(p, moving[k], values[kind])
+        elif not _nothing(values[kind]):
+            p = p + values[kind] * moving[k]
     # alpha turns about the x before beta and a moves along the x after it; the two differ only
     # when beta is not zero, so _RowAxes keeps alpha's axis and `column` rebuilds a's from y and z.
     x, y, z = moving
@@ -395,11 +390,3 @@ def chain_jacobian(robot: Robot, chain: Frames, shift: Shift = NO_SHIFT) -> Arra
     """Return the Jacobian, shape (..., 6, n), of frames already at hand."""
     columns = [column(robot, chain, ('q', i), shift) for i in range(robot.n)]
     return np.moveaxis(np.stack(np.broadcast_arrays(*columns), axis=1), (0, 1), (-2, -1))
-
-
-def identification_channels(robot: Robot) -> tuple[Channel, ...]:
-    """Return every geometric channel: base, theta d a alpha beta of every row, root, tool."""
-    rows = tuple((key, i) for i in range(robot.n) for key in ROW_CHANNELS)
-    root = tuple(('root', k) for k in range(6)) if robot.behind else ()
-    base = tuple(('base', k) for k in range(6))
-    return base + rows + root + tuple(('tool', k) for k in range(6))

@@ -107,11 +107,6 @@ def clearances(shape: _Body) -> Array:
     return np.stack(out, axis=-1) if out else empty
 
 
-def free(robot: Robot, q: Array, seen: Array, box: Array | None = None) -> Array:
-    """Return which postures (N, n) are free, shape (N,), bool; see `Space`."""
-    return Space(robot, seen, box).free(q)
-
-
 class Space:
     """
     Where an arm has room, asked again and again.

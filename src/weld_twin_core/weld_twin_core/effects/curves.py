@@ -14,7 +14,7 @@ from ..arm.channels import ROW_CHANNELS, Channel, Shift
 from ..arm.dynamics import chain_gravity_torque, wrench_torque
 from ..arm.robot import Robot
 from ..arrays import Array
-from ..cubics import hermite, spline_slopes
+from ..cubics import hermite, natural_slopes
 from ..errors import DataError, ModelError
 from .effect import Effect
 from .hooks import FitHooks, Hooked, SearchHooks, Traits, TwinHooks
@@ -109,7 +109,7 @@ def _cardinal(knots: tuple[float, ...], x: Array) -> tuple[Array, Array]:
 
 @lru_cache(maxsize=256)
 def _slopes(knots: tuple[float, ...]) -> Array:
-    return spline_slopes(np.array(knots), np.eye(len(knots)), natural=True)
+    return natural_slopes(np.array(knots), np.eye(len(knots)))
 
 
 def _check_knots(name: str, over: str, knots: Sequence[float], count: int) -> None:

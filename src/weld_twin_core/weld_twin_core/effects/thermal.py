@@ -16,7 +16,7 @@ from numbers import Real
 
 import numpy as np
 
-from ..arm.channels import Channel, Shift
+from ..arm.channels import Shift
 from ..arm.robot import Robot
 from ..arrays import Array
 from ..errors import DataError, ModelError
@@ -69,7 +69,7 @@ class ThermalGrowth(LinearEffect):
             robot.index(name)
         if not isinstance(self.reference, Real):
             raise ModelError(f'thermal_growth: reference must be a number, got {self.reference!r}')
-        if self.warmup is not None and not _is_curve(self.warmup):
+        if self.warmup is not None and not (_is_pair(self.warmup) and self.warmup[1] > 0.0):
             raise ModelError(
                 'thermal_growth: warmup must be [rise in K, time constant in s above zero], '
                 f'got {self.warmup!r}'
@@ -95,16 +95,11 @@ class ThermalGrowth(LinearEffect):
             )
         return view.temperature - self.reference
 
-    def _lengths(self, view: View) -> list[tuple[Channel, float]]:
-        robot = view.robot
-        rows = range(robot.n) if self.links is None else [robot.index(k) for k in self.links]
-        lengths = [((key, i), float(getattr(robot, key)[i])) for i in rows for key in ('a', 'd')]
-        return [(channel, length) for channel, length in lengths if length != 0.0]
-
     def per_unit(self, view: View) -> list[Shift]:
         """Return length times temperature rise; travel of a joint that slides does not grow."""
-        rise = self.rise(view)
-        return [{channel: length * rise for channel, length in self._lengths(view)}]
+        robot = view.robot
+        rows = range(robot.n) if self.links is None else [robot.index(k) for k in self.links]
+        return [_grown(robot, rows, self.rise(view))]
 
     def remedy(self, robot: Robot) -> str:
         links = self.links or ('all links',)
@@ -114,9 +109,14 @@ class ThermalGrowth(LinearEffect):
         )
 
 
-def _is_curve(warmup: Sequence[float]) -> bool:
-    numbers = [value for value in warmup if isinstance(value, Real)]
-    return len(warmup) == len(numbers) == 2 and warmup[1] > 0.0
+def _grown(robot: Robot, rows: Iterable[int], strain: Array) -> Shift:
+    """Return by how much lengths of rows grow that are not zero, by a share of them, shape (N,)."""
+    lengths = {(key, i): float(getattr(robot, key)[i]) for i in rows for key in ('a', 'd')}
+    return {channel: length * strain for channel, length in lengths.items() if length != 0.0}
+
+
+def _is_pair(values: Sequence[float]) -> bool:
+    return len(values) == 2 and all(isinstance(value, Real) for value in values)
 
 
 _CONSTANTS = (0.15, 0.6, 2.5)
@@ -173,7 +173,7 @@ class LinkWarmUp(Effect):
 
     def check(self, robot: Robot) -> None:
         super().check(robot)
-        if self.follows is not None and not _is_pair(self.follows):
+        if self.follows is not None and not (_is_pair(self.follows) and self.follows[1] != 0.0):
             raise ModelError(
                 'link_warm_up: follows must be [temperature in degC, rise in K, not zero], got '
                 f'{self.follows!r}'
@@ -192,11 +192,7 @@ class LinkWarmUp(Effect):
         return np.asarray((view.temperature - self.follows[0]) / self.follows[1])
 
     def _grown(self, view: View, strain: Array) -> Shift:
-        i = view.robot.index(self.joint)
-        lengths: list[tuple[Channel, float]] = [
-            ((key, i), float(getattr(view.robot, key)[i])) for key in ('a', 'd')
-        ]
-        return {channel: length * strain for channel, length in lengths if length != 0.0}
+        return _grown(view.robot, [view.robot.index(self.joint)], strain)
 
     def displace(self, view: View) -> Shift:
         """Return the growth of the link's lengths; travel of a joint that slides does not grow."""
@@ -240,11 +236,6 @@ class LinkWarmUp(Effect):
             f'Warm {self.site} up before welding, or compensate its link while it warms: it grows by '
             f'{number(grown)} mm per m.'
         )
-
-
-def _is_pair(follows: Sequence[float]) -> bool:
-    numbers = [value for value in follows if isinstance(value, Real)]
-    return len(follows) == len(numbers) == 2 and follows[1] != 0.0
 
 
 def _counted(t: Array) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array, readonly
 from ..errors import ModelError
-from ..kernels.draws import DhDraws, SeamDraws
+from .dh_draws import DhDraws, SeamDraws
 from .expansion import CHUNK, Expansion, expand, expandable
 from .outcome import Outcomes, joined, outcomes
 from .seam_study import Study
@@ -114,7 +114,7 @@ def model(
     study : Study
     tolerances : sequence of Tolerance
     exact : bool
-        Run every draw exactly: those of nothing but DH values by `kernels.draws`, all others
+        Run every draw exactly: those of nothing but DH values by `dh_draws`, all others
         through the twin.
     seed : int
         Chooses the runs on which the expansion is compared.

@@ -16,10 +16,10 @@ import numpy as np
 
 from ..arm import rotation
 from ..arm.chain import forward
+from ..arm.single_pose import SinglePose, turn_between, turn_matrix
 from ..arrays import Array
 from ..effects.effect import MemoryEffect
 from ..errors import DataError
-from ..kernels.single_pose import SinglePose, turn_between, turn_matrix
 from ..motion.inverse.newton import least_step
 from ..recording import JointMotion
 from .goal_correction import GoalLimits, not_corrected

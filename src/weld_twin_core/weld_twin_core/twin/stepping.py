@@ -12,10 +12,10 @@ import numpy as np
 
 from ..arm.chain import displaced_robot
 from ..arm.channels import Channel
+from ..arm.single_pose import SinglePose
 from ..arrays import Array
 from ..effects.effect import View
 from ..errors import DataError
-from ..kernels.single_pose import SinglePose
 from .memory import added, in_series
 from .poses import Poses, posed
 from .stages import EffectStages

@@ -12,8 +12,8 @@ import numpy as np
 from weld_twin_core.arm.bulk import BulkKernel
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.single_pose import SinglePose
 from weld_twin_core.arrays import Array
-from weld_twin_core.kernels.single_pose import SinglePose
 from weld_twin_core.twin.twin import Twin
 
 from .arms import random_positions

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from weld_twin_core.arm.single_pose import quaternion_matrix
 from weld_twin_core.arrays import Array, readonly
 from weld_twin_core.errors import DataError
-from weld_twin_core.kernels.single_pose import quaternion_matrix
 from weld_twin_core.recording import JointMotion
 
 NANOSECONDS = 1_000_000_000

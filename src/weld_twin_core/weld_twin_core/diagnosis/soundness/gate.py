@@ -136,7 +136,9 @@ def examine(
         result = streams(trial)
         look = _Look()
         if not result:
-            posed = aligned(trial.recordings, trial.robot, trial.align, _kept(known, given, trial))
+            # Known effects of another robot mean nothing on this one.
+            own = known if trial.robot.joint_names == given.robot.joint_names else ()
+            posed = aligned(trial.recordings, trial.robot, trial.align, tuple(own))
             look = _looked(*with_changes(*posed, trial.may_change, beliefs or Beliefs()))
             result = look.found
         reported = {each.sentence for each in mistakes}
@@ -200,11 +202,6 @@ def _looked(problem: Problem, model: Model) -> _Look:
     mistakes = [*beside.found, *(_gave_way(slip, part[0]) for slip in beside.dated)]
     found = [*look.found, *(each._replace(mend=None) for each in mistakes)]
     return look._replace(checks=(*said, *beside.checks), found=found)
-
-
-def _kept(known: Sequence[Effect], given: Given, trial: Given) -> tuple[Effect, ...]:
-    """Return the known effects; those of another robot mean nothing on this one."""
-    return tuple(known) if trial.robot.joint_names == given.robot.joint_names else ()
 
 
 def _checked(problem: Problem, model: Model) -> _Look:

@@ -16,15 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arm.channels import row_factors
-from ..arm.robot import Robot
-from ..arm.rotation import (
-    LARGE_TURN,
-    SMALL_ANGLE,
-    matrix_from_quaternion,
-    rotation_vector,
-)
 from ..arrays import Array
+from .channels import row_factors
+from .robot import Robot
+from .rotation import LARGE_TURN, SMALL_ANGLE, matrix_from_quaternion, rotation_vector
 
 
 class _Row(NamedTuple):

@@ -257,7 +257,9 @@ def test_what_a_controller_feeds_back_is_measured_against_what_it_commanded(cell
             feedback=point(cell, np.flip(Q[k]).copy()),
         )
     names = TopicNames(joints='/controller/state', pose='/controller/state')
-    recording = read_recording(cell.write(tmp_path), ROBOT, names)
+    bag = cell.write(tmp_path)
+    assert bag_info(bag, names).usable
+    recording = read_recording(bag, ROBOT, names)
     np.testing.assert_allclose(recording.joints.q, Q - 2e-3, atol=1e-15)
     np.testing.assert_allclose(
         recording.measured.position, [tool(k) for k in range(N)], atol=1e-12
@@ -280,8 +282,9 @@ def test_a_dynamic_joint_state_is_a_joint_state(cell, tmp_path):
             joint_names=['wrench_sensor', *ROBOT.joint_names],
             interface_values=[other, *each],
         )
-    names = TopicNames(joints='/dynamic_joint_states')
-    np.testing.assert_allclose(read_recording(cell.write(tmp_path), ROBOT, names).joints.q, Q)
+    bag, names = cell.write(tmp_path), TopicNames(joints='/dynamic_joint_states')
+    np.testing.assert_allclose(read_recording(bag, ROBOT, names).joints.q, Q)
+    assert 'joint states' not in ' '.join(bag_info(bag, names).missing)
 
 
 def test_a_prefix_of_all_joints_is_taken_off_and_told(cell, tmp_path):

@@ -129,14 +129,11 @@ JOINTS: Mapping[str, Plain] = {
 FOREIGN: Mapping[str, Plain] = {**POSES, **JOINTS}
 CONTROLLER = 'control_msgs/msg/JointTrajectoryControllerState'
 """Type that may also stand for a measured pose: of the joints that the controller feeds back."""
+SURE_POSE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
+"""Type of poses that tell how sure they are."""
 ACCEPTED: Mapping[str, tuple[str, ...]] = {
     JOINT_STATES.name: (JOINT_STATES.type, *JOINTS),
-    MEASURED_POSE.name: (
-        MEASURED_POSE.type,
-        'geometry_msgs/msg/PoseWithCovarianceStamped',
-        *POSES,
-        CONTROLLER,
-    ),
+    MEASURED_POSE.name: (MEASURED_POSE.type, SURE_POSE, *POSES, CONTROLLER),
 }
 """Types that a topic may have besides that of the table of topics, which comes first."""
 
@@ -191,3 +188,16 @@ def plain_messages(kind: str, message: Any, part: str = '') -> tuple[Any, ...]:
     """
     turn = FOREIGN.get(kind)
     return (message,) if turn is None else tuple(turn(message, part))
+
+
+def plain_poses(
+    kind: str, message: Any, part: str = '', fed_back: FedBack | None = None
+) -> tuple[Any, ...]:
+    """
+    Return the poses that a message stands for; as `plain_messages`.
+
+    fed_back: turns what a controller feeds back; None where the robot is not known.
+    """
+    if kind == CONTROLLER and fed_back is not None:
+        return tuple(fed_back(message))
+    return plain_messages(kind, message, part)

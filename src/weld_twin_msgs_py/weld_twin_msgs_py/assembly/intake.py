@@ -16,6 +16,7 @@ from weld_twin_core.arm.rotation import matrix_from_quaternion
 from weld_twin_core.arrays import Array
 
 from ..messages import from_messages
+from .foreign_types import SURE_POSE
 from .frame_names import MeasuringFrame, WrenchFrame
 from .joint_states import JointSample, JointStates
 from .stamp_order import Forward
@@ -23,9 +24,6 @@ from .stamp_order import Forward
 UNIT = 0.009
 """By how much the length of a quaternion may differ from one without a closer look."""
 
-
-SURE_POSE = 'geometry_msgs/msg/PoseWithCovarianceStamped'
-"""Type of poses that tell how sure they are."""
 PLAIN, COVARIANCE = 8, 36
 """Numbers of a pose with its sigma, and of its covariance."""
 

@@ -14,18 +14,9 @@ import numpy as np
 from weld_twin_core.bursts import ONE_CLOCK, Bursts, apart, bursts
 
 from ..assembly.foreign_types import split_topic
-from ..messages.topics import (
-    BY_NAME,
-    CONTACT,
-    JOINT_STATES,
-    MEASURED_POINT,
-    MEASURED_SIGMA,
-    TEMPERATURE,
-    TOOL_WRENCH,
-    TopicNames,
-)
+from ..messages.topics import BY_NAME, CONTACT, TopicNames
 from .ends import GAP, Ends, never_recorded, uneven_ends
-from .needed import POSE_TYPES, no_joints, no_measurements
+from .needed import TYPES, no_joints, no_measurements
 from .reader import BagReader
 
 
@@ -150,15 +141,10 @@ def _ends(result: list[TopicInfo]) -> dict[str, Ends]:
 
 
 def _uses(names: TopicNames) -> dict[str, tuple[str, tuple[str, ...]]]:
-    """Return use and acceptable types by topic name."""
+    """Return use and acceptable types by topic name; joints last, for one topic may tell both."""
     return {
-        names.joints: ('joints', (JOINT_STATES.type,)),
-        split_topic(names.pose)[0]: ('pose', POSE_TYPES),
-        names.point: ('point', (MEASURED_POINT.type,)),
         names.contact: ('contact', (CONTACT.type,)),
-        names.sigma: ('sigma', (MEASURED_SIGMA.type,)),
-        names.wrench: ('wrench', (TOOL_WRENCH.type,)),
-        names.temperature: ('temperature', (TEMPERATURE.type,)),
+        **{split_topic(getattr(names, r.value))[0]: (r.value, t) for r, t in TYPES.items()},
     }
 
 
@@ -200,12 +186,14 @@ def _judge(
     """Return what is missing for a diagnosis and what it will do without."""
     missing, notes = [], []
     present = {t.name: (t.type, t.count) for t in result}
-    if 'joints' not in used:
+    joints = used.get('joints')
+    if joints is None:
         missing.append(no_joints(names, present))
     measured = used.get('contact') or used.get('pose') or used.get('point')
+    if measured is None and joints and joints.name == split_topic(names.pose)[0]:
+        measured = joints  # a controller tells of both: what it commands and what comes back
     if measured is None:
         missing.append(no_measurements(names, present))
-    joints = used.get('joints')
     if joints and measured:
         sentence = apart(_span(joints), _span(measured))
         missing += [] if sentence is None else [f'{sentence}. {ONE_CLOCK}']

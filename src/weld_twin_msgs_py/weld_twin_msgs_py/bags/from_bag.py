@@ -19,21 +19,13 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Recording
 
 from ..assembly import Intake, Role, Samples, assembled
-from ..assembly.foreign_types import CONTROLLER, JOINTS, FedBack, plain_messages, split_topic
+from ..assembly.foreign_types import FedBack, plain_messages, plain_poses, split_topic
 from ..assembly.joint_states import names_called
 from ..messages.from_messages import stamp_ns
-from ..messages.topics import (
-    CONTACT,
-    JOINT_STATES,
-    MEASURED_POINT,
-    MEASURED_SIGMA,
-    TEMPERATURE,
-    TOOL_WRENCH,
-    TopicNames,
-)
+from ..messages.topics import CONTACT, TopicNames
 from .ends import Ends, never_recorded, uneven_ends
 from .images import images, looking
-from .needed import POSE_TYPES, no_joints, no_measurements, other_names
+from .needed import TYPES, no_joints, no_measurements, other_names
 from .reader import BagReader
 from .regular import LEFT_OUT, Stream, fill_regular
 
@@ -117,15 +109,6 @@ def _plain(labels: tuple[str, ...], value: np.ndarray) -> Artefact:
     return Artefact(tuple(Contact(n, 'length' if n in long else 'point') for n in names))
 
 
-TYPES = {
-    Role.JOINTS: (JOINT_STATES.type, *JOINTS),
-    Role.POSE: (*POSE_TYPES, CONTROLLER),
-    Role.POINT: (MEASURED_POINT.type,),
-    Role.SIGMA: (MEASURED_SIGMA.type,),
-    Role.WRENCH: (TOOL_WRENCH.type,),
-    Role.TEMPERATURE: (TEMPERATURE.type,),
-}
-"""Message types from which each role is read."""
 INJECTED = 'effects'
 """Key of the provenance under which the simulator and the injector tell what they put in."""
 
@@ -186,7 +169,7 @@ def read_recording(
         )
     samples = {role: stream.samples() for role, stream in streams.items()}
     whole = assembled(
-        _name(Path(path)),
+        Path(path).stem if Path(path).is_file() else Path(path).resolve().name,
         robot,
         samples,
         wrench_frame=intake.wrench_frame.meaning,
@@ -230,10 +213,6 @@ def _ends(names: TopicNames, samples: Mapping[Role, Samples]) -> dict[str, Ends]
         for role, item in samples.items()
         if role in (Role.JOINTS, Role.POSE, Role.POINT) and item.ns.size > 1
     }
-
-
-def _name(path: Path) -> str:
-    return path.stem if path.is_file() else path.resolve().name
 
 
 def _roles(names: TopicNames, present: Mapping[str, tuple[str, int]]) -> dict[Role, str]:
@@ -311,8 +290,8 @@ def _fill(
         for role in roles[topic]:
             stream = streams[role]
             try:
-                if role is Role.POSE and kind == CONTROLLER:
-                    plain = tuple(fed_back(message))
+                if role is Role.POSE:
+                    plain = plain_poses(kind, message, parts[role], fed_back)
                 else:
                     plain = plain_messages(kind, message, parts[role])
             except DataError as error:

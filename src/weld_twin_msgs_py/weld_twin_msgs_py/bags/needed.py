@@ -8,12 +8,29 @@ from collections.abc import Mapping, Sequence
 
 from weld_twin_core.arm.robot import Robot
 
-from ..assembly.foreign_types import POSES, split_topic
-from ..messages.topics import BY_NAME, JOINT_STATES, MEASURED_POINT, MEASURED_POSE, TopicNames
+from ..assembly import Role
+from ..assembly.foreign_types import ACCEPTED, SURE_POSE, split_topic
+from ..messages.topics import (
+    BY_NAME,
+    JOINT_STATES,
+    MEASURED_POINT,
+    MEASURED_POSE,
+    MEASURED_SIGMA,
+    TEMPERATURE,
+    TOOL_WRENCH,
+    TopicNames,
+)
 
-_PLAIN_POSES = (MEASURED_POSE.type, 'geometry_msgs/msg/PoseWithCovarianceStamped')
-POSE_TYPES = (*_PLAIN_POSES, *POSES)
-"""Message types from which measured poses are read."""
+_PLAIN_POSES = (MEASURED_POSE.type, SURE_POSE)
+TYPES: Mapping[Role, tuple[str, ...]] = {
+    Role.POSE: ACCEPTED[MEASURED_POSE.name],
+    Role.POINT: (MEASURED_POINT.type,),
+    Role.SIGMA: (MEASURED_SIGMA.type,),
+    Role.WRENCH: (TOOL_WRENCH.type,),
+    Role.TEMPERATURE: (TEMPERATURE.type,),
+    Role.JOINTS: ACCEPTED[JOINT_STATES.name],
+}
+"""Message types from which each role is read."""
 Present = Mapping[str, tuple[str, int]]
 """Type and number of messages of every topic of a bag."""
 _LISTED = 12

@@ -30,7 +30,7 @@ def csv_text(header: Sequence[Any], rows: Iterable[Sequence[Any]]) -> str:
 
 def guarded(cell: Any) -> Any:
     """Return a cell that no spreadsheet computes; what is a number stays as it is."""
-    if not isinstance(cell, str) or not cell.startswith(_FORMULA) or _is_number(cell):
+    if not isinstance(cell, str) or not cell.startswith(_FORMULA) or is_number(cell):
         return cell
     return _GUARD + cell
 
@@ -40,7 +40,8 @@ def unguarded(text: str) -> str:
     return text[1:] if text.startswith(_GUARD) and text[1:].startswith(_FORMULA) else text
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Return whether a text is a number as Python reads it."""
     try:
         float(text)
     except ValueError:

@@ -64,7 +64,8 @@ def read_model(robot: Robot, path: Path | str) -> Model:
     model = content.get('model')
     if not isinstance(model, dict):
         raise ModelError(_without_model(path, content))
-    mends = _mends(content)
+    applied = _applied(content)
+    mends = tuple(mend for item in applied if isinstance(mend := item.get('mend'), dict))
     robot = replayed(mends, Given((), robot)).robot
     _refuse_other_robot(robot, path, model)
     try:
@@ -81,7 +82,8 @@ def read_model(robot: Robot, path: Path | str) -> Model:
     if not bases:
         raise ModelError(f"the model of diagnosis '{path}' has no base frame")
     placed = robot.with_frames(tool=tool)
-    return Model(placed, bases, known, result, _mended(content), mends=mends, alone=alone)
+    mended = tuple(str(item.get('sentence')) for item in applied)
+    return Model(placed, bases, known, result, mended, mends=mends, alone=alone)
 
 
 def _alone(entry: Any, robot: Robot) -> Alone | None:
@@ -126,25 +128,14 @@ def _refuse_other_robot(robot: Robot, path: Path | str, model: dict[str, Any]) -
     raise ModelError(f"diagnosis '{path}' is {other}; give the robot it was made for")
 
 
-def _mended(content: dict[str, Any]) -> tuple[str, ...]:
-    """Return what was wrong with the data of a diagnosis and was undone."""
-    items = content.get('unsound') or []
-    if not isinstance(items, list):
-        return ()
-    return tuple(
-        str(item.get('sentence'))
-        for item in items
+def _applied(content: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return what was wrong with the data of a diagnosis and was undone, in its order."""
+    items = content.get('unsound')
+    return [
+        item
+        for item in (items if isinstance(items, list) else ())
         if isinstance(item, dict) and item.get('applied')
-    )
-
-
-def _mends(content: dict[str, Any]) -> tuple[dict[str, Any], ...]:
-    """Return how that was undone, in its order."""
-    items = content.get('unsound') or []
-    if not isinstance(items, list):
-        return ()
-    own = [item for item in items if isinstance(item, dict) and item.get('applied')]
-    return tuple(mend for item in own if isinstance(mend := item.get('mend'), dict))
+    ]
 
 
 def mended_source(

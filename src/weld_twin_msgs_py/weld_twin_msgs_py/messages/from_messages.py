@@ -89,9 +89,7 @@ def joint_positions(message: Any, joint_names: Sequence[str]) -> Array:
             f'the joint state has {len(message.name)} names but {len(values)} positions; '
             'it must give one position per name'
         )
-    chosen = [values[k] for k in index]
-    _refuse_unfinite(chosen, joint_names, 'position')
-    return np.array(chosen, dtype=np.float64)
+    return _finite([values[k] for k in index], joint_names, 'position')
 
 
 def joint_velocities(message: Any, joint_names: Sequence[str]) -> Array | None:
@@ -110,8 +108,7 @@ def joint_velocities(message: Any, joint_names: Sequence[str]) -> Array | None:
     chosen = [values[k] for k in index]
     if any(value != value for value in chosen):
         return None
-    _refuse_unfinite(chosen, joint_names, 'velocity')
-    return np.array(chosen, dtype=np.float64)
+    return _finite(chosen, joint_names, 'velocity')
 
 
 def joint_efforts(message: Any, joint_names: Sequence[str]) -> Array:
@@ -131,18 +128,17 @@ def joint_efforts(message: Any, joint_names: Sequence[str]) -> Array:
             'give one effort per name, or --use-effort be left out'
         )
     index = _indices(tuple(message.name), tuple(joint_names))
-    chosen = [values[k] for k in index]
-    _refuse_unfinite(chosen, joint_names, 'effort')
-    return np.array(chosen, dtype=np.float64)
+    return _finite([values[k] for k in index], joint_names, 'effort')
 
 
-def _refuse_unfinite(values: Sequence[float], joint_names: Sequence[str], what: str) -> None:
-    """Refuse in plain numbers: for one sample of an arm numpy costs more than the arithmetic."""
+def _finite(values: Sequence[float], joint_names: Sequence[str], what: str) -> Array:
+    """Return values, refused in plain numbers: for one sample numpy costs more than the arithmetic."""
     if not all(map(isfinite, values)):
         k = [isfinite(value) for value in values].index(False)
         raise DataError(
             f'joint {joint_names[k]!r} has the {what} {values[k]}; it must be a finite number'
         )
+    return np.array(values, dtype=np.float64)
 
 
 def _xyz(vector: Any, name: str) -> Array:

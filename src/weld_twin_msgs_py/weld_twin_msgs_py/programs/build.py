@@ -21,8 +21,8 @@ from weld_twin_core.motion.programs.moves import Kind
 from .controllers import Controller, Frame
 from .source import Notation, Number, Source
 
-Suits = Callable[[Robot, Controller], Callable[[Array], Array]]
-"""Makes, for a robot, what tells the postures that a program asks for."""
+Suits = Callable[[Controller], Callable[[Array], Array]]
+"""Makes, for a controller, what tells the postures that a program asks for."""
 
 
 class Point(NamedTuple):
@@ -218,7 +218,7 @@ def _move(
         step.stop,
         step.dwell,
         step.duration,
-        None if step.suits is None else step.suits(carried.robot, controller),
+        None if step.suits is None else step.suits(controller),
         step.where,
         seam,
         along=along,
@@ -257,8 +257,7 @@ def turn_bits(turn: int) -> Suits:
     turn: bit k is set where axis k + 1 is below zero.
     """
 
-    def suits(robot: object, controller: Controller) -> Any:
-        del robot
+    def suits(controller: Controller) -> Any:
         back = np.linalg.inv(controller.mix)
 
         def of(q: Array) -> Array:
@@ -279,8 +278,7 @@ def quadrants(conf: Sequence[int]) -> Suits:
     conf: cf1, cf4, cf6 and cfx, which is left out: its meaning depends on the arm.
     """
 
-    def suits(robot: object, controller: Controller) -> Any:
-        del robot
+    def suits(controller: Controller) -> Any:
         first = len(controller.external)
         places = first + np.array([0, 3, 5])
 
@@ -304,13 +302,8 @@ def nearest(near: Array) -> Suits:
     near: shape (n,).
     """
 
-    def suits(robot: object, controller: Controller) -> object:
-        del robot, controller
+    def of(q: Array) -> Array:
+        away = np.abs(q - near).sum(axis=1)
+        return np.asarray(away == away.min())
 
-        def of(q: Array) -> Array:
-            away = np.abs(q - near).sum(axis=1)
-            return np.asarray(away == away.min())
-
-        return of
-
-    return suits  # type: ignore[return-value]
+    return lambda _: of

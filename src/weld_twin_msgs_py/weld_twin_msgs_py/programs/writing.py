@@ -81,16 +81,6 @@ class Exported:
         shown = list(zip(labels, self.joints(move), strict=True))
         return dict(shown[: len(names)] + sorted(shown[len(names) :]))
 
-    @property
-    def joint_sizes(self) -> Array:
-        """Return the speed limits of the joints, shape (n,) [rad/s or m/s]."""
-        return np.asarray(self.context.robot.max_velocity)
-
-
-def move_count(program: Exported) -> int:
-    """Return how many moves a program has."""
-    return len(program.moves)
-
 
 def comma(values: list[float], digits: int) -> str:
     """Return numbers with commas between, no minus before a zero."""
@@ -206,10 +196,10 @@ def _urscript(program: Exported) -> str:
     rows = [f'def {program.name}():', *(f'  # {text}' for text in program.comments)]
     rows.append(f'  set_tcp(p[{comma(UR_POSE.numbers(program.tool, [0.0] * 7), 7)}])')
     on, off = (f'  set_digital_out({program.trigger}, {word})' for word in ('True', 'False'))
-    fastest = float(program.joint_sizes.max())
+    fastest = float(program.context.robot.max_velocity.max())
     old = [0.0] * 7
 
-    def move(step: ExportMove) -> list[str]:
+    def move(_: int, step: ExportMove) -> list[str]:
         nonlocal old
         radius = 0.0 if step.stop else BLEND
         if step.kind == 'joint':
@@ -240,7 +230,7 @@ def _krl(program: Exported) -> str:
     share = speed = -1.0
     old = [0.0] * 6
 
-    def move(step: ExportMove) -> list[str]:
+    def move(_: int, step: ExportMove) -> list[str]:
         nonlocal share, speed, old
         out = []
         if step.kind == 'joint':
@@ -279,7 +269,7 @@ def _rapid(program: Exported) -> str:
         '    ConfL \\Off;',
     ]
 
-    def move(step: ExportMove) -> list[str]:
+    def move(_: int, step: ExportMove) -> list[str]:
         nonlocal old
         zone = 'fine' if step.stop else 'z1'
         speed = f'[{max(step.speed * 1e3, 1.0):.2f},50,50,50]'
@@ -326,15 +316,12 @@ def _inform(program: Exported) -> str:
         rows.append(f'C{k:05d}=' + ','.join(f'{v:.0f}' for v in values + 0.0))
     rows += ['//INST', '///DATE 2000/01/01 00:00', '///ATTR SC,RW', '///GROUP1 RB1', 'NOP']
     rows += [f"'{text[:32]}" for text in program.comments]
-    count = -1
 
-    def move(step: ExportMove) -> list[str]:
-        nonlocal count
-        count += 1
+    def move(k: int, step: ExportMove) -> list[str]:
         level = ' PL=0' if step.stop else ' PL=1'
         if step.kind == 'joint':
-            return [f'MOVJ C{count:05d} VJ={max(100.0 * step.share, 0.01):.2f}{level}']
-        return [f'MOVL C{count:05d} V={max(step.speed * 1e3, 0.1):.1f}{level}']
+            return [f'MOVJ C{k:05d} VJ={max(100.0 * step.share, 0.01):.2f}{level}']
+        return [f'MOVL C{k:05d} V={max(step.speed * 1e3, 0.1):.1f}{level}']
 
     on, off = (f'DOUT OT#({program.trigger}) {word}' for word in ('ON', 'OFF'))
     rows += _body(program, move, on, off, lambda s: f'TIMER T={s:.2f}', "'{}")
@@ -344,15 +331,12 @@ def _inform(program: Exported) -> str:
 def _fanuc(program: Exported) -> str:
     body: list[str] = [f'!{text[:32]}' for text in program.comments]
     body += ['UFRAME_NUM=0', 'UTOOL_NUM=1']
-    count = 0
 
-    def move(step: ExportMove) -> list[str]:
-        nonlocal count
-        count += 1
+    def move(k: int, step: ExportMove) -> list[str]:
         end = 'FINE' if step.stop else 'CNT5'
         if step.kind == 'joint':
-            return [f'J P[{count}] {max(round(100.0 * step.share), 1)}% {end}']
-        return [f'L P[{count}] {max(step.speed * 1e3, 1.0):.0f}mm/sec {end}']
+            return [f'J P[{k + 1}] {max(round(100.0 * step.share), 1)}% {end}']
+        return [f'L P[{k + 1}] {max(step.speed * 1e3, 1.0):.0f}mm/sec {end}']
 
     on, off = (f'DO[{program.trigger}]={word}' for word in ('ON', 'OFF'))
     body += _body(program, move, on, off, lambda s: f'WAIT {s:6.2f}(sec)', '!{}')
@@ -361,7 +345,9 @@ def _fanuc(program: Exported) -> str:
     further = {axis.label[:3] for axis in program.external if axis.label[0] == 'G'}
     groups = ','.join('1' if f'GP{k}' in further or k == 1 else '*' for k in range(1, 6))
     rows += [f'DEFAULT_GROUP\t= {groups};', 'CONTROL_CODE\t= 00000000 00000000;', '/MN']
-    rows += [_fanuc_line(k, text) for k, text in enumerate(body, start=1)]
+    for k, text in enumerate(body, start=1):
+        motion = text.startswith(('J P[', 'L P['))
+        rows.append(f'{k:4d}:{text}    ;' if motion else f'{k:4d}:  {text} ;')
     rows.append('/POS')
     for k, step in enumerate(program.moves, start=1):
         rows += [f'P[{k}]{{', *_fanuc_groups(program, step), '};']
@@ -383,11 +369,6 @@ def _fanuc_groups(program: Exported, step: ExportMove) -> list[str]:
         rows += [f'   {group}:', '\tUF : 0, UT : 1,\t', *(f'\t{line},' for line in lines[:-1])]
         rows.append(f'\t{lines[-1]}')
     return rows
-
-
-def _fanuc_line(number: int, text: str) -> str:
-    motion = text.startswith(('J P[', 'L P['))
-    return f'{number:4d}:{text}    ;' if motion else f'{number:4d}:  {text} ;'
 
 
 def _trajectory(program: Exported) -> str:
@@ -426,7 +407,9 @@ def _csv(program: Exported) -> str:
 
 def _body(
     program: Exported,
-    move: Callable[[ExportMove], list[str]],
+    move: Callable[
+        [int, ExportMove], list[str]
+    ],  # takes the number of a move, from 0, and the move
     on: str,
     off: str,
     wait: Callable[[float], str],
@@ -436,7 +419,7 @@ def _body(
     rows: list[str] = []
     for k, step in enumerate(program.moves):
         rows += [remark.format(step.comment)] if step.comment else []
-        rows += move(step)
+        rows += move(k, step)
         if program.stations and step.dwell > 0.0:
             rows += [wait(SETTLE), on, wait(step.dwell), off]
         elif not program.stations and k == 0:

@@ -93,7 +93,9 @@ def stations(
     """Return what a table means, and the units of the joints whose columns name none."""
     path = cells.path
     try:
-        return _read(cells, robot, options, said)
+        columns = find_columns(cells.header, robot, options)
+        usable = _usable(cells, columns, options, said)
+        return _Reading(usable, robot, columns, options, said).table()
     except DataError as error:
         text = str(error)
         raise DataError(text if str(path) in text else f"table '{path}': {text}") from None
@@ -102,14 +104,6 @@ def stations(
             f"table '{path}' holds numbers far beyond any robot's; look for slipped columns or "
             'decimal signs'
         ) from None
-
-
-def _read(
-    cells: Cells, robot: Robot, options: TableOptions, said: list[str]
-) -> tuple[Table, Units]:
-    columns = find_columns(cells.header, robot, options)
-    reading = _Reading(_usable(cells, columns, options, said), robot, columns, options, said)
-    return reading.table()
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,8 @@ from typing import NamedTuple
 
 from weld_twin_core.errors import DataError
 
+from ..files.csv_text import is_number
+
 _HEAD = 40
 """Lines at the top in which a format is told and its header found."""
 
@@ -236,11 +238,3 @@ def _seen(cells: list[str], known: Format) -> list[str]:
     if known.gap and [is_number(c) and float(c) == 0.0 for c in cells[-3:]] == [True] * 3:
         return [*cells[:-3], '', '', '']
     return cells
-
-
-def is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -26,7 +26,8 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-from .formats import Read, is_number, one_of
+from ..files.csv_text import is_number
+from .formats import Read, one_of
 
 _LOOK = 40
 """Lines at the top in which a list is told."""

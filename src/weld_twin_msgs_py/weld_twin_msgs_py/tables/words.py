@@ -130,16 +130,8 @@ EFFORT = {'effort', 'efforts', 'torque', 'torques', 'tau', 'moment', 'drehmoment
 LETTERS = ('s', 'l', 'u', 'r', 'b', 't')
 """The joints of six-axis arms of Yaskawa."""
 TURNS = {
-    'rot',
-    'rotation',
-    'orient',
-    'orientation',
-    'orientierung',
-    'euler',
-    'rpy',
-    'angle',
-    'winkel',
-}
+    'rot', 'rotation', 'orient', 'orientation', 'orientierung', 'euler', 'rpy', 'angle', 'winkel',
+}  # fmt: skip
 """With an axis: an angle about it."""
 QUATERNION = {'quat', 'quaternion', 'q'}
 ANGLES = {'roll': 'x', 'pitch': 'y', 'yaw': 'z'}

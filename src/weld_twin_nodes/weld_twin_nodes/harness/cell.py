@@ -165,7 +165,7 @@ class Cell:
         self._stack.callback(self._executor.shutdown)
         self._stack.callback(self._remove_all)
         self.node = self.add(Node, 'harness')
-        self._stack.callback(self._stop_all)
+        self._stack.callback(stop_all, self.processes)
 
     # Nodes -----------------------------------------------------------------------------------
 
@@ -399,9 +399,6 @@ class Cell:
     def _remove_all(self) -> None:
         for node in list(self._nodes):
             self.remove(node)
-
-    def _stop_all(self) -> None:
-        stop_all(self.processes)
 
 
 class _Asked:

@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import DataError, ModelError, TwinError
 from weld_twin_msgs_py.assembly import Intake
-from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, FedBack, plain_messages
+from weld_twin_msgs_py.assembly.foreign_types import ACCEPTED, FedBack, plain_messages, plain_poses
 from weld_twin_msgs_py.messages.from_messages import time_ns
 from weld_twin_msgs_py.messages.topics import (
     BY_NAME,
@@ -38,7 +38,7 @@ from .health import Input, Output
 from .settings import SHARED, QosOverrides, Setting
 from .source import Source, Wanted, full_names, unreached_subscribers
 from .telling_node import TellingNode
-from .words import ALIVE, Turn, measured_turn, reader
+from .words import ALIVE, reader
 
 READY_EVERY = 0.02
 """Seconds between two looks at whether the listeners are there."""
@@ -247,14 +247,14 @@ class CellNode(TellingNode):
 
         return guarded
 
-    def _plain_turn(self, topic: Topic) -> Turn:
+    def _plain_turn(self, topic: Topic) -> Callable[[str, Any], tuple[Any, ...]]:
         """Return what turns messages of other types into those that the topic usually has."""
         part = self.setting('measured_frame') if self.has_parameter('measured_frame') else ''
         of_joints = self.setting('joint_part') if self.has_parameter('joint_part') else ''
         if topic is not MEASURED_POSE:
             return partial(plain_messages, part=of_joints)
         fed_back = FedBack(self.arm, of_joints, self.joint_names) if self.arm else None
-        return measured_turn(part, fed_back)
+        return partial(plain_poses, part=part, fed_back=fed_back)
 
     def intakes(self) -> Sequence[Intake]:
         """Return what takes messages in: what it takes for granted is told, not with every message."""

@@ -12,14 +12,13 @@ from __future__ import annotations
 import json
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 
 from weld_twin_core.errors import DataError, TwinError
-from weld_twin_msgs_py.assembly.foreign_types import CONTROLLER, FedBack, plain_messages
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_msgs_py.messages.cdr_read import READERS, decoder
 from weld_twin_msgs_py.messages.topics import DIAGNOSTICS, JOINT_STATES, message_class
@@ -146,26 +145,6 @@ class Book:
         early = ([w for w in words if w.at <= at - UNDER_WAY] for words in self._words.values())
         last = (words[-1].sent.get(topic) for words in early if words)
         return sum(sent.number for sent in last if sent is not None)
-
-
-Turn = Callable[[str, Any], Iterable[Any]]
-"""A type and a message of it, to the messages that it stands for."""
-
-
-def measured_turn(part: str, fed_back: FedBack | None) -> Turn:
-    """
-    Return what turns messages that stand for a measured pose into poses.
-
-    part: the frame that was measured, where a message holds several.
-    fed_back: turns what a controller feeds back; None where the robot is not known.
-    """
-
-    def turn(kind: str, message: Any) -> Iterable[Any]:
-        if kind == CONTROLLER and fed_back is not None:
-            return fed_back(message)
-        return plain_messages(kind, message, part)
-
-    return turn
 
 
 def reader(kind: str) -> Callable[[bytes], Any]:

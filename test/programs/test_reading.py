@@ -200,6 +200,26 @@ def test_fanuc_points_that_something_else_uses_are_left(line, held):
     assert {program.points[k].name for k in program.held} == held
 
 
+@pytest.mark.parametrize(
+    ('language', 'place', 'seconds'),
+    [('krl', 1, 0.4), ('rapid', 5, 0.3), ('urscript', 1, 0.3), ('inform', 1, 0.3), ('fanuc-ls', 1, 0.3)],
+)  # fmt: skip
+def test_a_wait_makes_the_move_before_it_last_longer(language, place, seconds):
+    robot, files = PROGRAMS[language]
+    texts = [(MADE / name).read_bytes().decode('latin-1') for name in files]
+    steps = read(language, texts, robot).steps
+    assert [step.dwell for step in steps] == [seconds * (k == place) for k in range(len(steps))]
+    assert steps[place].stop
+
+
+def test_a_wait_is_of_its_own_routine_and_one_before_any_move_of_none():
+    axes = 'A2 -85.0,A3 100.0,A4 5.0,A5 70.0,A6 -3.0'
+    one, two, three = (f'PTP {{A1 {k},{axes}}}\n' for k in (1, 2, 3))
+    text = f'DEF a()\n{one}END\nDEF b()\nWAIT SEC 9\n{two}WAIT SEC 1.5\n{three}END\n'
+    steps = read('krl', (text,), 'kuka_kr16_2').steps
+    assert [step.dwell for step in steps] == [0.0, 1.5, 0.0]
+
+
 def test_a_point_that_is_declared_twice_is_refused_with_its_line():
     text = 'MODULE M\n' + 2 * (
         'CONST robtarget p1:=[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n'

@@ -129,6 +129,17 @@ def test_points_are_read_where_there_are_no_poses(tmp_path, robot, recording):
     assert back.sigma is None
 
 
+def test_sigma_is_that_of_the_same_stamp_and_none_where_one_pose_has_none(tmp_path, robot):
+    make, stamps, read = bag_messages(), [k * SECOND for k in (1, 2, 3)], {}
+    poses = [('/measured/tool_pose', make.pose(ns, np.ones(3), np.eye(3))) for ns in stamps]
+    sure = [('/measured/sigma', make.vector3(ns, np.array([1e-5, 2e-5, 2e-5]))) for ns in stamps]
+    for count in (3, 2):
+        write_messages(tmp_path / f'{count}', [*joint_states(stamps), *poses, *sure[:count]])
+        read[count] = read_recording(tmp_path / f'{count}', robot).measured.sigma
+    np.testing.assert_allclose(read[3], np.sqrt(3.0) * 1e-5)
+    assert read[2] is None
+
+
 def test_poses_win_over_points_with_a_note(tmp_path, robot):
     make = bag_messages()
     pose = make.pose(SECOND, np.ones(3), np.eye(3))

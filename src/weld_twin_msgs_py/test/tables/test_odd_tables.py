@@ -92,6 +92,9 @@ TABLES = {
         ','.join([*J, *(f'{w} {a}' for w in ('Nom', 'Meas') for a in XYZ), 'dX', 'dY', 'dZ']),
         rows(DEG, MM - 1.0, MM, np.ones((12, 3))),
     ),
+    'measured and difference in small letters': lines(
+        ','.join([*J, *XYZ, 'dx', 'dy', 'dz']), rows(DEG, MM, np.ones((12, 3)))
+    ),
     'speeds beside': lines(
         ','.join([*(f'{j} [deg]' for j in J), *(f'{j} [deg/s]' for j in J), *XYZ]),
         rows(DEG, 0.0 * DEG, MM),

@@ -315,6 +315,14 @@ def test_a_file_that_is_no_diagnosis_is_told_in_one_line(tmp_path, capsys, conte
     assert reason in err and err.count('\n') == 1
 
 
+@pytest.mark.parametrize(('size', 'reason'), [(60e6, 'is not JSON'), (65e6, 'larger than any')])
+def test_a_diagnosis_has_at_most_64_megabytes(tmp_path, capsys, size, reason):
+    with open(tmp_path / 'm.json', 'wb') as file:
+        file.truncate(int(size))
+    assert run('export', tmp_path / 'm.json', '--robot', 'ur5') == 2
+    assert reason in capsys.readouterr().err
+
+
 def covariances(bag):
     """Stamps, positions and covariances of the poses that a bag says it is sure of."""
     topic = '/twin/tool_pose_with_covariance'

@@ -15,7 +15,7 @@ from weld_twin_core.arm.catalog import load
 from weld_twin_core.diagnosis.result import Check, Shares, Site, Traces, Unsound
 from weld_twin_core.recording import JointMotion
 from weld_twin_msgs_py.files.input_files import InputFile
-from weld_twin_nodes.wording.quantities import turned, with_ends
+from weld_twin_nodes.wording.quantities import small_turn, turned, with_ends
 from weld_twin_nodes.wording.switches import cause_name, switches
 from weld_twin_report.cli.commands.diagnose import BRANDS as CHOICES
 from weld_twin_report.report import report_page
@@ -321,6 +321,7 @@ def test_figures_of_iso_9283_stand_where_stations_were_repeated():
 
 def test_an_angle_is_told_with_two_digits_at_least():
     assert turned(2.46e-4) == '0.014°' and turned(1e-6) == '0.000057°'
+    assert small_turn(1e-4) == '0.0057°' and small_turn(-1e-6) == '<\N{NO-BREAK SPACE}0.001°'
 
 
 def test_what_is_open_is_told_apart_before_anything_is_mended():

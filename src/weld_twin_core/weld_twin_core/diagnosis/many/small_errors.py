@@ -272,8 +272,7 @@ def groups(result: tuple[Effect, ...], beliefs: Beliefs) -> tuple[Array, Array]:
     scales = [effect.fit.coordinate_scales() for effect in result]
     names = {label: k for k, label in enumerate(dict.fromkeys(labels))}
     numbers = np.array([names[label] for label in labels], dtype=int)
-    counts = np.bincount(numbers, minlength=len(names)) if numbers.size else np.zeros(0, int)
-    free = counts[numbers] < beliefs.tied_from if numbers.size else np.zeros(0, bool)
+    free = np.bincount(numbers, minlength=len(names))[numbers] < beliefs.tied_from
     return np.where(free, -1, numbers), np.concatenate([np.zeros(0), *scales])
 
 

@@ -17,7 +17,7 @@ from weld_twin_core.motion.sample_count import refuse_endless
 from weld_twin_core.recording import JointMotion
 
 from .whole_files import write_text
-from .yaml_file import numbers_text, read_yaml, yaml_text
+from .yaml_file import read_yaml, yaml_text
 
 KIND = 'joints'
 """The `kind` of a path file that holds a joint motion."""
@@ -41,9 +41,9 @@ def write_joint_motion(path: Path, motion: Mapping[str, Any], comment: str) -> N
         'kind': KIND,
         'stations': bool(motion['static']),
         'joint_names': list(motion['joint_names']),
+        **{key: np.asarray(motion[key], float).tolist() for key in ('t', 'q')},
     }
-    rows = ''.join(numbers_text(key, np.asarray(motion[key], float)) for key in ('t', 'q'))
-    write_text(path, f'# {comment}\n{yaml_text(content)}{rows}', overwrite=True)
+    write_text(path, f'# {comment}\n{yaml_text(content)}', overwrite=True)
 
 
 def read_joint_motion(path: Path | str, robot: Robot) -> tuple[Array, Array, bool] | None:

@@ -12,14 +12,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
+
+try:
+    from yaml import CSafeDumper as FastDumper  # ten times as fast, where libyaml is there
+except ImportError:
+    from yaml import SafeDumper as FastDumper  # type: ignore[assignment]
 
 SIZE_LIMIT = 1_000_000
 """Bytes; robot and effects files are a few kilobytes."""
@@ -129,7 +133,7 @@ WIDTH = 99
 """Columns of a line at the most, as in the rest of the project."""
 
 
-class _Dumper(yaml.SafeDumper):
+class _Dumper(FastDumper):
     """Rows of numbers on one line, everything else as a block."""
 
 
@@ -138,11 +142,12 @@ def _is_row(value: Any) -> bool:
     return all(not isinstance(item, list | dict) for item in items)
 
 
-def _represent_list(dumper: yaml.SafeDumper, data: list[Any]) -> yaml.Node:
-    return dumper.represent_sequence('tag:yaml.org,2002:seq', data, flow_style=_is_row(data))
-
-
-_Dumper.add_representer(list, _represent_list)
+_Dumper.add_representer(
+    list,
+    lambda dumper, data: dumper.represent_sequence(
+        'tag:yaml.org,2002:seq', data, flow_style=_is_row(data)
+    ),
+)
 _Dumper.ignore_aliases = lambda self, data: True  # type: ignore[method-assign]
 
 
@@ -156,36 +161,3 @@ def yaml_text(data: Any) -> str:
         width=WIDTH,
         default_flow_style=False,
     )
-
-
-def numbers_text(key: str, values: Array) -> str:
-    """
-    Return finite numbers, or rows of them, as `yaml_text` writes them under a key.
-
-    A motion has tens of thousands; a general emitter looks at each of them, for a second or two.
-
-    values: shape (N,) or (N, n), not empty.
-    """
-    if values.ndim == 1:
-        return f'{key}: {_wrapped([_number(v) for v in values.tolist()], len(key) + 2)}\n'
-    rows = (_wrapped([_number(v) for v in row], 2) for row in values.tolist())
-    return f'{key}:\n' + ''.join(f'- {row}\n' for row in rows)
-
-
-def _number(value: float) -> str:
-    """Return a number as YAML 1.1 reads it: without a point it would be a text."""
-    text = repr(float(value))
-    return text if '.' in text else text.replace('e', '.0e', 1)
-
-
-def _wrapped(items: Sequence[str], start: int) -> str:
-    """Return a row of numbers that begins at a column, broken once a line is wide enough."""
-    lines, line = [], ' ' * start + '['
-    for item in items[:-1]:
-        line += f'{item},'
-        if len(line) > WIDTH:
-            lines.append(line)
-            line = '  '
-        else:
-            line += ' '
-    return '\n'.join([*lines, line + items[-1] + ']'])[start:]

@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -104,17 +104,19 @@ def export(
 
 
 def write_program(
-    out: Path, told_as: Path, path: str, context: Context, language: str, how: Speeds, **more: Any
+    out: Path,  # program to write; the sheet goes beside it
+    shown_as: Path,  # where it will be found
+    path: str,
+    context: Context,
+    language: str,
+    how: Speeds,
+    *,
+    trigger: int,
+    seam_speed: float = 0.0,
+    faster: str = '',  # how to have it run faster
 ) -> list[str]:
-    """
-    Write a program and the sheet that says how to load it; return what to tell.
-
-    ``out``: program to write; the sheet goes beside it. ``told_as``: where it will be found.
-    ``path`` and ``context`` and ``language`` and ``how``: as `export` takes them. ``more``:
-    ``trigger`` and ``seam_speed`` of `export`; ``faster``, how to have it run faster.
-    """
-    faster = str(more.pop('faster', ''))
-    made, text, notes = export(path, context, language, out.stem, how, **more)
+    """Write a program, as `export` makes it, and the sheet that says how to load it; return remarks."""
+    made, text, notes = export(path, context, language, out.stem, how, trigger, seam_speed)
     fast = f"at most {how.share:.0%} of the joints' speed and {how.tool * 1e3:g} mm/s"
     first = f' That is for the first run{faster}.' if how.share <= SLOW[0] else ''
     write_text(out, text)
@@ -123,9 +125,9 @@ def write_program(
         out.with_name(guide), sheet(made, language, out.name, f'It runs {fast}.{first}', notes)
     )
     return [
-        f'{told_as}: {len(made.moves)} moves in {language}, {fast}',
+        f'{shown_as}: {len(made.moves)} moves in {language}, {fast}',
         *(f'note: {note}' for note in notes),
-        f'how to load it and to record: {told_as.with_name(guide)}',
+        f'how to load it and to record: {shown_as.with_name(guide)}',
     ]
 
 

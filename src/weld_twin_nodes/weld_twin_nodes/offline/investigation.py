@@ -95,7 +95,9 @@ def closes(result: Mapping[str, Any]) -> str:
     if not is_sure(verdict) or verdict['status'] not in STATED:
         return ''
     open_ = verdict['status'] == 'ambiguous' and not _inseparable(result)
-    return '' if open_ or _to_confirm(result) else _words(result)
+    # Joints that hardly moved may have to move before anything is sure.
+    confirms = (result.get('next_experiment') or {}).get('confirms')
+    return '' if open_ or confirms else _words(result)
 
 
 def is_sure(verdict: Mapping[str, Any]) -> bool:
@@ -173,12 +175,18 @@ def _same(result: Mapping[str, Any], other: Mapping[str, Any], *, no_wider: bool
 
 
 def _sites(result: Mapping[str, Any]) -> list[set[tuple[str, str | None]]]:
-    return [{(e['effect'], e.get('joint')) for e in group} for group in sets_named(result)]
+    """Return what each cause that is named may be: sets of effect and joint."""
+    return [_sites_of(group) for group in result['verdict'].get('indistinguishable') or ()]
 
 
-def sets_named(result: Mapping[str, Any]) -> Sequence[Sequence[Mapping[str, Any]]]:
-    """Return what each cause that is named may be, one group a cause."""
-    return result['verdict'].get('indistinguishable') or ()
+def _sites_of(entries: Sequence[Mapping[str, Any]]) -> set[tuple[str, str | None]]:
+    return {(entry['effect'], entry.get('joint')) for entry in entries}
+
+
+def _together(result: Mapping[str, Any], first: Any, second: Any) -> bool:
+    """Return whether a set that is named has some of both explanations."""
+    sides = _sites_of(first), _sites_of(second)
+    return any(sides[0] & group and sides[1] & group for group in _sites(result))
 
 
 def _words(result: Mapping[str, Any]) -> str:
@@ -200,16 +208,8 @@ def _open_ends(result: Mapping[str, Any]) -> bool:
     sigma = wanted['expected_separation_sigma']
     if sigma is not None and sigma < NOTHING:
         return False
-    sides = [{(e['effect'], e.get('joint')) for e in side} for side in wanted.get('between') or ()]
-    open_ = len(sides) == 2 and any(
-        sides[0] & group and sides[1] & group for group in _sites(result)
-    )
-    return open_ and not _inseparable(result)
-
-
-def _to_confirm(result: Mapping[str, Any]) -> bool:
-    """Return whether joints that hardly moved have to move before anything is sure."""
-    return bool((result.get('next_experiment') or {}).get('confirms'))
+    sides = wanted.get('between') or ()
+    return len(sides) == 2 and _together(result, *sides) and not _inseparable(result)
 
 
 def _inseparable(result: Mapping[str, Any]) -> bool:
@@ -443,12 +443,7 @@ def decided(asked: Mapping[str, Any], result: Mapping[str, Any]) -> bool | None:
         return max(known) >= FOUND and min(known) <= 1.0 - FOUND
     if verdict['status'] not in (*NAMING, 'none'):
         return False
-    groups = [
-        {(item['effect'], item.get('joint')) for item in group}
-        for group in verdict.get('indistinguishable') or []
-    ]
-    first, second = ({(e['effect'], e.get('joint')) for e in side} for side in asked['between'])
-    return not any(first & group and second & group for group in groups)
+    return not _together(result, *asked['between'])
 
 
 def _held(side: Sequence[Mapping[str, Any]], causes: Sequence[Mapping[str, Any]]) -> float:

@@ -226,13 +226,18 @@ def short_rows(
 
 def _that_count(value: Any, std: Any, factor: float, unit: str) -> str:
     """Return the parts of a vector that differ from nothing, each with its axis."""
-    errors = std if np.ndim(std) and len(std) == len(value) else [None] * len(value)
-    axes = ('x ', 'y ', 'z ') if len(value) == len('xyz') else [''] * len(value)
     return ', '.join(
         axis + in_short(float(v), e, factor, unit)
-        for axis, v, e in zip(axes, value, errors, strict=True)
+        for axis, v, e in _parts(value, std)
         if (abs(v) > _SEEN * e if e is not None else v != 0.0)
     )
+
+
+def _parts(value: Any, std: Any) -> list[tuple[str, Any, Any]]:
+    """Return axis, value and standard error of the parts of a vector; None where it is not known."""
+    errors = std if np.ndim(std) and len(std) == len(value) else [None] * len(value)
+    axes = ('x ', 'y ', 'z ') if len(value) == len('xyz') else [''] * len(value)
+    return list(zip(axes, value, errors, strict=True))
 
 
 def parameter_rows(
@@ -265,16 +270,12 @@ def _shown(name: str, si: str, value: Any, std: Any) -> str:
 
 def _listed(value: Any, std: Any, factor: float, unit: str) -> str:
     """Return several numbers with their errors in one unit, each with its axis if there are three."""
-    errors = std if np.ndim(std) and len(std) == len(value) else [None] * len(value)
-    axes = ('x ', 'y ', 'z ') if len(value) == len('xyz') else [''] * len(value)
-    if all(e is not None and abs(v) <= _SEEN * e for v, e in zip(value, errors, strict=True)):
+    rows = _parts(value, std)
+    if all(e is not None and abs(v) <= _SEEN * e for _, v, e in rows):
         alike = ' each' if len(value) > 1 else ''
         alike = ' in x, y and z' if len(value) == len('xyz') else alike
-        return f'{uncertain(0.0, max(errors), factor, unit)}{alike}'
-    parts = [
-        axis + uncertain(float(v), e, factor)
-        for axis, v, e in zip(axes, value, errors, strict=True)
-    ]
+        return f'{uncertain(0.0, max(e for _, _, e in rows), factor, unit)}{alike}'
+    parts = [axis + uncertain(float(v), e, factor) for axis, v, e in rows]
     return f'{", ".join(parts)}{"" if unit == "°" else " "}{unit}'.rstrip()
 
 

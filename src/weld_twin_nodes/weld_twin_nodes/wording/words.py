@@ -144,22 +144,27 @@ def leading(alternatives: Sequence[tuple[str, float]]) -> list[tuple[str, float]
 
 def cause_words(cause: Cause) -> str:
     """Return place and dependence as a part of a sentence."""
-    where = likely(cause.place) or 'a place not found'
-    on = [name for name, p in cause.dependence if p > 0.5][:2]
-    if not on or on == ['constant']:
-        return f'{where}, and is constant there' if on else where
-    return f'{where}, depending on {listed([DEPENDENCES.get(o, o) for o in on])}'
+    where, on = _place_and_dependence(cause)
+    if on == ['constant']:
+        return f'{where}, and is constant there'
+    return f'{where}, depending on {_dependences(on)}' if on else where
 
 
 def someplace(cause: Cause) -> str:
     """Return a cause without a name as a heading: where it sits and what it depends on."""
-    where = likely(cause.place) or 'a place not found'
-    on = [name for name, p in cause.dependence if p > 0.5][:2]
-    if not on:
-        return f'something at {where}'
+    where, on = _place_and_dependence(cause)
     if on == ['constant']:
         return f'something constant at {where}'
-    return f'something at {where} that depends on {listed([DEPENDENCES.get(o, o) for o in on])}'
+    return f'something at {where}' + (f' that depends on {_dependences(on)}' if on else '')
+
+
+def _place_and_dependence(cause: Cause) -> tuple[str, list[str]]:
+    where = likely(cause.place) or 'a place not found'
+    return where, [name for name, p in cause.dependence if p > HALF][:2]
+
+
+def _dependences(on: Sequence[str], word: str = 'and') -> str:
+    return listed([DEPENDENCES.get(name, name) for name in on], word)
 
 
 def passed(fine: int, of: int) -> str:
@@ -246,9 +251,10 @@ def share_by_site(diagnosis: Diagnosis) -> dict[Site, float]:
 
 def depending(*on: str) -> str:
     """Return what something without a name does, by what it may depend on."""
-    words = [DEPENDENCES.get(name, name) for name in on if name != 'constant']
-    reported = ['is constant'] if 'constant' in on else []
-    return ' or '.join([*reported, *([f'depends on {listed(words, "or")}'] if words else [])])
+    others = [name for name in on if name != 'constant']
+    words = ['is constant'] if 'constant' in on else []
+    words += [f'depends on {_dependences(others, "or")}'] if others else []
+    return ' or '.join(words)
 
 
 def carries_curves(diagnosis: Diagnosis) -> bool:

@@ -21,7 +21,6 @@ from weld_twin_nodes.cli.options import ANY_ROBOT, TOPICS, folder_output, robot_
 
 if TYPE_CHECKING:
     from weld_twin_core.arm.robot import Robot
-    from weld_twin_core.recording import Recording
     from weld_twin_core.sensitivity.tolerance import Tolerance
 
     from ...sensitivity_report import Setting
@@ -124,9 +123,11 @@ def _setting(args: argparse.Namespace) -> Setting | None:
         'effort': Effort(args.samples, args.runs, args.trajectories, args.placements, args.seed),
     }
     if args.bag:
+        from weld_twin_msgs_py.bags import read_recording
+
         return Setting(
             seam=Path(args.bag).name,
-            recording=_recording(args, twin.robot),
+            recording=read_recording(args.bag, twin.robot, topics_of(args)),
             normal=args.normal,
             **common,
         )
@@ -167,12 +168,6 @@ def _tolerances(args: argparse.Namespace, robot: Robot) -> tuple[Tolerance, ...]
         return tolerances_from_list(read_yaml(args.tolerances, 'tolerance file'), robot)
     except ModelError as error:
         raise ModelError(f"tolerance file '{args.tolerances}': {error}") from None
-
-
-def _recording(args: argparse.Namespace, robot: Robot) -> Recording:
-    from weld_twin_msgs_py.bags import read_recording
-
-    return read_recording(args.bag, robot, topics_of(args))
 
 
 def _claims_robots(args: argparse.Namespace) -> list[Robot]:

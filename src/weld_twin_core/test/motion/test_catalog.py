@@ -8,18 +8,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from geometric_channels import geometric_channels
 from source_chains import CHAINS, chain_poses
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.chain import (
-    column,
     forward,
-    frames,
     jacobian,
 )
 from weld_twin_core.arm.dynamics import gravity_torque
-from weld_twin_core.arm.rotation import angle_between
 from weld_twin_core.errors import ModelError
 
 UR = 'ur_description/urdf'
@@ -116,12 +112,6 @@ def test_ranges_and_speeds_of_an_arm_are_those_of_its_data_sheet_in_degrees():
     np.testing.assert_allclose(arm.max_velocity, speed, rtol=1e-15)
 
 
-def test_the_file_form_round_trips(robot):
-    again = type(robot).from_mapping(robot.to_mapping())
-    q = np.linspace(0.1, 0.9, robot.n)
-    np.testing.assert_allclose(forward(again, q), forward(robot, q), atol=1e-15)
-
-
 def test_tool_pose_jacobian_and_gravity_are_those_of_pinocchio(
     robot, pinocchio_model, configurations
 ):
@@ -138,20 +128,6 @@ def test_tool_pose_jacobian_and_gravity_are_those_of_pinocchio(
         # What gravity does to the joints is minus what the motors must hold.
         held = pin.computeGeneralizedGravity(model, data, q)
         np.testing.assert_allclose(gravity_torque(robot, q), -held, atol=1e-10)
-
-
-def test_every_geometric_column_is_the_finite_difference(robot, configurations):
-    q = configurations(robot, 5)
-    at = frames(robot, q)
-    step = 1e-6
-    for channel in geometric_channels(robot):
-        high, low = (forward(robot, q, {channel: np.array(sign * step)}) for sign in (1, -1))
-        linear = (high[:, :3, 3] - low[:, :3, 3]) / (2 * step)
-        turn = angle_between(high[:, :3, :3], low[:, :3, :3]) / (2 * step)
-        expected = np.concatenate([linear, turn], axis=1)
-        np.testing.assert_allclose(
-            column(robot, at, channel).T, expected, atol=1e-8, err_msg=str(channel)
-        )
 
 
 @pytest.mark.parametrize('name', URDFS)

@@ -50,25 +50,6 @@ def test_a_pose_is_taken_to_where_the_real_tool_is_where_it_was_meant():
     assert np.linalg.norm(looked.added[:3]) > 1e-4
 
 
-def test_poses_between_two_looks_are_as_good():
-    motion = plan(UR5, default_seam(UR5, 'spline'), rate_hz=250.0).motion
-    poses = forward(UR5, motion.q)[:1500]
-    found, looks, worst = correction(), 1, 0.0
-    found.adopt(found.first(poses[0], motion.q[0]))
-    joints = motion.q[0]
-    for k, pose in enumerate(poses):
-        added, far = found.added(pose)
-        if k % 50 == 0:
-            (joints,), _ = polish(UR5, joints[None], moved(pose, added)[None])
-            off = forward(real_arm(), joints[None])[0] - pose
-            worst = max(worst, float(np.abs(off[:3, 3]).max()))
-        if far > 0.7:
-            found.adopt(found.exact(pose))
-            looks += 1
-    assert worst < 2e-9
-    assert looks < len(poses) / 10
-
-
 def test_a_stream_adds_what_compensate_does_for_an_arm_that_sags_and_ripples():
     entries = (
         {'effect': 'joint_compliance', 'joint': 'shoulder_lift_joint', 'compliance': 8e-6},

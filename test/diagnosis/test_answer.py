@@ -217,10 +217,7 @@ def test_the_waterfall_ends_where_the_shrink_ends(answer):
 
 @pytest.mark.parametrize(
     ('name', 'joint', 'regime'),
-    [
-        ('play', 'elbow_joint', 'reversal'),
-        ('stations', 'shoulder_lift_joint', 'load'),
-    ],
+    [('play', 'elbow_joint', 'reversal'), ('stations', 'shoulder_lift_joint', 'load')],
 )
 def test_most_of_the_gap_lies_on_the_joint_and_in_the_regime_of_its_cause(name, joint, regime):
     effects, options = ANSWERS[name]

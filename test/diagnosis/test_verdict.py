@@ -62,12 +62,7 @@ def test_what_the_data_cannot_show_is_absent_with_its_reason():
 
 
 @pytest.mark.parametrize(
-    ('align', 'gone'),
-    [
-        (('base',), {'base_pose'}),
-        (('tool',), {'tool_pose'}),
-        ((), set()),
-    ],
+    ('align', 'gone'), [(('base',), {'base_pose'}), (('tool',), {'tool_pose'}), ((), set())]
 )
 def test_frames_fitted_as_nuisance_are_no_cause(align, gone):
     found = library(*tiny(align=align))

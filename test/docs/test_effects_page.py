@@ -10,13 +10,7 @@ import pytest
 import yaml
 
 from weld_twin_core.arm.robot import Robot
-from weld_twin_core.effects import (
-    REGISTRY,
-    Effect,
-    JointOffset,
-    MemoryEffect,
-    effects_from_list,
-)
+from weld_twin_core.effects import REGISTRY, Effect, JointOffset, MemoryEffect, effects_from_list
 from weld_twin_core.effects.hooks import OF_GROUP, TRAITS
 from weld_twin_core.twin.twin import Twin
 

@@ -75,8 +75,7 @@ def test_orientations_are_written_as_each_maker_does(notation, numbers, turn):
 
 @pytest.mark.parametrize('notation', [KUKA_POSE, FANUC_POSE, UR_POSE, ABB_POSE])
 @given(
-    vector=arrays(float, 3, elements=st.floats(-3.1, 3.1)),
-    far=st.sampled_from([0.0, 1e-9, 1e-4]),
+    vector=arrays(float, 3, elements=st.floats(-3.1, 3.1)), far=st.sampled_from([0.0, 1e-9, 1e-4])
 )
 @settings(max_examples=15, deadline=None)
 def test_a_pose_is_written_next_to_the_numbers_it_replaces(notation, vector, far):

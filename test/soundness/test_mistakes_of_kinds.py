@@ -69,8 +69,7 @@ def pair(rng, second, **how):
 
 def test_a_tool_that_may_change_and_did_by_millimetres_is_fitted(cell, rng):
     code, found = cell(
-        *pair(rng, turned(24.0)),
-        options=('--align', 'base,tool', '--may-change', 'tool_pose'),
+        *pair(rng, turned(24.0)), options=('--align', 'base,tool', '--may-change', 'tool_pose')
     )
     assert code == 0
     (zero,) = found['verdict']['effects']
@@ -154,9 +153,7 @@ def test_a_tracker_that_repeats_itself_at_rest_is_a_measurement(rng):
     made = measured(REAL, t, q, rng, noise=2e-5, at_rest=False)
     held = np.repeat(np.arange(0, len(q), 40), 40)
     still = replace(
-        made.measured,
-        position=made.measured.position[held],
-        rotation=made.measured.rotation[held],
+        made.measured, position=made.measured.position[held], rotation=made.measured.rotation[held]
     )
     assert not kinds(made.with_measured(still))
 

@@ -127,9 +127,7 @@ DRIVERS = {
         'fanuc_m10id12',
         numbered('J{}'),
         velocities=False,
-        options={
-            'joint_map': '{' + ', '.join(f'joint_{k}: J{k}' for k in range(1, 7)) + '}',
-        },
+        options={'joint_map': '{' + ', '.join(f'joint_{k}: J{k}' for k in range(1, 7)) + '}'},
     ),
     'kuka_drivers': Driver(
         'kroshu/kuka_drivers '

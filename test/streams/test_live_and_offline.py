@@ -12,13 +12,7 @@ import pytest
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arm.rotation import rotation_matrix
-from weld_twin_core.effects import (
-    REGISTRY,
-    Effect,
-    Parameter,
-    Stage,
-    effect_from_mapping,
-)
+from weld_twin_core.effects import REGISTRY, Effect, Parameter, Stage, effect_from_mapping
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Signal
 from weld_twin_core.twin.twin import Twin

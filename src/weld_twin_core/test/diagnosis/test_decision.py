@@ -354,10 +354,7 @@ def test_families_are_told_largest_first_and_what_they_account_for():
 )
 def test_kinds_are_told_and_the_status_says_if_they_are_all(believed, left, status, named):
     told = structured(
-        left,
-        families=(family('link_length'),),
-        structure=taking(left),
-        believed=(believed,),
+        left, families=(family('link_length'),), structure=taking(left), believed=(believed,)
     )
     verdict = decide(told)
     assert (verdict.status, len(verdict.sets)) == (status, named)

@@ -172,8 +172,7 @@ def test_a_curve_that_is_none_is_refused_in_a_sentence(change, words):
 
 
 @pytest.mark.parametrize(
-    ('gain', 'steady', 'status'),
-    [(0.16, 2.1, 'unknown'), (0.14, 9.0, 'none'), (0.9, 1.9, 'none')],
+    ('gain', 'steady', 'status'), [(0.16, 2.1, 'unknown'), (0.14, 9.0, 'none'), (0.9, 1.9, 'none')]
 )
 def test_a_gap_that_something_predicts_is_no_noise(gain, steady, status):
     part = SimpleNamespace(group='tool, depending on load')
@@ -230,10 +229,7 @@ def test_a_wrong_unit_that_no_effect_stands_for_is_placed_at_the_instrument():
     measured = recording.measured
     stretched = wt.Measurements(measured.t[::4], 1.0004 * measured.position[::4])
     told = wt.diagnose(
-        recording.with_measured(stretched),
-        robot,
-        exclude=['measurement_scale'],
-        experiment=False,
+        recording.with_measured(stretched), robot, exclude=['measurement_scale'], experiment=False
     )
     assert told.status == 'unknown'
     assert (told.causes[0].place[0][0], told.causes[0].dependence[0][0]) == ('instrument', 'place')

@@ -108,8 +108,7 @@ def test_sag_of_two_axes_among_dozens_of_small_errors_is_named_with_its_joints()
 
 
 @pytest.mark.parametrize(
-    ('change', 'kind'),
-    [((2, 'alpha', 8e-4), 'link_twist'), ((1, 'a', 4e-4), 'link_length')],
+    ('change', 'kind'), [((2, 'alpha', 8e-4), 'link_twist'), ((1, 'a', 4e-4), 'link_length')]
 )
 def test_one_cause_and_noise_gets_no_other_kind(change, kind):
     found = told(1.2, changes=[change])

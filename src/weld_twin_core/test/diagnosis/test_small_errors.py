@@ -48,10 +48,7 @@ def off(model, recording):
 
 def test_an_error_of_a_joint_that_stood_still_is_left_to_the_frames(robot):
     """Read off the misfit of a slow gear, it would be wrong by degrees where the joint moves."""
-    errors = (
-        LinkTwist('elbow_joint', 1e-3),
-        TransmissionRipple('wrist_1_joint', 3e-4, 7.0, 0.3),
-    )
+    errors = (LinkTwist('elbow_joint', 1e-3), TransmissionRipple('wrist_1_joint', 3e-4, 7.0, 0.3))
     still = stations(robot, [0.01, 0.9, 0.9, 0.9, 0.9, 0.9], errors)
     model = fitted(still, robot, 'base', *GEOMETRY)
     first = [effect for effect in model.found if effect.site == 'shoulder_pan_joint']

@@ -141,9 +141,7 @@ def test_a_kernel_is_prepared_once_for_each_thread(make_robot: Callable[..., Rob
     assert kernel_of(robot) is kernel_of(robot) is not others[0]
 
 
-def test_a_kernel_keeps_the_memory_of_a_few_lengths_only(
-    make_robot: Callable[..., Robot],
-) -> None:
+def test_a_kernel_keeps_the_memory_of_a_few_lengths_only(make_robot: Callable[..., Robot]) -> None:
     kernel = BulkKernel(make_robot(6))
     for count in range(1, 20):
         kernel.poses(positions(kernel.robot, count))

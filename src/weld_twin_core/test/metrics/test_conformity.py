@@ -10,8 +10,7 @@ from weld_twin_core.metrics.conformity import FAIL, OPEN, PASS, Rule
 
 
 @pytest.mark.parametrize(
-    ('size', 'verdict'),
-    [(0.83e-3, PASS), (0.84e-3, OPEN), (1.16e-3, OPEN), (1.17e-3, FAIL)],
+    ('size', 'verdict'), [(0.83e-3, PASS), (0.84e-3, OPEN), (1.16e-3, OPEN), (1.17e-3, FAIL)]
 )
 def test_one_reading_is_judged_with_1_645_standard_uncertainties(size, verdict):
     assert Rule(1e-3, 1e-4).judged(size) == verdict

@@ -62,10 +62,7 @@ def test_the_family_does_not_depend_on_base_and_tool():
 
 
 @settings(max_examples=60, deadline=None)
-@given(
-    name=st.sampled_from(ARMS),
-    part=st.lists(st.floats(0.02, 0.98), min_size=6, max_size=6),
-)
+@given(name=st.sampled_from(ARMS), part=st.lists(st.floats(0.02, 0.98), min_size=6, max_size=6))
 def test_the_joint_positions_a_pose_was_made_with_are_found_again(name, part):
     robot = catalog.load(name)
     q = robot.lower + np.array(part) * (robot.upper - robot.lower)
@@ -219,9 +216,7 @@ def test_a_joint_limit_in_the_way_is_named():
     q = np.array([0.3, 0.4, -0.2, 0.5, 0.6, -0.7])
     stiff = np.arange(6) == 4
     narrow = replace(
-        robot,
-        lower=np.where(stiff, -0.01, robot.lower),
-        upper=np.where(stiff, 0.01, robot.upper),
+        robot, lower=np.where(stiff, -0.01, robot.lower), upper=np.where(stiff, 0.01, robot.upper)
     )
     with pytest.raises(ReachError, match=r"'joint_5' would have to be at .* outside \[-0\.010, 0"):
         solve(narrow, forward(robot, q))

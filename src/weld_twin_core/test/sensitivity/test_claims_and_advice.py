@@ -125,12 +125,7 @@ def test_verdicts_follow_the_measurements(case):
     assert found['smooth_below_aggressive'].verdict.startswith('holds when')
     turned = judge({CaseName('a', 'b'): {**case, 'distal_ratio': 1.5}})
     assert {c.key: c.verdict for c in turned}['distal'] == 'holds'
-    split = judge(
-        {
-            CaseName('a', 'b'): case,
-            CaseName('c', 'd'): {**case, 'distal_ratio': 1.5},
-        }
-    )
+    split = judge({CaseName('a', 'b'): case, CaseName('c', 'd'): {**case, 'distal_ratio': 1.5}})
     distal = {c.key: c for c in split}['distal']
     assert (distal.verdict, distal.held, distal.cases) == ('does not hold', 1, 2)
     assert f'{case["distal_ratio"]:.2f} to 1.50' in distal.reason

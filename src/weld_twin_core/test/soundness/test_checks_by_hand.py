@@ -30,11 +30,7 @@ from weld_twin_core.diagnosis.soundness.slips import Settling, Slip, changes
 from weld_twin_core.diagnosis.soundness.snapshot import FRAMES, Snapshot
 from weld_twin_core.diagnosis.soundness.stamps import _stream, written
 from weld_twin_core.diagnosis.soundness.stuck import _freed, _inside, _runs, _whole
-from weld_twin_core.diagnosis.soundness.suspicions import (
-    doubles,
-    suspicions,
-    turned_bases,
-)
+from weld_twin_core.diagnosis.soundness.suspicions import doubles, suspicions, turned_bases
 from weld_twin_core.diagnosis.soundness.touches import _stretch
 from weld_twin_core.effects.dated import InstrumentKnock, JointSlip, ToolSlip
 from weld_twin_core.errors import DataError

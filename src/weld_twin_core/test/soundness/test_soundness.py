@@ -6,15 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from measured_cells import (
-    anywhere,
-    asked,
-    moving,
-    recorded,
-    rejointed,
-    remeasured,
-    stations,
-)
+from measured_cells import anywhere, asked, moving, recorded, rejointed, remeasured, stations
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arm.rotation import matrix_from_quaternion, quaternion_from_matrix

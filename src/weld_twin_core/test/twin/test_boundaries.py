@@ -197,10 +197,7 @@ def test_thermal_growth_without_any_temperature_is_refused(arm):
 
 def test_positions_in_degrees_are_recognised():
     robot = Robot.from_mapping(
-        {
-            'name': 'r',
-            'joints': [{'name': 'j0', 'lower': -3.0, 'upper': 3.0}],
-        }
+        {'name': 'r', 'joints': [{'name': 'j0', 'lower': -3.0, 'upper': 3.0}]}
     )
     robot.check_positions(np.array([[3.0], [-3.0]]))
     with pytest.raises(DataError) as error:

@@ -125,10 +125,7 @@ def test_turns_are_about_the_fixed_axes_of_the_world():
 
 def test_a_turn_of_the_base_moves_the_tool_by_its_lever():
     robot = Robot.from_mapping(
-        {
-            'name': 'one',
-            'joints': [{'name': 'j', 'a': 0.8, 'alpha': 0.0, 'd': 0.0}],
-        }
+        {'name': 'one', 'joints': [{'name': 'j', 'a': 0.8, 'alpha': 0.0, 'd': 0.0}]}
     )
     what = Directions(('base',), 2, ())
     covariance = np.zeros((12, 12))

@@ -10,11 +10,7 @@ OF_CELLS = {'root_pose', 'guide_bend', 'guide_tilt'}
 ENTRIES = {
     'base_pose': {'xyz': [1e-3, 2e-3, 0.0], 'rotvec': [1e-2, 0.2, 0.1]},
     'tool_pose': {'xyz': [1e-3, 2e-3, 0.1], 'rotvec': [1e-2, 0.2, 0.1]},
-    'joint_curve': {
-        'joint': 'j1',
-        'values': [1e-4, -2e-4, 4e-4],
-        'knots': [-1.0, 0.2, 1.5],
-    },
+    'joint_curve': {'joint': 'j1', 'values': [1e-4, -2e-4, 4e-4], 'knots': [-1.0, 0.2, 1.5]},
     'frame_curve': {'xyz': [0.0, 1e-6] * 3, 'rotvec': [0.0, 1e-6] * 3, 'knots': [0.0, 4.0]},
     'transmission_ripple': {
         'joint': 'j1',

@@ -35,5 +35,5 @@ def diagnosis(status, *groups, confidence=0.9, effects=()):
             'indistinguishable': [
                 [{'effect': family, 'joint': joint} for family, joint in group] for group in groups
             ],
-        },
+        }
     }

@@ -8,11 +8,7 @@ import pytest
 from blind_verdicts import diagnosis, offset, truth
 
 from weld_twin_lab.blind.judging import judge
-from weld_twin_lab.blind.measures import (
-    alias_measure,
-    calibration_measures,
-    verdict_measures,
-)
+from weld_twin_lab.blind.measures import alias_measure, calibration_measures, verdict_measures
 from weld_twin_lab.blind.scoring import Score, page
 
 A, B, C = ('joint_offset', 'a'), ('joint_offset', 'b'), ('gear_ratio', 'a')
@@ -106,13 +102,7 @@ def test_the_page_names_every_failure_and_why_there_is_no_verdict():
         'median_memory_mib': 3.0,
         'most_memory_mib': 4.0,
     }
-    score = Score(
-        made,
-        CASES,
-        {},
-        costs,
-        {'case_0001': 'no joint moves'},
-    )
+    score = Score(made, CASES, {}, costs, {'case_0001': 'no joint moves'})
     failed = [line for line in page(score).splitlines() if line.startswith('| case_')]
     assert len(failed) == sum(not case.right for case in CASES)
     assert any('no joint moves' in line for line in failed)

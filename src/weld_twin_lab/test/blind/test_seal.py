@@ -27,11 +27,7 @@ def sealed(tmp_path):
         (cases / name / 'train' / 'train.mcap').write_bytes(b'recording of ' + name.encode())
         layout.write(truths / name / layout.TRUTH, truth('single', [offset('a')], name=name))
         entries.append(
-            {
-                'name': name,
-                'case': seal.digest(cases / name),
-                'truth': seal.digest(truths / name),
-            }
+            {'name': name, 'case': seal.digest(cases / name), 'truth': seal.digest(truths / name)}
         )
     layout.write(cases / layout.CASES, {'seal': seal.seal_of(entries), 'cases': entries})
     layout.write(truths / layout.TRUTHS, {'seed': 1})

@@ -79,9 +79,7 @@ def test_a_gear_by_direction_turns_further_one_way():
     got = record(UR5, [ratio], command, richness=0.0)
     q = command.q[:, 1]
     assert np.allclose(
-        got.position,
-        _shifted(command, 1, 1e-3 * np.sign(np.diff(q, prepend=q[0])) * q),
-        atol=1e-8,
+        got.position, _shifted(command, 1, 1e-3 * np.sign(np.diff(q, prepend=q[0])) * q), atol=1e-8
     )
 
 

@@ -146,11 +146,7 @@ def test_poses_win_over_points_with_a_note(tmp_path, robot):
     point = make.point(SECOND, np.zeros(3))
     write_messages(
         tmp_path / 'bag',
-        [
-            *joint_states([SECOND]),
-            ('/measured/tool_point', point),
-            ('/measured/tool_pose', pose),
-        ],
+        [*joint_states([SECOND]), ('/measured/tool_point', point), ('/measured/tool_pose', pose)],
     )
     back = read_recording(tmp_path / 'bag', robot)
     np.testing.assert_array_equal(back.measured.position, np.ones((1, 3)))
@@ -373,12 +369,7 @@ def test_a_gripper_on_the_same_topic_is_passed_over(tmp_path, robot):
 
 @pytest.mark.parametrize(
     ('frame', 'expected'),
-    [
-        ('', 'tool'),
-        ('tool0', 'tool'),
-        ('base_link', 'base'),
-        ('world', 'base'),
-    ],
+    [('', 'tool'), ('tool0', 'tool'), ('base_link', 'base'), ('world', 'base')],
 )
 def test_the_wrench_is_in_the_frame_its_header_names(tmp_path, robot, frame, expected):
     wrench = bag_messages().wrench(SECOND, np.arange(6.0), frame)

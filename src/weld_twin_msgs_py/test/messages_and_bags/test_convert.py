@@ -112,11 +112,7 @@ def test_nan_in_a_point_is_refused(make):
 
 @pytest.mark.parametrize(
     ('celsius', 'words'),
-    [
-        (np.nan, 'no temperature'),
-        (-300.0, 'no temperature'),
-        (296.0, 'looks like kelvin'),
-    ],
+    [(np.nan, 'no temperature'), (-300.0, 'no temperature'), (296.0, 'looks like kelvin')],
 )
 def test_impossible_temperatures_are_refused(make, celsius, words):
     with pytest.raises(DataError, match=words):

@@ -235,8 +235,7 @@ def test_a_full_disk_is_told_in_a_sentence_and_keeps_what_was_on_it(
     here, there = context.Pipe()
     messages = [numbered(number) for number in range(4000)]
     process = context.Process(
-        target=record_until_full,
-        args=(tmp_path / 'bag', storage, messages, 200_000, there),
+        target=record_until_full, args=(tmp_path / 'bag', storage, messages, 200_000, there)
     )
     process.start()
     flushed, said = 0, here.recv()

@@ -91,10 +91,7 @@ GOOD = [
     ('seam', {'kind': 'points', 'points': [PLACE, [0.4, 0.1, 0.2], [0.5, 0.1, 0.2]]}),
     ('artefact', {'contacts': {'a': 'point', 'b': {'kind': 'point'}}, 'distances': [TIE]}),
     ('artefact', {'contacts': {'a': {'kind': 'plane', 'at': PLACE, 'axis': [0.0, 0.0, 1.0]}}}),
-    (
-        'artefact',
-        {'blocks': {'b': {'size': [1, 1, 1], 'at': PLACE, 'turn': PLACE, 'sigma': 1}}},
-    ),
+    ('artefact', {'blocks': {'b': {'size': [1, 1, 1], 'at': PLACE, 'turn': PLACE, 'sigma': 1}}}),
 ]
 BAD = [
     ('robot', {'name': 'no joints'}),

@@ -39,10 +39,7 @@ def model(robot, tmp_path):
         covariance,
         Discrepancy(0.0, 0.0, np.zeros(6), np.zeros(6), 0.1),
         Domain(
-            robot.joint_names,
-            tuple(((q - 0.1, q + 0.1),) for q in Q),
-            (0.02,) * 6,
-            (True,) * 6,
+            robot.joint_names, tuple(((q - 0.1, q + 0.1),) for q in Q), (0.02,) * 6, (True,) * 6
         ),
     )
     content = {

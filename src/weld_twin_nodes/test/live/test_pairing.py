@@ -70,10 +70,7 @@ def test_a_measurement_waits_until_the_twin_has_passed_it():
 
 @pytest.mark.parametrize(
     ('twin', 'measured', 'why'),
-    [
-        ([10, 20], [5], 'before the first pose'),
-        ([10, 900], [400], 'in a gap of the twin'),
-    ],
+    [([10, 20], [5], 'before the first pose'), ([10, 900], [400], 'in a gap of the twin')],
 )
 def test_what_cannot_be_paired_is_counted(twin, measured, why):
     pairing, pairs = paired([ns * MS for ns in twin], [ns * MS for ns in measured])

@@ -52,10 +52,7 @@ def test_bad_recordings_harm_nobody_and_nothing_runs_twice(plant):
     ]
     assert sorted(
         rows(db, 'select name, status from cells join verdicts on cell_id = cells.id')
-    ) == [
-        ('line 1', 'identified'),
-        ('line 2', 'identified'),
-    ]
+    ) == [('line 1', 'identified'), ('line 2', 'identified')]
     assert len(list((plant / 'kept').glob('*/report.html'))) == 2
     second = weld_twin(*words)
     assert (second.code, second.out) == (0, f'{plant}/list.csv: 5 there already\n')

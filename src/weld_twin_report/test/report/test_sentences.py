@@ -49,13 +49,7 @@ def test_lengths_are_told_in_millimetres(metres, text):
 
 @pytest.mark.parametrize(
     ('share', 'text'),
-    [
-        (0.0, '0 %'),
-        (0.002, '< 1 %'),
-        (0.93, '93 %'),
-        (0.9999, '> 99 %'),
-        (1.0, '100 %'),
-    ],
+    [(0.0, '0 %'), (0.002, '< 1 %'), (0.93, '93 %'), (0.9999, '> 99 %'), (1.0, '100 %')],
 )
 def test_a_share_close_to_all_or_nothing_is_not_told_as_such(share, text):
     assert plain(percent(share)) == text
@@ -86,12 +80,7 @@ def test_an_effect_of_the_user_is_named_by_its_own_name():
 
 @pytest.mark.parametrize(
     ('names', 'text'),
-    [
-        ([], ''),
-        (['a'], 'a'),
-        (['a', 'b'], 'a and b'),
-        (['a', 'b', 'c'], 'a, b and c'),
-    ],
+    [([], ''), (['a'], 'a'), (['a', 'b'], 'a and b'), (['a', 'b', 'c'], 'a, b and c')],
 )
 def test_lists_read_as_prose(names, text):
     assert listed(names) == text
@@ -164,8 +153,7 @@ def test_what_is_certain_and_largest_is_to_be_done_first():
 
 def test_an_effect_that_was_not_to_be_tried_is_told_where_nothing_explains_the_gap():
     case = replace(
-        diagnoses.unknown(),
-        absent={'backlash': 'excluded by the user', 'drift': 'no time'},
+        diagnoses.unknown(), absent={'backlash': 'excluded by the user', 'drift': 'no time'}
     )
     first, _ = map(plain, verdict(case))
     assert first == (

@@ -59,10 +59,7 @@ def unknown(size):
     curve = {'effect': 'joint_curve', 'joint': 'joint_a3', 'values': [-size, size], 'knots': ends}
     case = diagnoses.diagnosis('unknown', robot, [play], [curve], seam, effects=())
     cause = replace(
-        case.causes[0],
-        dependence=(('direction', 0.8),),
-        share=0.97,
-        share_ci90=(0.7, 1.0),
+        case.causes[0], dependence=(('direction', 0.8),), share=0.97, share_ci90=(0.7, 1.0)
     )
     return replace(case, causes=(cause,))
 

@@ -145,10 +145,12 @@ class _State:
         of_eye = np.concatenate([-by_there, by_there @ skew(away)], axis=2)
         of_target = np.concatenate([by_at, -by_at @ skew(own)], axis=2)
         of_corner = by_at @ target[:, :3, :3]
-        whole = self._placed(by_lens, of_eye, of_target, of_corner)
+        whole = self._in_columns(by_lens, of_eye, of_target, of_corner)
         return seen.pixel - pixel, of_tool, whole
 
-    def _placed(self, by_lens: Array, of_eye: Array, of_target: Array, of_corner: Array) -> Array:
+    def _in_columns(
+        self, by_lens: Array, of_eye: Array, of_target: Array, of_corner: Array
+    ) -> Array:
         """Return the change with every shared unknown, each in its own column, (N, 2, Z)."""
         seen, count = self.seen, len(self.seen.cameras)
         whole = np.zeros((len(by_lens), 2, self.sizes.size))
@@ -243,7 +245,7 @@ class _Point:
         for first in range(0, len(self.state.tool), _TOGETHER):
             some = np.flatnonzero((image >= first) & (image < first + _TOGETHER))
             count = min(_TOGETHER, len(self.state.tool) - first)
-            slot = _slots(image[some] - first)
+            slot = _numbers(image[some] - first)
             wide = np.zeros((count, slot.max() + 1, 2, 6))
             wide[image[some] - first, slot] = of_tool[some]
             right = np.zeros((count, slot.max() + 1, 2, size))
@@ -260,8 +262,8 @@ class _Point:
     def stepped(self, damping: float) -> _Point:
         """Return the place a damped step away."""
         own = self.reduced
-        held = own.normal + np.diag(1.0 + damping * np.diag(own.normal))
-        step = np.asarray(np.linalg.solve(held, own.rest - self.state.unknowns), dtype=float)
+        damped = own.normal + np.diag(1.0 + damping * np.diag(own.normal))
+        step = np.asarray(np.linalg.solve(damped, own.rest - self.state.unknowns), dtype=float)
         square = _swap(own.roots) @ own.roots
         each = np.einsum('mii->mi', square)
         square = square + damping * each[:, :, None] * np.eye(6)
@@ -270,7 +272,7 @@ class _Point:
         return _Point.at(self.state.moved(step, tool), self.weight)
 
 
-def _slots(image: NDArray[np.intp]) -> NDArray[np.intp]:
+def _numbers(image: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return a number for every sighting that is its own within its image."""
     order = np.argsort(image, kind='stable')
     first = np.searchsorted(image[order], image[order])
@@ -303,7 +305,7 @@ def adjusted(seen: Sightings) -> _Adjusted:
         state = _descended(_Point.at(state, weight)).state
     state = _loosened(state, reported)
     weight, noise = _weights(state, reported)
-    return _told(_Point.at(state, weight), noise)
+    return _result(_Point.at(state, weight), noise)
 
 
 def _loosened(state: _State, reported: Array) -> _State:
@@ -422,7 +424,7 @@ def _descended(here: _Point) -> _Point:
     return here
 
 
-def _told(point: _Point, noise: float) -> _Adjusted:
+def _result(point: _Point, noise: float) -> _Adjusted:
     """Return poses with what is not sure about them."""
     own, state = point.reduced, point.state
     weak = np.linalg.cond(own.roots) > _SINGULAR

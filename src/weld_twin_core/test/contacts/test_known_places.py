@@ -99,7 +99,7 @@ def test_faces_of_a_block_lie_as_far_apart_as_its_size(robot):
     # The arm is 1 % too large: faces felt one by one lie too far apart, the block stays a block.
     large = 1.01 * points
 
-    alone = {item.tie.between: item.found for item in lengths(recording.contacts, large)[::5]}
+    alone = {item.tie.between: item.measured for item in lengths(recording.contacts, large)[::5]}
     where = {s.contact.label: s for s in places(recording.contacts, large).surfaces}
 
     assert alone['block +x', 'block -x'] == pytest.approx(1.01 * SIZE[0], abs=2e-4)

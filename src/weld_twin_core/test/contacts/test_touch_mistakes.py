@@ -35,7 +35,7 @@ def sound(robot):
 def told(recording, robot):
     """Return the sentences of what is wrong, mended and not."""
     found = touches(*aligned(recording, robot, '', ()))
-    return found, [item.sentence for item in found.told], [m.sentence for m in found.mistakes]
+    return found, [item.sentence for item in found.unsound], [m.sentence for m in found.mistakes]
 
 
 def with_labels(recording, changed):

@@ -88,7 +88,7 @@ def test_rough_touches_count_by_what_they_are_worth_and_one_in_a_wrong_place_is_
 
     found = touches(*aligned([tracked(real), wrong], robot, 'base', ()))
 
-    (told,) = found.told
+    (told,) = found.unsound
     assert told.sentence.startswith("Posture 1 of 'left' rests in 'low'")
     assert sum(found.problem.samples) == STATIONS + 3 * EACH - 1
     instrument, *pins = found.problem.loose

@@ -151,7 +151,7 @@ def test_an_effect_that_is_not_named_is_taken_to_be_small():
     k = series.names.index(NAMES[0])
     error = np.median([np.sqrt(each.covariance[0, 0]) for each in weeks[1:]])
     assert series.precision[0, k, k] == pytest.approx(1.0 / (3.0 * error) ** 2)
-    assert series.told[0, k] == 0.0
+    assert series.weighted[0, k] == 0.0
 
 
 def test_diagnoses_of_one_instant_and_none_are_refused():

@@ -131,7 +131,7 @@ def test_what_a_joint_remembers_is_the_same_from_a_table_as_run_by_run(study, fa
         rest, where = joint.rest(draws)
         found = np.zeros((200, study.samples))
         found[:, where] = rest.of(slice(None))
-        np.testing.assert_allclose(found, joint.left(draws[:, joint.columns]), atol=3e-10)
+        np.testing.assert_allclose(found, joint.remainder(draws[:, joint.columns]), atol=3e-10)
     # Draws beyond what the tolerances can be are run one by one.
     beyond, where = joints[0].rest(100.0 + np.abs(draws))
     assert beyond.rise is None

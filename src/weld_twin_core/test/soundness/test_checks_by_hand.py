@@ -31,7 +31,7 @@ from weld_twin_core.diagnosis.soundness.snapshot import FRAMES, Snapshot
 from weld_twin_core.diagnosis.soundness.stamps import _stream, written
 from weld_twin_core.diagnosis.soundness.stuck import _freed, _inside, _runs, _whole
 from weld_twin_core.diagnosis.soundness.suspicions import doubles, suspicions, turned_bases
-from weld_twin_core.diagnosis.soundness.touches import _stretch
+from weld_twin_core.diagnosis.soundness.touches import _moved_run
 from weld_twin_core.effects.dated import InstrumentKnock, JointSlip, ToolSlip
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion
@@ -132,7 +132,7 @@ def test_frames_are_off_in_units_of_what_a_cause_may_be(ur5, rng, off):
         assert shot.arm.displaced == pytest.approx((turn or off) / most, rel=0.1)
         assert shot.arm.bent < 1.0 and shot.arm.off == max(shot.arm.bent, shot.arm.displaced)
         free = replace(shot, align=FRAMES)
-        assert free.arm.displaced == 0.0 and free.left < 1e-3 < shot.left
+        assert free.arm.displaced == 0.0 and free.remaining < 1e-3 < shot.remaining
 
 
 # Snapshots --------------------------------------------------------------------------------------
@@ -291,12 +291,12 @@ def test_a_stray_is_far_from_its_neighbours_and_a_step_is_none(rng):
 def test_places_that_moved_are_found_in_a_row_and_the_shorter_part_is_told(rng):
     points = 1e-5 * rng.standard_normal((30, 3))
     points[8:20] += [1e-3, 0.0, 0.0]
-    first, last, shift, explained = _stretch(points)
+    first, last, shift, explained = _moved_run(points)
     assert (first, last) == (8, 20) and explained > 0.99
     assert shift == pytest.approx(1e-3, rel=0.02)
     points[:] = 1e-5 * rng.standard_normal((30, 3))
     points[:22] += [0.0, 2e-3, 0.0]
-    assert _stretch(points)[:2] == (22, 30)
+    assert _moved_run(points)[:2] == (22, 30)
 
 
 # Motion -----------------------------------------------------------------------------------------
@@ -344,7 +344,7 @@ def test_a_change_explains_what_was_put_in_and_nothing_once_it_is_taken_out(ur5,
     assert base.log_bayes_factor(after) > 50.0
     left = base.taken_out(after)
     assert left.change('base').gains(after[None])[0] < 1e-6 * base.gains(after[None])[0]
-    assert left.far < 0.2 * rest.far and left.left(0) < rest.left(0)
+    assert left.far < 0.2 * rest.far and left.rms(0) < rest.rms(0)
 
 
 def test_constant_errors_of_an_arm_leave_nothing_that_changed(ur5, rng):
@@ -354,7 +354,7 @@ def test_constant_errors_of_an_arm_leave_nothing_that_changed(ur5, rng):
     off = 2e-3 * maker.column(('q', 2))[:3] + 1e-3 * maker.column(('a', 1))[:3]
     both = rest_of([problem.residuals(model)[0] + off], problem, model)
     alone = rest_of([problem.residuals(model)[0]], problem, model)
-    assert both.left(0) < 1.2 * alone.left(0)
+    assert both.rms(0) < 1.2 * alone.rms(0)
 
 
 SIDE = np.array([[1.0], [-1.0], [0.5]])
@@ -429,9 +429,11 @@ def test_what_would_look_the_same_is_told_with_its_place(still):
 def test_of_one_recording_what_gave_way_is_for_the_search_to_weigh(ur5, still):
     slip = Slip(ToolSlip(time=11.5), 0, 2e-3, 90.0)
     found = Examined(Given((still,), ur5), asked(ur5, still), (), (), (), (slip,))
-    assert found.torn(*found.posed) is found
-    assert [item.kind for item in found.told([ToolSlip(time=11.5)])] == ['reflector_jumped']
-    assert found.told([]) == ()
+    assert found.refusing_slips(*found.posed) is found
+    assert [item.kind for item in found.unsound_with([ToolSlip(time=11.5)])] == [
+        'reflector_jumped'
+    ]
+    assert found.unsound_with([]) == ()
 
 
 # What is believed -------------------------------------------------------------------------------
@@ -452,10 +454,10 @@ def test_a_tool_that_never_moves_is_held_where_the_arm_says_so_too(ur5, still, g
     seen = replace(still.measured, position=np.tile(still.seen.position[:1], (40, 1)))
     case = Case(*asked(ur5, still.with_measured(seen)))
     vars(case)['gap'] = gap
-    assert case.held is held
+    assert case.tool_fixed is held
     case = Case(*asked(ur5, still))
     vars(case)['gap'] = gap
-    assert not case.held
+    assert not case.tool_fixed
 
 
 @pytest.mark.parametrize(
@@ -476,13 +478,13 @@ def test_a_gap_is_made_up_for_what_the_fit_took(ur5, still):
 
 def test_stations_that_are_there_twice_are_counted(ur5, rng):
     run = recorded(ur5, stations(ur5, rng, 40), rng, points=True)
-    case = SimpleNamespace(held=False, recordings=(run,), motions=[run.joints.q])
+    case = SimpleNamespace(tool_fixed=False, recordings=(run,), motions=[run.joints.q])
     assert not list(repeats(case))
     seen, q = run.measured, np.array(run.joints.q)
     position = np.array(seen.position)
     position[[7, 9]], q[[7, 9]] = position[3], q[3]
     both = replace(rejointed(run, q), measured=replace(seen, position=position))
-    case = SimpleNamespace(held=False, recordings=(both,), motions=[q])
+    case = SimpleNamespace(tool_fixed=False, recordings=(both,), motions=[q])
     (found,) = repeats(case)
     assert found.level == 'warning' and found.sentence.startswith('2 station(s)')
 

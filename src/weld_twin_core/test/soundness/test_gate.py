@@ -213,11 +213,11 @@ def test_what_gave_way_in_one_of_several_recordings_is_told_where_nothing_explai
     found = examine(Given((plain, bad), ur5, frozenset()))
     assert found.posed is not None and not found.unsound
     problem, model = found.posed
-    (item,) = found.torn(problem, model).unsound
+    (item,) = found.refusing_slips(problem, model).unsound
     assert (item.kind, item.at, item.applied) == ('joint_slipped', ('elbow_joint',), False)
     # A model that leaves no step, as where play that the load turns over only looked like one.
     explained = replace(problem, recordings=(plain, replace(plain, name='bad')))
-    assert found.torn(explained, model) is found
+    assert found.refusing_slips(explained, model) is found
 
 
 def test_where_the_tool_never_turns_a_knock_and_a_jump_are_told_as_alike(ur5, rng):

@@ -72,7 +72,7 @@ def test_of_mix_ups_that_do_as_well_the_first_of_the_table_is_named_and_the_othe
     best = _best(shot, arm, [elbow, pan, again])
     assert best.suspicion is pan and best.alike == (again,) and best.off < 1.0
     assert _best(shot, arm, [elbow]) is None and _best(shot, arm, []) is None
-    assert best.undone.left < 1e-4 < shot.left
+    assert best.undone.remaining < 1e-4 < shot.remaining
 
 
 def test_what_is_known_of_joints_stays_with_the_robot_they_are_of(ur5, still):

@@ -52,10 +52,10 @@ def _gravity_direction(robot: Robot, chain: Frames) -> Array:
 def payload_torque(robot: Robot, chain: Frames, mass: Array | float, com: Array) -> Array:
     """Return torques (n, ...) [N m] of a mass [kg] that the tool carries at com (..., 3) [m]."""
     weight = mass * pad(_gravity_direction(robot, chain), np.ndim(mass))
-    return point_force_torque(robot, chain, _carried_point(chain, com), weight)
+    return point_force_torque(robot, chain, _in_world(chain, com), weight)
 
 
-def _carried_point(chain: Frames, point: Array) -> Array:
+def _in_world(chain: Frames, point: Array) -> Array:
     """Return a point of the tool frame, shape (..., 3), in the world, components first [m]."""
     return components(chain.position + (chain.rotation @ np.asarray(point)[..., None])[..., 0])
 
@@ -124,13 +124,13 @@ def chain_gravity_torque(robot: Robot, chain: Frames) -> Array:
     """Return load torques, shape (n, ...) [N m], for frames already at hand."""
     torque = np.zeros((robot.n, *chain.position.shape[:-1]))
     gravity = _gravity_direction(robot, chain)
-    for i, (mass, lever) in enumerate(_carried(robot, chain)):
+    for i, (mass, lever) in enumerate(_loads(robot, chain)):
         z = chain.rows[i].z
         torque[i] = mass * dot(z, gravity) if robot.prismatic[i] else dot(cross(z, lever), gravity)
     return torque
 
 
-def _carried(robot: Robot, chain: Frames) -> list[tuple[float, Array]]:
+def _loads(robot: Robot, chain: Frames) -> list[tuple[float, Array]]:
     """Return the mass beyond each joint, and its first moment about the joint, (3, ...) [kg m]."""
     samples = chain.position.shape[:-1]
     mass = robot.payload_mass
@@ -149,13 +149,13 @@ def _heaped(
     robot: Robot, chain: Frames, inward: list[int], mass: float, moment: Array
 ) -> list[tuple[float, Array]]:
     """Return mass and first moment beyond each joint, from the outermost joint to the foot."""
-    carried = []
+    loads = []
     for i in inward:
         if robot.mass is not None and robot.com is not None:
             moment = moment + robot.mass[i] * link_point(robot, chain, i, robot.com[i])
             mass += robot.mass[i]
-        carried.append((mass, moment - mass * chain.rows[i].z_point))
-    return carried
+        loads.append((mass, moment - mass * chain.rows[i].z_point))
+    return loads
 
 
 def torque_slope(
@@ -168,26 +168,26 @@ def torque_slope(
     first moment that joint i carries. A wrench, see `wrench_torque`, that is fixed to the tool
     turns along.
     """
-    slope = _weight_slope(robot, chain, _carried(robot, chain))
+    slope = _weight_slope(robot, chain, _loads(robot, chain))
     return slope if wrench is None else slope + _wrench_slope(robot, chain, wrench, frame)
 
 
 def payload_slope(robot: Robot, chain: Frames, mass: Array | float, com: Array) -> Array:
     """Return how torques of `payload_torque` change with the joints, (n, n, ...), torque first."""
-    centre = _carried_point(chain, com)
+    centre = _in_world(chain, com)
     levers = [mass * (centre - pad(row.z_point, centre.ndim - 1)) for row in chain.rows]
-    carried: list[tuple[Any, Array]] = [(mass, lever) for lever in levers]
+    loads: list[tuple[Any, Array]] = [(mass, lever) for lever in levers]
     for i in range(robot.behind):
-        carried[i] = (0.0, np.zeros_like(levers[i]))
-    return _weight_slope(robot, chain, carried)
+        loads[i] = (0.0, np.zeros_like(levers[i]))
+    return _weight_slope(robot, chain, loads)
 
 
-def _weight_slope(robot: Robot, chain: Frames, carried: Sequence[tuple[Any, Array]]) -> Array:
+def _weight_slope(robot: Robot, chain: Frames, loads: Sequence[tuple[Any, Array]]) -> Array:
     """Return d tau_i / d q_j of weights, by the mass and first moment beyond each joint."""
-    axes = carried[0][1].ndim - 1
+    axes = loads[0][1].ndim - 1
     gravity = pad(_gravity_direction(robot, chain), axes)
-    slope = np.zeros((robot.n, robot.n, *carried[0][1].shape[1:]))
-    for j, (mass, lever) in enumerate(carried):
+    slope = np.zeros((robot.n, robot.n, *loads[0][1].shape[1:]))
+    for j, (mass, lever) in enumerate(loads):
         z = pad(chain.rows[j].z, axes)
         shifted = mass * z if robot.prismatic[j] else cross(z, lever)
         pull = cross(shifted, gravity)

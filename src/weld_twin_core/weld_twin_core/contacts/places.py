@@ -71,7 +71,7 @@ class Places:
                 change[:, ends[k] : ends[k] + own.shape[1]] = own
             parts.append((off, change, np.full(off.size, tie.sigma)))
         for k, surface in enumerate(self.surfaces):
-            off, own, sigma = surface.held()
+            off, own, sigma = surface.from_known_place()
             change = np.zeros((off.size, ends[-1]))
             change[:, ends[k] : ends[k + 1]] = own
             parts.append((off, change, sigma))
@@ -178,7 +178,7 @@ class Length(NamedTuple):
     """A known distance [m] or angle [rad], and what tool points make of it."""
 
     tie: Tie
-    found: float
+    measured: float
 
 
 def spreads(contacts: Contacts, points: Array) -> dict[str, Array]:
@@ -209,11 +209,11 @@ def lengths(contacts: Contacts, points: Array) -> list[Length]:
     for tie in artefact.ties:
         if not set(tie.between) <= set(contacts.labels):
             continue
-        out.append(Length(tie, _found(tie, contacts, points)))
+        out.append(Length(tie, _measured(tie, contacts, points)))
     return out
 
 
-def _found(tie: Tie, contacts: Contacts, points: Array) -> float:
+def _measured(tie: Tie, contacts: Contacts, points: Array) -> float:
     """Return what tool points make of a tie, each contact where its own points have it."""
     ends = []
     for label in tie.between:

@@ -110,7 +110,7 @@ class Surface:
             return replace(self, point=self.point + step[:3], radius=self.radius + more)
         return replace(self, point=point, axis=axis / np.linalg.norm(axis))
 
-    def held(self) -> tuple[Array, Array, Array]:
+    def from_known_place(self) -> tuple[Array, Array, Array]:
         """
         Return how far it is from its known place (k,), the change of that, and its uncertainty.
 

@@ -175,7 +175,7 @@ def _told(
     progress: Progress,
 ) -> Diagnosis:
     """Return the diagnosis of what was found."""
-    examined = examined.torn(result.problem, result.final.model)
+    examined = examined.refusing_slips(result.problem, result.final.model)
     if examined.posed is None:
         return refusal(examined)
     holdout = examined.mended(holdout)

@@ -57,11 +57,11 @@ def _play_of_many(q: Array, half: Array, start: Array) -> Array:
     before = np.clip(start[..., None], q[:1] - half, q[:1] + half)
     out[..., :1] = before
     for first, last in zip([0, *turns], [*turns, q.size - 1], strict=True):
-        stretch = q[first + 1 : last + 1]
+        part = q[first + 1 : last + 1]
         if q[last] > q[first]:
-            np.maximum(before, stretch - half, out=out[..., first + 1 : last + 1])
+            np.maximum(before, part - half, out=out[..., first + 1 : last + 1])
         else:
-            np.minimum(before, stretch + half, out=out[..., first + 1 : last + 1])
+            np.minimum(before, part + half, out=out[..., first + 1 : last + 1])
         before = out[..., last : last + 1]
     return out
 

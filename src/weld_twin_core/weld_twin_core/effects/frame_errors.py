@@ -18,7 +18,7 @@ from .effect import Effect
 from .hooks import Hooked, SearchHooks
 from .registry import register
 from .view import Parameter, Plausible, Stage, Value, View, single
-from .wording import base_frame, frame, placed
+from .wording import base_frame, controller_pose, frame
 
 
 def frame_parameters(
@@ -85,7 +85,7 @@ class BasePose(FrameError):
         """Return the same of a cell, where poses are measured in a frame that a positioner moves."""
         now, step = robot.T_world_base, self.vector()
         new = transform(rotation_matrix(step[3:]) @ now[:3, :3], now[:3, 3] + step[:3])
-        before, after = (placed(np.array(np.linalg.inv(pose))) for pose in (now, new))
+        before, after = (controller_pose(np.array(np.linalg.inv(pose))) for pose in (now, new))
         return (
             'Correct the frame on the workpiece: on the positioner it lies at '
             f'{after} in place of {before}. If it was right '
@@ -179,5 +179,5 @@ class RootPose(FrameError):
         moved = frame(step, 'of the base', 'of the positioner')
         return (
             f'Correct the root frame of the positioner by {moved}: in the base of the robot it '
-            f'stands at {placed(new)} in place of {placed(now)}.'
+            f'stands at {controller_pose(new)} in place of {controller_pose(now)}.'
         )

@@ -51,7 +51,7 @@ def _carriage_axes(view: View, i: int) -> tuple[Array, Array, Array]:
     return x, cross(z, x), z
 
 
-def _carried(view: View, i: int, slide: Array | None, turn: Array | None) -> Shift:
+def _displacement(view: View, i: int, slide: Array | None, turn: Array | None) -> Shift:
     """
     Return how the pose moves where the carriage of joint i is slid or turned against its guide.
 
@@ -93,7 +93,7 @@ class GuideTilt(_GuideError):
     def per_unit(self, view: View) -> list[Shift]:
         i = view.robot.index(self.joint)
         axes = _carriage_axes(view, i)
-        return [_carried(view, i, None, view.joint(i) * axis) for axis in axes]
+        return [_displacement(view, i, None, view.joint(i) * axis) for axis in axes]
 
     def remedy(self, robot: Robot) -> str:
         each = ', '.join(number(float(np.degrees(v))) for v in np.asarray(self.rate))
@@ -130,7 +130,7 @@ class GuideBend(_GuideError):
         i = view.robot.index(self.joint)
         x, y, _ = _carriage_axes(view, i)
         bow = 0.5 * view.joint(i) ** 2
-        return [_carried(view, i, bow * axis, None) for axis in (x, y)]
+        return [_displacement(view, i, bow * axis, None) for axis in (x, y)]
 
     def remedy(self, robot: Robot) -> str:
         x, y = np.asarray(self.curvature) * 0.125e3

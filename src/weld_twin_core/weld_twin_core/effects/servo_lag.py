@@ -143,23 +143,23 @@ class ServoLag(MemoryEffect):
         """
         Return output minus input of the loop of second order, and what to carry.
 
-        On a straight stretch what is beside the trail swings freely; each pole has its share of
+        On a straight segment what is beside the trail swings freely; each pole has its share of
         it, and every kink of the command kicks both.
         """
         tau = np.maximum(self.number('time_constant'), _SHORTEST)
         one, other = self._poles()
         rest = np.zeros(q.shape[:-1], complex)
-        t0, q0, rate0, left0, right0 = state or (t[0], q[..., 0], 0.0 * q[..., 0], rest, rest)
+        t0, q0, rate0, a0, b0 = state or (t[0], q[..., 0], 0.0 * q[..., 0], rest, rest)
         dt = np.diff(t, prepend=t0)
         change = np.diff(q, axis=-1, prepend=np.asarray(q0)[..., None])
         before = np.broadcast_to(np.asarray(rate0)[..., None], change[..., :1].shape)
         rate = np.where(dt > 0.0, change / np.where(dt > 0.0, dt, 1.0), 0.0)
         rate = np.where(dt > 0.0, rate, np.concatenate([before, rate[..., :-1]], axis=-1))
         kick = np.diff(rate, axis=-1, prepend=before)
-        left = linear(np.exp(one * dt), -np.exp(one * dt) * (1.0 + other * tau) * kick, left0)
-        right = linear(np.exp(other * dt), -np.exp(other * dt) * (1.0 + one * tau) * kick, right0)
-        free = ((left - right) / (one - other)).real
-        return free - tau * rate, (t[-1], q[..., -1], rate[..., -1], left[..., -1], right[..., -1])
+        a = linear(np.exp(one * dt), -np.exp(one * dt) * (1.0 + other * tau) * kick, a0)
+        b = linear(np.exp(other * dt), -np.exp(other * dt) * (1.0 + one * tau) * kick, b0)
+        free = ((a - b) / (one - other)).real
+        return free - tau * rate, (t[-1], q[..., -1], rate[..., -1], a[..., -1], b[..., -1])
 
     def gradient(self, view: View) -> list[Shift | None]:
         """Return dx/dtau by the recursion's own derivative; of a loop, by differences."""

@@ -87,7 +87,7 @@ def base_frame(step: Array) -> str:
     return frame(step, 'of the measuring frame', 'of the base')
 
 
-def placed(pose: Array) -> str:
+def controller_pose(pose: Array) -> str:
     """Return a frame as controllers take it: mm, and turns about fixed x, y and z in degrees."""
     place = ', '.join(f'{value * 1e3:.3f}' for value in pose[:3, 3])
     yaw = np.arctan2(pose[1, 0], pose[0, 0])

@@ -89,7 +89,7 @@ class Change:
     """Of a step: earliest day from which a trend explains it as well; None where none does."""
 
 
-class Found(NamedTuple):
+class Term(NamedTuple):
     """A shape on a coordinate that was taken in."""
 
     shape: _Shape
@@ -132,7 +132,7 @@ def changes(
     # What use cannot change has to explain more, if it is known what use can.
     rare = np.array([bool(likely) and name not in {*named, *likely} for name in series.names])
     look = _Look(series, shapes, simple[:, None] + 2.0 * _LIKELY * rare, sooner)
-    taken: list[tuple[Found, Change]] = []
+    taken: list[tuple[Term, Change]] = []
     while len(taken) < MOST:
         more = look.next([result for result, _ in taken])
         if more is None:
@@ -151,20 +151,20 @@ class _Look(NamedTuple):
     sooner: Array
     """Nats by which a coordinate goes before others that explain as much, shape (P,)."""
 
-    def next(self, result: Sequence[Found]) -> tuple[Found, Change] | None:
+    def next(self, result: Sequence[Term]) -> tuple[Term, Change] | None:
         """Return what explains most beside what was found, None if it is no more than chance."""
         system = _System(self.series, result)
         gain = np.array([system.gains(shape) for shape in self.shapes])
         row, column = np.unravel_index(int(np.argmax(gain - self.bar)), gain.shape)
         best = int(row), int(column)
         # Beside the change: without it, the change itself would count as scatter.
-        scatter = _System(self.series, [*result, Found(self.shapes[best[0]], best[1])]).scatter
+        scatter = _System(self.series, [*result, Term(self.shapes[best[0]], best[1])]).scatter
         gain /= scatter
         if gain[best] <= self.bar[best]:
             return None
-        return _told(self.series, system, self.shapes, gain, best, self.sooner, scatter)
+        return _described(self.series, system, self.shapes, gain, best, self.sooner, scatter)
 
-    def settled(self, taken: Sequence[tuple[Found, Change]]) -> list[tuple[Found, Change]]:
+    def settled(self, taken: Sequence[tuple[Term, Change]]) -> list[tuple[Term, Change]]:
         """
         Return the changes, each looked for once more beside all others.
 
@@ -173,7 +173,7 @@ class _Look(NamedTuple):
         """
         if len(taken) < 2:
             return list(taken)
-        out: list[tuple[Found, Change]] = []
+        out: list[tuple[Term, Change]] = []
         for k in range(len(taken)):
             again = self.next([result for result, _ in (*out, *taken[k + 1 :])])
             out += [again] if again else []
@@ -186,7 +186,7 @@ def value_and_rise(
     """Return a coordinate's value and rise in a day at the last diagnosis, and covariance."""
     series = series_of(observations)
     shapes = {(each.kind, float(series.days[each.begin])): each for each in _shapes(series.days)}
-    taken = [Found(shapes[each.kind, each.day], series.names.index(each.name)) for each in result]
+    taken = [Term(shapes[each.kind, each.day], series.names.index(each.name)) for each in result]
     return _System(series, taken).now(series.names.index(name))
 
 
@@ -208,12 +208,12 @@ def _shapes(days: Array) -> list[_Shape]:
 class _System:
     """The arm as it was at first and the changes found so far, fitted together."""
 
-    def __init__(self, series: Series, result: Sequence[Found]) -> None:
-        self._series, self._found = series, tuple(result)
+    def __init__(self, series: Series, result: Sequence[Term]) -> None:
+        self._series, self._terms = series, tuple(result)
         self._sizes: dict[tuple[str, int], tuple[Array, Array]] = {}
         first = series.precision.sum(axis=0)
         blocks = [[first + np.diag(series.prior)]]
-        right = [series.told.sum(axis=0)]
+        right = [series.weighted.sum(axis=0)]
         for each in result:
             cross, _, reported = self._against(each.shape, np.array([each.place]))
             blocks.append([cross[..., 0], *self._among(each)])
@@ -235,12 +235,12 @@ class _System:
         for w, (own, whitening) in enumerate(series.whitening):
             state = self.solution[:count].copy()
             at = count
-            for each in self._found:
+            for each in self._terms:
                 width = each.shape.columns.shape[1]
                 state[each.place] += each.shape.columns[w] @ self.solution[at : at + width]
                 at += width
             if whitening.size:
-                gap = whitening.T @ (series.told[w, own] - series.precision[w, own] @ state)
+                gap = whitening.T @ (series.weighted[w, own] - series.precision[w, own] @ state)
                 ratios.append(float(gap @ gap) / gap.size)
         return max(1.0, float(np.median(ratios))) if ratios else 1.0
 
@@ -249,7 +249,7 @@ class _System:
         weights = np.zeros((2, self.solution.size))
         weights[0, place] = 1.0
         at = len(self._series.names)
-        for each in self._found:
+        for each in self._terms:
             width = each.shape.columns.shape[1]
             if each.place == place:
                 weights[0, at : at + width] = each.shape.columns[-1]
@@ -262,12 +262,12 @@ class _System:
         x, series = shape.columns, self._series
         cross = np.tensordot(x, series.precision, axes=(0, 0))[..., places]
         own = np.einsum('wm,wn,wj->jmn', x, x, series.precision[:, places, places])
-        return cross, own, x.T @ series.told[:, places]
+        return cross, own, x.T @ series.weighted[:, places]
 
-    def _among(self, one: Found) -> list[Array]:
+    def _among(self, one: Term) -> list[Array]:
         """Return the products of a change found with those found before it, and with itself."""
         series, out = self._series, []
-        for other in self._found:
+        for other in self._terms:
             between = series.precision[:, one.place, other.place]
             out.append(np.einsum('wm,wn,w->mn', one.shape.columns, other.shape.columns, between))
             if other is one:
@@ -294,7 +294,7 @@ class _System:
             series.shapes[key] = self._against(shape, places)
         cross, own, reported = series.shapes[key]
         rows = [np.moveaxis(cross, 0, -1)]  # (P first, C, m)
-        for each in self._found:
+        for each in self._terms:
             between = series.precision[:, each.place, places]
             rows.append(np.einsum('wa,wm,wj->ajm', each.shape.columns, shape.columns, between))
         stacked = np.concatenate(rows, axis=0)  # (P + found, C, m)
@@ -324,7 +324,7 @@ def _symmetric(blocks: list[list[Array]]) -> Array:
     return np.asarray(np.tril(out) + np.tril(out, -1).T)
 
 
-def _told(
+def _described(
     series: Series,
     system: _System,
     shapes: Sequence[_Shape],
@@ -332,7 +332,7 @@ def _told(
     best: tuple[int, int],
     sooner: Array,
     scatter: float,
-) -> tuple[Found, Change]:
+) -> tuple[Term, Change]:
     """
     Return the simplest change that explains as much as the best, and what else would.
 
@@ -352,7 +352,7 @@ def _told(
     near = [shapes[k].begin for k in same if gain[k, place] > most[place] - _DATED]
     ranked = sorted(odds, key=lambda j: -odds[j])
     others = [j for j in ranked if j != place and odds[j] > odds[place] - 0.5 * _ALIKE]
-    return Found(shape, place), Change(
+    return Term(shape, place), Change(
         series.names[place],
         kind,
         float(series.days[shape.begin]),

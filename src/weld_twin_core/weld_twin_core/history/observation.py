@@ -103,7 +103,7 @@ class Series:
     names: tuple[str, ...]
     precision: Array
     """Shape (W, P, P)."""
-    told: Array
+    weighted: Array
     """Precision times value, shape (W, P)."""
     prior: Array
     """Precision of what was believed before any of them, shape (P,)."""

@@ -179,14 +179,14 @@ class _JointLine:
         self, robot: Robot, path: Path, torch: Torch, seed: Array | None, reported: Array | None
     ) -> None:
         reported = rest(robot)[None] if reported is None else np.atleast_2d(reported)
-        self.carried = CarriedArm(robot, reported.shape[1])
-        self.robot, self.path, self.torch = self.carried.arm, path, torch
-        self._told = _along(reported, path.length)
+        self.axes = CarriedArm(robot, reported.shape[1])
+        self.robot, self.path, self.torch = self.axes.arm, path, torch
+        self._external = _along(reported, path.length)
         self._first = path.sample(np.zeros(1))
         count = int(np.ceil(path.length / min(path.length / 256.0, path.detail / 24.0)))
         grid = np.linspace(0.0, path.length, count + 1)
-        self.solution: PathSolution = self.carried.solve_path(
-            self.poses(grid), self._told(grid), seed
+        self.solution: PathSolution = self.axes.solve_path(
+            self.poses(grid), self._external(grid), seed
         )
         self._spline = CubicSpline(grid, self.solution.q)
 
@@ -196,7 +196,7 @@ class _JointLine:
 
     def _seen(self, s: Array) -> Array:
         """Return the same as the arm's base sees them."""
-        return self.carried.seen(self.poses(s), self._told(s))
+        return self.axes.seen(self.poses(s), self._external(s))
 
     def motion(self, timing: Timing) -> tuple[JointMotion, float]:
         """Return the motion and its largest error of closure."""
@@ -209,8 +209,8 @@ class _JointLine:
         # Rounded, so that a joint at rest is at rest and not reversing within the last digit.
         q = q.round(12)
         residual = float(np.abs(pose_error(frames(self.robot, q), poses)).max())
-        velocity = self.carried.whole(self._told(timing.s, 1), rate) * timing.sd[:, None]
-        q = self.carried.whole(self._told(timing.s), q)
+        velocity = self.axes.whole(self._external(timing.s, 1), rate) * timing.sd[:, None]
+        q = self.axes.whole(self._external(timing.s), q)
         return JointMotion(timing.t, q, velocity.round(9)), residual
 
     def _twist(self, s: Array) -> Array:

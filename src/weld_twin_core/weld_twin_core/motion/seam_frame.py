@@ -38,8 +38,8 @@ def path_tangents(position: ArrayLike) -> Array:
     moving = np.flatnonzero(length > _STILL)
     if moving.size == 0:
         raise DataError('the path does not move, so it has no direction; give the seam tangent')
-    held = moving[np.maximum(np.searchsorted(moving, index, side='right') - 1, 0)]
-    tangents: Array = chord[held] / length[held, None]
+    latest = moving[np.maximum(np.searchsorted(moving, index, side='right') - 1, 0)]
+    tangents: Array = chord[latest] / length[latest, None]
     return tangents
 
 

@@ -83,7 +83,7 @@ class SeamDraws:
             self.samples, self.spread, self.remainder = result
         self._phases = np.exp(1j * q[self.samples].T)[..., None]
         nominal = DhDraws(*(getattr(robot, key)[None] for key in DhDraws._fields))
-        self._nominal = self._carried(nominal)
+        self._nominal = self._tool_points(nominal)
 
     def deviations(self, draws: DhDraws) -> Array:
         """Return the tool point's deviations from nominal in the world, (D, N, 3) [m]."""
@@ -91,14 +91,16 @@ class SeamDraws:
         with unbuffered():
             for start in range(0, len(out), _BLOCK):
                 part = slice(start, start + _BLOCK)
-                away = self._carried(DhDraws(*(values[part] for values in draws))) - self._nominal
+                away = (
+                    self._tool_points(DhDraws(*(values[part] for values in draws))) - self._nominal
+                )
                 if self.spread is not None:
                     away = self.spread @ away
                 away = np.swapaxes(away, 1, 2)
                 out[part] = np.einsum('nij,jdn->dni', self._first, away, optimize=True)
         return out
 
-    def _carried(self, draws: DhDraws) -> Array:
+    def _tool_points(self, draws: DhDraws) -> Array:
         """Return tool points before the first joint's turn, shape (3, S, D)."""
         turns, twists = (np.cos(v.T) + 1j * np.sin(v.T) for v in (draws.theta, draws.alpha))
         yz, xy, spin = np.empty((3, len(self.samples), len(draws.theta)), dtype=complex)

@@ -57,7 +57,7 @@ class Expansion:
 
     def deviations(self, draws: Array) -> Array:
         """Return deviations along, across and normal, shape (3, D, N) [m], of draws (D, P)."""
-        remaining = self._left(draws)
+        remaining = self._remainder(draws)
         return self._deviations(draws, remaining, slice(None))[:, :, np.argsort(remaining.order)]
 
     def outcomes(self, draws: Array) -> Outcomes:
@@ -66,14 +66,14 @@ class Expansion:
         parts = []
         for start in range(0, len(draws), _BLOCK):
             block = draws[start : start + _BLOCK]
-            remaining = self._left(block)
+            remaining = self._remainder(block)
             for k in range(0, len(block), rows):
                 chunk = slice(k, k + rows)
                 off = self._deviations(block[chunk], remaining, chunk)
                 parts.append(outcomes(off, self.study.length))
         return joined(parts)
 
-    def _left(self, draws: Array) -> _Left:
+    def _remainder(self, draws: Array) -> _Remainder:
         """Return what the slopes leave, the path points where any joint has something put last."""
         result = [part.rest(draws) for part in self.memory]
         somewhere = np.zeros(self.study.samples, dtype=bool)
@@ -81,39 +81,39 @@ class Expansion:
             somewhere[where] = True
         order = np.argsort(somewhere, kind='stable')
         place = np.argsort(order) - (self.study.samples - int(somewhere.sum()))
-        carried = np.zeros((3, sum(w.size for _, w in result), int(somewhere.sum())))
+        lever = np.zeros((3, sum(w.size for _, w in result), int(somewhere.sum())))
         start = 0
         for (_, where), moved in zip(result, self.moved, strict=True):
             rows = np.arange(start, start + where.size)
-            carried[:, rows, place[where]] = moved[:, where]
+            lever[:, rows, place[where]] = moved[:, where]
             start += where.size
         shapes = np.ascontiguousarray(self.shapes[:, :, order])
-        return _Left(order, shapes, [rest for rest, _ in result], carried)
+        return _Remainder(order, shapes, [rest for rest, _ in result], lever)
 
-    def _deviations(self, draws: Array, remaining: _Left, chunk: slice) -> Array:
+    def _deviations(self, draws: Array, remaining: _Remainder, chunk: slice) -> Array:
         x = np.ascontiguousarray((draws / self.scale).T)
         first, second = self.products
         features = np.concatenate([x, x[first] * x[second]])
         out: Array = (features.T @ self.weights) @ remaining.shapes
-        if remaining.carried.size:
+        if remaining.lever.size:
             rests = np.concatenate([rest.of(chunk) for rest in remaining.rests], axis=1)
-            out[:, :, out.shape[2] - remaining.carried.shape[2] :] += rests @ remaining.carried
+            out[:, :, out.shape[2] - remaining.lever.shape[2] :] += rests @ remaining.lever
         return out
 
 
-class _Left(NamedTuple):
+class _Remainder(NamedTuple):
     """
     What the slopes leave of some draws.
 
     ``order`` of the path points (N,) puts those where anything is left last, K of them; ``shapes``
-    are in it. ``rests`` are displacements of the joints, S columns in all, and ``carried`` (3, S,
+    are in it. ``rests`` are displacements of the joints, S columns in all, and ``lever`` (3, S,
     K) how far each moves the tool there.
     """
 
     order: NDArray[np.intp]
     shapes: Array
     rests: list[Rest]
-    carried: Array
+    lever: Array
 
 
 def expandable(tolerances: Sequence[Tolerance]) -> bool:

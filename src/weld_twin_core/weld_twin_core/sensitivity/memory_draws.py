@@ -70,7 +70,7 @@ class Remembered:
     slope: Array
     """Displacement per unit of each at its typical size, shape (M, N)."""
 
-    def left(self, own: Array) -> Array:
+    def remainder(self, own: Array) -> Array:
         """Return what the slope leaves of the displacements by draws (D, M), shape (D, N)."""
         out = _displacement(self.study, self.joint, self.tolerances, own)
         out -= own @ self.slope
@@ -87,7 +87,7 @@ class Remembered:
         if len(self.columns) != 1:
             return None
         ends = self.tolerances[0].distribution.values([0.0, 1.0])
-        return _straight_between(lambda x: self.left(x[:, None]), *ends)
+        return _straight_between(lambda x: self.remainder(x[:, None]), *ends)
 
     def rest(self, draws: Array) -> tuple[Rest, NDArray[np.intp]]:
         """Return what the slope leaves of draws (D, P), and at which path points (K,)."""
@@ -97,15 +97,15 @@ class Remembered:
             if np.all((knots[0] <= one) & (one <= knots[-1])):
                 row = np.clip(np.searchsorted(knots, one, 'right') - 1, 0, knots.size - 2)
                 part = (one - knots[row]) / (knots[row + 1] - knots[row])
-                where, table, rise = self._carried
+                where, table, rise = self._where_any
                 return Rest(table, rise, row, part), where
         different, row = _different(own)
-        remaining = self.left(different)
+        remaining = self.remainder(different)
         where = _somewhere(remaining)
         return Rest(remaining[:, where], None, row, None), where
 
     @cached_property
-    def _carried(self) -> tuple[NDArray[np.intp], Array, Array]:
+    def _where_any(self) -> tuple[NDArray[np.intp], Array, Array]:
         """Return the path points where the table has anything, and the table and its rise there."""
         assert self.table is not None
         values = self.table[1]

@@ -217,7 +217,7 @@ def scaled(tolerances: Sequence[Tolerance], factors: Mapping[str, float]) -> tup
     out = []
     for item in tolerances:
         factor, law = factors.get(item.effect, 1.0), item.distribution
-        stretch = (factor, 1.0) if law.kind == 'lognormal' else (factor,) * len(law.numbers)
-        numbers = tuple(v * f for v, f in zip(law.numbers, stretch, strict=True))
+        each = (factor, 1.0) if law.kind == 'lognormal' else (factor,) * len(law.numbers)
+        numbers = tuple(v * f for v, f in zip(law.numbers, each, strict=True))
         out.append(replace(item, distribution=replace(law, numbers=numbers)))
     return tuple(out)

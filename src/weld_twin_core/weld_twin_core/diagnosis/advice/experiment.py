@@ -93,7 +93,7 @@ def next_experiment(
         least = min(plan.minutes for plan in good)
         # Half a minute is no reason to learn less.
         near = [plan for plan in good if plan.minutes <= least + _NEAR]
-        reported = _told(max(near, key=lambda plan: plan.apart), alternatives, model)
+        reported = _comparison(max(near, key=lambda plan: plan.apart), alternatives, model)
     return reported | {'skipped': skipped} if skipped else reported
 
 
@@ -152,7 +152,7 @@ _NARROW = (
 )
 
 
-def _told(plan: Plan, alternatives: Sequence[_Explanation], model: Model) -> dict[str, Any]:
+def _comparison(plan: Plan, alternatives: Sequence[_Explanation], model: Model) -> dict[str, Any]:
     one, other = _apart(alternatives[0], alternatives[plan.other])
     reported = ' from '.join(filter(None, (_named(one, other), _named(other, one))))
     reason = (
@@ -248,7 +248,7 @@ def motion_entry(joints: JointMotion, names: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def carried_on(effect: Effect, ends: dict[str, tuple[float, float]]) -> Effect:
+def extended(effect: Effect, ends: dict[str, tuple[float, float]]) -> Effect:
     """Return a curve over an angle with knots as dense as they are over all that may be reached."""
     if not isinstance(effect, JointCurve) or effect.over != 'angle':
         return effect

@@ -159,7 +159,7 @@ class Design:
         own = self.root[: self.errors]
         return float(np.einsum('pi,pi->', own, weight @ own))
 
-    def told(self, rows: Array, weight: Array) -> Array:
+    def lowered(self, rows: Array, weight: Array) -> Array:
         """Return by how much each touch, (N, 3, P), lowers what is `open`, shape (N,)."""
         half = rows @ self.root
         seen = np.eye(3) + half @ np.swapaxes(half, 1, 2)
@@ -187,7 +187,7 @@ def chosen(
     order: list[int] = []
     after: list[Design] = []
     for _ in range(min(count, len(rows))):
-        reported = np.where(free, design.told(rows, weight), -np.inf)
+        reported = np.where(free, design.lowered(rows, weight), -np.inf)
         best = int(np.argmax(reported))
         free[best] = False
         design = design.after(rows[best])

@@ -72,18 +72,18 @@ class Parting:
     @cached_property
     def before(self) -> Array:
         """Return by how many standard deviations the data at hand part them, each way, (2,)."""
-        return np.array([_left(matrix[None])[0] for matrix in self.now])
+        return np.array([_remainder(matrix[None])[0] for matrix in self.now])
 
     def gained(self, chosen: Sequence[int], more: Sequence[int]) -> Array:
         """Return what each further piece adds to it, beside those chosen, shape (len(more),)."""
         out: Array = np.zeros(len(more))
         for before, now, pieces in zip(self.before, self.now, self.pieces, strict=True):
-            after = _left(now + pieces[list(chosen)].sum(axis=0) + pieces[list(more)])
+            after = _remainder(now + pieces[list(chosen)].sum(axis=0) + pieces[list(more)])
             out += np.sqrt(np.maximum(after**2 - before**2, 0.0)) / 2.0
         return out
 
 
-def _left(matrices: Array) -> Array:
+def _remainder(matrices: Array) -> Array:
     """Return what columns leave of the last one, its length, shape (K,)."""
     size = np.sqrt(np.maximum(np.diagonal(matrices, axis1=1, axis2=2), np.finfo(float).tiny))
     scaled = matrices / size[:, :, None]
@@ -117,12 +117,12 @@ def partings(
         parting = Parting([], [])
         for true, wrong in ((0, other), (other, 0)):
             names = sorted({n for side in (now, *ahead) for n in side.names[wrong]})
-            held = np.diag(_held(model.with_found(alternatives[wrong]), names))
+            prior = np.diag(_prior(model.with_found(alternatives[wrong]), names))
             stacks = [_stacked(side, true, wrong, names) for side in (now, *ahead)]
             pieces = [
                 _of_piece(stacks[p.recording + 1], ahead[p.recording], p) for p in candidate.pieces
             ]
-            parting.now.append(held + stacks[0] @ stacks[0].T)
+            parting.now.append(prior + stacks[0] @ stacks[0].T)
             parting.pieces.append(np.array([piece @ piece.T for piece in pieces]))
         out.append(parting)
     return out
@@ -136,7 +136,7 @@ def _of_piece(stack: Array, side: Side, piece: Piece) -> Array:
     return stack[:, at.ravel()]
 
 
-def _held(model: Model, names: Sequence[str]) -> Array:
+def _prior(model: Model, names: Sequence[str]) -> Array:
     """Return the prior precision of every column by name; none of frames, none of the difference."""
     precision = effect_precision(model)
     own = [f'{k}.{j}' for k, e in enumerate(model.found) for j in range(e.fit.coordinates().size)]

@@ -135,7 +135,7 @@ def _compared(result: Search, examined: Examined, verdict: Verdict) -> dict[str,
         'checks': (*examined.checks, *_untold_check(result, named)),
         'changed': _changed(result, named),
         'may_change': named,
-        'unsound': examined.told(result.final.model.found),
+        'unsound': examined.unsound_with(result.final.model.found),
         'same': never_parted(result.baseline.model.robot, result.work.problem.align, verdict.sets),
     }
 

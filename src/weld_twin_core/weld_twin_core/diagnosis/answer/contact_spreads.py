@@ -42,7 +42,7 @@ def contact_spreads(result: Search, unseen: Unseen) -> ContactResult | None:
         for label in before
     )
     known = tuple(
-        KnownLength(a.tie.between, a.tie.kind, a.tie.value, a.tie.sigma, a.found, b.found)
+        KnownLength(a.tie.between, a.tie.kind, a.tie.value, a.tie.sigma, a.measured, b.measured)
         for a, b in zip(was, now, strict=True)
     )
     was_m, now_m, held_m = (

@@ -15,7 +15,7 @@ from ...arrays import Array
 from ...effects import REGISTRY
 from ...effects.effect import Effect
 from ..advice.chosen_pieces import DECIDES
-from ..advice.experiment import carried_on, confirming, next_experiment
+from ..advice.experiment import confirming, extended, next_experiment
 from ..advice.next_touches import next_touches
 from ..advice.postures import Limits, Room
 from ..algebra.fit import fit
@@ -185,7 +185,7 @@ def _without_names(
             for c in (group if p is parts[0] else p.group).carried
         ]
         out.append(_fitted(alternative.found, (*kept, *curves)))
-    return [tuple(carried_on(effect, ends) for effect in effects) for effects in out]
+    return [tuple(extended(effect, ends) for effect in effects) for effects in out]
 
 
 def _others(parts: Sequence[Part]) -> list[Group]:

@@ -56,7 +56,7 @@ class Rest:
     noise: float
     """Unit of the positions [m]."""
 
-    def left(self, k: int) -> float:
+    def rms(self, k: int) -> float:
         """Return the RMS distance [m] that is left of recording k, as a lag counts it."""
         own = np.sort((self.residual[self.recording == k][:, :3] ** 2).sum(axis=1))
         return self.noise * float(np.sqrt(own[: max(int(KEPT * own.size), 1)].mean()))

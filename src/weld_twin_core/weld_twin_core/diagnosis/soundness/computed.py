@@ -33,13 +33,13 @@ SMOOTH = 2e-8
 def computed(case: Case) -> Sequence[Finding]:
     """Return the recordings whose poses were computed from the joint positions beside them."""
     return [
-        _told(recording, remaining)
+        _mistake(recording, remaining)
         for k, recording in enumerate(case.recordings)
-        if not recording.simulated and (remaining := _left(case, k)) is not None
+        if not recording.simulated and (remaining := _rounding_gap(case, k)) is not None
     ]
 
 
-def _told(recording: Recording, remaining: float) -> Finding:
+def _mistake(recording: Recording, remaining: float) -> Finding:
     much = f'to {length(remaining)}'.replace('to less than 0.001 mm', 'to the last digit')
     return mistake(
         f'The poses of {recording.name} agree with a rigid arm {much}, with no noise: they were '
@@ -52,7 +52,7 @@ def _told(recording: Recording, remaining: float) -> Finding:
     )
 
 
-def _left(case: Case, k: int) -> float | None:
+def _rounding_gap(case: Case, k: int) -> float | None:
     """Return what a rigid arm leaves of a recording [m] where that is no more than rounding."""
     if case.gap > UNEXPLAINED:
         return None

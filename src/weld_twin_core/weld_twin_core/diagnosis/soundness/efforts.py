@@ -110,17 +110,17 @@ def compared(recordings: Sequence[Recording], robot: Robot) -> Efforts | None:
 def efforts(case: Case) -> Sequence[Finding]:
     """Return what the efforts are, and what they say of payload and torque constants."""
     result = compared(case.recordings, case.model.robot)
-    return [] if result is None else [_told_sign(result), *_told_differences(result)]
+    return [] if result is None else [_sign(result), *_differences(result)]
 
 
-def _told_differences(result: Efforts) -> Iterator[Finding]:
+def _differences(result: Efforts) -> Iterator[Finding]:
     if not result.weighed:
         yield note(
             'The robot model has no link masses, so the unit of the efforts is not checked; a '
             'compliance found with them is for each unit of effort.'
         )
     elif result.causes:
-        yield warning(_told_causes(result))
+        yield warning(_causes_in_words(result))
     elif result.difference > AGREES:
         factors = [f'{j.joint} {j.factor:.2f}' for j in result.joints if j.factor is not None]
         yield note(
@@ -130,7 +130,7 @@ def _told_differences(result: Efforts) -> Iterator[Finding]:
         )
 
 
-def _told_sign(result: Efforts) -> Finding:
+def _sign(result: Efforts) -> Finding:
     meaning = 'what holds the load' if result.holds else 'the load itself, not what holds it'
     if 2.0 * abs(result.correlation) < 1.0:
         return warning(
@@ -144,7 +144,7 @@ def _told_sign(result: Efforts) -> Finding:
     return note(sentence)
 
 
-def _told_causes(result: Efforts) -> str:
+def _causes_in_words(result: Efforts) -> str:
     words = {
         'payload': '{value:+.2f} kg of payload (standard error {std:.2f}; left {left:.1%})',
         'torque_constant': 'an effort of {joint} that is {value:.3f} times the torque (standard error '
@@ -233,7 +233,7 @@ def _causes(loads: _Loads, gap: Array) -> tuple[EffortCause, ...]:
     names = loads.robot.joint_names
     plain = [np.zeros((0, *gap.shape)), *(_only(i, loads.beside) for i in range(len(names)))]
     nuisance = np.concatenate(plain)
-    before = _left(nuisance, gap)[2]
+    before = _fitted(nuisance, gap)[2]
     offered: list[tuple[str, str | None, Array]] = [('payload', None, loads.payload)]
     offered += [
         ('torque_constant', name, _only(i, loads.statics[None])) for i, name in enumerate(names)
@@ -241,9 +241,9 @@ def _causes(loads: _Loads, gap: Array) -> tuple[EffortCause, ...]:
     offered += [('link_mass', name, loads.links[[i]]) for i, name in enumerate(names)]
     offered += [('link_masses', None, loads.links.sum(axis=0)[None])]
     result, every = [], np.concatenate([*(columns for *_, columns in offered), nuisance])
-    noise = _left(every, gap)[2]
+    noise = _fitted(every, gap)[2]
     for name, joint, columns in offered:
-        values, spread, remaining = _left(np.concatenate([columns, nuisance]), gap)
+        values, spread, remaining = _fitted(np.concatenate([columns, nuisance]), gap)
         if remaining - noise < AGREES * (before - noise):
             value = float(values[0]) + (name != 'payload')
             result.append(EffortCause(name, joint, value, float(spread[0]), remaining / before))
@@ -257,7 +257,7 @@ def _only(i: int, columns: Array) -> Array:
     return out
 
 
-def _left(columns: Array, gap: Array) -> tuple[Array, Array, float]:
+def _fitted(columns: Array, gap: Array) -> tuple[Array, Array, float]:
     """Return coefficients, their standard errors, and the squared difference that is left."""
     matrix = columns.reshape(len(columns), -1).T
     values, *_ = np.linalg.lstsq(matrix, gap.ravel(), rcond=None)

@@ -43,7 +43,7 @@ class Finding(NamedTuple):
     of_all: bool = True
     alike: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
-    def told(self, *, applied: bool) -> Unsound:
+    def as_unsound(self, *, applied: bool) -> Unsound:
         """Return what is told of a mistake in a diagnosis, undone or not."""
         done = as_entry(self.mend)
         return Unsound(self.kind, self.at, self.sentence, self.remedy, applied, self.alike, done)
@@ -78,7 +78,7 @@ class Case:
         return middle(self.residuals)
 
     @cached_property
-    def held(self) -> bool:
+    def tool_fixed(self) -> bool:
         """Return whether the tool is where the chain begins, as two arms hold one bar."""
         still = all((np.ptp(r.seen.position, axis=0) < TINY).all() for r in self.recordings)
         widest = max(float(np.ptp(q, axis=0).max()) for q in self.motions)
@@ -100,7 +100,7 @@ class Case:
             return result
         rest = self.rest[1]
         return [
-            late if late is not None and late.after < WORTH * rest.left(k) else None
+            late if late is not None and late.after < WORTH * rest.rms(k) else None
             for k, late in enumerate(result)
         ]
 

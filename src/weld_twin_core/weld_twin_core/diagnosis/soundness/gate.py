@@ -72,16 +72,16 @@ class Examined:
     """Those that were undone."""
     slips: tuple[Slip, ...] = ()
     """What seems to have given way at an instant. Of one recording these are causes that ``posed``
-    offers the search; of several see `torn`."""
+    offers the search; of several see `refusing_slips`."""
 
-    def told(self, result: Sequence[Effect]) -> tuple[Unsound, ...]:
+    def unsound_with(self, result: Sequence[Effect]) -> tuple[Unsound, ...]:
         """Return the mistakes, and the slips that a fit has among what it found."""
         kept = {effect.key for effect in result}
         slips = (slip for slip in self.slips if slip.effect.key in kept)
-        own = (_gave_way(slip, self.given).told(applied=True) for slip in slips)
+        own = (_gave_way(slip, self.given).as_unsound(applied=True) for slip in slips)
         return (*self.unsound, *own)
 
-    def torn(self, problem: Problem, model: Model) -> Examined:
+    def refusing_slips(self, problem: Problem, model: Model) -> Examined:
         """
         Return the same, unsound where something gave way in one of several recordings.
 
@@ -103,7 +103,7 @@ class Examined:
             self,
             posed=None,
             checks=(*_first(mistakes, applied=False), *self.checks),
-            unsound=(*self.unsound, *(m.told(applied=False) for m in mistakes)),
+            unsound=(*self.unsound, *(m.as_unsound(applied=False) for m in mistakes)),
         )
 
     def mended(self, recordings: Sequence[Recording]) -> tuple[Recording, ...]:
@@ -140,7 +140,7 @@ def examine(
             own = known if trial.robot.joint_names == given.robot.joint_names else ()
             posed = aligned(trial.recordings, trial.robot, trial.align, tuple(own))
             look = _looked(*with_changes(*posed, trial.may_change, beliefs or Beliefs()))
-            result = look.found
+            result = look.mistakes
         reported = {each.sentence for each in mistakes}
         fresh = [each for each in result if each.sentence not in reported]
         mistakes += fresh
@@ -155,7 +155,7 @@ def examine(
         look.marked(mistakes) if done or not mistakes else None,
         # What the checks say of data mended on trial holds for nothing that was given.
         (*_first(mistakes, applied=done), *(look.checks if done or not mistakes else ())),
-        (*(m.told(applied=done) for m in mistakes), *look.told),
+        (*(m.as_unsound(applied=done) for m in mistakes), *look.unsound),
         tuple(mistakes) if done else (),
         look.dated,
     )
@@ -172,9 +172,9 @@ class _Look(NamedTuple):
 
     posed: tuple[Problem, Model] | None = None
     checks: tuple[Check, ...] = ()
-    found: list[Finding] = []
+    mistakes: list[Finding] = []
     dated: tuple[Slip, ...] = ()
-    told: tuple[Unsound, ...] = ()
+    unsound: tuple[Unsound, ...] = ()
 
     def marked(self, mistakes: Sequence[Finding]) -> tuple[Problem, Model] | None:
         """Return the problem with what gave way, and the model with what was undone."""
@@ -192,16 +192,16 @@ def _looked(problem: Problem, model: Model) -> _Look:
     if not problem.touched:
         return _checked(problem, model)
     touched = touches(problem, model)
-    said = tuple(Check('contacts', 'warning', item.sentence) for item in touched.told)
-    look = _Look(touched[:2], said, list(touched.mistakes), (), touched.told)
+    said = tuple(Check('contacts', 'warning', item.sentence) for item in touched.unsound)
+    look = _Look(touched[:2], said, list(touched.mistakes), (), touched.unsound)
     if problem.untracked:
         return look
     # Of an instrument's recordings beside contacts nothing is mended.
     part = tracked_part(touched.problem, touched.model)
     beside = _checked(*part)
-    mistakes = [*beside.found, *(_gave_way(slip, part[0]) for slip in beside.dated)]
-    found = [*look.found, *(each._replace(mend=None) for each in mistakes)]
-    return look._replace(checks=(*said, *beside.checks), found=found)
+    mistakes = [*beside.mistakes, *(_gave_way(slip, part[0]) for slip in beside.dated)]
+    found = [*look.mistakes, *(each._replace(mend=None) for each in mistakes)]
+    return look._replace(checks=(*said, *beside.checks), mistakes=found)
 
 
 def _checked(problem: Problem, model: Model) -> _Look:

@@ -139,10 +139,10 @@ def poses_inverted(given: Given) -> Given:
 
 def robot_as(given: Given, name: str) -> Given:
     """Return what was given with a bundled robot that stands where the first did, same tool."""
-    placed = catalog.load(name).with_frames(
+    other = catalog.load(name).with_frames(
         base=given.robot.T_world_base, tool=given.robot.T_flange_tool
     )
-    return replace(given, robot=placed)
+    return replace(given, robot=other)
 
 
 def differing(given: Given, families: tuple[str, ...]) -> Given:

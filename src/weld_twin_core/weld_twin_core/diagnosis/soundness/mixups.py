@@ -54,8 +54,8 @@ def mixups(case: Case) -> Sequence[Finding]:
     shot = case.snapshot
     arm = shot.arm
     if arm.off > 1.0 and (result := _unravelled(shot, arm)):
-        after = result[-1].undone.left
-        return [_told(each, shot, after) for each in result]
+        after = result[-1].undone.remaining
+        return [_finding(each, shot, after) for each in result]
     if arm.bent > 1.0 and (other := _beyond(case, shot, arm)):
         return other
     return (_frames(shot) if arm.displaced > 1.0 else ()) or (
@@ -77,12 +77,12 @@ class _Tried(NamedTuple):
         return self.arm.off * self.undone.collapsed
 
 
-def _told(tried: _Tried, shot: Snapshot, after: float) -> Finding:
+def _finding(tried: _Tried, shot: Snapshot, after: float) -> Finding:
     """Return the mistake that a suspicion is, with the gap [m] before and after it is undone."""
     one, others = tried.suspicion, tried.alike
     words = f'{one.sentence[0].upper()}{one.sentence[1:]}'
-    if after < shot.left:
-        words += f'; undone, {falls(shot.left, after)}'
+    if after < shot.remaining:
+        words += f'; undone, {falls(shot.remaining, after)}'
     if others:
         words += f'. As well it may be that {" or that ".join(o.sentence for o in others)}'
     alike = [*one.alike, *((o.kind, o.at) for o in others)]
@@ -141,7 +141,7 @@ def _best(shot: Snapshot, before: Arm, tries: Iterable[Finding]) -> _Tried | Non
     if least > WORTH * before.off:
         return None
     alike = [each for _, each in sorted(fitted.items()) if WORTH * each.off <= least]
-    gaps = [each.undone.left for each in alike] if len(alike) > 1 else [0.0]
+    gaps = [each.undone.remaining for each in alike] if len(alike) > 1 else [0.0]
     best = next(e for e, gap in zip(alike, gaps, strict=True) if (1.0 - FEW) * gap <= min(gaps))
     near = (each for each, gap in zip(alike, gaps, strict=True) if WORTH * gap <= min(gaps))
     others = {each.suspicion.sentence: each.suspicion for each in near}
@@ -152,7 +152,7 @@ def _best(shot: Snapshot, before: Arm, tries: Iterable[Finding]) -> _Tried | Non
 def _rough(shots: Sequence[Snapshot], before: Arm, thorough: bool) -> list[float]:
     """Return the gap [m] that is left of trials for their size; as given, where only frames are off."""
     if before.bent < 1.0:
-        return [shot.left * shot.collapsed for shot in shots]
+        return [shot.remaining * shot.collapsed for shot in shots]
     models = rough_models(shots, thorough=thorough)
     return [shot.gap(m) * shot.collapsed for shot, m in zip(shots, models, strict=True)]
 
@@ -171,10 +171,10 @@ def _frames(shot: Snapshot) -> Sequence[Finding]:
 
 def _framed(shot: Snapshot, model: Model, more: set[str], remaining: float) -> Finding:
     if more == {'base'} and shot.robot.behind:
-        return _fixture(shot.robot, model.bases, falls(shot.left, remaining))
+        return _fixture(shot.robot, model.bases, falls(shot.remaining, remaining))
     names = listed(sorted(more))
     return mistake(
-        f'The gap of {length(shot.left)} is almost only one of frames: with the {names} fitted '
+        f'The gap of {length(shot.remaining)} is almost only one of frames: with the {names} fitted '
         f'{length(remaining)} remain.',
         'other',
         tuple(sorted(more)),
@@ -216,7 +216,7 @@ def _links(case: Case, shot: Snapshot, arm: Arm) -> Sequence[Finding]:
         return ()
     bundled = _best(shot, arm, robots(shot.robot))
     if bundled and bundled.arm.off < 1.0 and _other_links(bundled.undone) is None:
-        return (_told(bundled, shot, bundled.undone.left),)
+        return (_finding(bundled, shot, bundled.undone.remaining),)
     return (reported,)
 
 

@@ -123,7 +123,7 @@ def quantity(case: Case) -> Sequence[Finding]:
                 else 'the tool does, so these are not its joint states'
             )
         )
-    if seen < NOISE and not case.held:
+    if seen < NOISE and not case.tool_fixed:
         raise DataError('the joints move, but the measured tool never does; is the topic right?')
     total = sum(problem.samples)
     if problem.at_rest and total < ENOUGH:
@@ -162,7 +162,7 @@ def _shown(recording: Recording) -> Array:
 
 def repeats(case: Case) -> Iterator[Finding]:
     """Yield recordings given twice, samples given twice, and frozen measurements."""
-    if case.held:
+    if case.tool_fixed:
         return
     seen = [r.seen.position for r in case.recordings]
     for i, k in combinations(range(len(seen)), 2):

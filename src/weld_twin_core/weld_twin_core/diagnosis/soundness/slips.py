@@ -205,7 +205,7 @@ class _Seen:
         out += [(0.0, shape) for shape in other_shapes(age)]
         # It may have moved between recordings, not within one.
         out += [(MOVED_BEFORE, np.ones(age.size))] if len(self.problem.recordings) > 1 else []
-        return [(constant, self._placed(shape, k)) for constant, shape in out]
+        return [(constant, self._in_recording(shape, k)) for constant, shape in out]
 
     def _smooth(self, k: int) -> Iterator[_Trial]:
         shapes = self._shapes(k)
@@ -225,7 +225,7 @@ class _Seen:
                 allowed[max(at - edge, 0) : at + edge] = False
         for effect, change in self._kinds if allowed.any() else ():
             at = int(np.where(allowed, change.step_gains(k), -np.inf).argmax())
-            shape = self._placed((np.arange(t.size) >= at).astype(np.float64), k)
+            shape = self._in_recording((np.arange(t.size) >= at).astype(np.float64), k)
             # Every instant was asked; the best of many is better than it should be.
             log_bayes_factor = change.log_bayes_factor(shape) - float(np.log(t.size))
             slip = replace(effect, time=float(t[at - 1] + t[at]) / 2.0)  # type: ignore[call-arg]
@@ -260,7 +260,7 @@ class _Seen:
         t = self.problem.recordings[k].seen.t
         return np.asarray((t - t[0]) / max(float(np.ptp(t)), TINY))
 
-    def _placed(self, shape: Array, k: int) -> Array:
+    def _in_recording(self, shape: Array, k: int) -> Array:
         out = np.zeros(self.rest.recording.size)
         out[self.rest.recording == k] = shape
         return out

@@ -123,7 +123,7 @@ class Snapshot:
         return self.aligned(self.align)
 
     @cached_property
-    def left(self) -> float:
+    def remaining(self) -> float:
         """Return the median gap [m] that those frames leave."""
         return self.gap(self.given)
 
@@ -149,7 +149,7 @@ class Snapshot:
         near: frames that were given are believed to be near.
         """
         # What is open to free frames, on few stations, is as it was given.
-        as_given = near and self.align != FRAMES and self.left < FAR
+        as_given = near and self.align != FRAMES and self.remaining < FAR
         model = (self.given if as_given else self.framed).with_found(tuple(errors))
         problem = self.problem
         if near:

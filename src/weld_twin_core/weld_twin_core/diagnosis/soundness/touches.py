@@ -39,7 +39,7 @@ class Touched(NamedTuple):
 
     problem: Problem
     model: Model
-    told: tuple[Unsound, ...] = ()
+    unsound: tuple[Unsound, ...] = ()
     mistakes: tuple[Finding, ...] = ()
 
 
@@ -175,7 +175,7 @@ class _Postures:
         """Give postures in a row that rest together elsewhere a contact of their own."""
         if index.size < 2 * RUN:
             return
-        first, last, shift, explained = _stretch(self._points[index])
+        first, last, shift, explained = _moved_run(self._points[index])
         # What an arm's own errors leave follows the order of postures too; of three measured arms they
         # explained up to 0.6.
         if explained < WORTH or shift < max(2.0 * usual, LARGE):
@@ -211,7 +211,7 @@ def _mended(at: tuple[str, ...], sentence: str, remedy: str) -> Unsound:
     return Unsound('other', at, sentence, remedy, applied=True)
 
 
-def _stretch(points: Array) -> tuple[int, int, float, float]:
+def _moved_run(points: Array) -> tuple[int, int, float, float]:
     """Return the postures in a row that lie most apart: first, end, shift [m], share explained."""
     x = points - points.mean(axis=0)
     sums = np.concatenate([np.zeros((1, 3)), np.cumsum(x, axis=0)])

@@ -3,12 +3,18 @@
 """Charts of the pages: the library is the one that was pinned, and one cursor serves all of a key."""
 
 import hashlib
+import json
 import re
 from importlib.resources import files
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
-from weld_twin_report.report.charts import Axis, Line, chart, embedded, thinned
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.effects import effect_from_mapping
+from weld_twin_core.twin.directions import Directions
+from weld_twin_report.report.charts import Axis, Line, chart, curve_figure, embedded, thinned
 from weld_twin_report.report.html import document
 
 UPLOT = files('weld_twin_report.report') / 'uplot'
@@ -68,3 +74,21 @@ def test_thinning_keeps_the_peaks_of_every_line():
 def test_what_is_not_finite_is_null_in_a_page():
     text = embedded({'a': [1.0, float('nan')], 'b': {'c': float('inf')}})
     assert text.endswith('>{"a":[1.0,null],"b":{"c":null}}</script>')
+
+
+@pytest.mark.parametrize('known', [True, False])
+def test_a_curve_is_drawn_with_the_band_that_holds_nine_in_ten(known):
+    robot, sigma = load('ur5'), np.array([2e-4, 1e-4])
+    entry = {'effect': 'joint_curve', 'joint': 'elbow_joint', 'values': [1e-3, -5e-4]}
+    curve = effect_from_mapping({**entry, 'knots': [-1.0, 0.5]})
+    allowed = SimpleNamespace(directions=Directions((), 1, (curve,)), covariance=np.diag(sigma**2))
+    model = SimpleNamespace(found=(curve,), robot=robot)
+    case = SimpleNamespace(model=model, posterior=allowed if known else None)
+    told = json.loads(re.search(r'json">(.*)</script>', curve_figure(case, 0, curve))[1])
+    np.testing.assert_allclose(np.array(told['x'])[[0, -1]], np.degrees([-1.0, 0.5]), rtol=1e-3)
+    off, (low, high) = np.array(told['lines'][0]['values']), np.array(told['band'])
+    np.testing.assert_allclose(off[[0, -1]], np.degrees([1e-3, -5e-4]), rtol=1e-3)
+    half = np.degrees(1.645 * sigma * known)
+    np.testing.assert_allclose((high - low)[[0, -1]], 2.0 * half, rtol=2e-2, atol=1e-12)
+    np.testing.assert_allclose(0.5 * (high + low), off, atol=1e-4)
+    assert told['joint'] == 2

@@ -83,6 +83,11 @@ def test_one_command_writes_figures_indices_and_a_page(studied):
         assert len((out / 'figures' / f'figure-{number:02}.csv').read_text().splitlines()) > 20
     result = json.loads((out / 'sensitivity.json').read_text())
     assert set(result['motions']) == {'smooth', 'aggressive'}
+    page = (out / 'sensitivity.html').read_text(encoding='utf-8')
+    given, *others = (row['expected_m'] for row in result['advice']['placement'])
+    assert others and min(others) < given
+    for expected in others:
+        assert f'{100.0 - 100.0 * expected / given:.1f} %' in page
     assert {row['motion'] for row in csv.DictReader((out / 'indices.csv').open())} == {
         'smooth',
         'aggressive',

@@ -6,6 +6,7 @@ Break the code on purpose, one place at a time, and count how often the tests no
 
     tools/in_env python tools/mutants.py                     200 drawn from the whole diagnosis
     tools/in_env python tools/mutants.py --room weld_twin_core.twin --draw 60
+    tools/in_env python tools/mutants.py --room all --draw 60  from each room of all packages in turn
 
 A mutant is a comparison turned round or moved to its boundary, a number 25 % up or down, a sign, a
 term that is dropped, two arguments exchanged, the least for the most, 'and' for 'or', or a branch
@@ -56,7 +57,9 @@ TESTS = {
     'src/weld_twin_core/test/advice': 'next_experiment pieces_by_hand',
 }
 """What asks about the engine, folder by folder: files of tests that take a second or two at most.
-Other rooms are asked about by the files that import the modules drawn."""
+Other rooms are asked about by the files that import the modules drawn, and by folders of their name."""
+EVERY = 'all'
+"""What stands for the rooms of all packages."""
 QUICK = 'not slow and not cells'
 CHEAP, SLOW, SPENT = 0.2, 6.0, 12.0
 """Seconds that a test takes which is asked at once, that one may take, and all of them together."""
@@ -443,16 +446,36 @@ def asking(rooms: Sequence[str], drawn: Sequence[Place]) -> list[str]:
             for file in sorted(Path(folder).glob(f'test_{name}.py'))
         ]
     wanted = {tuple(place.module.rsplit('.', 1)) for place in drawn}
+    folders = {room_of(place).partition('.')[2] for place in drawn}
     out = []
     for file in sorted(
         [*Path('test').rglob('test_*.py'), *Path('src').glob('*/test/**/test_*.py')]
     ):
         text = file.read_text(encoding='utf-8')
-        if any(
+        if file.parent.name in folders or any(
             f'{room}.{name} ' in text or f'{room} import {name}' in text for room, name in wanted
         ):
             out.append(str(file))
     return out
+
+
+def room_of(place: Place) -> str:
+    """Return the package and the room of a place, as in 'weld_twin_core.twin'."""
+    return '.'.join(place.module.split('.')[:2])
+
+
+def drawn_from(every: Sequence[Place], count: int, seed: int, *, in_turn: bool) -> list[Place]:
+    """Return so many places, 0 for all; from each room in turn, or wherever they lie."""
+    draw, most = random.Random(seed), min(count or len(every), len(every))
+    mixed = draw.sample(every, len(every))
+    if not in_turn:
+        return mixed[:most]
+    turns = Counter[str]()
+    keyed = []
+    for place in mixed:
+        turns[room_of(place)] += 1
+        keyed.append((turns[room_of(place)], place))
+    return [place for _, place in sorted(keyed, key=lambda each: each[0])[:most]]
 
 
 def modules(rooms: Sequence[str]) -> dict[str, Path]:
@@ -512,11 +535,13 @@ def main() -> int:
     os.chdir(ROOT)
     import pytest
 
-    rooms = args.room or [ENGINE]
+    whole = args.room == [EVERY]
+    packages = sorted(place.name for place in (ROOT / 'src').iterdir())
+    rooms = packages if whole else args.room or [ENGINE]
     files = modules(rooms)
     trees = {name: ast.parse(file.read_text(encoding='utf-8')) for name, file in files.items()}
     every = [place for name, tree in trees.items() for place in places(name, tree)]
-    drawn = random.Random(args.seed).sample(every, min(args.draw or len(every), len(every)))
+    drawn = drawn_from(every, args.draw, args.seed, in_turn=whole)
     asked = Asked(drawn, files, trees, args.jobs)
     options = ['-q', '-n', '0', '-p', 'no:cacheprovider', '--no-header', '-s', '-m', QUICK]
     pytest.main([*options, *(args.tests or asking(rooms, drawn))], plugins=[asked])

@@ -5,6 +5,8 @@
 import numpy as np
 import pytest
 
+from weld_twin_core.arm.catalog import load
+from weld_twin_core.errors import DataError
 from weld_twin_lab.experiments.goals import page, summary
 
 
@@ -74,3 +76,17 @@ def test_a_sealed_cell_records_with_what_was_changed():
     assert np.linalg.norm(moved.measured.position - plain.measured.position, axis=1).min() > 0.3
     (_, back), _ = with_changes([plain, moved], {1: set_up_change('instrument')}, cell.robot)
     assert np.abs(back.measured.position - plain.measured.position).max() < 0.02
+
+
+def test_an_experiment_begins_when_it_is_run_and_is_followed_at_an_even_rate():
+    from weld_twin_lab.experiments.sealed_cell import as_motion
+
+    robot, t = load('ur5'), np.array([7.0, 7.5, 8.5, 9.0])
+    asked = {'joint_names': robot.joint_names, 't': t, 'q': np.outer(t - 7.0, np.ones(6))}
+    still = as_motion({**asked, 'static': True}, robot)
+    assert still.static and still.t.tolist() == [0.0, 0.5, 1.5, 2.0]
+    moving = as_motion({**asked, 'static': False}, robot)
+    np.testing.assert_allclose(moving.q[:, 3], moving.t, atol=1e-12)  # one radian a second
+    assert moving.t[0] == 0.0 and np.ptp(np.diff(moving.t)) < 1e-12 and moving.t[-1] > 1.9
+    with pytest.raises(DataError, match='is not for franka_panda'):
+        as_motion({**asked, 'static': True}, load('franka_panda'))

@@ -50,6 +50,15 @@ def test_a_table_has_its_own_rows_alone(found):
         assert split.train.joints.q.shape[0] == split.train.measured.t.size
 
 
+@pytest.mark.parametrize(('count', 'back'), [(15, 0), (17, 2), (100, 25)])
+def test_a_quarter_is_kept_back_evenly_and_from_within_unless_too_few_are_left(count, back):
+    fitted, kept = kept_back(np.arange(count))
+    assert (fitted.size, kept.size) == (count - back, back)
+    assert sorted([*fitted, *kept]) == list(range(count))
+    apart = np.diff([0, *kept, count - 1])
+    assert back == 0 or np.ptp(apart) <= 1
+
+
 def test_counts_and_regions_are_as_named(found, table):
     assert [found[f'n{n}'].train.measured.t.size for n in (15, 240)] == [15, 240]
     assert np.ptp(found['still_2'].train.joints.q[:, 1]) <= np.radians(2.0) + 1e-12

@@ -372,6 +372,7 @@ def test_cards_and_bars_have_the_same_three_directions_and_tell_the_side():
     assert sides_words(np.array([-2e-4, 0.0, 3e-4])) == (
         '0.200\N{NO-BREAK SPACE}mm behind, 0.300\N{NO-BREAK SPACE}mm out along the tool'
     )
+    assert sides_words(np.array([4.5e-7, 6e-7, 0.0])) == '0.001\N{NO-BREAK SPACE}mm to the left'
     whole = components(THREE, 0, traces.before[0])
     assert np.linalg.norm(whole, axis=1) == pytest.approx(
         np.linalg.norm(traces.before[0], axis=1), rel=1e-6

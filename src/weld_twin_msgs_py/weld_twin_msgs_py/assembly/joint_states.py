@@ -117,7 +117,6 @@ def names_called(
 
 
 def _picker(index: Sequence[int]) -> Callable[[Any], tuple[float, ...]]:
-    """Return what picks values out of a row by their places."""
     if len(index) > 1:
         return itemgetter(*index)
     only = index[0]

@@ -122,7 +122,6 @@ def _between(before: Placed, after: Placed, stamp: int) -> Array:
 
 
 def _placed(each: Any) -> Placed:
-    """Return where a TransformStamped has its frame."""
     p, q, child = each.transform.translation, each.transform.rotation, each.child_frame_id
     if not isfinite(p.x + p.y + p.z):
         raise DataError(f'the transform of {child!r} is not finite')

@@ -351,7 +351,6 @@ class BackgroundBag:
             return list(islice(self._queue, BATCH)), notes, self._closing
 
     def _settle(self, items: list[_Item]) -> None:
-        """Take written messages out of the queue."""
         with self._changed:
             for item in items:
                 self._queue.popleft()

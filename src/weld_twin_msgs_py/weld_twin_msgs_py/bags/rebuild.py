@@ -190,7 +190,6 @@ def _open(path: Path, stack: ExitStack) -> sqlite3.Connection:
 
 
 def _page(path: Path) -> int:
-    """Return the size of a page [bytes]."""
     with path.open('rb') as file:
         size = int.from_bytes(file.read(18)[16:18], 'big')
     return 65536 if size == 1 else max(size, 512)
@@ -333,7 +332,6 @@ def _scratch(target: Path) -> Iterator[Path]:
 
 
 def _copy(source: Path, folder: Path, name: str, damage: Damage) -> Counter[str]:
-    """Copy what is whole, file by file."""
     counts: Counter[str] = Counter()
     files = _files(source)
     storage = _STORAGE[files[0].suffix][0]

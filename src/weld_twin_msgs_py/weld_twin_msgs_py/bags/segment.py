@@ -382,7 +382,6 @@ def recover_command(path: Path, growing: Path | None = None) -> str:
 
 
 def _has_room(folder: Path, needed: int) -> bool:
-    """Return whether so many bytes can be written into a directory."""
     with suppress(OSError):
         return os.access(folder, os.W_OK) and shutil.disk_usage(folder).free >= needed
     return False

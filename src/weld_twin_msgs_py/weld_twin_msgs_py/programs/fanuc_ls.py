@@ -174,7 +174,6 @@ class FanucReader(Reader):
         self._add(kind, where, via, point, tail)
 
     def _hold_used(self, text: str, where: str, moves: bool) -> None:
-        """Hold points that a register chooses, or that something else than a move uses."""
         if re.search(r'(?<![A-Z])P\[\s*(?:A?R)\[', text):
             for point in self.points.values():
                 self.program.hold(point, f'a register chooses the point at {where}')

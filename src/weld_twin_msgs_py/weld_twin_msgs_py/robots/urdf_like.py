@@ -107,7 +107,6 @@ def write_urdf_like(
 
 
 def _last(joints: list[Joint]) -> int:
-    """Return the place of the last joint that moves."""
     return max(k for k, joint in enumerate(joints) if joint.kind in MOVABLE)
 
 

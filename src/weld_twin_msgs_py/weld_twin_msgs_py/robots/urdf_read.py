@@ -169,7 +169,6 @@ def _tip(tree: Tree, base: str, wanted: str | None) -> str:
 
 
 def _moves(tree: Tree, link: str) -> bool:
-    """Tell whether a joint moves somewhere above a link."""
     for _ in tree.links:
         joint = tree.above.get(link)
         if joint is None or joint.kind in MOVABLE:
@@ -214,7 +213,6 @@ def _chain(tree: Tree, base: str, tip: str) -> Chain:
 
 
 def _refuse_unfit(joints: list[Joint]) -> None:
-    """Refuse joints that no arm has."""
     for joint in joints:
         if joint.kind not in MOVABLE | {'fixed'}:
             raise ModelError(f'joint {joint.name!r} is {joint.kind}; an arm cannot have that')

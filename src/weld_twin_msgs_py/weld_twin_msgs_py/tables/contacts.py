@@ -128,7 +128,6 @@ def read_contacts(
 
 
 def _labels(cells: Cells, columns: Mapping[str, str], alone: str | None) -> tuple[str, ...]:
-    """Return what was touched in every row."""
     if 'contact' not in columns:
         return (alone or '',) * len(cells.rows)
     labels = tuple(cells.column(columns['contact']))
@@ -154,7 +153,6 @@ def _once(cells: Cells, names: list[str], said: list[str]) -> Cells:
 
 
 def _touched(contacts: Contacts, known: Artefact) -> list[str]:
-    """Return how often each thing was touched, in words."""
     return [
         f'{contacts.of(label).size} postures touch {label!r}, a {known.named(label).kind}'
         for label in dict.fromkeys(contacts.labels)
@@ -196,7 +194,6 @@ def _lengths(
 def _kinds(
     cells: Cells, name: str | None, labels: tuple[str, ...], value: Array | None
 ) -> dict[str, str]:
-    """Return the kind of every label."""
     texts = ['' for _ in labels] if name is None else cells.column(name)
     out: dict[str, str] = {}
     for k, (label, text) in enumerate(zip(labels, texts, strict=True)):

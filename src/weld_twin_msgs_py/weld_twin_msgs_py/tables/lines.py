@@ -172,7 +172,6 @@ class _Row(NamedTuple):
 
 
 def _read(path: Path, lines: Sequence[str], delimiter: str) -> Iterator[_Row]:
-    """Yield the rows that are not empty."""
     reader = csv.reader(lines, delimiter=delimiter)
     first = 1
     endless = (

@@ -86,7 +86,6 @@ def read_pixels(
 
 
 def _columns(cells: Cells, options: TableOptions) -> dict[str, str]:
-    """Return the columns by use."""
     out = cells.by_words(WORDS, but=options.joint_columns or ())
     for use in ('u', 'v', 'point'):
         if use not in out:
@@ -98,7 +97,6 @@ def _columns(cells: Cells, options: TableOptions) -> dict[str, str]:
 
 
 def _clock(stations: Cells, said: list[str]) -> np.ndarray:
-    """Return the stamps of images [s], from the first on."""
     date, clock = time_columns(stations.header)
     t, sentence = stamps(stations, clock, None if clock is None else unit_of(clock), date)
     said.append(sentence)
@@ -142,7 +140,6 @@ def _sightings(
 
 
 def _places(cells: Cells, column: str | None, names: list[str], what: str) -> np.ndarray:
-    """Return which camera or target every row is of."""
     if column is None:
         if len(names) > 1:
             raise DataError(

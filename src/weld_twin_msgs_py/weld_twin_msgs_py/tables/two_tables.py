@@ -168,7 +168,6 @@ def _kept(cells: Cells, keep: NDArray[np.intp], said: list[str], why: str) -> Ce
 
 
 def _clock(cells: Cells, options: TableOptions) -> tuple[str | None, str | None]:
-    """Return the columns of the time and of the date."""
     if options.time_column in cells.header:
         return options.time_column, None
     date, clock = time_columns(cells.header)

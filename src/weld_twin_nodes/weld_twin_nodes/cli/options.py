@@ -192,7 +192,6 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
 
 
 def _learned_by_effort(args: argparse.Namespace) -> bool:
-    """Return whether springs of the model that is given take measured efforts."""
     from ..offline.told_twin import by_effort
 
     given = (getattr(args, name, None) for name in ('model', 'effects_known'))

@@ -137,7 +137,6 @@ def _positional(name: str, values: Sequence[str]) -> tuple[str, dict[str, Any]]:
 
 
 def _value(values: Sequence[str], *, again: bool) -> dict[str, Any]:
-    """Return how the values of an option are read."""
     shown = values[0]
     if shown.startswith('{'):
         return {'choices': tuple(shown.strip('{}').split(','))}

@@ -83,7 +83,6 @@ class AskedNodes:
         self._take(name, answer.result().values)
 
     def _take(self, name: str, values: list[Any]) -> None:
-        """Note the robot, the effects and the seed of another node."""
         robot_name, base, tip, model, text = [value.string_value for value in values[:5]]
         if told_by_topic(robot_name) and not self._description:
             self._waiting.append((name, values))

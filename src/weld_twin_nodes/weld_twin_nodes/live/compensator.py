@@ -170,7 +170,6 @@ class Compensator(ManagedNode):
         return [topic.relative for topic in COMPENSATED]
 
     def _offer_action(self) -> GoalRelay | None:
-        """Offer the action, or say why not."""
         try:
             from control_msgs.action import FollowJointTrajectory
         except ImportError:
@@ -302,7 +301,6 @@ class Compensator(ManagedNode):
         self.keep(WITHDRAWN, why, logged=False)
 
     def _present(self) -> ProgramModel:
-        """Return what acts on the arm under its present load and temperature."""
         assert self._model is not None
         wrench, warm = self._around
         return self._model.around(wrench, self._intake.wrench_frame.meaning, warm)
@@ -310,7 +308,6 @@ class Compensator(ManagedNode):
     # Poses -----------------------------------------------------------------------------------
 
     def _pose_correction(self) -> PoseCorrection:
-        """Return what corrects poses under the present load and temperature."""
         self._streamed = self._around
         return PoseCorrection(self._present(), self.robot.T_flange_tool)
 
@@ -369,7 +366,6 @@ class Compensator(ManagedNode):
     # Goals -----------------------------------------------------------------------------------
 
     async def _decide(self, goal: Any) -> Decision:
-        """Return what becomes of a goal."""
         self._look()
         token = self._token()
         audit = self._audit
@@ -421,7 +417,6 @@ class Compensator(ManagedNode):
             self._correction.publish(encode(begun + round(float(t) * 1e9), added))
 
     def _token(self) -> str | None:
-        """Return what tells the model that counts now."""
         return None if self._model is None else self._model.digest
 
     def _since(self, token: object) -> str:

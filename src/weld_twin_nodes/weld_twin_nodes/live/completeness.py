@@ -77,7 +77,6 @@ class SentBook(Book):
 
 
 def _ours(node: str) -> bool:
-    """Return whether a node has the name of one of the project's."""
     return node.rpartition('/')[2] in MODULES
 
 

@@ -112,7 +112,6 @@ class ContactMarker(CellNode):
             self._parts.setdefault(names, Part()).take(from_messages.stamp_ns(message), q)
 
     def _mark(self) -> str:
-        """Return the number of the contact; refuse what is none."""
         stamp, joints = self._standing()
         label = str(self.setting('label')).strip()
         if not label:

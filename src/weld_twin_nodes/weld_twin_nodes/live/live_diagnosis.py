@@ -226,7 +226,6 @@ class LiveDiagnosis(ManagedNode):
         self.start()
 
     def _looked_with(self) -> TopicNames:
-        """Return what is known of the cameras and of what they look at."""
         texts = (
             [part for part in self.setting(name).split(',') if part]
             for name in ('cameras', 'targets')

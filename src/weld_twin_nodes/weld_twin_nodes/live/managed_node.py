@@ -202,7 +202,6 @@ class ManagedNode(CellNode):
         later.answer(response)
 
     def _go(self, step: Step, state: str) -> None:
-        """Be in another state, and tell so."""
         event = TransitionEvent(
             timestamp=self.get_clock().now().nanoseconds,
             transition=Transition(id=step.number, label=step.label),

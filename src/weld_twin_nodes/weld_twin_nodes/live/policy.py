@@ -181,7 +181,6 @@ def _full(name: str, space: str) -> str:
 
 
 def _profile(node: str, space: str, remaps: Mapping[str, str]) -> str:
-    """Return the enclave of a node; what is remapped has its full name."""
     lines = [
         f'    <enclave path={quoteattr(enclave(node, space))}>',
         '      <profiles>',

@@ -74,7 +74,6 @@ class QosOverrides:
         return value
 
     def _refuse_odd(self, name: str, topics: Collection[str]) -> None:
-        """Refuse what would be passed over."""
         topic, role, policy = (*name.removeprefix(PREFIX).rsplit('.', 2), '', '')[:3]
         if role not in ROLES or policy not in (*CHOICES, 'depth'):
             raise DataError(

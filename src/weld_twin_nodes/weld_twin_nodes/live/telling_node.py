@@ -204,7 +204,6 @@ class TellingNode(Node):
         self.keep('partners', '; '.join(unmatched), logged=False)
 
     def _named_twice(self) -> list[str]:
-        """Return that another node has this one's name, if one has."""
         own = self.get_fully_qualified_name()
         if not self.neighbours.twice(own):
             return []
@@ -213,7 +212,6 @@ class TellingNode(Node):
         ]
 
     def _timeless(self) -> list[str]:
-        """Return that simulated time is asked for and has not begun, if so."""
         if not self.setting('use_sim_time') or self.get_clock().now().nanoseconds:
             return []
         return ['use_sim_time is set, and nothing has come on /clock: time stands at zero']

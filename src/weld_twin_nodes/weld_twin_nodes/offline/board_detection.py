@@ -59,7 +59,6 @@ def detector(board: Mapping[str, Any]) -> Callable[[Path], Corners]:
 
 
 def _finder(cv2: Any, board: Mapping[str, Any]) -> Callable[[Any], Any]:
-    """Return what finds labels and places of a board's points in an image."""
     if board['board'] == 'tags':
         return _tags(cv2, board)
     columns, rows = (int(count) for count in board['squares'])
@@ -69,7 +68,6 @@ def _finder(cv2: Any, board: Mapping[str, Any]) -> Callable[[Any], Any]:
 
 
 def _markers(cv2: Any, board: Mapping[str, Any], usual: str) -> Any:
-    """Return the dictionary of a board's markers."""
     name = str(board.get('dictionary', usual))
     if not hasattr(cv2.aruco, name):
         raise ModelError(f'OpenCV has no dictionary {name!r}; one is {usual}')

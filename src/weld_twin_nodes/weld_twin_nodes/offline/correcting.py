@@ -444,7 +444,6 @@ def _promised(content: dict[str, Any], read: ProgramModel) -> Promise | None:
 
 
 def _number(content: dict[str, Any], part: str, key: str) -> float:
-    """Return a number of a diagnosis; 0 where it has none."""
     values = content.get(part)
     value = values.get(key) if isinstance(values, dict) else None
     return float(value) if isinstance(value, int | float) else 0.0

@@ -277,5 +277,4 @@ def _write_effects(path: Path, notes: Sequence[str], effects: Sequence[Effect]) 
 
 
 def _mended(model: Model) -> list[str]:
-    """Return what was wrong with the data that the model comes from."""
     return [f'Mended before the diagnosis: {sentence}' for sentence in model.mended]

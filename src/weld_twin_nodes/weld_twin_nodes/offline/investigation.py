@@ -145,7 +145,6 @@ def _log_odds(result: Mapping[str, Any]) -> float:
 
 
 def _with_belief(result: Mapping[str, Any], other: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a diagnosis with the confidence that it has beside another."""
     verdict = result['verdict']
     if verdict['status'] not in STATED:
         return result
@@ -190,7 +189,6 @@ def _together(result: Mapping[str, Any], first: Any, second: Any) -> bool:
 
 
 def _words(result: Mapping[str, Any]) -> str:
-    """Return why an answer closes the question, where it does."""
     reported = {'identified': 'the causes are identified', 'ambiguous': ALIKE}
     return reported.get(result['verdict']['status'], 'nothing is left to explain above the noise')
 
@@ -213,7 +211,6 @@ def _open_ends(result: Mapping[str, Any]) -> bool:
 
 
 def _inseparable(result: Mapping[str, Any]) -> bool:
-    """Return whether no motion parts what is left."""
     wanted = result.get('next_experiment')
     return wanted is not None and wanted['motion'] is None
 

@@ -203,7 +203,6 @@ def write_plan(folder: Path, context: Context, language: str | None, plan: Plann
 
 
 def _labels(robot: Robot, language: str | None) -> list[str]:
-    """Return the names of the joints on the pendant."""
     if language == 'inform' and robot.n == len(YASKAWA):
         return list(YASKAWA)
     label = LABELS.get(language or '')

@@ -197,7 +197,6 @@ def _read(file: Path) -> Any:
 
 
 def _decided(note: Path) -> Change:
-    """Return the change that a note holds."""
     change = Change(**_read(note))
     place = {name: None if ours is None else str(ours) for name, ours in change.place.items()}
     new = _digests(change.listed)

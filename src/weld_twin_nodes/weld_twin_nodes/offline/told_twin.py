@@ -115,7 +115,6 @@ def _doubt(effect: Effect, parameter: str, value: float, limit: float) -> str:
 
 
 def _possible(robot: Robot, effects: Sequence[Effect], source: str) -> None:
-    """Refuse values that no machine comes near."""
     for effect in effects:
         for parameter, value, limit in beyond(robot, effect):
             if abs(value) > IMPOSSIBLE * abs(limit) > 0.0:

@@ -393,7 +393,6 @@ class PoseStream:
 
 
 def _over(values: Array, limits: Array, name: str, robot: Robot) -> str:
-    """Return that a joint breaks its limit; empty where none does."""
     over = values - limits
     if over.max() <= 0.0:
         return ''

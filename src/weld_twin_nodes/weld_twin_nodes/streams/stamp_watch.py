@@ -198,7 +198,6 @@ def told(offset: float, digits: int) -> str:
 
 
 def _recent(samples: deque[Sample]) -> deque[Sample]:
-    """Return the last `RECENT` seconds of a stream."""
     if not samples:
         return samples
     return deque(s for s in samples if samples[-1].stamp - s.stamp < RECENT / NANOSECOND)

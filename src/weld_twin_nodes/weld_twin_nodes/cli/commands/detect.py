@@ -59,7 +59,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _paths(given: list[str]) -> list[Path]:
-    """Return the images, those of folders by name."""
     out = list[Path]()
     for text in given:
         path = Path(text)

@@ -78,7 +78,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _simulate(args: argparse.Namespace) -> int:
-    """Write the bag of a seam and print the deviation."""
     from ...offline.seam_motion import plan_motion, stamps
     from ...offline.simulation import Simulation, write_simulation
 
@@ -105,7 +104,6 @@ def _simulate(args: argparse.Namespace) -> int:
 
 
 def _predict(args: argparse.Namespace) -> int:
-    """Write the bag; say how far measured and twin are apart where something was measured."""
     from weld_twin_msgs_py.bags import read_recording
 
     from ...offline.prediction import (

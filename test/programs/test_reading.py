@@ -196,7 +196,7 @@ def test_fanuc_points_that_something_else_uses_are_left(line, held):
     )
     text = f'/PROG A\n/MN\n 1:J P[1] 5% FINE ;\n 2:  !P[1] ;\n 3:{line} ;\n/POS\n{points}/END\n'
     program = read('fanuc-ls', (text,), 'fanuc_m10ia')
-    assert {program.points[k].name for k in program.held} == held
+    assert {program.points[k].name for k in program.fixed} == held
 
 
 @pytest.mark.parametrize(

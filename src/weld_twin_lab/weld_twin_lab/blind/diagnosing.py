@@ -17,8 +17,8 @@ from weld_twin_core.errors import DataError
 from weld_twin_msgs_py.bags import read_recording
 from weld_twin_msgs_py.files.whole_files import write_text
 from weld_twin_msgs_py.robots import load_robot
+from weld_twin_nodes.offline.given_twin import build_twin
 from weld_twin_nodes.offline.task_pool import Runner, Task
-from weld_twin_nodes.offline.told_twin import build_twin
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 from ..study import engine_digest

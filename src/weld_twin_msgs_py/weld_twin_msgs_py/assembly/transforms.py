@@ -44,7 +44,7 @@ class NotYet(NoTransform):
     """It is not known yet: a frame on the way has told of itself up to just before the stamp."""
 
 
-class Placed(NamedTuple):
+class StampedPose(NamedTuple):
     """
     Where a frame is in its parent.
 
@@ -70,9 +70,9 @@ class Branch:
     def __init__(self, parent: str, *, static: bool) -> None:
         self.parent = parent
         self.static = static
-        self.places: deque[Placed] = deque()
+        self.places: deque[StampedPose] = deque()
 
-    def add(self, place: Placed) -> None:
+    def add(self, place: StampedPose) -> None:
         """Take a place; one that is not newer than the last counts as said before."""
         if self.static:
             self.places.clear()
@@ -112,7 +112,7 @@ class Branch:
         return _between(self.places[k - 1], after, stamp)
 
 
-def _between(before: Placed, after: Placed, stamp: int) -> Array:
+def _between(before: StampedPose, after: StampedPose, stamp: int) -> Array:
     """Return the place at a stamp between two: a straight way, and a turn about one axis."""
     share = (stamp - before.stamp) / (after.stamp - before.stamp)
     A, B = before.T_parent_child, after.T_parent_child
@@ -121,14 +121,14 @@ def _between(before: Placed, after: Placed, stamp: int) -> Array:
     return transform(A[:3, :3] @ rotation_matrix(share * turn), position)
 
 
-def _placed(each: Any) -> Placed:
+def _stamped_pose(each: Any) -> StampedPose:
     p, q, child = each.transform.translation, each.transform.rotation, each.child_frame_id
     if not isfinite(p.x + p.y + p.z):
         raise DataError(f'the transform of {child!r} is not finite')
     quaternion = q.x, q.y, q.z, q.w
     if not abs(hypot(*quaternion) - 1.0) < UNIT:
         matrix_from_quaternion(quaternion, f'rotation of {child!r}')  # has the sentence, the bound
-    return Placed(time_ns(each.header.stamp), (p.x, p.y, p.z), quaternion)
+    return StampedPose(time_ns(each.header.stamp), (p.x, p.y, p.z), quaternion)
 
 
 class TransformTree:
@@ -151,13 +151,13 @@ class TransformTree:
         for each in message.transforms:
             parent, child = each.header.frame_id.strip('/'), each.child_frame_id.strip('/')
             try:
-                self._add(parent, child, _placed(each), static=static)
+                self._add(parent, child, _stamped_pose(each), static=static)
             except DataError as error:
                 wrong = error
         if wrong is not None:
             raise wrong
 
-    def _add(self, parent: str, child: str, place: Placed, *, static: bool) -> None:
+    def _add(self, parent: str, child: str, place: StampedPose, *, static: bool) -> None:
         branch = self._branches.get(child)
         if branch is None or branch.parent != parent or branch.static != static:
             above = [parent, *self._above(parent)]

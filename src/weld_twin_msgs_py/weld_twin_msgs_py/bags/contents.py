@@ -83,7 +83,7 @@ def bag_info(path: Path | str, topics: TopicNames | None = None) -> BagInfo:
 
     """
     names = TopicNames() if topics is None else topics
-    result, made = _found(path, names)
+    result, made = _topics_of(path, names)
     used = [t for t in result if t.use and t.start_ns is not None]
     timed = used or [t for t in result if t.start_ns is not None]
     start = min((t.start_ns for t in timed if t.start_ns is not None), default=0)
@@ -102,7 +102,7 @@ def bag_info(path: Path | str, topics: TopicNames | None = None) -> BagInfo:
     )
 
 
-def _found(path: Path | str, names: TopicNames) -> tuple[list[TopicInfo], dict[str, Any]]:
+def _topics_of(path: Path | str, names: TopicNames) -> tuple[list[TopicInfo], dict[str, Any]]:
     """Return the topics of a bag and what its writer said of it."""
     stamps: dict[str, array[int]] = {}
     unstamped: dict[str, int] = {}

@@ -242,7 +242,7 @@ class BackgroundBag:
         self._bag = bag
         self._flush_every = flush_every
         self._most = most_bytes
-        self._held = 0
+        self._queued = 0
         self._written: Counter[str] = Counter()
         self._dropped: Counter[str] = Counter()
         self._queue: deque[_Item] = deque()
@@ -260,10 +260,10 @@ class BackgroundBag:
         """Queue a serialised message; return whether there was room."""
         size = len(data) + ITEM
         with self._changed:
-            if self.failure or self._closing or self._held + size > self._most:
+            if self.failure or self._closing or self._queued + size > self._most:
                 self._dropped[topic] += 1
                 return False
-            self._held += size
+            self._queued += size
             self._queue.append(_Item(topic, kind, data, log_ns))
             if len(self._queue) == 1:
                 self._changed.notify()
@@ -354,5 +354,5 @@ class BackgroundBag:
         with self._changed:
             for item in items:
                 self._queue.popleft()
-                self._held -= len(item.data) + ITEM
+                self._queued -= len(item.data) + ITEM
                 self._written[item.topic] += 1

@@ -34,7 +34,7 @@ from .segment import SUFFIXES, Channel, Segments, clear_write_errors, sync
 from .storage import look, storage_files
 from .writer import custom_data
 
-Found = tuple[Channel, int, bytes]
+Salvaged = tuple[Channel, int, bytes]
 """Channel, time of recording [ns] and serialised message."""
 
 
@@ -72,7 +72,7 @@ def _qos(text: Any) -> tuple[Qos, ...]:
 _UNPACK = {'': lambda data, _: data, 'zstd': unzstd, 'lz4': unlz4}
 
 
-def salvage_mcap(path: Path, damage: Damage) -> Iterator[Found]:
+def salvage_mcap(path: Path, damage: Damage) -> Iterator[Salvaged]:
     """
     Yield messages in the order of the file, up to the first record that is not whole.
 
@@ -100,13 +100,13 @@ class _Bounded:
 
     def __init__(self, file: IO[bytes], size: int) -> None:
         self._file = file
-        self._left = size
+        self._remaining = size
 
     def read(self, size: int) -> bytes:
         """Return the next bytes, all of them."""
-        if size > self._left:
+        if size > self._remaining:
             raise EOFError
-        self._left -= size
+        self._remaining -= size
         return self._file.read(size)
 
 
@@ -148,7 +148,7 @@ JOURNALS = ('-journal', '-wal')
 """Files beside a database in which a writer that died has left a step half done."""
 
 
-def salvage_sqlite(path: Path, damage: Damage) -> Iterator[Found]:
+def salvage_sqlite(path: Path, damage: Damage) -> Iterator[Salvaged]:
     """Yield messages in the order they were written, up to the first that cannot be read."""
     with ExitStack() as stack:
         try:
@@ -172,16 +172,16 @@ def _open(path: Path, stack: ExitStack) -> sqlite3.Connection:
     read as half a message and zeros.
     """
     journals = [file for file in _beside(path) if file.exists()]
-    torn = path.stat().st_size % _page(path)
+    partial_page = path.stat().st_size % _page(path)
     mode = 'immutable=1'
-    if journals or torn:
+    if journals or partial_page:
         folder = Path(
             stack.enter_context(TemporaryDirectory(dir=path.parent, prefix='.recovering-'))
         )
         for file in (path, *journals):
             shutil.copy(file, folder / file.name)
         path, mode = folder / path.name, 'mode=rw'
-        os.truncate(path, path.stat().st_size - torn)
+        os.truncate(path, path.stat().st_size - partial_page)
     base = sqlite3.connect(f'{path.resolve().as_uri()}?{mode}', uri=True)
     stack.enter_context(closing(base))
     base.execute('PRAGMA trusted_schema = OFF')
@@ -260,7 +260,7 @@ def recover(path: Path | str, out: Path | str | None = None) -> Recovery:
     if target.exists():
         raise DataError(f"'{target}' exists already and is not overwritten; choose with --out")
     damage = Damage()
-    with _held(source), clear_write_errors(target, _elsewhere), _scratch(target) as folder:
+    with _locked(source), clear_write_errors(target, _elsewhere), _scratch(target) as folder:
         counts = _copy(source, folder, target.name, damage)
         if not counts:
             said = '; '.join(damage.sentences) or 'there is none'
@@ -308,14 +308,14 @@ def _files(source: Path) -> list[Path]:
 
 
 @contextmanager
-def _held(source: Path) -> Iterator[None]:
+def _locked(source: Path) -> Iterator[None]:
     """Keep the recorder, and another recovery, off an unfinished bag."""
-    held = lock(source) if is_growing(source) else -1
+    lock_file = lock(source) if is_growing(source) else -1
     try:
         yield
     finally:
-        if held >= 0:
-            os.close(held)
+        if lock_file >= 0:
+            os.close(lock_file)
 
 
 @contextmanager
@@ -349,7 +349,7 @@ def _copy(source: Path, folder: Path, name: str, damage: Damage) -> Counter[str]
 
 
 def _write(
-    segments: Segments, result: Found, file: Path, counts: Counter[str], damage: Damage
+    segments: Segments, result: Salvaged, file: Path, counts: Counter[str], damage: Damage
 ) -> None:
     channel, log_ns, data = result
     try:

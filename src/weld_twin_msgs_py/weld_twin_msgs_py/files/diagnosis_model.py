@@ -81,9 +81,9 @@ def read_model(robot: Robot, path: Path | str) -> Model:
         raise ModelError(f"diagnosis '{path}': {error}") from None
     if not bases:
         raise ModelError(f"the model of diagnosis '{path}' has no base frame")
-    placed = robot.with_frames(tool=tool)
+    with_tool = robot.with_frames(tool=tool)
     mended = tuple(str(item.get('sentence')) for item in applied)
-    return Model(placed, bases, known, result, mended, mends=mends, alone=alone)
+    return Model(with_tool, bases, known, result, mended, mends=mends, alone=alone)
 
 
 def _alone(entry: Any, robot: Robot) -> Alone | None:
@@ -156,7 +156,7 @@ def mended_source(
     Returns
     -------
     recording : Recording
-    told : str
+    remark : str
         A sentence; empty where nothing had to be mended.
 
     """

@@ -16,7 +16,7 @@ from weld_twin_core.recording import Recording
 PART = 0.5
 """Standard deviation of a coordinate in units of the largest error permitted: manuals of trackers
 have typical results at half of that (ISO 10360-10:2021)."""
-_TOLD = re.compile(
+_WRITTEN = re.compile(
     r'(?P<least>[0-9.]+)(?:\+(?P<more>[0-9.]+)/m)?(?:@(?P<away>[0-9.]+))?', re.IGNORECASE
 )
 
@@ -55,7 +55,7 @@ def instrument(given: str) -> Instrument:
     """
     name, _, away = given.partition('@')
     known = INSTRUMENTS.get(name.lower())
-    result = _TOLD.fullmatch(f'0@{away}' if known and away else given if known is None else '0')
+    result = _WRITTEN.fullmatch(f'0@{away}' if known and away else given if known is None else '0')
     try:
         numbers = {k: float(v) for k, v in result.groupdict().items() if v} if result else {}
     except ValueError:

@@ -42,25 +42,25 @@ class Scratch:
         parent.mkdir(parents=True, exist_ok=True)
         sweep(parent, prefix, rescue)
         self.path, lock = _made(parent, prefix)
-        self._held: int | None = lock
+        self._lock: int | None = lock
 
     def close(self) -> None:
         """Remove the directory; may be called again."""
-        held, self._held = self._held, None
-        if held is not None:
+        lock, self._lock = self._lock, None
+        if lock is not None:
             _remove(self.path)
-            os.close(held)
+            os.close(lock)
 
     def leave(self) -> None:
         """Let go of the directory as it is; the next sweep rescues and removes it."""
-        held, self._held = self._held, None
-        if held is not None:
-            os.close(held)
+        lock, self._lock = self._lock, None
+        if lock is not None:
+            os.close(lock)
 
     @property
     def is_whole(self) -> bool:
         """Return whether nobody has deleted the directory meanwhile; one made anew does not count."""
-        return self._held is not None and os.fstat(self._held).st_nlink > 0
+        return self._lock is not None and os.fstat(self._lock).st_nlink > 0
 
     def __enter__(self) -> Path:
         return self.path
@@ -93,8 +93,8 @@ def sweep(parent: Path, prefix: str, rescue: Callable[[Path], object] | None = N
         if not entry.is_dir(follow_symlinks=False) or not _mine(entry):
             continue
         folder = Path(entry.path)
-        held = _hold(folder)
-        if held is None:
+        lock = _hold(folder)
+        if lock is None:
             with suppress(OSError):
                 folder.rmdir()  # killed before it had a lock: removed only if it is empty
             continue
@@ -103,7 +103,7 @@ def sweep(parent: Path, prefix: str, rescue: Callable[[Path], object] | None = N
                 rescue(folder)
             _remove(folder)
         finally:
-            os.close(held)
+            os.close(lock)
 
 
 def _mine(entry: os.DirEntry[str]) -> bool:
@@ -118,27 +118,27 @@ def _made(parent: Path, prefix: str) -> tuple[Path, int]:
         folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
         with suppress(FileNotFoundError):
             made = os.open(folder / LOCK, os.O_CREAT | os.O_RDWR | os.O_EXCL, 0o600)
-            held = _hold(folder)
-            if held is None and (folder / LOCK).exists():
+            lock = _hold(folder)
+            if lock is None and (folder / LOCK).exists():
                 return folder, made  # a file system without locks; nobody can sweep here either
             os.close(made)
-            if held is not None:
-                return folder, held
+            if lock is not None:
+                return folder, lock
 
 
 def _hold(folder: Path) -> int | None:
     """Return the lock of a directory; None where another process has it, or it has none."""
     try:
-        held = os.open(folder / LOCK, os.O_RDWR | os.O_NOFOLLOW)
+        lock = os.open(folder / LOCK, os.O_RDWR | os.O_NOFOLLOW)
     except OSError:
         return None
     try:
-        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if os.path.samestat(os.fstat(held), os.stat(folder / LOCK)):
-            return held
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.path.samestat(os.fstat(lock), os.stat(folder / LOCK)):
+            return lock
     except OSError:
         pass
-    os.close(held)
+    os.close(lock)
     return None
 
 

@@ -55,8 +55,8 @@ class Layout:
         None where a message is of another layout.
 
         """
-        for at, held in self.same:
-            if (block[:, at : at + len(held)] != np.frombuffer(held, np.uint8)).any():
+        for at, fixed in self.same:
+            if (block[:, at : at + len(fixed)] != np.frombuffer(fixed, np.uint8)).any():
                 return None
         stamp = np.ascontiguousarray(block[:, _STAMP])
         seconds = stamp.view('<i4')[:, 0].astype(np.int64)
@@ -113,10 +113,10 @@ class _Walk:
         self._at += 8 * count
 
     def _keep(self, size: int) -> bytes:
-        held = self._data[self._at : self._at + size]
-        self.same.append((self._at, held))
+        fixed = self._data[self._at : self._at + size]
+        self.same.append((self._at, fixed))
         self._at += size
-        return held
+        return fixed
 
     def _align(self, size: int) -> None:
         self._at += -(self._at - HEADER) % size

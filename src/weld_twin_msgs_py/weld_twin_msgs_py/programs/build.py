@@ -36,7 +36,7 @@ class Point(NamedTuple):
     notation: Notation
     value: Array
     """A pose (4, 4) in its own base frame, or joint positions of the model (n,)."""
-    told: Array | None = None
+    external: Array | None = None
     """External axes at a pose, as the first joints of the model, shape (m,); None where it does
     not say."""
 
@@ -87,7 +87,7 @@ class Program:
     points: list[Point] = field(default_factory=list)
     pieces: list[list[Step]] = field(default_factory=lambda: [[]])
     """Routines; where one begins, nobody knows where the arm is."""
-    held: dict[int, str] = field(default_factory=dict)
+    fixed: dict[int, str] = field(default_factory=dict)
     """Points that must not be moved, with the reason."""
     notes: list[str] = field(default_factory=list)
     """What a reader should know, in sentences."""
@@ -100,7 +100,7 @@ class Program:
         numbers: Sequence[Number],
         notation: Notation,
         file: int = 0,
-        told: Array | None = None,
+        external: Array | None = None,
     ) -> int:
         """
         Add a point and return its index.
@@ -108,14 +108,14 @@ class Program:
         Raises DataError: its numbers make no pose.
 
         file: which of the sources they stand in.
-        told: external axes at a pose, shape (m,).
+        external: positions of external axes at a pose, shape (m,).
         """
         where = self.sources[file].where(numbers[0].start)
         try:
             value = notation.value([number.value for number in numbers])
         except DataError as error:
             raise DataError(f'{where}: {error}') from None
-        self.points.append(Point(name, where, tuple(numbers), notation, value, told))
+        self.points.append(Point(name, where, tuple(numbers), notation, value, external))
         return len(self.points) - 1
 
     def add(self, step: Step) -> None:
@@ -139,7 +139,7 @@ class Program:
 
     def hold(self, point: int, why: str) -> None:
         """Keep a point from being moved."""
-        self.held.setdefault(point, why)
+        self.fixed.setdefault(point, why)
 
     @property
     def steps(self) -> list[Step]:
@@ -176,7 +176,7 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
     controller: where the controller's frames are on this robot, and the frames that were given.
     """
     count = len(controller.external)
-    carried = CarriedArm(robot.with_frames(base=np.eye(4)), count)
+    arm = CarriedArm(robot.with_frames(base=np.eye(4)), count)
     points = [_with_external(point, count) for point in program.points]
     seam, pieces = -1, []
     for steps in program.pieces:
@@ -185,28 +185,28 @@ def to_moves(program: Program, robot: Robot, controller: Controller) -> MoveProg
         for step in steps:
             if step.kind == 'joint' and moves and not program.one_seam:
                 seam += 1
-            moves.append(_move(step, seam, carried, controller, points))
+            moves.append(_move(step, seam, arm, controller, points))
         if moves:
             pieces.append(tuple(moves))
     still = np.zeros(count)
-    reported = tuple(still if point.told is None else point.told for point in points)
+    reported = tuple(still if point.external is None else point.external for point in points)
     values = tuple(point.value for point in points)
     return MoveProgram(values, tuple(pieces), reported if count else ())
 
 
 def _with_external(point: Point, count: int) -> Point:
     """Return a point that says where the external axes stand, as one of all joints does anyway."""
-    return point if point.value.ndim == 2 else point._replace(told=point.value[:count])
+    return point if point.value.ndim == 2 else point._replace(external=point.value[:count])
 
 
 def _move(
-    step: Step, seam: int, carried: CarriedArm, controller: Controller, points: Sequence[Point]
+    step: Step, seam: int, arm: CarriedArm, controller: Controller, points: Sequence[Point]
 ) -> Move:
     try:
         if step.end is None:
             raise DataError(step.why)
         tool = controller.tool(step.tool)
-        base, along = _base(step, points[step.end.point], carried, controller)
+        base, along = _base(step, points[step.end.point], arm, controller)
     except DataError as error:
         return Move('unknown', None, np.eye(4), where=step.where, seam=seam, why=str(error))
     return Move(
@@ -225,18 +225,16 @@ def _move(
     )
 
 
-def _base(
-    step: Step, end: Point, carried: CarriedArm, controller: Controller
-) -> tuple[Array, bool]:
+def _base(step: Step, end: Point, arm: CarriedArm, controller: Controller) -> tuple[Array, bool]:
     """Return the base frame of a move where the chain begins, and whether it goes along."""
-    if not carried.count:
+    if not arm.count:
         return controller.base(step.base), True
-    if end.told is None:
+    if end.external is None:
         raise DataError(f'{end.name} does not say where the external axes stand')
     if end.value.ndim == 1:
         return np.eye(4), step.along
     base, along = controller.base(step.base), controller.goes_along(step.base)
-    return base if along else np.asarray(carried.roots(end.told) @ base), along and step.along
+    return base if along else np.asarray(arm.roots(end.external) @ base), along and step.along
 
 
 def _use(ref: Ref, base: Array) -> Use:

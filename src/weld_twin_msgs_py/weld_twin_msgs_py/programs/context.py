@@ -29,7 +29,7 @@ class Context(NamedTuple):
         """Return how many joints the controller has as the arm's own."""
         return self.robot.n - len(self.controller.external)
 
-    def told(self, numbers: Sequence[Number | None]) -> Array | None:
+    def external(self, numbers: Sequence[Number | None]) -> Array | None:
         """
         Return the external axes of a point as joints of the model; None where one is missing.
 

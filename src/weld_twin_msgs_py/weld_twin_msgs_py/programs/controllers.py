@@ -167,7 +167,7 @@ class Controller:
     """In the order of the robot's first joints, which they are."""
     along: frozenset[str] | None = None
     """Names of bases that go along with a positioner, in lower case; None where nobody told."""
-    placed: bool = True
+    world_known: bool = True
     """Where bases that stand still count from is known. It is not of an arm on a track, unless
     told."""
     positioner: bool = False
@@ -217,7 +217,7 @@ class Controller:
                     f"program; say --on-positioner '{frame.name}', or --on-positioner none"
                 )
             moving = frame.name.lower() in self.along
-        if not moving and not self.placed:
+        if not moving and not self.world_known:
             raise DataError(
                 'positions in a frame that stands still count from the world of the controller, and '
                 'where the track begins in it is not known; say it with --world X,Y,Z,...'

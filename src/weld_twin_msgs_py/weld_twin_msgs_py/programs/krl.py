@@ -106,7 +106,7 @@ class KrlReader(Reader):
                 _OTHER: self._other,
                 _SET: self._set,
                 _BAS: self._bas,
-                _WAIT: lambda found: self.dwell(found.span(1)),
+                _WAIT: lambda match: self.dwell(match.span(1)),
                 _ROUTINE: self.new_piece,
             }
         )
@@ -177,7 +177,7 @@ class KrlReader(Reader):
                 numbers = [content.numbers[key] for key in keys]
                 reported = [content.numbers.get(label) for label in known]
                 point = self.program.add_point(
-                    name, numbers, notation, file, self.context.told(reported)
+                    name, numbers, notation, file, self.context.external(reported)
                 )
                 outer = [k for k in EXTERNAL if k in content.numbers and k not in known]
                 if any(content.numbers[key].value != 0.0 for key in outer):

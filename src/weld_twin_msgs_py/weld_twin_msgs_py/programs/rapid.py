@@ -95,7 +95,7 @@ class RapidReader(Reader):
             {
                 _MOVE: self._move,
                 _OTHER: self._other,
-                _WAIT: lambda found: self.dwell(found.span(2)),
+                _WAIT: lambda match: self.dwell(match.span(2)),
                 _CONF: self._conf,
                 _ROUTINE: self.new_piece,
             }
@@ -184,8 +184,8 @@ class RapidReader(Reader):
             point = self.program.add_point(name, numbers, self.context.degrees())
         else:
             numbers = self._numbers(parts[:2], (3, 4), name, start)
-            reported = self.context.told(given)
-            point = self.program.add_point(name, numbers, ABB_POSE, told=reported)
+            reported = self.context.external(given)
+            point = self.program.add_point(name, numbers, ABB_POSE, external=reported)
             if len(parts) > 2:
                 conf = self._numbers(parts[2:3], (4,), name, start)
                 self.suits[point] = quadrants([round(number.value) for number in conf])

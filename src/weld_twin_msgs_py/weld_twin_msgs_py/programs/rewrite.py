@@ -91,9 +91,9 @@ def check_written(before: Program, after: Program, points: Sequence[Array]) -> N
 
 
 def _same_external(was: Point, point: Point) -> bool:
-    if was.told is None or point.told is None:
-        return was.told is point.told
-    return bool(np.abs(was.told - point.told).max(initial=0.0) < UNMOVED)
+    if was.external is None or point.external is None:
+        return was.external is point.external
+    return bool(np.abs(was.external - point.external).max(initial=0.0) < UNMOVED)
 
 
 def _close(value: Array, point: Point) -> bool:

@@ -46,7 +46,7 @@ _ENDS = re.compile(
 """What is a flange where a tool hangs on it, and may be the tool's tip where it is the last link."""
 
 
-class Placed(NamedTuple):
+class FixedLink(NamedTuple):
     """A link that is fixed to another, where it is in that one (4, 4), and on how many joints."""
 
     link: str
@@ -56,7 +56,7 @@ class Placed(NamedTuple):
 
 def foot_of(
     tree: Tree, base: str, chain: Sequence[Joint], wanted: str | None
-) -> tuple[Placed, Placed]:
+) -> tuple[FixedLink, FixedLink]:
     """
     Return the link that the arm stands in and the controller's base, placed in the first link.
 
@@ -65,11 +65,11 @@ def foot_of(
     wanted: the link that was asked for with --base-link; it is both.
     """
     if wanted is not None:
-        return Placed(base, np.eye(4), 0), Placed(base, np.eye(4), 0)
+        return FixedLink(base, np.eye(4), 0), FixedLink(base, np.eye(4), 0)
     fixed = _fixed_to(tree, base)
     moving = [joint for joint in chain if joint.kind in MOVABLE]
     prefix = _prefix([joint.name for joint in moving])
-    named = {name.removeprefix(prefix): placed for name, placed in fixed.items()}
+    named = {name.removeprefix(prefix): link for name, link in fixed.items()}
     foot = fixed[moving[0].parent if base in _WORLDS and moving[0].parent in fixed else base]
     foot = named.get('base_link', foot)
     for name in _BASES:
@@ -109,7 +109,7 @@ def flange_link_of(
     return chosen, inverse(fixed[tip].T) @ fixed[chosen].T
 
 
-def _likeliest(fixed: dict[str, Placed], way: list[str]) -> str:
+def _likeliest(fixed: dict[str, FixedLink], way: list[str]) -> str:
     """Return the link that is the flange by its name; ``way`` leads to the tip."""
     ranks = {link: _rank(link, link != way[0], link in way[:-1]) for link in fixed}
     ordered = sorted(fixed, key=lambda link: (ranks[link], link not in way, fixed[link].steps))
@@ -141,27 +141,27 @@ def _rank(link: str, fixed: bool, carries: bool) -> int:
     return 4 if fixed and carries and re.search(rf'(^|_)({_ENDS.pattern})$', name) else 5
 
 
-def _fixed_to(tree: Tree, link: str, *, down_only: bool = False) -> dict[str, Placed]:
+def _fixed_to(tree: Tree, link: str, *, down_only: bool = False) -> dict[str, FixedLink]:
     """Return all links that fixed joints hold to a link, itself first, by name."""
-    out: dict[str, Placed] = {}
-    ahead = [Placed(link, np.eye(4), 0)]
+    out: dict[str, FixedLink] = {}
+    ahead = [FixedLink(link, np.eye(4), 0)]
     while ahead:
         at = ahead.pop(0)
         if at.link in out:
             continue
         out[at.link] = at
         ahead += [
-            Placed(joint.child, at.T @ joint.T_parent_joint, at.steps + 1)
+            FixedLink(joint.child, at.T @ joint.T_parent_joint, at.steps + 1)
             for joint in tree.below(at.link)
             if joint.kind == 'fixed'
         ]
         over = tree.above.get(at.link)
         if over is not None and over.kind == 'fixed' and not down_only:
-            ahead.append(Placed(over.parent, at.T @ inverse(over.T_parent_joint), at.steps + 1))
+            ahead.append(FixedLink(over.parent, at.T @ inverse(over.T_parent_joint), at.steps + 1))
     return out
 
 
-def _above(tree: Tree, named: dict[str, Placed], upper: str, lower: str) -> bool:
+def _above(tree: Tree, named: dict[str, FixedLink], upper: str, lower: str) -> bool:
     """Tell whether a link hangs somewhere below another: then that is a stand and no base."""
     link = named[lower].link if lower in named else ''
     while link in tree.above:

@@ -88,10 +88,10 @@ def write_urdf_like(
     origins, carrier = _moving(chain.down[: last + 1], chain.start, was, now)
     plain = now[-1] @ inverse(based.T_flange_tool) @ nominal.T_flange_tool
     hand = Hand(carrier, plain, now[-1])
-    carried = _carried(given, nominal, chain.down[-1].child)
-    for joint, origin in [*moved, *origins, *_fixed(chain.down[last + 1 :], hand, carried)]:
+    on_tip = _flange_on_tip(given, nominal, chain.down[-1].child)
+    for joint, origin in [*moved, *origins, *_fixed(chain.down[last + 1 :], hand, on_tip)]:
         _set(joints[joint.name], origin)
-    if carried:
+    if on_tip:
         at = hand.plain if len(chain.down) > last + 1 else hand.carrier
         end = _put_between(root, joints[chain.down[-1].name], inverse(at) @ hand.tip)
         if end:
@@ -153,7 +153,7 @@ def _moving(
     return out, after
 
 
-def _carried(given: GivenUrdf, nominal: Robot, tip: str) -> bool:
+def _flange_on_tip(given: GivenUrdf, nominal: Robot, tip: str) -> bool:
     """Tell whether the flange is the tip or hangs on it: a tool that moves must not take it along."""
     assert nominal.controller is not None
     above, link = read_tree(given.path).above, nominal.controller.flange_link
@@ -162,16 +162,16 @@ def _carried(given: GivenUrdf, nominal: Robot, tip: str) -> bool:
     return link == tip
 
 
-def _fixed(behind: list[Joint], hand: Hand, carried: bool) -> list[tuple[Joint, Array]]:
+def _fixed(behind: list[Joint], hand: Hand, on_tip: bool) -> list[tuple[Joint, Array]]:
     """Return the fixed joints before the tip whose origins change: the first, and that of the tool."""
     if not behind:
         return []
-    goal = hand.plain if carried or len(behind) > 1 else hand.tip
+    goal = hand.plain if on_tip or len(behind) > 1 else hand.tip
     rest = np.eye(4)
     for joint in behind[1:]:
         rest = rest @ joint.T_parent_joint
     out = [(behind[0], inverse(hand.carrier) @ goal @ inverse(rest))]
-    if len(behind) > 1 and not carried:
+    if len(behind) > 1 and not on_tip:
         tool = behind[-1].T_parent_joint @ inverse(hand.plain) @ hand.tip
         out.append((behind[-1], tool))
     return out

@@ -17,7 +17,7 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.errors import ModelError
 
 from .axes_to_dh import Axis, dh_rows, inverse
-from .controller_links import FLANGE, Placed, flange_link_of, foot_of
+from .controller_links import FLANGE, FixedLink, flange_link_of, foot_of
 from .urdf_tree import MOVABLE, Joint, Tree, parse_tree, read_tree
 
 _TURN = 2.0 * np.pi + 1e-6
@@ -138,7 +138,7 @@ def _beside(tree: Tree, chain: Chain, robot: Robot, path: Path | str) -> Robot:
 
 
 def _controller(
-    robot: Robot, origin: tuple[Placed, Placed], flange: tuple[str, Array]
+    robot: Robot, origin: tuple[FixedLink, FixedLink], flange: tuple[str, Array]
 ) -> ControllerFrames:
     """Return the frames of links: foot and base placed in the first, the flange in the tip."""
     (foot, base), (flange_link, T_tip) = origin, flange
@@ -238,17 +238,17 @@ def _robot(
     moving = [joint for joint in chain if joint.kind in MOVABLE]
     T = start
     axes: list[Axis] = []
-    carried: list[list[tuple[float, Array]]] = []
+    loads: list[list[tuple[float, Array]]] = []
     on_chain = {joint.name for joint in chain}
     for joint in chain:
         T = T @ joint.T_parent_joint
         if joint.kind in MOVABLE:
             axes.append(Axis(T[:3, :3] @ joint.axis, T[:3, 3], joint.kind == 'prismatic'))
-            carried.append([])
-        if carried:
-            carried[-1] += _masses(tree, joint.child, T, on_chain)
+            loads.append([])
+        if loads:
+            loads[-1] += _masses(tree, joint.child, T, on_chain)
     T_base_first, rows, frames = dh_rows(axes, T)
-    mass, com = _merged(carried, frames)
+    mass, com = _merged(loads, frames)
     theta, d, a, alpha, beta = np.array(rows).T
     limits = np.array([(joint.lower, joint.upper, joint.velocity) for joint in moving])
     return Robot(
@@ -284,15 +284,15 @@ def _masses(tree: Tree, link: str, T: Array, on_chain: set[str]) -> list[tuple[f
 
 
 def _merged(
-    carried: list[list[tuple[float, Array]]], frames: list[Array]
+    loads: list[list[tuple[float, Array]]], frames: list[Array]
 ) -> tuple[Array | None, Array | None]:
     """Return mass (n,) and centre (n, 3) in the DH end frames; None when nothing weighs."""
-    mass = np.array([sum(m for m, _ in bodies) for bodies in carried])
+    mass = np.array([sum(m for m, _ in bodies) for bodies in loads])
     if not mass.any():
         return None, None
     com = np.zeros((mass.size, 3))
     for k in np.flatnonzero(mass):
-        centre = sum(m * c for m, c in carried[k]) / mass[k]
+        centre = sum(m * c for m, c in loads[k]) / mass[k]
         com[k] = frames[k][:3, :3].T @ (centre - frames[k][:3, 3])
     return mass, com
 

@@ -214,7 +214,7 @@ def _in_order(
         result = 'more than one set of' if chosen else 'no'
         raise DataError(
             f'the table has {result} columns for the {robot.n} joints of robot {robot.name!r} '
-            f'({", ".join(robot.joint_names)}){_found(parts, _numbered(parts))}; '
+            f'({", ".join(robot.joint_names)}){_listing(parts, _numbered(parts))}; '
             '--joint-columns decides'
         )
     return tuple(chosen[0][k] for k in sorted(chosen[0]))
@@ -261,7 +261,7 @@ def _numbered(parts: Sequence[Named]) -> dict[tuple[str, ...], dict[int, str]]:
     return out
 
 
-def _found(parts: Sequence[Named], numbered: Mapping[tuple[str, ...], Mapping[int, str]]) -> str:
+def _listing(parts: Sequence[Named], numbered: Mapping[tuple[str, ...], Mapping[int, str]]) -> str:
     """Return what the header has: the joints that were understood, then the other names."""
     joints = [name for group in numbered.values() for _, name in sorted(group.items())]
     others = [part.name for part in parts if part.name not in joints]

@@ -95,7 +95,7 @@ def joint_units(
     robot, names, options, said, judge: as for `joint_angles`.
     """
     turning, sliding = ~robot.prismatic, robot.prismatic
-    reported = [_told(names, kind, given) for kind, given in _kinds(robot, options)]
+    reported = [_given_unit(names, kind, given) for kind, given in _kinds(robot, options)]
     usual = Units(
         reported[0] or _usual_angle(q[:, turning]), reported[1] or _usual_slide(q, robot)
     )
@@ -151,7 +151,7 @@ def _kinds(robot: Robot, options: TableOptions) -> tuple[tuple[Sequence[bool], s
     )
 
 
-def _told(names: Sequence[str], kind: Sequence[bool], given: str | None) -> str | None:
+def _given_unit(names: Sequence[str], kind: Sequence[bool], given: str | None) -> str | None:
     """Return the unit that an option or the header gives one of some columns."""
     reported = (unit_of(name) for name, meant in zip(names, kind, strict=True) if meant)
     return given or next((unit for unit in reported if unit), None)

@@ -232,13 +232,13 @@ def read_c3d(path: Path, marker: str | None) -> Read:
     except (AttributeError, AssertionError, ValueError, KeyError, EOFError) as error:
         raise DataError(f"'{path}' cannot be read as C3D: {error}") from None
     at = labels.index(one_of(labels, marker))
-    rows = [_placed((number - first) / rate, points[at]) for number, points in frames]
+    rows = [_row((number - first) / rate, points[at]) for number, points in frames]
     header = ['time [s]', *(f'{axis} [{unit}]' for axis in 'xyz')]
     said = [f'read as C3D; measured is {labels[at]!r}']
     return Read(header, rows, list(range(1, len(rows) + 1)), said)
 
 
-def _placed(time: float, point: Array) -> list[str]:
+def _row(time: float, point: Array) -> list[str]:
     """Return a row; a residual below zero says that the marker was not seen."""
     seen = point[3] >= 0.0 and bool(np.isfinite(point[:3]).all())
     return [f'{time:.9g}', *(f'{v:.9g}' if seen else '' for v in point[:3])]

@@ -13,9 +13,9 @@ from weld_twin_core.arm import catalog
 from weld_twin_msgs_py.bags import BagReader, bag_info, provenance
 from weld_twin_msgs_py.messages import from_messages
 from weld_twin_nodes.harness import Cell
+from weld_twin_nodes.offline.given_twin import build_twin
 from weld_twin_nodes.offline.seam_motion import plan_motion, stamps
 from weld_twin_nodes.offline.simulation import Simulation, write_simulation
-from weld_twin_nodes.offline.told_twin import build_twin
 
 pytestmark = pytest.mark.cells
 

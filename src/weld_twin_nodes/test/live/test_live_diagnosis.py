@@ -27,7 +27,7 @@ from weld_twin_msgs_py.messages.topics import (
 )
 from weld_twin_nodes.live.diagnosis_worker import Finding, Job, Worker, find
 from weld_twin_nodes.live.live_diagnosis import LONGEST, Window
-from weld_twin_nodes.offline.told_twin import told_cameras
+from weld_twin_nodes.offline.given_twin import given_cameras
 
 START = 1_700_000_000_000_000_000
 ONE_JOINT = Robot.from_mapping(
@@ -183,7 +183,7 @@ def test_what_a_camera_sees_is_diagnosed_in_the_other_process(tmp_path):
         window.take(Role.JOINTS, make.joint_state(stamp, load('ur5').joint_names, q))
     for t, rows in seen[1:]:
         window.take_image(make.image_points(START + round(t * 1e9), 'eye', rows))
-    cameras, targets = told_cameras([f'eye={tmp_path}/eye.yaml'], [f'b={tmp_path}/board.yaml'])
+    cameras, targets = given_cameras([f'eye={tmp_path}/eye.yaml'], [f'b={tmp_path}/board.yaml'])
     job = Job(
         window.recording(least=3.0),
         load('ur5'),

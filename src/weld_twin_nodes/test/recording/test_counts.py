@@ -78,7 +78,7 @@ def test_a_node_of_the_project_is_never_taken_for_somebody_else():
     for look in np.arange(0.0, 2 * NEW, 0.2):
         book.meet(TWIN, 10.0 + look)
         book.meet('/driver', 10.0 + look)
-    assert book.silent_since(10.5) == book.never_told() == [TWIN]
+    assert book.silent_since(10.5) == book.silent_nodes() == [TWIN]
 
 
 def test_a_node_that_did_not_hear_all_is_named():

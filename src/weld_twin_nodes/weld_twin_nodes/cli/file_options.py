@@ -225,7 +225,9 @@ def _clamped(file: str, robot: Robot, options: TableOptions) -> Table:
 
     touches, said = read_contacts(file, robot, Artefact((Contact('bar'),)), options)
     count = touches.joints.t.size
-    held = Measurements(touches.joints.t, np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)))
+    clamped = Measurements(
+        touches.joints.t, np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1))
+    )
     note = f'{count} postures with one bar clamped at both ends; diagnose with --align tool'
     said = (*(one for one in said if 'touch' not in one), note)
-    return Table(replace(touches, contacts=None, measured=held, notes=said), said)
+    return Table(replace(touches, contacts=None, measured=clamped, notes=said), said)

@@ -140,7 +140,7 @@ def inputs_of(**files: str | Sequence[str]) -> list[InputFile]:
 
 def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
     """Return the robot with the effects of a file; say which values no machine has."""
-    from ..offline.told_twin import build_twin
+    from ..offline.given_twin import build_twin
 
     # Recordings that it is for are checked, and mended, by themselves.
     twin = build_twin(robot, path, implausible=implausible, mended=True)
@@ -150,7 +150,7 @@ def twin_of(robot: Robot, path: str, *, implausible: bool = False) -> Twin:
 
 def say_doubts(twin: Twin, path: str) -> None:
     """Say on stderr which values of a model no machine has."""
-    from ..offline.told_twin import doubts
+    from ..offline.given_twin import doubts
 
     for doubt in doubts(twin):
         print(f'weld-twin: {path}: {doubt}', file=sys.stderr)
@@ -158,15 +158,15 @@ def say_doubts(twin: Twin, path: str) -> None:
 
 def cameras_of(args: argparse.Namespace) -> tuple[tuple[Camera, ...], tuple[Target, ...]]:
     """Return the cameras and targets that the options describe."""
-    from ..offline.told_twin import told_cameras
+    from ..offline.given_twin import given_cameras
 
-    return told_cameras(args.camera, args.target)
+    return given_cameras(args.camera, args.target)
 
 
 def pair(text: str, option: str, shown: str, sign: str = '=') -> tuple[str, str]:
     """Return both sides of what is given as ``shown``, such as NAME=FILE; a DataError without them."""
-    name, found, value = text.partition(sign)
-    if not (name and found and value):
+    name, mark, value = text.partition(sign)
+    if not (name and mark and value):
         raise DataError(f"{option} takes {shown}, got '{text}'")
     return name, value
 
@@ -192,7 +192,7 @@ def topics_of(args: argparse.Namespace) -> TopicNames:
 
 
 def _learned_by_effort(args: argparse.Namespace) -> bool:
-    from ..offline.told_twin import by_effort
+    from ..offline.given_twin import by_effort
 
     given = (getattr(args, name, None) for name in ('model', 'effects_known'))
     return any(by_effort(path) for path in given if path)

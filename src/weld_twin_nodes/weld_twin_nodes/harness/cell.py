@@ -329,21 +329,21 @@ class Cell:
         Raises CellTimeout: it has taken in nothing more for `LIMIT` seconds; the message says what
         is missing.
         """
-        held: dict[str, int] = {}
+        recorded: dict[str, int] = {}
 
         def lacking() -> str:
             short = [
-                f'{held.get(topic, 0)} of {count} on {topic}'
+                f'{recorded.get(topic, 0)} of {count} on {topic}'
                 for topic, count in counts.items()
-                if held.get(topic, 0) < count
+                if recorded.get(topic, 0) < count
             ]
             return f'the recorder, which holds {", ".join(short)}'
 
         def all_there() -> bool:
-            held.update(json.loads(self.trigger(f'{recorder}/counts').message))
-            return all(held.get(topic, 0) >= count for topic, count in counts.items())
+            recorded.update(json.loads(self.trigger(f'{recorder}/counts').message))
+            return all(recorded.get(topic, 0) >= count for topic, count in counts.items())
 
-        self.wait(all_there, lacking, progress=lambda: str(held))
+        self.wait(all_there, lacking, progress=lambda: str(recorded))
 
     # Waiting ---------------------------------------------------------------------------------
 

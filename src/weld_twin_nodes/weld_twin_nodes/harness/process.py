@@ -28,7 +28,7 @@ DOMAINS = range(1, 102)
 """Domains whose ports stay clear of those Linux hands out by itself."""
 FIRST, APART = 7400, 250
 """First port of domain 0, and how many ports a domain has: section 9.6.1 of the RTPS standard."""
-HELD = 5
+LOCK_PORT = 5
 """Port of a domain that no participant takes: two are for multicast, its participants' begin at ten."""
 TAKEN = range(10, 20)
 """Ports of the first five participants of a domain: one of them is there as long as any is new."""
@@ -49,9 +49,9 @@ def own_domain() -> Iterator[int]:
     start = os.getpid() % len(DOMAINS)
     for domain in (*DOMAINS[start:], *DOMAINS[:start]):
         first = FIRST + APART * domain
-        with ExitStack() as held:
+        with ExitStack() as sockets:
             try:
-                held.enter_context(_port(first + HELD))
+                sockets.enter_context(_port(first + LOCK_PORT))
                 for port in TAKEN:
                     _port(first + port).close()
             except OSError:
@@ -110,7 +110,7 @@ class NodeProcess:
     def __init__(
         self, node: str | Sequence[str], parameters: Mapping[str, Any], folder: Path
     ) -> None:
-        self._told = False
+        self._interrupted = False
         self.known = isinstance(node, str)
         self.name = node if isinstance(node, str) else Path(node[0]).name
         self._log = folder / f'{self.name}.log'
@@ -153,8 +153,8 @@ class NodeProcess:
 
     def interrupt(self) -> None:
         """Send what Ctrl-C sends, once, if the process still runs."""
-        if self.code is None and not self._told:
-            self._told = True
+        if self.code is None and not self._interrupted:
+            self._interrupted = True
             self.signal(signal.SIGINT)
 
     def stop(self) -> int:

@@ -16,9 +16,9 @@ from weld_twin_core.arm.robot import Robot
 from weld_twin_core.errors import TwinError
 from weld_twin_msgs_py.robots import load_robot, parse_urdf
 
-from ..offline.told_twin import build_twin
+from ..offline.given_twin import build_twin
 from .cell_node import CellNode
-from .robot_settings import told_by_topic
+from .robot_settings import names_topic
 
 ASKED = {'error_injector': 'effects', 'forward_kinematics_twin': 'twin_effects'}
 """Nodes whose parameters tell how the bag came about, and where their effects are noted."""
@@ -75,16 +75,16 @@ class AskedNodes:
                 del self._unasked[name]
                 asked = QUESTIONS + (['seed'] if name == 'error_injector' else [])
                 question = GetParameters.Request(names=asked)
-                client.call_async(question).add_done_callback(partial(self._told, name))
+                client.call_async(question).add_done_callback(partial(self._answered, name))
         if not self._unasked:
             self._node.destroy_timer(self._asking)
 
-    def _told(self, name: str, answer: Future) -> None:
+    def _answered(self, name: str, answer: Future) -> None:
         self._take(name, answer.result().values)
 
     def _take(self, name: str, values: list[Any]) -> None:
         robot_name, base, tip, model, text = [value.string_value for value in values[:5]]
-        if told_by_topic(robot_name) and not self._description:
+        if names_topic(robot_name) and not self._description:
             self._waiting.append((name, values))
             return
         try:
@@ -100,7 +100,7 @@ class AskedNodes:
             self._note('seed', values[5].integer_value)
 
     def _robot(self, name: str, base: str | None, tip: str | None) -> Robot:
-        if told_by_topic(name):
+        if names_topic(name):
             return parse_urdf(self._description, 'robot_description', base, tip)
         return load_robot(name, base, tip)
 

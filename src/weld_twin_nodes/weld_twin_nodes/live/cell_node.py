@@ -152,7 +152,7 @@ class CellNode(TellingNode):
         *,
         required: bool = False,
         at_once: bool = False,
-        held: bool = False,
+        hold_last: bool = False,
     ) -> Input:
         """
         Subscribe to a topic of the table once the outputs have their subscribers.
@@ -161,7 +161,7 @@ class CellNode(TellingNode):
         of other types that stand for the same are turned into those of the table before.
         required: the node can do nothing without this input; health calls its absence stale.
         at_once: do not wait for the subscribers of the outputs.
-        held: see `watch`.
+        hold_last: see `watch`.
 
         Raises ModelError: by a remap the node publishes the topic itself, or has it as another
         input.
@@ -177,7 +177,7 @@ class CellNode(TellingNode):
                 f"{topic.name} is remapped to '{name}', which is another input of this node: it would "
                 'be compared with itself'
             )
-        state = self.watch(name, required=required, steady=topic.steady, held=held)
+        state = self.watch(name, required=required, steady=topic.steady, hold_last=hold_last)
         qos = topic.requested
         if self.setting('reliable_inputs'):
             qos = replace(qos, reliability=topic.offered.reliability)
@@ -362,7 +362,7 @@ class CellNode(TellingNode):
             self.get_logger().info(said)
         self.keep('waiting', said, logged=False)
 
-    def serve_until(self, told: Callable[[], bool], what: str) -> None:
+    def serve_until(self, condition: Callable[[], bool], what: str) -> None:
         """
         Serve until something is told that the node can do nothing without; say what it waits for.
 
@@ -372,7 +372,7 @@ class CellNode(TellingNode):
         runner = SingleThreadedExecutor(context=self.context)
         runner.add_node(self)
         try:
-            while not told():
+            while not condition():
                 if not self.context.ok():
                     raise ModelError(f'stopped while waiting for {what}')
                 runner.spin_once(timeout_sec=TURN)

@@ -144,7 +144,7 @@ class Compensator(ManagedNode):
         self._streamed: tuple[Any, float | None] = self._around
         self._model: LoadedModel | None = None
         self._active = False
-        self._told = self._outdated = ''
+        self._reported = self._outdated = ''
         self._watch = Supervision()
         self._listened, self._most_age = False, self.setting('max_age')
         self._stream: PoseStream | None = None
@@ -156,8 +156,8 @@ class Compensator(ManagedNode):
         self._frame = PlannedFrame(self.setting('base_frame'))
         self._encoders: dict[str, tuple[PoseEncoder, TwistEncoder]] = {}
         self.answer('~/reload', self._reload)
-        self.listen(TOOL_WRENCH, self._on_wrench, held=True)
-        self.listen(TEMPERATURE, self._on_temperature, held=True)
+        self.listen(TOOL_WRENCH, self._on_wrench, hold_last=True)
+        self.listen(TEMPERATURE, self._on_temperature, hold_last=True)
         self.listen(JOINT_STATES, self._on_joints)
         self.listen(DEVIATION, self._on_deviation)
         self.listen(POSE_IN, self._on_pose)
@@ -295,9 +295,9 @@ class Compensator(ManagedNode):
         if self._model is not None:
             self._outdated = self._model.outdated(self.setting('max_model_age'))
         why = self._withdrawn() if self._active else ''
-        if why != self._told and why.partition(':')[0] != self._told.partition(':')[0]:
+        if why != self._reported and why.partition(':')[0] != self._reported.partition(':')[0]:
             self.get_logger().warning(why or 'the model is used again')
-        self._told = why
+        self._reported = why
         self.keep(WITHDRAWN, why, logged=False)
 
     def _present(self) -> ProgramModel:

@@ -56,7 +56,7 @@ class SentBook(Book):
                     )
         return out
 
-    def never_told(self) -> list[str]:
+    def silent_nodes(self) -> list[str]:
         """Return the nodes of the project that were met and have not told anything at all."""
         return [node for node in self._listened if _ours(node) and node not in self.nodes()]
 
@@ -68,11 +68,11 @@ class SentBook(Book):
 
     def silent_since(self, then: float) -> list[str]:
         """Return the nodes met that tell, or may tell, of themselves and have not since [s]."""
-        told, recent = self.nodes(), self.nodes(then)
+        known, recent = self.nodes(), self.nodes(then)
         return [
             node
             for node, listened in self._listened.items()
-            if node not in recent and (node in told or listened < NEW or _ours(node))
+            if node not in recent and (node in known or listened < NEW or _ours(node))
         ]
 
 

@@ -73,16 +73,16 @@ class DeviationAnalyzer(CellNode):
             self.setting('path_length'),
             self.setting('buffer'),
             self.setting('max_gap'),
-            base_told=True,
+            awaits_base=True,
         )
-        self._held_since: float | None = None
+        self._waiting_since: float | None = None
         self._base_timer = self.every(BASE_EVERY, self._look_for_base)
         self._vector = self.offer(DEVIATION)
         self._encode = Vector3Encoder(base_frame(self))
         self._frame = MeasuringFrame(self.setting('measuring_frame'))
         self._metrics = self.offer(DEVIATION_METRICS, awaited=False)
         self._stamp = 0
-        self._seen = self._told = 0
+        self._seen = self._published = 0
         self._every = self.setting('metrics_every')
         self.every(self.setting('metrics_idle'), self._on_idle)
         self.every(LOOK_EVERY, self._look_at_clocks)
@@ -94,7 +94,7 @@ class DeviationAnalyzer(CellNode):
         """Forget what was not paired, and begin the metrics anew."""
         self._measured_inputs.clear()
         self._deviations.reset()
-        self._seen = self._told = 0
+        self._seen = self._published = 0
 
     def _on_measured(self, _: Role, message: Any) -> None:
         position = from_messages.position(message)
@@ -110,18 +110,18 @@ class DeviationAnalyzer(CellNode):
     @property
     def waiting_for_base(self) -> int:
         """Return how many pairs wait to be told in the axes of the base."""
-        return self._deviations.held
+        return self._deviations.waiting_for_base
 
     def _look_for_base(self) -> None:
         """Take the robot's own base for pairs that have waited long enough for another."""
-        if not self._deviations.held:
+        if not self._deviations.waiting_for_base:
             return
         now = time.monotonic()
-        if self._held_since is None:
-            self._held_since = now
+        if self._waiting_since is None:
+            self._waiting_since = now
         topic = self.resolve_topic_name(TWIN_BASE.relative)
         patience = BASE_SOMEBODY if self.count_publishers(topic) else BASE_NOBODY
-        if now - self._held_since < patience:
+        if now - self._waiting_since < patience:
             return
         self._base_timer.cancel()
         self.remark(f'{topic}: nothing heard; the base is taken to be where the robot has it')
@@ -141,7 +141,7 @@ class DeviationAnalyzer(CellNode):
     def _on_idle(self) -> None:
         """Tell the last metrics of a run once nothing more comes."""
         samples = self._deviations.samples
-        if samples == self._seen != self._told:
+        if samples == self._seen != self._published:
             self._publish_metrics()
         self._seen = samples
 
@@ -158,7 +158,7 @@ class DeviationAnalyzer(CellNode):
         )
 
     def _publish_metrics(self) -> None:
-        self._told = self._deviations.samples
+        self._published = self._deviations.samples
         self._metrics.publish(
             self.messages.diagnostics(
                 self._stamp,

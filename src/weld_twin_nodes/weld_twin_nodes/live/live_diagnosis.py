@@ -31,14 +31,14 @@ from weld_twin_msgs_py.messages.topics import (
     TopicNames,
 )
 
-from ..offline.told_twin import build_twin, told_cameras
+from ..offline.given_twin import build_twin, given_cameras
 from .diagnosis_worker import Finding, Job, Worker
 from .managed_node import ManagedNode
 from .robot_settings import (
     JOINT_SETTINGS,
     MEASURED_SETTINGS,
     ROBOT_SETTINGS,
-    placed_twin,
+    place_twin,
     robot_of,
 )
 from .run_node import run
@@ -211,7 +211,7 @@ class LiveDiagnosis(ManagedNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('live_diagnosis', **kwargs)
-        self._twin = placed_twin(self, build_twin(robot_of(self), self.setting('model')))
+        self._twin = place_twin(self, build_twin(robot_of(self), self.setting('model')))
         self._align = frames_named(self.setting('align'))
         self._names = self._looked_with()
         self._window = self._empty_window()
@@ -230,7 +230,7 @@ class LiveDiagnosis(ManagedNode):
             [part for part in self.setting(name).split(',') if part]
             for name in ('cameras', 'targets')
         )
-        cameras, targets = told_cameras(*texts)
+        cameras, targets = given_cameras(*texts)
         return TopicNames(cameras=cameras, targets=targets)
 
     def prepare(self) -> None:
@@ -239,8 +239,8 @@ class LiveDiagnosis(ManagedNode):
     def begin(self) -> None:
         """Listen, and diagnose from time to time."""
         for topic, role in INPUTS.items():
-            required, held = role is Role.JOINTS, role in SIGNALS
-            self.listen(topic, partial(self._take, role), required=required, held=held)
+            required, hold_last = role is Role.JOINTS, role in SIGNALS
+            self.listen(topic, partial(self._take, role), required=required, hold_last=hold_last)
         if self._names.cameras:
             self.listen(IMAGE_POINTS, self._window.take_image)
         self._measured = MeasuredInputs(self, self._take)

@@ -37,7 +37,7 @@ class Counted:
         self._sent: dict[tuple[str, str], Sent] = {}
         self._base = (0, 0)
         self._short: deque[int] = deque(maxlen=TELLS)
-        self._told = False
+        self._heard = False
         self._before = self._now = 0
 
     @property
@@ -56,7 +56,7 @@ class Counted:
         sent, new = word.sent[state.topic], teller not in self._sent
         alone = not self._sent
         self._sent[teller] = sent
-        self._told = True
+        self._heard = True
         if new or not state.matched:  # what was sent before the two met is no loss
             whole = alone and sent.first is not None and sent.first == state.first
             self._base = (0, 0) if whole else (self._total(), state.received)
@@ -66,9 +66,9 @@ class Counted:
 
     def look(self) -> int:
         """Return how many messages are missing for good; to be called once a second."""
-        if not self._told and self._sent:
+        if not self._heard and self._sent:
             self._short.append(self._lack())
-        self._told = False
+        self._heard = False
         if len(self._short) == TELLS:
             self._now = max(min(self._short), 0)  # what is sent again comes after all
         return self._before + self._now

@@ -15,10 +15,10 @@ from weld_twin_core.twin.twin import Twin
 from weld_twin_msgs_py.assembly import Intake
 from weld_twin_msgs_py.messages.topics import JOINT_STATES, TEMPERATURE, TOOL_WRENCH
 
-from ..offline.told_twin import build_twin, doubts
+from ..offline.given_twin import build_twin, doubts
 from ..streams.twin_stream import JointStream, Sample
 from .cell_node import CellNode
-from .robot_settings import JOINT_SETTINGS, ROBOT_SETTINGS, placed_twin, robot_of
+from .robot_settings import JOINT_SETTINGS, ROBOT_SETTINGS, place_twin, robot_of
 from .settings import Setting
 
 MODEL_SETTINGS = (
@@ -47,8 +47,8 @@ class ModelNode(CellNode):
 
     def start(self) -> None:
         """Take input; to be called when the outputs are there."""
-        self.listen(TOOL_WRENCH, self.stream.take_wrench, held=True)
-        self.listen(TEMPERATURE, self.stream.take_temperature, held=True)
+        self.listen(TOOL_WRENCH, self.stream.take_wrench, hold_last=True)
+        self.listen(TEMPERATURE, self.stream.take_temperature, hold_last=True)
         self._input = self.listen(JOINT_STATES, self._on_joints, required=True)
 
     def time_went_back(self) -> None:
@@ -77,7 +77,7 @@ class ModelNode(CellNode):
         twin = build_twin(self.robot, self.setting('model'), effects)
         for doubt in doubts(twin):
             self.warn(doubt, doubt)
-        return placed_twin(self, twin)
+        return place_twin(self, twin)
 
     def why_not(self, name: str, value: Any) -> str:
         """Return what is wrong with effects that are set."""

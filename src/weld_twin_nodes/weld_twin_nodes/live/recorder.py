@@ -37,7 +37,7 @@ LOOK_EVERY = 0.2
 """Seconds between two looks for new topics."""
 DRAIN_EVERY = 0.05
 """Seconds between two looks at whether an ending recorder has everything."""
-TOLD_WITHIN = 2.0
+COUNTED_WITHIN = 2.0
 """
 Seconds an ending recorder waits for the publishers' last counts. Each tells once a second; one that
 takes longer stands still, and an end may take three seconds in all.
@@ -151,7 +151,7 @@ class RecordingRun:
         if lacking != self._lacked:
             self._lacked, self._moved = lacking, now
         since = now - self._ending_since
-        untold = self._untold() and since < TOLD_WITHIN
+        untold = self._untold() and since < COUNTED_WITHIN
         within = ARRIVED_WITHIN if self._still_sent(lacking) else FLOWS_WITHIN
         coming = lacking and now - self._moved < within
         if not (untold or coming) or since > LONGEST or self._bag.failure is not None:
@@ -203,7 +203,7 @@ class RecordingRun:
         sentences = [short.sentence(name) for name, short in lacking.items()]
         unknown = [name for name, topic in self._topics.items() if not topic.source.kind]
         sentences += [f'{name}: nobody published this topic' for name in unknown]
-        silent = set(self._book.never_told())
+        silent = set(self._book.silent_nodes())
         if self._ending_since is not None:
             silent.update(self._untold())
         sentences += [f'{named(node)} has not told what it sent' for node in sorted(silent)]

@@ -56,7 +56,7 @@ def base_on_tf(node: CellNode) -> Array:
     if frames.lack:
         raise ModelError(f'base_from_tf cannot be done: {frames.lack}')
 
-    def told() -> bool:
+    def known() -> bool:
         try:
             frames.tree.latest(measuring, base)
         except NoTransform as error:
@@ -64,8 +64,8 @@ def base_on_tf(node: CellNode) -> Array:
             return False
         return True
 
-    if not told():
-        node.serve_until(told, f'/tf to tell where {base!r} is in {measuring!r}')
+    if not known():
+        node.serve_until(known, f'/tf to tell where {base!r} is in {measuring!r}')
     node.keep('frames', '')
     T = frames.tree.latest(measuring, base)
     node.remark(f'the base is where /tf has {base!r} in {measuring!r}')
@@ -124,7 +124,7 @@ def base_frame(node: CellNode) -> str:
     return node.setting('base_frame') or BASE
 
 
-def placed(node: CellNode, robot: Robot) -> Robot:
+def place_robot(node: CellNode, robot: Robot) -> Robot:
     """
     Return the robot with its base where the node's parameters put it.
 
@@ -141,9 +141,9 @@ def placed(node: CellNode, robot: Robot) -> Robot:
     return robot.with_origin(base_on_tf(node))
 
 
-def placed_twin(node: CellNode, twin: Twin) -> Twin:
+def place_twin(node: CellNode, twin: Twin) -> Twin:
     """Return the twin of a model likewise; the parameter counts more than a fitted base."""
-    robot = placed(node, twin.robot)
+    robot = place_robot(node, twin.robot)
     moved = abs(robot.T_world_base - twin.robot.T_world_base).max()
     if moved > 0.0:
         node.remark('the base that was given is used; the base of the model differs from it')
@@ -252,18 +252,18 @@ def robot_of(node: CellNode) -> Robot:
     """
     name = node.setting('robot')
     base, tip = node.setting('base_link') or None, node.setting('tip_link') or None
-    if told_by_topic(name):
+    if names_topic(name):
         topic = node.resolve_topic_name(ROBOT_DESCRIPTION.relative if name == 'topic' else name)
         robot = _described(node, topic, lambda text: parse_urdf(text, topic, base, tip))
     else:
         robot = load_robot(name, base, tip)
-    robot = placed(node, robot)
+    robot = place_robot(node, robot)
     given = node.has_parameter('joint_map')
     node.take_robot(robot, joint_names(node, robot) if given else None)
     return robot
 
 
-def told_by_topic(name: str) -> bool:
+def names_topic(name: str) -> bool:
     """Return whether a robot's name means a topic with its URDF: 'topic', or a topic's name."""
     absolute = name.startswith('/') and not Path(name).suffix and not Path(name).is_file()
     return name == 'topic' or absolute

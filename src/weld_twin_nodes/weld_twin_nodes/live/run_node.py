@@ -131,7 +131,7 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
         InvalidParameterValueException,
         InvalidParameterTypeException,
     ) as error:
-        return _told(error)
+        return _reported(error)
     except Exception:
         if rclpy.ok():
             raise
@@ -140,7 +140,7 @@ def run(make: Callable[[], CellNode], args: list[str] | None = None) -> int:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
-    return 0 if node is None or node.failure is None else _told(node.failure)
+    return 0 if node is None or node.failure is None else _reported(node.failure)
 
 
 SECURITY = 'security'
@@ -194,6 +194,6 @@ def _made(make: Callable[[], CellNode]) -> CellNode:
         raise ModelError(f'{said}; {UNLOCKED}') from None
 
 
-def _told(error: Exception) -> int:
+def _reported(error: Exception) -> int:
     print(f'weld_twin: {error}', file=sys.stderr)
     return USAGE_ERROR

@@ -47,7 +47,7 @@ class TellingNode(Node):
         self.partners: list[Callable[[], list[str]]] = []
         self._warned: dict[str, float] = {}
         self._losses: dict[str, Losses] = {}
-        self._held: list[Input] = []
+        self._holding: list[Input] = []
         self._unmatched: list[str] = []
         self.declare()
         self.health = Health(self.get_fully_qualified_name(), self.setting('stale_after'))
@@ -133,24 +133,24 @@ class TellingNode(Node):
 
     # Inputs ----------------------------------------------------------------------------------
 
-    def watch(self, name: str, *, required: bool, steady: bool, held: bool = False) -> Input:
+    def watch(self, name: str, *, required: bool, steady: bool, hold_last: bool = False) -> Input:
         """
         Return a new input, whose rate, age and losses are told from now on.
 
-        held: its last value counts until the next one comes; that it does so without a source is
-        told.
+        hold_last: its last value counts until the next one comes; that it does so without a source
+        is reported.
         """
         state = self.health.watch(name, required=required, steady=steady)
         self._losses[name] = Losses(state)
-        if held:
-            self._held.append(state)
+        if hold_last:
+            self._holding.append(state)
         return state
 
     def unwatch(self, name: str) -> None:
         """Tell no more of an input."""
         self.health.inputs.pop(name, None)
         self._losses.pop(name, None)
-        self._held = [state for state in self._held if state.topic != name]
+        self._holding = [state for state in self._holding if state.topic != name]
         self.keep(_loss_of(name), '')
 
     def look(self) -> None:
@@ -160,7 +160,7 @@ class TellingNode(Node):
         """Tell of the node and its inputs."""
         self.look()
         self._look_at_losses()
-        self._look_at_held()
+        self._look_at_old_values()
         self._look_at_partners()
         self.diagnostics.publish(
             self.messages.statuses(self.get_clock().now().nanoseconds, self.health.statuses())
@@ -185,14 +185,14 @@ class TellingNode(Node):
                 self.tell_once(sentence)
             self.keep(_loss_of(name), losses.telling, logged=False)
 
-    def _look_at_held(self) -> None:
+    def _look_at_old_values(self) -> None:
         """Tell, as long as it is so, of a value that counts although nobody tells it any more."""
         now = time.monotonic()
-        for state in self._held:
-            held = state.silent(now) and state.used  # what was refused counts for nothing
+        for state in self._holding:
+            old = state.silent(now) and state.used  # what was refused counts for nothing
             age = f'{now - state.used:.1f} s old, nothing usable came since'
-            told = f'{state.topic}: the value that counts is {age}' if held else ''
-            self.keep(f'held from {state.topic}', told)
+            sentence = f'{state.topic}: the value that counts is {age}' if old else ''
+            self.keep(f'held from {state.topic}', sentence)
 
     def _look_at_partners(self) -> None:
         """Tell of every partner that does not match, as long as it is there."""

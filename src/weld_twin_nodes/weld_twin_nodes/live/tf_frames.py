@@ -111,7 +111,7 @@ class MeasuredInputs:
         while self._waiting:
             since, source, message, use = self._waiting[0]
             try:
-                carried = self._carried(message)
+                transformed = self._in_measuring_frame(message)
             except NotYet as error:
                 if time.monotonic() - since < PATIENCE:
                     return
@@ -120,13 +120,13 @@ class MeasuredInputs:
                 self._node.refuse(source, str(error))
             else:
                 try:
-                    use(carried)
+                    use(transformed)
                 except DataError as error:
                     self._node.refuse(source, str(error))
             if self._waiting:  # what used it may have begun anew
                 self._waiting.popleft()
 
-    def _carried(self, message: Any) -> Any:
+    def _in_measuring_frame(self, message: Any) -> Any:
         """Return a measurement in the measuring frame."""
         assert self._tree is not None
         frame, stamp = message.header.frame_id.strip('/'), from_messages.stamp_ns(message)
@@ -143,10 +143,10 @@ class MeasuredInputs:
         self._node.remark(
             f'measurements in {frame!r} are carried into {self._wanted!r} by /tf{moves}'
         )
-        return carried(message, T, self._wanted)
+        return transformed(message, T, self._wanted)
 
 
-def carried(message: Any, T: Array, frame_id: str) -> Any:
+def transformed(message: Any, T: Array, frame_id: str) -> Any:
     """
     Return a pose or a point in another frame.
 

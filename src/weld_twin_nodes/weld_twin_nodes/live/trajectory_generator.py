@@ -56,17 +56,17 @@ def apart(book: Book, there: Collection[str]) -> list[str]:
     The graph a node sees is its own: that two others have not found each other yet, only they know,
     and one of the two may know it before the other.
     """
-    told = [word for word in book.latest() if word.node in there]
+    words = [word for word in book.latest() if word.node in there]
     known = [node for node in there if node.rpartition('/')[2] in MODULES]
     out = [f'{node} to tell of itself' for node in known if node not in book.nodes()]
-    for word in told:
+    for word in words:
         for topic, count in word.reached.items():
-            wanted = [other.node for other in told if topic in other.inputs]
+            wanted = [other.node for other in words if topic in other.inputs]
             if count < len(wanted):
                 out.append(f'{word.node} to reach {" and ".join(wanted)} on {topic}')
-    for word in told:
+    for word in words:
         for topic, heard in word.heard.items():
-            wanted = [other.node for other in told if topic in other.reached]
+            wanted = [other.node for other in words if topic in other.reached]
             if heard.publishers < len(wanted):
                 out.append(f'{word.node} to hear {" and ".join(wanted)} on {topic}')
     return out

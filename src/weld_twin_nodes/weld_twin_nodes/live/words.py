@@ -212,9 +212,9 @@ class NeighbourHealth:
         if REACHED.encode() not in data:
             return
         try:
-            told = word(from_messages.diagnostics(self._read(data)), time.monotonic())
+            heard = word(from_messages.diagnostics(self._read(data)), time.monotonic())
         except TwinError:  # somebody else's, and none of the inputs
             return
-        if told is not None:
+        if heard is not None:
             for hearer in [*self._hearers]:
-                hearer(told)
+                hearer(heard)

@@ -44,7 +44,7 @@ from weld_twin_msgs_py.programs import (
 from weld_twin_msgs_py.programs.source import Source
 
 from ..streams.supervision import Promise
-from .told_twin import build_twin, diagnosis_of, refuse_mended
+from .given_twin import build_twin, diagnosis_of, refuse_mended
 
 SCHEMA = 'weld_twin/correction/1'
 TOOL_LEFT = (
@@ -142,7 +142,7 @@ def corrected_program(
     result = correct_program(
         model,
         moves,
-        held=program.held,
+        held=program.fixed,
         caps=caps,
         start=start,
         written=lambda points: _read_back(program, context, points)[1],

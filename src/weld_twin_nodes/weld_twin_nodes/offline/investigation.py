@@ -56,7 +56,7 @@ def weighed(
 
     Returns
     -------
-    found : mapping
+    believed : mapping
         The one that is believed; where there were two, its confidence is that of both. If both name
         the same, it is that of all recordings, unless only the other closes the question.
     why : str
@@ -114,7 +114,7 @@ def belief(result: Mapping[str, Any], other: Mapping[str, Any]) -> float:
     """
     Return how probable it is that an answer is right, with another of most of the same measurements.
 
-    ``found`` and ``other``: as `signs` takes them.
+    ``result`` and ``other``: as `signs` takes them.
     """
     own, same, against = signs(result, other)
     total = OWN * own + FOR * same + AGAINST * against + BEGIN
@@ -140,8 +140,8 @@ def _log_odds(result: Mapping[str, Any]) -> float:
     verdict = result['verdict']
     learned = verdict.get('learned')
     reported = float((verdict['confidence'] if learned is None else learned) or 0.0)
-    held = min(max(reported, EXTREME), 1.0 - EXTREME)
-    return log(held / (1.0 - held))
+    bounded = min(max(reported, EXTREME), 1.0 - EXTREME)
+    return log(bounded / (1.0 - bounded))
 
 
 def _with_belief(result: Mapping[str, Any], other: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -219,7 +219,7 @@ STATE, PAGE = 'investigation.json', 'investigation.html'
 SCHEMA = 'weld_twin/investigation/1'
 SAID = 0.8
 """Probability from which an experiment says that it will decide; below it says that it may."""
-FOUND = 0.7
+IDENTIFIED = 0.7
 """Probability from which a place and a dependence count as found; below the rest, as not."""
 WIDENED = 3
 """Experiments of one kind without a comparison: more of the same seldom shows anything new."""
@@ -433,17 +433,17 @@ def decided(asked: Mapping[str, Any], result: Mapping[str, Any]) -> bool | None:
         return None
     verdict = result['verdict']
     if verdict['status'] == 'unknown':
-        found_causes = verdict.get('causes') or []
+        causes = verdict.get('causes') or []
         # What has nothing of its own holds where the other does not.
-        known = [_held(side, found_causes) for side in asked['between'] if side]
+        known = [_support(side, causes) for side in asked['between'] if side]
         known += [1.0 - known[0]] if len(known) == 1 else []
-        return max(known) >= FOUND and min(known) <= 1.0 - FOUND
+        return max(known) >= IDENTIFIED and min(known) <= 1.0 - IDENTIFIED
     if verdict['status'] not in (*NAMING, 'none'):
         return False
     return not _together(result, *asked['between'])
 
 
-def _held(side: Sequence[Mapping[str, Any]], causes: Sequence[Mapping[str, Any]]) -> float:
+def _support(side: Sequence[Mapping[str, Any]], causes: Sequence[Mapping[str, Any]]) -> float:
     """Return how far the places and dependences of a side are found."""
     each = []
     for item in side:

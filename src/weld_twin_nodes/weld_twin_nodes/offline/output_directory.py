@@ -383,13 +383,13 @@ def _kept_notice(tell: Callable[[str], None]) -> Callable[[str, str], None]:
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
     """Change a folder while no other process does."""
-    held = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         with suppress(OSError):  # a file system without locks
-            fcntl.flock(held, fcntl.LOCK_EX)
+            fcntl.flock(lock, fcntl.LOCK_EX)
         yield
     finally:
-        os.close(held)
+        os.close(lock)
 
 
 def _install(

@@ -47,7 +47,7 @@ from weld_twin_msgs_py.files.input_files import hashed
 from weld_twin_msgs_py.files.posterior_entry import read_posterior
 from weld_twin_msgs_py.files.whole_files import write_text
 
-from .told_twin import build_twin, diagnosis_of
+from .given_twin import build_twin, diagnosis_of
 
 BESIDE = 'prediction.json'
 """Beside the bag: the stretches outside what was recorded."""
@@ -57,7 +57,7 @@ MOST = 3
 """Stretches told on the terminal; the others are in the file."""
 
 
-class Stretch(NamedTuple):
+class Segment(NamedTuple):
     """A stretch of a motion outside what was recorded [s from its first stamp], and why."""
 
     t_start: float
@@ -75,7 +75,7 @@ class Predictor(NamedTuple):
     source: Recording | None = None
     """The recording that it is for, mended as the diagnosis mended its own; None where nothing had
     to be."""
-    told: str = ''  # what is to be said of that
+    remark: str = ''  # what is to be said of that
 
     def expected(self, recording: Recording) -> tuple[Poses, Array] | None:
         """Return where all models allowed have the tool at every joint state, and how sure that is."""
@@ -83,21 +83,21 @@ class Predictor(NamedTuple):
             return None
         return expected_poses(self.posterior, self.twin, recording, recording.joints.t, self.setup)
 
-    def outside(self, recording: Recording) -> list[Stretch]:
+    def outside(self, recording: Recording) -> list[Segment]:
         """Return the stretches of a motion that lie outside what was recorded."""
         if self.posterior is None:
             return []
         t = recording.joints.t
         result = self.posterior.domain.outside(*as_seen(recording, t))
         t = t - t[0]
-        return [Stretch(float(t[a]), float(t[b]), why) for a, b, why in result]
+        return [Segment(float(t[a]), float(t[b]), why) for a, b, why in result]
 
 
 class Written(NamedTuple):
     """What a prediction came to."""
 
     rms_m: float | None  # RMS of measured minus twin, where something was measured
-    outside: Sequence[Stretch]
+    outside: Sequence[Segment]
     sigma_m: float | None  # median of the standard deviation of position in its worst direction
 
 
@@ -199,11 +199,11 @@ def _deviation(twin: Twin, recording: Recording) -> Array | None:
     return np.asarray(gap @ twin.robot.T_world_origin[:3, :3])
 
 
-def beside_bag(model: Predictor, outside: Sequence[Stretch]) -> dict[str, str]:
+def beside_bag(model: Predictor, outside: Sequence[Segment]) -> dict[str, str]:
     """Return what lies in the bag's directory: the stretches outside what was recorded."""
     if model.posterior is None:
         return {}
-    content = {'outside': [stretch._asdict() for stretch in outside]}
+    content = {'outside': [segment._asdict() for segment in outside]}
     return {BESIDE: json.dumps(content, indent=1) + '\n'}
 
 
@@ -234,11 +234,11 @@ class Compensated(NamedTuple):
 
     result: Compensation
     model: Predictor
-    outside: Sequence[Stretch]  # of the nominal commands: where they leave what was recorded
+    outside: Sequence[Segment]  # of the nominal commands: where they leave what was recorded
     least: float
     """Smallest share of the correction that was applied anywhere, 1 for all of it everywhere."""
     motion: JointMotion  # the new commands, counted as the nominal ones came
-    told: str = ''
+    remark: str = ''
     """That the commands were read as the diagnosis mended its recordings, and are written as they
     came; empty where they are not."""
 

@@ -170,7 +170,7 @@ class Deviations:
     robot: its base frame is the one deviations are given in.
     path_length: length of the seam [m]; 0 takes the way the twin has gone.
     depth, max_gap: see `Pairing`.
-    base_told: whether the base is yet to be told. Until it is, pairs are held back, at most
+    awaits_base: whether the base is yet to come. Until it does, pairs are kept back, at most
     ``depth``: in other axes they would be other deviations.
     """
 
@@ -181,7 +181,7 @@ class Deviations:
         depth: int = 2000,
         max_gap: float = 0.5,
         *,
-        base_told: bool = False,
+        awaits_base: bool = False,
     ) -> None:
         self._rotation_base_world = robot.T_world_origin[:3, :3].T
         self._pairing = Pairing(depth, max_gap)
@@ -189,13 +189,13 @@ class Deviations:
         self._metrics = RunningMetrics(path_length)
         self._clocks = ClockWatch()
         self._recent: deque[float] = deque(maxlen=RECENT)
-        self._waits = base_told
-        self._held: deque[Pair] = deque(maxlen=depth)
+        self._waits = awaits_base
+        self._pending: deque[Pair] = deque(maxlen=depth)
 
     @property
-    def held(self) -> int:
+    def waiting_for_base(self) -> int:
         """Return how many pairs wait for the base."""
-        return len(self._held)
+        return len(self._pending)
 
     def take_base(self, rotation: Array | None = None) -> Iterator[Deviation]:
         """
@@ -205,15 +205,16 @@ class Deviations:
         """
         if rotation is not None:
             self._rotation_base_world = rotation.T
-        held, self._held, self._waits = [*self._held], deque(maxlen=self._held.maxlen), False
-        return self._each(held)
+        pairs, self._waits = [*self._pending], False
+        self._pending.clear()
+        return self._each(pairs)
 
     def reset(self) -> None:
         """Begin anew, as after a jump of the clock."""
         self._pairing.reset()
         self._clocks.reset()
         self._recent.clear()
-        self._held.clear()
+        self._pending.clear()
         self._metrics = RunningMetrics(self._path_length)
 
     @property
@@ -257,7 +258,7 @@ class Deviations:
     def _each(self, pairs: list[Pair]) -> Iterator[Deviation]:
         """Work one pair at a time, so that the metrics are those up to the deviation yielded."""
         if self._waits:
-            self._held.extend(pairs)
+            self._pending.extend(pairs)
             return
         for stamp, measured, twin in pairs:
             vector = self._rotation_base_world @ (measured - twin)

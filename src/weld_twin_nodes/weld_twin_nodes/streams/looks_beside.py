@@ -25,7 +25,7 @@ from weld_twin_core.twin.pose_correction import Looked, PoseCorrection
 _MODULE = 'weld_twin_nodes.streams.looks_beside'
 READY = 'ready'
 """First word of the process: it has loaded what it needs."""
-Found = Looked | float | DataError
+Answer = Looked | float | DataError
 """An exact look, how sure the model is of one [m], or why there is none."""
 
 
@@ -88,7 +88,7 @@ class LooksBeside:
         self._busy = True
         self._send('doubt', (looked,))
 
-    def answer(self) -> Found | None:
+    def answer(self) -> Answer | None:
         """Return the answer once it is there."""
         try:
             while self._link is not None and self._link.poll():
@@ -100,7 +100,7 @@ class LooksBeside:
                     continue
                 self._busy = False
                 if number == self._number:
-                    answer: Found = result
+                    answer: Answer = result
                     return answer
         except (EOFError, OSError):
             self.close()

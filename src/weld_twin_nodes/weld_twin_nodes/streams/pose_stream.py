@@ -110,7 +110,7 @@ class PoseStream:
         self._know_nothing()
         self._mode, self._refused, self._tried = 'none', '', -np.inf
         self._ramp: _Ramp | None = None
-        self._held = np.zeros(6)
+        self._added = np.zeros(6)
         self._rest_pose: Array | None = None
         self._at, self._since = np.eye(4), np.inf
         self._rest_since = self._last = -np.inf
@@ -149,15 +149,15 @@ class PoseStream:
         if self._ramp is not None:
             return self._on_ramp(now, why)
         if added is None:
-            stays = self._held_still(pose, arm) if why == OPENING else None
+            stays = self._hold_still(pose, arm) if why == OPENING else None
             return stays or self._uncorrected(pose, now, rest, self._refused or why)
         if self._mode == 'corrected':
-            self._held = added
+            self._added = added
             return Given(moved(pose, added), added)
         if self._mode == 'none':
             return self._begun(pose, now, added, arm)
         if rest < REST:
-            return Given(moved(pose, self._held), self._held, 'waits for a standstill')
+            return Given(moved(pose, self._added), self._added, 'waits for a standstill')
         return self._begin_ramp(pose, now, added, 'corrected')
 
     def settle(self) -> None:
@@ -324,26 +324,26 @@ class PoseStream:
         if not self._passing:
             self._mode = 'none'
             return Given(None, None, why)
-        if self._mode in ('corrected', 'held') and np.abs(self._held).max() > SHORT:
+        if self._mode in ('corrected', 'held') and np.abs(self._added).max() > SHORT:
             if rest >= REST:
                 return self._begin_ramp(pose, now, np.zeros(6), 'passed', why)
             self._mode = 'held'
-            return Given(moved(pose, self._held), self._held, why)
-        self._mode, self._held = 'passed', np.zeros(6)
-        return Given(pose, self._held, why)
+            return Given(moved(pose, self._added), self._added, why)
+        self._mode, self._added = 'passed', np.zeros(6)
+        return Given(pose, self._added, why)
 
     def _begun(self, pose: Array, now: float, added: Array, arm: Array | None) -> Given:
         """Begin with a stream: fade in from where the arm stands, before its first pose is followed."""
         there = self._to_arm(pose, arm)
         if there is None:
             return self._uncorrected(pose, now, 0.0, self._refused)
-        self._held = there
+        self._added = there
         return self._begin_ramp(pose, now, added, 'corrected')
 
-    def _held_still(self, pose: Array, arm: Array | None) -> Given | None:
+    def _hold_still(self, pose: Array, arm: Array | None) -> Given | None:
         """Return what keeps the arm where it is while the first look is made; None where it is not."""
-        held = self._to_arm(pose, arm) if self._mode == 'none' else self._held
-        return None if held is None else Given(moved(pose, held), held)
+        there = self._to_arm(pose, arm) if self._mode == 'none' else self._added
+        return None if there is None else Given(moved(pose, there), there)
 
     def _to_arm(self, pose: Array, arm: Array | None) -> Array | None:
         """Return what takes a pose to where the arm stands, shape (6,); None where that is too far."""
@@ -361,9 +361,9 @@ class PoseStream:
         return None
 
     def _begin_ramp(self, pose: Array, now: float, end: Array, mode: str, why: str = '') -> Given:
-        way = [float(np.linalg.norm(part)) for part in np.split(end - self._held, 2)]
+        way = [float(np.linalg.norm(part)) for part in np.split(end - self._added, 2)]
         if max(way) < SHORT:
-            self._mode, self._held = mode, end
+            self._mode, self._added = mode, end
             return Given(moved(pose, end), end, why)
         most = min(
             self._limits.acceleration, float(self.correction.model.robot.max_acceleration.min())
@@ -373,13 +373,13 @@ class PoseStream:
             SMOOTH_SPEED * way[1] / self._limits.turn_rate,
             sqrt(SMOOTH_PEAK * (way[0] / LEVER + way[1]) / most),
         )
-        self._ramp = _Ramp(pose, self._held, end, now, span, mode)
+        self._ramp = _Ramp(pose, self._added, end, now, span, mode)
         return self._on_ramp(now, why)
 
     def _on_ramp(self, now: float, why: str) -> Given:
         assert self._ramp is not None
         ramp, added = self._ramp, self._ramp.at(now)
-        self._held = added
+        self._added = added
         if now - ramp.begun >= ramp.span:
             self._mode, self._ramp = ramp.mode, None
         return Given(moved(ramp.pose, added), added, why)

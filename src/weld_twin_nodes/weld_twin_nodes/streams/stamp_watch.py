@@ -144,9 +144,9 @@ class ClockWatch:
             said = (
                 f'no measurement meets a pose of the twin: {waiting} wait, {dropped} are dropped'
             )
-            return f'{said}; {told(offset, 1)}' if abs(offset) > APART else said
+            return f'{said}; {offset_words(offset, 1)}' if abs(offset) > APART else said
         if abs(offset) > APART and self.measured.in_real_time and self.twin.in_real_time:
-            return told(offset, 2)
+            return offset_words(offset, 2)
         return self._by_motion(now)
 
     def _by_stamps(self) -> float:
@@ -173,7 +173,7 @@ class ClockWatch:
         if before is None or abs(result - before) > STEADY or abs(result) < SHIFTED:
             return ''
         trailing = ', or every joint trails by as much' if result > 0.0 else ''
-        return told(result, 3) + trailing
+        return offset_words(result, 3) + trailing
 
     def _drift(self) -> str:
         """Return what is to be told of a shift that grows with time."""
@@ -191,7 +191,7 @@ class ClockWatch:
         )
 
 
-def told(offset: float, digits: int) -> str:
+def offset_words(offset: float, digits: int) -> str:
     """Return an offset [s] in words."""
     where = 'ahead of' if offset > 0.0 else 'behind'
     return f'measurements are {abs(offset):.{digits}f} s {where} the joints'
@@ -218,16 +218,16 @@ def shift(measured: deque[Sample], twin: deque[Sample]) -> float | None:
     if not inside.any() or np.ptp(at[inside]) < LEAST:
         return None
     at, seen = at[inside], seen[inside]
-    none = _left(at, seen, t, way)
+    none = _mismatch(at, seen, t, way)
     if none < BLURRED**2:
         return None
     shifts = np.arange(-REACH, REACH + 0.5 * STEP, STEP)
-    remaining = np.array([_left(at - s, seen, t, way) for s in shifts])
+    remaining = np.array([_mismatch(at - s, seen, t, way) for s in shifts])
     # A weave is like itself again one period on; the shift nearest to none is the one meant.
     good = np.flatnonzero(remaining <= 1.2 * remaining.min() + 1e-10)
     k = int(good[np.argmin(np.abs(shifts[good]))])
     result = float(shifts[k]) + STEP * _vertex(remaining, k)
-    return result if _left(at - result, seen, t, way) < EXPLAINED * none else None
+    return result if _mismatch(at - result, seen, t, way) < EXPLAINED * none else None
 
 
 def _arrays(samples: deque[Sample], epoch: int) -> tuple[Array, Array]:
@@ -235,7 +235,7 @@ def _arrays(samples: deque[Sample], epoch: int) -> tuple[Array, Array]:
     return np.array([s - epoch for s in stamps]) * NANOSECOND, np.stack(positions)
 
 
-def _left(at: Array, seen: Array, t: Array, way: Array) -> float:
+def _mismatch(at: Array, seen: Array, t: Array, way: Array) -> float:
     """Return the mean squared difference, a constant one apart [m^2]."""
     off = seen - np.stack([np.interp(at, t, axis) for axis in way.T], axis=1)
     return float(((off - off.mean(axis=0)) ** 2).sum(axis=1).mean())

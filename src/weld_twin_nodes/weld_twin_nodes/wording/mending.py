@@ -89,11 +89,11 @@ def left_with(diagnosis: Diagnosis, mended: Collection[int]) -> Left:
     kept = _KEPT.setdefault(diagnosis, {})
     key = tuple(sorted(mended))
     if key not in kept:
-        kept[key] = _left_with(diagnosis, key)
+        kept[key] = _worked_out(diagnosis, key)
     return kept[key]
 
 
-def _left_with(diagnosis: Diagnosis, mended: tuple[int, ...]) -> Left:
+def _worked_out(diagnosis: Diagnosis, mended: tuple[int, ...]) -> Left:
     runs: list[tuple[np.ndarray, np.ndarray]] = []
     for run, (remaining, parts) in enumerate(zip(*parted(diagnosis), strict=True)):
         good = trusted(diagnosis, run)

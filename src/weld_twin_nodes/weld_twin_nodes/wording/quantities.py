@@ -284,7 +284,7 @@ def _orders(
 ) -> list[tuple[str, str]]:
     """Return amplitude and phase for every order, the largest first."""
 
-    def told(size: float, error: float | None) -> str:
+    def shown(size: float, error: float | None) -> str:
         if slides:
             return uncertain(size, error, 1e3, 'mm')
         return f'{uncertain(size, error, DEGREES, "°")} ({uncertain(size, None, 1e3, "mrad")})'
@@ -298,7 +298,7 @@ def _orders(
     return [
         (
             f'order {order:g}',
-            f'{told(size, error)} at {uncertain(phase, turn, DEGREES, "°")}',
+            f'{shown(size, error)} at {uncertain(phase, turn, DEGREES, "°")}',
         )
         for size, order, phase, error, turn in rows
     ]

@@ -182,7 +182,7 @@ def open_sets(diagnosis: Diagnosis) -> list[tuple[Site, ...]]:
     what to do name them alike. What is one error on any motion is no question of the data.
     """
     share = share_by_site(diagnosis)
-    odds_of = {site: p for held in diagnosis.causes for site, p in held.name}
+    odds_of = {site: p for each in diagnosis.causes for site, p in each.name}
     beside = {site for _, *others in diagnosis.same for site in others}
     asked = [[s for s in group if s not in beside] for group in diagnosis.indistinguishable]
     groups = [
@@ -238,8 +238,8 @@ def cause_by_site(diagnosis: Diagnosis) -> dict[Site, int]:
     result = diagnosis.model.found
     return {
         Site(result[m].name, result[m].site): k
-        for k, held in enumerate(diagnosis.causes)
-        for m in held.members
+        for k, each in enumerate(diagnosis.causes)
+        for m in each.members
         if m < len(result)
     }
 

@@ -15,7 +15,7 @@ from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.twin.posterior import Posterior, pose_covariances
 from weld_twin_msgs_py.files.diagnosis_model import read_model
-from weld_twin_nodes.offline.told_twin import build_twin
+from weld_twin_nodes.offline.given_twin import build_twin
 from weld_twin_report.report.diagnosis_files import diagnosis_text
 
 from ..open_form import ContestAnswer, ContestCase

@@ -125,8 +125,8 @@ def _predict(args: argparse.Namespace) -> int:
         recording = recording.at_temperature(args.temperature)
     model = predictor(robot, args.model, args.bag, recording, args.setup)
     recording = on_one_clock(recording if model.source is None else model.source)
-    if model.told:
-        print(f'note: {model.told}')
+    if model.remark:
+        print(f'note: {model.remark}')
     say_doubts(model.twin, args.model)
     made = {'model': str(args.model)}
     got = write_prediction(args.out, model, recording, storage=args.storage, provenance=made)

@@ -93,8 +93,8 @@ def _corrected_bag(args: argparse.Namespace) -> int:
     recording = read_recording(args.program, robot, topics_of(args))
     made = compensated(robot, args.model, recording)
     say_doubts(made.model.twin, args.model)
-    if made.told:
-        print(f'note: {made.told}')
+    if made.remark:
+        print(f'note: {made.remark}')
     robot.check_positions(made.result.motion.q)
     write_compensated(args.out, made, recording, storage=args.storage)
     before, after = made.result.rms
@@ -146,7 +146,7 @@ def _by_model(args: argparse.Namespace, context: Context, program: Program) -> i
         tolerance_entry,
         way,
     )
-    from weld_twin_nodes.offline.told_twin import diagnosis_of, other_readings
+    from weld_twin_nodes.offline.given_twin import diagnosis_of, other_readings
 
     from ...report.correction_page import correction_page, headline, tolerance_sentences
 

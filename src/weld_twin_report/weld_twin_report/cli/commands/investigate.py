@@ -211,7 +211,7 @@ def _program(
     args: argparse.Namespace,
     context: Context,
     path: Path,
-    told_in: Path,
+    shown_in: Path,
     name: str,
     dwell: float | None = None,
 ) -> list[str]:
@@ -221,7 +221,7 @@ def _program(
 
     name += LANGUAGES[args.controller].extensions[0]
     how = Speeds() if dwell is None else Speeds(dwell=dwell)
-    places = (path.with_name(name), told_in / name)
+    places = (path.with_name(name), shown_in / name)
     return write_program(*places, str(path), context, args.controller, how, trigger=args.trigger)
 
 

@@ -105,7 +105,7 @@ def _setting(args: argparse.Namespace) -> Setting | None:
     from weld_twin_core.motion.paths import KINDS, default_seam
     from weld_twin_core.sensitivity import WeldTolerance
     from weld_twin_msgs_py.files.path_file import read_path
-    from weld_twin_nodes.offline.told_twin import build_twin
+    from weld_twin_nodes.offline.given_twin import build_twin
 
     from ...sensitivity_report import Effort, Setting
 

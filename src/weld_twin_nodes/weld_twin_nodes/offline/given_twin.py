@@ -142,7 +142,7 @@ def _flat(entry: Mapping[str, Any]) -> dict[str, Any]:
     return {**known, **entry['parameters']}
 
 
-def told_cameras(
+def given_cameras(
     cameras: Iterable[str], targets: Iterable[str]
 ) -> tuple[tuple[Camera, ...], tuple[Target, ...]]:
     """

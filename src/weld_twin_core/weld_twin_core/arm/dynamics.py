@@ -222,19 +222,16 @@ def _wrench_slope(robot: Robot, chain: Frames, wrench: Array, frame: str) -> Arr
 
 def link_point(robot: Robot, chain: Frames, i: int, point: Array) -> Array:
     """Return a point (3,) of link i's DH frame, at its far end, in the world, (3, ...) [m]."""
-    if i < robot.behind:
-        x, y, z, origin = chain.ends[i]
-        outer: Array = origin + point[0] * x + point[1] * y + point[2] * z
-        return outer
     if i + 1 == robot.n:
         return components(chain.flange_point + chain.flange_rotation @ point)
+    if i < robot.behind:
+        x, y, z, origin = chain.ends[i]
     # The frame at the end of row i is where row i + 1 starts.
-    row, following = chain.rows[i], chain.rows[i + 1]
-    if robot.convention == 'standard':
-        origin, y, z = following.z_point, row.y, following.z
+    elif robot.convention == 'standard':
+        origin, y, z = chain.rows[i + 1].z_point, chain.rows[i].y, chain.rows[i + 1].z
         x = cross(y, z)
     else:
-        origin, x, z = following.x_point, following.x, row.z
+        origin, x, z = chain.rows[i + 1].x_point, chain.rows[i + 1].x, chain.rows[i].z
         y = cross(z, x)
     place: Array = origin + point[0] * x + point[1] * y + point[2] * z
     return place

@@ -21,35 +21,10 @@ from .controller_frames import ControllerFrames, frame_of, pose_mapping
 _CONVENTIONS = ('standard', 'modified')
 STANDARD_GRAVITY = (0.0, 0.0, -9.80665)
 """In the world frame [m/s^2], of a robot file that does not say."""
-_TOP_KEYS = {
-    'name',
-    'convention',
-    'gravity',
-    'base',
-    'tool',
-    'joints',
-    'links',
-    'payload',
-    'source',
-    'plausible',
-    'controller',
-    'workpiece',
-}
 _WORKPIECE_KEYS = {'name', 'convention', 'base', 'tool', 'joints', 'links', 'payload'}
-_JOINT_KEYS = {
-    'name',
-    'type',
-    'a',
-    'alpha',
-    'd',
-    'theta_offset',
-    'beta',
-    'lower',
-    'upper',
-    'max_velocity',
-    'max_acceleration',
-}
+_TOP_KEYS = _WORKPIECE_KEYS | {'gravity', 'source', 'plausible', 'controller', 'workpiece'}
 _LIMITS = ('lower', 'upper', 'max_velocity', 'max_acceleration')
+_JOINT_KEYS = {'name', 'type', 'a', 'alpha', 'd', 'theta_offset', 'beta', *_LIMITS}
 _PER_ROW: tuple[str, ...] = ('a', 'alpha', 'd', 'theta', 'beta', 'prismatic', *_LIMITS)
 
 

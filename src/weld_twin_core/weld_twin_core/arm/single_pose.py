@@ -71,7 +71,9 @@ class SinglePose:
     def __call__(self, q: Array) -> Array:
         """Return the tool pose ``T_world_tool``, shape (4, 4), of a joint position (n,)."""
         if self._foot is not None:
-            return self._through_foot(self._foot, q)
+            behind = self.robot.behind
+            there = np.linalg.inv(self._foot(q[:behind][::-1]))
+            return np.asarray(there @ self._arm(q[behind:]))
         values = [*q.tolist(), 0.0]
         x0, x1, x2, z0, z1, z2, p0, p1, p2 = self._tool
         for joint, slides, angle, d, a, cosine, sine in self._rows:
@@ -107,11 +109,6 @@ class SinglePose:
         packed = _PACKED(x0, y0, z0, p0, x1, y1, z1, p1, x2, y2, z2, p2, 0.0, 0.0, 0.0, 1.0)
         pose: Array = np.ndarray((4, 4), np.float64, bytearray(packed))
         return pose if self._base is None else self._base @ pose
-
-    def _through_foot(self, foot: SinglePose, q: Array) -> Array:
-        """Return the pose of a tool in the frame of a workpiece that a positioner moves."""
-        behind = self.robot.behind
-        return np.asarray(np.linalg.inv(foot(q[:behind][::-1])) @ self._arm(q[behind:]))
 
 
 def _rows(robot: Robot) -> list[_Row]:

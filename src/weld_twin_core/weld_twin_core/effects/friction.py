@@ -17,6 +17,7 @@ A loop that never lets go trails as play does, and is told as `backlash`.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -51,13 +52,8 @@ class _Fit(FitHooks):
             return None
         unit = view.radian(view.robot.index(self.effect.joint))
         travels = unit * np.geomspace(SHORTEST, LONGEST, 7)
-        each = [
-            Friction(self.effect.joint, 1.0, self.effect.asymmetry, float(x), self.effect.release)
-            for x in travels
-        ]
-        many = Friction(
-            self.effect.joint, 1.0, self.effect.asymmetry, travels, self.effect.release
-        )
+        each = [replace(self.effect, windup=1.0, travel=float(travel)) for travel in travels]
+        many = replace(self.effect, windup=1.0, travel=travels)
         return each, many.run(view)[0]['q', view.robot.index(self.effect.joint)]
 
 
@@ -195,7 +191,7 @@ class Friction(MemoryEffect):
         if len(coefficients) > 1:
             uneven = float(coefficients[1]) / windup if windup > 0.0 else 0.0
             asymmetry = float(np.clip(uneven, -_UNEVEN, _UNEVEN)) or _A_LITTLE
-        return Friction(self.joint, windup, asymmetry, self.travel, self.release)
+        return replace(self, windup=windup, asymmetry=asymmetry)
 
     def remedy(self, robot: Robot) -> str:
         return (

@@ -13,6 +13,7 @@ whose two poles run as one linear recursion each.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -63,10 +64,7 @@ class _Fit(FitHooks):
             if zoom == 0
             else self.effect.damping * np.geomspace(0.9, 1.1, 9)
         )
-        each = [
-            ServoLag(self.effect.joint, self.effect.time_constant, float(damping))
-            for damping in near
-        ]
+        each = [replace(self.effect, damping=float(damping)) for damping in near]
         return each, np.stack([lag.run(view)[0]['q', i] for lag in each])
 
 
@@ -101,15 +99,20 @@ class ServoLag(MemoryEffect):
     needs = frozenset({'velocity', 'time'})
     fit = Hooked(_Fit)
 
-    def _coefficients(self, dt: Array) -> tuple[Array, Array]:
-        """Return the decay over a step and the weight of the input's change over it."""
+    def _trail(self, dt: Array, change: Array, x0: Array) -> tuple[Array, Array, Array]:
+        """
+        Return output minus input of the lag of first order, shape (..., N).
+
+        x_k = decay x_{k-1} - weight change_k; the decay over each step in time and the weight of
+        the input's change over it come along.
+        """
         tau = np.maximum(self.number('time_constant'), 1e-12)
         decay = np.exp(-dt / tau)
         weight = np.where(dt > 0.0, -np.expm1(-dt / tau) * tau / np.where(dt > 0.0, dt, 1.0), 1.0)
-        return decay, weight
+        return linear(decay, -weight * change, x0), decay, weight
 
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
-        """Return output minus input: x_k = decay x_{k-1} - weight (theta_k - theta_{k-1})."""
+        """Return output minus input."""
         q = self._theta(view)
         if view.static:
             return self._moves(view, np.zeros_like(q)), None
@@ -119,8 +122,7 @@ class ServoLag(MemoryEffect):
         t0, q0, x0 = (view.t[0], q[..., 0], np.zeros(q.shape[:-1])) if state is None else state
         dt = np.diff(view.t, prepend=t0)
         change = np.diff(q, axis=-1, prepend=np.asarray(q0)[..., None])
-        decay, weight = self._coefficients(dt)
-        x = linear(decay, -weight * change, x0)
+        x, _, _ = self._trail(dt, change, x0)
         return self._moves(view, x), (view.t[-1], q[..., -1], x[..., -1])
 
     def check(self, robot: Robot) -> None:
@@ -171,8 +173,7 @@ class ServoLag(MemoryEffect):
         tau = np.maximum(self.number('time_constant'), 1e-12)
         dt = np.diff(view.t, prepend=view.t[0])
         change = np.diff(q, axis=-1, prepend=q[..., :1])
-        decay, weight = self._coefficients(dt)
-        x = linear(decay, -weight * change, np.zeros(q.shape[:-1]))
+        x, decay, weight = self._trail(dt, change, np.zeros(q.shape[:-1]))
         before = np.concatenate([np.zeros_like(x[..., :1]), x[..., :-1]], axis=-1)
         d_decay = decay * dt / tau**2
         d_weight = np.where(dt > 0.0, weight / tau - decay / tau, 0.0)
@@ -187,9 +188,7 @@ class ServoLag(MemoryEffect):
             return np.asarray(tangent + self._swing(view.t, tangent, None)[0])
         dt = np.diff(view.t, prepend=view.t[0])
         change = np.diff(tangent, axis=-1, prepend=tangent[..., :1])
-        decay, weight = self._coefficients(dt)
-        x: Array = linear(decay, -weight * change, np.zeros(tangent.shape[:-1]))
-        return tangent + x
+        return tangent + self._trail(dt, change, np.zeros(tangent.shape[:-1]))[0]
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> list[ServoLag]:

@@ -111,9 +111,10 @@ class Vibration(MemoryEffect):
         kick = np.nan_to_num(np.diff(rate, axis=-1, prepend=before))
         return dt, kick, (view.t[-1], q[..., -1], rate[..., -1], z0)
 
-    def _response(self, view: View, state: Any) -> tuple[Array, Array, Array, Array, Any]:
-        """Return the response z at gain 1, its decay, steps and kicks, and what to carry."""
-        q = self._theta(view)
+    def _response(
+        self, view: View, q: Array, state: Any = None
+    ) -> tuple[Array, Array, Array, Array, Any]:
+        """Return the response z of gain 1 to motion, its decay, steps and kicks, and the state."""
         dt, kick, (t, last, rate, z0) = self._kicks(view, q, state)
         pole, damped = self._mode()
         decay = np.exp(pole * dt)
@@ -123,14 +124,14 @@ class Vibration(MemoryEffect):
     def run(self, view: View, state: Any = None) -> tuple[Shift, Any]:
         if view.static:
             return self._moves(view, np.zeros_like(self._theta(view))), None
-        z, _, _, _, state = self._response(view, state)
+        z, _, _, _, state = self._response(view, self._theta(view), state)
         return self._moves(view, self.number('gain') * z.imag), state
 
     def gradient(self, view: View) -> list[Shift | None]:
         if view.static:
             zero: list[Shift | None] = [self._moves(view, np.zeros_like(self._theta(view)))] * 3
             return zero
-        z, decay, dt, kick, _ = self._response(view, None)
+        z, decay, dt, kick, _ = self._response(view, self._theta(view))
         zeta, gain, turn = self.number('damping'), self.number('gain'), 2.0 * np.pi
         pole, damped = self._mode()
         w, root = turn * self.number('frequency'), np.sqrt(1.0 - zeta**2)
@@ -146,12 +147,7 @@ class Vibration(MemoryEffect):
     def push(self, view: View, tangent: Array) -> Array:
         if view.static:
             return tangent
-        dt, kick, _ = self._kicks(view, tangent, None)
-        pole, damped = self._mode()
-        decay = np.exp(pole * dt)
-        z = linear(decay, -decay * kick / damped, np.zeros(tangent.shape[:-1]))
-        pushed: Array = tangent + self.number('gain') * z.imag
-        return pushed
+        return np.asarray(tangent + self.number('gain') * self._response(view, tangent)[0].imag)
 
     @classmethod
     def seeds(cls, view: View, joint: str | None, pull: Array | None = None) -> Iterable[Effect]:
@@ -165,7 +161,7 @@ class Vibration(MemoryEffect):
 
     def atoms(self, view: View) -> list[Shift]:
         """Return both quadratures of the response, so that frequency may be a little off."""
-        z = self._response(view, None)[0]
+        z = self._response(view, self._theta(view))[0]
         return [self._moves(view, z.imag), self._moves(view, z.real)]
 
     def from_atoms(self, coefficients: Array) -> Vibration:

@@ -16,7 +16,7 @@ from weld_twin_core.diagnosis.beliefs import Beliefs
 from weld_twin_core.diagnosis.hypotheses.rivals import Rival
 from weld_twin_core.diagnosis.result import Family, Site, Structure
 from weld_twin_core.diagnosis.verdict.decision import Left, decide
-from weld_twin_core.diagnosis.verdict.evidence import Evidence
+from weld_twin_core.diagnosis.verdict.evidence import Evidence, Scatter
 
 ELBOW, WRIST = 'elbow_joint', 'wrist_1_joint'
 PLAY, OFFSET = Site('backlash', ELBOW), Site('joint_offset', WRIST)
@@ -26,7 +26,8 @@ FLOOR = 3.5e-5
 
 def slot(*pairs):
     """Return an effect found with its rivals, from sites and probabilities."""
-    return tuple(Rival(site, 0.0, SimpleNamespace(), probability) for site, probability in pairs)
+    fit = SimpleNamespace(model=SimpleNamespace(found=()))
+    return tuple(Rival(site, 0.0, fit, probability) for site, probability in pairs)
 
 
 def left_over(gain, sure=9.0, names=('time',)):
@@ -155,6 +156,20 @@ def test_what_is_left_makes_a_gap_unknown_where_it_is_more_than_what_is_named(pa
         told = evidence(SURE, gap=1e-3, after=after, floor=0.3e-3, parts=(part,))
         verdict = decide(told)
         assert (verdict.status, verdict.sets) == (status, ((PLAY,),))
+
+
+@pytest.mark.parametrize(('joint', 'sets'), [(ELBOW, ((OFFSET,),)), (WRIST, ((PLAY,), (OFFSET,)))])
+def test_noise_that_comes_from_a_joint_has_no_name_and_its_mean_is_no_lost_motion(joint, sets):
+    both = SURE, slot((OFFSET, 1.0))
+    verdict = decide(evidence(*both, scattered=(Scatter(joint, 0.79, 13.0),)))
+    assert (verdict.status, verdict.sets) == ('unknown', sets)
+    assert verdict.reasons == (
+        f'what remains is no noise of the instrument: 79 % of it lies along the motion of {joint}',
+    )
+    # The same where nothing was found.
+    verdict = decide(evidence(gap=FLOOR, scattered=(Scatter(joint, 0.2, 6.0),)))
+    assert (verdict.status, verdict.sets) == ('unknown', ())
+    assert '20 % of it lies along the motion of' in verdict.reasons[0]
 
 
 @pytest.mark.parametrize('left', [0.6, 0.9])

@@ -178,7 +178,7 @@ def test_a_gap_that_something_predicts_is_no_noise(gain, steady, status):
     part = SimpleNamespace(group='tool, depending on load')
     rival = SimpleNamespace(form=SimpleNamespace(parts=(part,), gain=gain, steady=steady))
     nothing = Verdict('none')
-    verdict = no_noise(nothing, rival, (), Beliefs())
+    verdict = no_noise(nothing, rival, Beliefs())
     assert verdict.status == status
     assert (verdict == nothing) or 'tool, depending on load' in verdict.reasons[0]
 

@@ -23,7 +23,6 @@ from .hypotheses.search import Search, search
 from .hypotheses.selection import implausible
 from .levels.curved import carried, curved, no_noise, placed
 from .levels.gathered import gathered
-from .levels.scatter import scattered
 from .many.fitted_together import fitted_together
 from .many.weighed_families import weighed_families
 from .predicting.allowed import allowed, elsewhere
@@ -186,16 +185,15 @@ def _told(
     floor = noise_floor(result.problem, result.problem.residuals(result.final.model))
     shrink = held_out_shrink(result, unseen, holdout, beliefs)
     families = weighed_families(result, unseen, beliefs) if result.dense else None
-    evidence = gathered(result, unseen, leftover, shrink, floor, families)
+    evidence = gathered(result, unseen, leftover, shrink, floor, families, beliefs)
     table = tuple(Row.of(slot, beliefs) for slot in result.slots)
     statements = stated(evidence, table, beliefs)
     evidence = statements.put_to(evidence)
     verdict = decide(evidence, beliefs)
     alternative = curved(result, verdict, beliefs)
-    loose = scattered(result, unseen, beliefs)
-    verdict = no_noise(verdict, alternative, loose, beliefs)
+    verdict = no_noise(verdict, alternative, beliefs)
     unseen.forget_other_parts()
-    places = placed(result, verdict, alternative, loose, beliefs)
+    places = placed(result, verdict, alternative, evidence.scattered, beliefs)
     progress('held against curves without a formula')
     which = verdict, alternative, holdout, beliefs
     result, unseen, shrink, verdict = carried(result, unseen, shrink, *which)

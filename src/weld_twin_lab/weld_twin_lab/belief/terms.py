@@ -35,6 +35,7 @@ NAMED = {
     'left': -1,
     'left unexplained': -1,
     'stations': 0,
+    'instrument and base': -1,
     **NAMES,
 }
 """What speaks for an answer that names causes; against it speaks that one of them has no name."""
@@ -42,6 +43,7 @@ REST = {'weight': 1, 'second': -1, 'share': 1, 'steady': 1, 'groups': 0}
 TERMS: dict[str, dict[str, int]] = {
     'name': {
         'gap': 1,
+        'instrument and base': -1,
         'left unexplained': -1,
         'rows': 0,
         'joints moving': 1,
@@ -62,7 +64,6 @@ TERMS: dict[str, dict[str, int]] = {
         'size': 1,
         'gap': 0,
         'wander': 0,
-        'structure': -1,
     },
     'dependence': {
         'weight of the dependence': 1,

@@ -132,7 +132,7 @@ def _levels(
         own = [{**name.features, **of_level(row, level)} for level in both]
         levels = [_told(one, k, more, learned) for one, more in zip(both, own, strict=True)]
         return [*levels, replace(name, cause=k)]
-    if many and cause.name and not cause.rest:
+    if many and cause.effect is not None:
         reported = {'place': KIND_AT, 'dependence': KIND_AT, 'name': KIND}
         return [Statement(f'{on} of many', k, dict(situation), p) for on, p in reported.items()]
     own = [{**situation, **form, **of_rest(cause, level)} for level in both]

@@ -50,6 +50,8 @@ KINDS = {
 def of_situation(evidence: Evidence, beliefs: Beliefs) -> Numbers:
     """Return the features that all statements of a diagnosis share."""
     floor = max(evidence.floor, 1e-12)
+    # An instrument of another law, about an origin of its own, is near to a scale and a moved base.
+    places = {candidate_set[0].place for candidate_set in evidence.slots}
     return plain(
         {
             'gap': log(evidence.gap / floor),
@@ -61,6 +63,7 @@ def of_situation(evidence: Evidence, beliefs: Beliefs) -> Numbers:
             'lacking': float(bool(evidence.lacking)),
             'cancelling': log(sum(evidence.parts)) if evidence.parts else 0.0,
             'stations': float(evidence.stations),
+            'instrument and base': float({'instrument', 'base'} <= places),
         }
     )
 

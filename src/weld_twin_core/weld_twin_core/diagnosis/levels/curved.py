@@ -20,8 +20,8 @@ from ..unseen.groups import Group
 from ..unseen.held_out_shrink import held_out_shrink
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.decision import Verdict
+from ..verdict.evidence import Scatter
 from .free_form import FreeForm, Part, free_form
-from .scatter import Scatter
 
 ROWS = 6000
 """Rows that groups are chosen on; the curves are fitted on all."""
@@ -49,7 +49,7 @@ def curved(result: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
     result: the set-up's own motion that it holds stays beside the curves.
     verdict: of one that names something nothing is left.
     """
-    if verdict.status in NAMING or result.dense:
+    if verdict.status in NAMING or (result.dense and verdict.sets):
         return None
     reported = {site for group in verdict.sets for site in group}
     kept = [
@@ -57,7 +57,8 @@ def curved(result: Search, verdict: Verdict, beliefs: Beliefs) -> Curved | None:
         for effect, candidate_set in zip(result.final.model.found, result.slots, strict=False)
         if {Site.of(effect), candidate_set[0].site} & reported
     ]
-    kept = [effect for effect in result.final.model.found if not effect.traits.cause] + kept
+    of_setup = (e for e in result.final.model.found if not (e.traits.cause or e.traits.bends))
+    kept = [*of_setup, *kept]
     found = _beside(result, kept, beliefs)
     if found is None and verdict.status == 'unknown':
         found = _beside(result, kept, beliefs, wandering=True)
@@ -80,7 +81,7 @@ def _beside(
     full = result.problem
     scale = robust_scale(full, full.residuals(fit(small, model, scale, precision, 4).model))
     final, scale = robust_fit(full, model, scale, precision, rounds=1)
-    changed = replace(result, final=final, scale=scale, precision=precision)
+    changed = replace(result, final=final, scale=scale, precision=precision, dense=False)
     unseen = Unseen.of(full, scale, final, precision)
     return Curved(form, bare.model.found, changed, unseen)
 
@@ -126,30 +127,24 @@ def _worth(named: Unseen, alternative: Curved, verdict: Verdict, beliefs: Belief
     return taken.share >= beliefs.beaten_share and taken.steady >= beliefs.beaten_steady
 
 
-def no_noise(
-    verdict: Verdict, alternative: Curved | None, loose: Sequence[Scatter], beliefs: Beliefs
-) -> Verdict:
+def no_noise(verdict: Verdict, alternative: Curved | None, beliefs: Beliefs) -> Verdict:
     """
-    Return 'unknown' in the place of 'none' where what looks like noise follows something.
+    Return 'unknown' in the place of 'none' where free curves predict what looks like noise.
 
     verdict: of any other status, nothing changes.
     alternative: the free-form explanation, whether or not it can be carried to another motion.
     """
-    if verdict.status != 'none':
+    if verdict.status != 'none' or alternative is None:
         return verdict
-    reasons = [
-        f'what remains is no noise of the instrument: {100.0 * one.share:.0f} % of it lies along '
-        f'the motion of {one.joint}'
-        for one in loose
-    ]
-    form = None if alternative is None else alternative.form
-    if form and form.gain >= beliefs.beaten_share and form.steady >= beliefs.beaten_steady:
-        places = ' and '.join(str(part.group) for part in form.parts)
-        reasons.append(
-            f'no effect in the library explains the gap, but it is no noise: {places} predicts '
-            f'{100.0 * form.gain:.0f} % of it on unseen stretches'
-        )
-    return replace(verdict, status='unknown', reasons=tuple(reasons)) if reasons else verdict
+    form = alternative.form
+    if form.gain < beliefs.beaten_share or form.steady < beliefs.beaten_steady:
+        return verdict
+    places = ' and '.join(str(part.group) for part in form.parts)
+    reason = (
+        f'no effect in the library explains the gap, but it is no noise: {places} predicts '
+        f'{100.0 * form.gain:.0f} % of it on unseen stretches'
+    )
+    return replace(verdict, status='unknown', reasons=(reason,))
 
 
 ROUNDED, JUMPING = 0.6, 0.4
@@ -175,7 +170,7 @@ def placed(
     """
     if verdict.status != 'unknown':
         return FreeForm(())
-    if result.dense:
+    if result.dense and verdict.sets:
         # Beside many small errors it is what they leave that has no place yet.
         bare = replace(result.final, model=result.final.model.with_found(()))
         form = free_form(result.problem, result.scale, bare, beliefs)

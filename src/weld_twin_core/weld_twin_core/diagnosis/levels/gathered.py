@@ -10,12 +10,14 @@ from ...arm.robot import Robot
 from ...effects.effect import Effect
 from ...effects.plausible import beyond
 from ..algebra.noise_floor import NoiseFloor
+from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..result import Family, Shrink, Site, Structure
 from ..unseen.chance import chance_ratio, may_be_chance
 from ..unseen.folds import ways_to_divide
 from ..unseen.unseen_stretches import Unseen
 from ..verdict.evidence import Evidence
+from .scatter import scattered
 
 
 def gathered(
@@ -25,6 +27,7 @@ def gathered(
     shrink: Shrink,
     floor: NoiseFloor,
     families: tuple[Family, ...] | None,
+    beliefs: Beliefs,
 ) -> Evidence:
     """
     Return the evidence for a verdict.
@@ -54,6 +57,7 @@ def gathered(
         wandered=() if result.dense else tuple(unseen.wandered().tolist()),
         rows=result.effective(result.small),
         travel=tuple(np.max([np.ptp(r.joints.q, axis=0) for r in recordings], axis=0).tolist()),
+        scattered=scattered(result, unseen, beliefs),
         stations=any(recording.joints.static for recording in recordings),
     )
 

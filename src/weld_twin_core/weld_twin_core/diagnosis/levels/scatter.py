@@ -19,8 +19,6 @@ References
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
@@ -33,6 +31,7 @@ from ..beliefs import Beliefs
 from ..hypotheses.search import Search
 from ..unseen.folds import STRETCHES, jackknife
 from ..unseen.unseen_stretches import Unseen
+from ..verdict.evidence import Scatter
 
 LEAST = 80
 """Measurements of a recording from which on variances are told: ten for each stretch."""
@@ -45,23 +44,13 @@ TINY = 1e-9
 """Part of the diagonal added to a system of variances: two joints may move the tool alike."""
 
 
-class Scatter(NamedTuple):
-    """Scatter along one joint."""
-
-    joint: str
-    share: float
-    """Of the squared noise."""
-    steady: float
-    """The share in its standard errors between stretches."""
-
-
-def scattered(result: Search, unseen: Unseen, beliefs: Beliefs) -> list[Scatter]:
+def scattered(result: Search, unseen: Unseen, beliefs: Beliefs) -> tuple[Scatter, ...]:
     """Return the joints that noise comes from beyond doubt, largest first."""
-    return [
+    return tuple(
         one
         for one in sorted(scatter(result, unseen), key=lambda one: -one.share)
         if one.share >= beliefs.beaten_share and one.steady >= beliefs.scatter_sure
-    ]
+    )
 
 
 def scatter(result: Search, unseen: Unseen) -> list[Scatter]:

@@ -215,8 +215,12 @@ def _of_all(problem: Problem, features: list[Features]) -> Iterator[Plain]:
         yield 'instrument', 'place', field, ()
         # Where noise hides the squares of the place, its linear part may still show.
         linear = [np.concatenate([f[k : k + 3] for k in range(0, len(f), 9)]) for f in field]
-        yield 'instrument', 'place', linear, ()
-        yield 'instrument', 'place', [_sighted(maker, None) for maker in features], ()
+        sight = [_sighted(maker, None) for maker in features]
+        yield 'instrument', 'place', sight, ()
+        # A law about an origin of its own also shifts what is in the middle of the frame.
+        for law in (field, linear, sight):
+            about = [np.concatenate([_shifted(part), part]) for part in law]
+            yield 'instrument', 'place', about, ()
         knots = _spaced([_distance(maker) for maker in features], RANGES, NEAR)
         if knots is not None:
             yield 'instrument', 'place', [_sighted(maker, knots) for maker in features], ()
@@ -288,6 +292,11 @@ def _spaced(values: list[Array], count: int, least: float) -> tuple[float, ...] 
 
 def _distance(maker: Features) -> Array:
     return np.asarray(np.linalg.norm(maker.run.poses.position, axis=1))
+
+
+def _shifted(columns: Array) -> Array:
+    """Return a shift along each axis, (3, 6, M), for as many samples as columns have, (..., M)."""
+    return np.repeat(np.eye(6)[:3, :, None], columns.shape[-1], axis=2)
 
 
 def _sighted(maker: Features, knots: tuple[float, ...] | None) -> Array:

@@ -6,6 +6,8 @@ From the table of answers to a verdict: what is told, and is it more than what h
 One rule decides. An effect counts as named where its name is likelier right than wrong. What the
 others explain, and what nothing explains, has no name. Where that is more, or where a cause that has
 no name is likelier at work than not, the gap is unknown; what counts as named is told all the same.
+Noise that comes from a joint beyond doubt is such a cause. What depends there on the direction of motion
+is the mean of the same jumps, and no cause beside it.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import numpy as np
 
 from ..beliefs import Beliefs
 from ..result import Family, Site
-from .evidence import Evidence, named_together
+from .evidence import Evidence, Slot, named_together
 
 LIKELIER = 0.5
 """Probability from which on a cause counts as named: it is likelier right than wrong."""
@@ -126,11 +128,14 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
     if not evidence.slots:
         return _of_nothing(remaining)
     sets = tuple(named_together(slot, remaining.beliefs) for slot in evidence.slots)
-    likely = [p > LIKELIER for p in evidence.believed]
+    likely = [
+        p > LIKELIER and not _mean_of_jumps(evidence, slot)
+        for slot, p in zip(evidence.slots, evidence.believed, strict=True)
+    ]
     named = remaining.explained * _share_of(likely, evidence)
     more = remaining.share + remaining.explained * _share_of([not one for one in likely], evidence)
     reported = tuple(group for group, holds in zip(sets, likely, strict=True) if holds)
-    if named <= more or evidence.nameless > LIKELIER:
+    if named <= more or evidence.nameless > LIKELIER or evidence.scattered:
         return Verdict('unknown', reported, _why_unknown(remaining, sets, likely))
     reasons = tuple(
         f'{", ".join(map(str, group))} move the tool alike on these data: their fits differ by less '
@@ -139,6 +144,12 @@ def decide(evidence: Evidence, beliefs: Beliefs | None = None) -> Verdict:
         if len(group) > 1
     )
     return Verdict('ambiguous' if reasons else 'identified', reported, reasons)
+
+
+def _mean_of_jumps(evidence: Evidence, candidate_set: Slot) -> bool:
+    """Return whether an effect depends on the direction of a joint that noise comes from."""
+    leader, joints = candidate_set[0], {one.joint for one in evidence.scattered}
+    return leader.site.joint in joints and leader.dependence == 'direction'
 
 
 def _share_of(some: list[bool], evidence: Evidence) -> float:
@@ -155,9 +166,14 @@ def _why_unknown(
     """Return why something has no name, the gravest first."""
     evidence = remaining.evidence
     out = [_absurd(evidence)] if evidence.refused or evidence.lacking else []
+    out += _no_noise(evidence)
     if remaining.share > remaining.beliefs.unexplained:
         out.append(_depends(evidence))
-    doubted = [group[0] for group, holds in zip(sets, likely, strict=True) if not holds]
+    doubted = [
+        group[0]
+        for group, slot, holds in zip(sets, evidence.slots, likely, strict=True)
+        if not (holds or _mean_of_jumps(evidence, slot))
+    ]
     if doubted:
         names = ', '.join(map(str, doubted))
         out.append(
@@ -181,6 +197,8 @@ def _of_nothing(remaining: Left) -> Verdict:
             'what remains is far wider spread than noise, though it depends on nothing looked at'
         )
         return Verdict('unknown', (), (reason,))
+    if evidence.scattered:
+        return Verdict('unknown', (), tuple(_no_noise(evidence)))
     if not evidence.independent and remaining.rises(beliefs.above):
         reason = (
             'nothing is found, but what remains is not spread as noise is, and nothing on these '
@@ -226,6 +244,15 @@ def _sets_of(family: Family) -> list[tuple[Site, ...]]:
     """Return a set for every joint of a kind; what would do as well as the kind is in the first."""
     like = [site for site, _ in family.like]
     return [(site, *(like if k == 0 else ())) for k, (site, _) in enumerate(family.needed)]
+
+
+def _no_noise(evidence: Evidence) -> list[str]:
+    """Return that what looks like noise comes from a joint, for each such joint."""
+    return [
+        f'what remains is no noise of the instrument: {100.0 * one.share:.0f} % of it lies along '
+        f'the motion of {one.joint}'
+        for one in evidence.scattered
+    ]
 
 
 def _absurd(evidence: Evidence) -> str:

@@ -12,12 +12,22 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from ...effects.registry import REGISTRY
 from ..beliefs import Beliefs
 from ..hypotheses.rivals import Rival
 from ..result import Family, Site, Structure
+
+
+class Scatter(NamedTuple):
+    """Scatter along one joint."""
+
+    joint: str
+    share: float
+    """Of the squared noise."""
+    steady: float
+    """The share in its standard errors between stretches."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +72,8 @@ class Evidence:
     """How far every joint moves [rad, m]."""
     stations: bool = False
     """Whether the arm stood still where it was measured, in one of the recordings at least."""
+    scattered: tuple[Scatter, ...] = ()
+    """Noise that comes from joints beyond doubt, largest first."""
 
 
 Key = TypeVar('Key')

@@ -7,8 +7,8 @@ import pytest
 from measured_cells import anywhere, asked, moving, recorded, remeasured, stations
 
 from weld_twin_core.arm import catalog
-from weld_twin_core.arm.rotation import rotation_matrix
-from weld_twin_core.diagnosis.frames.alignment import initial_frames, nearest_rotation
+from weld_twin_core.arm.rotation import nearest_rotation, rotation_matrix
+from weld_twin_core.diagnosis.frames.alignment import initial_frames
 
 
 def worst_median(problem, model):

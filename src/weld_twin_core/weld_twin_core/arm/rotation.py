@@ -140,6 +140,13 @@ def quaternion_from_matrix(matrix: Array) -> Array:
     return np.reshape(canonical, matrix.shape[:-2] + (4,))
 
 
+def nearest_rotation(matrix: Array) -> Array:
+    """Return the rotations R that make trace(R' matrix) largest, shape (..., 3, 3)."""
+    u, _, vt = np.linalg.svd(matrix)
+    u[..., 2] *= np.linalg.det(u @ vt)[..., None]
+    return np.asarray(u @ vt)
+
+
 def transform(rotation: Array, position: Array) -> Array:
     """Return homogeneous transforms, shape (..., 4, 4)."""
     out = np.zeros(np.broadcast_shapes(rotation.shape[:-2], position.shape[:-1]) + (4, 4))

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arm.rotation import rotation_matrix, skew, transform
+from ..arm.rotation import nearest_rotation, rotation_matrix, skew, transform
 from ..arrays import Array
 from .lens import Lens
 
@@ -74,7 +74,7 @@ def _of_plane(own: Array, flat: Array) -> list[Array]:
     h = h / (0.5 * (np.linalg.norm(h[:, 0]) + np.linalg.norm(h[:, 1])))
     h = h * np.sign(h[2, 2])
     pose = transform(
-        _nearest(np.stack([h[:, 0], h[:, 1], np.cross(h[:, 0], h[:, 1])], 1)), h[:, 2]
+        nearest_rotation(np.stack([h[:, 0], h[:, 1], np.cross(h[:, 0], h[:, 1])], 1)), h[:, 2]
     )
     sight = pose[:3, 3] / np.linalg.norm(pose[:3, 3])
     normal = pose[:3, 2]
@@ -95,15 +95,9 @@ def _of_space(own: Array, flat: Array) -> list[Array]:
         first, second = (back @ (flat * ahead[:, None])).T
         size = max(0.5 * (np.linalg.norm(first[:3]) + np.linalg.norm(second[:3])), 1e-12)
         x, y = first[:3] / np.linalg.norm(first[:3]), second[:3] / np.linalg.norm(second[:3])
-        turn = _nearest(np.stack([x, y, np.cross(x, y)]))
+        turn = nearest_rotation(np.stack([x, y, np.cross(x, y)]))
         ahead = 1.0 + size * (own @ turn[2])
     return [transform(turn, np.array([first[3], second[3], 1.0]) / size)]
-
-
-def _nearest(matrix: Array) -> Array:
-    """Return the rotation nearest to a matrix."""
-    u, _, v = np.linalg.svd(matrix)
-    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v)
 
 
 def _refined(pose: Array, own: Array, flat: Array) -> tuple[float, Array]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arm.chain import forward
 from ..arm.robot import Robot
+from ..arm.rotation import nearest_rotation
 from ..arrays import Array
 from ..cubics import hermite, slopes_of_many
 from ..errors import DataError
@@ -124,8 +125,7 @@ def _mean_stop(
         return None
     rotation = None
     if measured.rotation is not None:
-        u, _, vt = np.linalg.svd(measured.rotation[rows].mean(axis=0))
-        rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+        rotation = nearest_rotation(measured.rotation[rows].mean(axis=0))
     return _Stop(
         late, joints.at(np.array(late))[0], measured.position[rows].mean(axis=0), rotation
     )

@@ -27,7 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arm.rotation import transform
+from ...arm.rotation import nearest_rotation, transform
 from ...arrays import Array
 from ..algebra.fit import fit, robust_scale
 from ..algebra.problem import Model, Problem
@@ -388,13 +388,6 @@ class Track:
     def turns(self) -> Array:
         """Return measured rotations, none where only points were measured."""
         return np.zeros((0, 3, 3)) if self.rotation is None else self.rotation
-
-
-def nearest_rotation(matrix: Array) -> Array:
-    """Return the rotations R that make trace(R' matrix) largest, shape (..., 3, 3)."""
-    u, _, vt = np.linalg.svd(matrix)
-    u[..., 2] *= np.linalg.det(u @ vt)[..., None]
-    return np.asarray(u @ vt)
 
 
 def chord(first: Array, second: Array) -> Array:

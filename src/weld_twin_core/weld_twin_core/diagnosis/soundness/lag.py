@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arm.rotation import nearest_rotation
 from ...arrays import Array
-from ..frames.alignment import nearest_rotation
 from .limits import ENOUGH, FEW, STEPS, WORTH
 
 MOST_LAG = 2.0

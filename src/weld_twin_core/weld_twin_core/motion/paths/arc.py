@@ -61,6 +61,11 @@ class Arc(Path):
         """Return the length of the arc [m]."""
         return self._arc.angle_of(self.end) * self.radius
 
+    @property
+    def middle_share(self) -> float:
+        """Return at which share of its length the arc passes ``middle``."""
+        return self._arc.angle_of(self.middle) / self._arc.angle_of(self.end)
+
     def sample(self, s: Array) -> SeamFrames:
         """Return the seam at arc lengths s, shape (N,) [m]."""
         position, tangent = self._arc.at(s)

@@ -256,7 +256,7 @@ def tool_way(
     middle = _pose(arm, program.place(move.via))[:3, 3]
     arc = Arc(begin[:3, 3], middle, end[:3, 3])
     count = count or _count(arc.length)
-    part = _share_of(arc, middle)
+    part = arc.middle_share
     at = at or int(np.clip(round(part * (count - 1)), 1, count - 2))
     share = np.interp(np.arange(count), [0, at, count - 1], [0.0, part, 1.0])
     position = arc.sample(share * arc.length).position
@@ -265,15 +265,6 @@ def tool_way(
 
 def _pose(arm: Robot, place: Array) -> Array:
     return place if place.ndim == 2 else np.asarray(forward(arm, place))
-
-
-def _share_of(arc: Arc, point: Array) -> float:
-    """Return at which share of an arc a point on it lies."""
-    out = (arc.start - arc.centre) / arc.radius
-    axis = np.cross(point - arc.start, arc.end - arc.start)
-    along = np.cross(axis / np.linalg.norm(axis), out)
-    angle = np.arctan2((point - arc.centre) @ along, (point - arc.centre) @ out)
-    return float(angle % (2.0 * np.pi) * arc.radius / arc.length)
 
 
 def _count(length: float) -> int:

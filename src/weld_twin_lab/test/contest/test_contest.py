@@ -8,11 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from weld_twin_core.arm.catalog import load
 from weld_twin_core.arm.chain import forward
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, Measurements, Recording
+from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 from weld_twin_lab.contest.arms import page as told_page
 from weld_twin_lab.contest.course import commands, run_all
 from weld_twin_lab.contest.entrants import bootstrap, geometry, never_knows, zero_offset
@@ -73,6 +74,34 @@ def test_what_was_measured_on_the_motion_asked_for_is_not_in_the_case(case):
     assert read_case(folder).ask.measured is None
     first = f'{positions[0, 0]:.17g}'
     assert not any(first in file.read_text() for file in folder.iterdir())
+
+
+def test_a_case_is_read_as_it_was_written_with_all_that_was_recorded(tmp_path):
+    rng, t = np.random.default_rng(2), 0.1 * np.arange(30.0)
+    motion = JointMotion(t, rng.normal(size=(30, 6)), rng.normal(size=(30, 6)))
+    turns = Rotation.random(30, random_state=1).as_matrix()
+    whole = Recording(
+        'train',
+        motion,
+        Measurements(t, rng.normal(size=(30, 3)), turns),
+        Signal(t[::3], rng.normal(size=(10, 6)), held=True),
+        'base',
+        Signal(t[::5], rng.normal(size=6), held=True),
+    )
+    (tmp_path / 'robot.yaml').write_text(yaml_text(load('ur5').to_mapping()), encoding='utf-8')
+    said = {'align': ['base'], 'exclude': ['drift'], 'known': ''}
+    write_case(tmp_path / 'case', tmp_path / 'robot.yaml', (whole, whole), said)
+    back = read_case(tmp_path / 'case')
+    assert (back.align, back.exclude, back.known) == (('base',), ('drift',), None)
+    np.testing.assert_array_equal(back.times, t)
+    for one in (back.train, back.ask):
+        assert (one.wrench_frame, one.joints.static) == ('base', False)
+        for got, given in ((one.wrench, whole.wrench), (one.temperature, whole.temperature)):
+            np.testing.assert_array_equal(got.t, given.t)
+            np.testing.assert_array_equal(got.value, given.value)
+        np.testing.assert_array_equal(one.joints.q, motion.q)
+        np.testing.assert_array_equal(one.joints.qd, motion.qd)
+    np.testing.assert_allclose(back.train.measured.rotation, turns, atol=1e-15)
 
 
 def test_geometry_finds_what_geometry_is(case, truth):

@@ -31,12 +31,6 @@ def cut_short(request, tmp_path):
     return tmp_path / 'bag'
 
 
-def test_a_reader_leads_to_the_command(cut_short, weld_twin):
-    said = weld_twin('bag', cut_short)
-    assert said.code == 2
-    assert f"'weld-twin bag recover {cut_short}'" in said.err
-
-
 def test_the_command_that_is_printed_for_a_full_disk_works(cut_short, weld_twin, monkeypatch):
     """The disk of the recording has no room left for a copy; that of the present directory has."""
     here = cut_short.parent.parent / f'elsewhere_{cut_short.parent.name}'

@@ -214,9 +214,10 @@ def test_a_wait_makes_the_move_before_it_last_longer(language, place, seconds):
 def test_a_wait_is_of_its_own_routine_and_one_before_any_move_of_none():
     axes = 'A2 -85.0,A3 100.0,A4 5.0,A5 70.0,A6 -3.0'
     one, two, three = (f'PTP {{A1 {k},{axes}}}\n' for k in (1, 2, 3))
-    text = f'DEF a()\n{one}END\nDEF b()\nWAIT SEC 9\n{two}WAIT SEC 1.5\n{three}END\n'
+    text = f'DEF a()\n{one}END\nDEF b()\nWAIT SEC 9\n{two}{three}WAIT SEC 1.5\nEND\n'
     steps = read('krl', (text,), 'kuka_kr16_2').steps
-    assert [step.dwell for step in steps] == [0.0, 1.5, 0.0]
+    assert [step.dwell for step in steps] == [0.0, 0.0, 1.5]
+    assert [step.where for step in steps] == [f'file0 line {k}' for k in (2, 6, 7)]
 
 
 def test_a_point_that_is_declared_twice_is_refused_with_its_line():

@@ -6,14 +6,11 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, NamedTuple
-
-from .small_parent import UNIT
 
 _SMALL = Path(__file__).with_name('small_parent.py')
 
@@ -59,12 +56,3 @@ def cost_of(
         code, wall, cpu, peak = json.loads(report.readline())
     process.wait()
     return int(code), Cost(wall, cpu, peak)
-
-
-def own_peak() -> float:
-    """Return the largest memory of this process so far [bytes], without that of who started it."""
-    status = Path('/proc/self/status')
-    if not status.exists():  # not Linux, where nobody else is counted with it
-        return float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * UNIT)
-    lines = status.read_text(encoding='utf-8').splitlines()
-    return next(float(line.split()[1]) * 1024.0 for line in lines if line.startswith('VmHWM'))

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from itertools import cycle
 
 import numpy as np
@@ -18,14 +19,14 @@ from weld_twin_core.twin.twin import Twin
 
 from .arms import random_positions
 from .peers import Peer
-from .race import Contender, Workload
+from .race import REFERENCE, Contender, Workload
 
 OWN = 'weld_twin'
 PLAIN = 'weld_twin, plain chain'
 LOOPED = 500
-"""Poses a peer that loops is timed on; its time per pose does not depend on how many."""
-BATCH = 10_000
-"""Poses a peer that takes batches is timed on for derivatives, the slowest of the workloads."""
+"""Poses that peers are timed on: they loop, so that the time per pose does not depend on how many."""
+CHAINED = 4096
+"""Poses that the plain chain is timed on at the most: fewer than it hands to the kernels."""
 EXACT = 1e-12
 """Difference [m or rad] that rounding may leave between two ways to the same number."""
 
@@ -51,7 +52,7 @@ def single(robot: Robot, peers: dict[str, Peer]) -> Workload:
         OWN: SinglePose(robot),
         'weld_twin, LiveTwin.step': step,
     }
-    ways |= {name: peer.single for name, peer in peers.items() if peer.single}
+    ways |= {name: peer.single for name, peer in peers.items()}
     contenders = []
     for name, way in ways.items():
         gap = max(np.abs(way(a)[:3] - b[:3]).max() for a, b in zip(q, wanted, strict=True))
@@ -69,65 +70,68 @@ def _poses(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
     wanted = forward(robot, q[:LOOPED])
     kernel = BulkKernel(robot)
     out = kernel.poses(q)
-    gap = _gap(out, wanted)
-    contenders = [Contender(OWN, lambda: kernel.poses(q, out), count, gap)]
-    few = q[: chain_limit(count)]
-    contenders.append(Contender(PLAIN, lambda: forward(robot, few), len(few)))
+    few = q[:CHAINED]
+    contenders = [
+        Contender(OWN, lambda: kernel.poses(q, out), count, _gap(out, wanted)),
+        Contender(PLAIN, lambda: forward(robot, few), len(few)),
+    ]
     for name, peer in peers.items():
-        part = q[:LOOPED] if peer.loops else q
-        contenders.append(
-            Contender(name, _call(peer.poses, part), len(part), _gap(peer.poses(part), wanted))
-        )
+        gap = _gap(peer.poses(q[:LOOPED]), wanted)
+        contenders.append(Contender(name, partial(peer.poses, q[:LOOPED]), LOOPED, gap))
     return Workload(f'forward kinematics, N = {count:,}', 'pose', contenders, EXACT)
 
 
-def chain_limit(count: int) -> int:
-    """Return how many poses the plain chain is timed on: fewer than it hands to the kernels."""
-    return min(count, 4096)
-
-
 def _jacobians(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
-    q = random_positions(robot, count)
-    kernel = BulkKernel(robot, [('theta', i) for i in range(robot.n)])
-    poses, out = kernel.screws(q)
-    found = out.transpose(2, 0, 1)
-    ways = {name: peer.screws for name, peer in peers.items() if peer.screws}
-    wanted = ways['pinocchio'](q[:LOOPED])[1] if 'pinocchio' in ways else found
-    own = Contender(OWN, lambda: kernel.screws(q, poses, out), count, _gap(found, wanted))
-    contenders = [own]
-    for name, way in ways.items():
-        part = q[:LOOPED]
-        contenders.append(Contender(name, _call(way, part), len(part), _gap(way(part)[1], wanted)))
     return Workload(
         f'poses and Jacobians, N = {count:,}',
         'pose',
-        contenders,
+        _with_screws(
+            BulkKernel(robot, [('theta', i) for i in range(robot.n)]),
+            random_positions(robot, count),
+            {name: peer.screws for name, peer in peers.items()},
+            lambda screws: screws.transpose(2, 0, 1),
+        ),
         EXACT,
         'weld_twin leaves the Jacobians components first in memory',
     )
 
 
 def _derivatives(robot: Robot, peers: dict[str, Peer], count: int) -> Workload:
-    q = random_positions(robot, count)
-    kernel = BulkKernel(robot, [(key, i) for i in range(robot.n) for key in ('theta', 'alpha')])
-    poses, out = kernel.screws(q)
-    found = written_out(out[..., :LOOPED])
-    ways = {name: peer.dh for name, peer in peers.items() if peer.dh}
-    wanted = ways['pinocchio'](q[:LOOPED])[1] if 'pinocchio' in ways else found
-    own = Contender(OWN, lambda: kernel.screws(q, poses, out), count, _gap(found, wanted))
-    contenders = [own]
-    for name, way in ways.items():
-        part = q[:LOOPED] if peers[name].loops else q[:BATCH]
-        derivative = way(part)[1]
-        gap = _gap(derivative, wanted[:, : derivative.shape[1]])
-        contenders.append(Contender(name, _call(way, part), len(part), gap))
     return Workload(
         f'poses and derivatives by {4 * robot.n} DH values, N = {count:,}',
         'pose',
-        contenders,
+        _with_screws(
+            BulkKernel(robot, [(key, i) for i in range(robot.n) for key in ('theta', 'alpha')]),
+            random_positions(robot, count),
+            {name: peer.dh for name, peer in peers.items() if peer.dh},
+            written_out,
+        ),
         EXACT,
-        'weld_twin gives them as two screws a row; JAX that of the tool point alone',
+        'weld_twin gives them as two screws a row',
     )
+
+
+def _with_screws(
+    kernel: BulkKernel,
+    q: Array,
+    ways: Mapping[str, Callable[[Array], tuple[Array, Array]]],
+    as_peers: Callable[[Array], Array],
+) -> list[Contender]:
+    """
+    Return the contenders for poses and their derivatives.
+
+    as_peers: brings the kernel's screws (6, k, N) into the form that peers give.
+    """
+    poses, out = kernel.screws(q)
+    found = as_peers(out[..., :LOOPED])
+    wanted = ways[REFERENCE](q[:LOOPED])[1] if REFERENCE in ways else found
+    contenders = [
+        Contender(OWN, lambda: kernel.screws(q, poses, out), len(q), _gap(found, wanted))
+    ]
+    for name, way in ways.items():
+        gap = _gap(way(q[:LOOPED])[1], wanted)
+        contenders.append(Contender(name, partial(way, q[:LOOPED]), LOOPED, gap))
+    return contenders
 
 
 def written_out(screws: Array) -> Array:
@@ -139,9 +143,4 @@ def written_out(screws: Array) -> Array:
 
 
 def _gap(found: Array, wanted: Array) -> float:
-    shared = min(len(found), len(wanted))
-    return float(np.abs(found[:shared] - wanted[:shared]).max())
-
-
-def _call(way: Callable[[Array], object], q: Array) -> Callable[[], object]:
-    return lambda: way(q)
+    return float(np.abs(found[: len(wanted)] - wanted).max())

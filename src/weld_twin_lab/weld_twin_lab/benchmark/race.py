@@ -14,7 +14,8 @@ import numpy as np
 from weld_twin_core.arrays import Array
 from weld_twin_core.errors import DataError
 
-REFERENCE = ('pinocchio',)
+REFERENCE = 'pinocchio'
+"""The contender that the others are compared with."""
 
 
 @dataclass(frozen=True)
@@ -27,25 +28,17 @@ class Contender:
     """How many poses, draws or runs one call does; a slow contender may do fewer of them."""
     gap: float = 0.0
     """Largest difference of its result to the reference."""
-    once: bool = False
-    """So slow that one round has to do."""
 
 
 @dataclass(frozen=True)
 class Workload:
-    """
-    A job: its contenders, the item their time is counted by, and how well they must agree.
-
-    ``reference`` names the contenders whose times, added up, the others are compared with: those
-    that only do the job together.
-    """
+    """A job: its contenders, the item their time is counted by, and how well they must agree."""
 
     title: str
     item: str
     contenders: Sequence[Contender]
     tolerance: float
     note: str = ''
-    reference: tuple[str, ...] = REFERENCE
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +50,9 @@ class Outcome:
 
     def ratio(self, name: str) -> Array | None:
         """Return the reference's time over the contender's, per round; None without either."""
-        names = self.workload.reference
-        if not all(key in self.seconds for key in names):
+        if REFERENCE not in self.seconds:
             return None
-        rounds = min(self.seconds[key].size for key in (*names, name))
-        total = sum(self.seconds[key][:rounds] for key in names)
-        return np.asarray(total / self.seconds[name][:rounds])
+        return np.asarray(self.seconds[REFERENCE] / self.seconds[name])
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers and lists."""
@@ -79,7 +69,7 @@ class Outcome:
         return {
             'title': load.title,
             'item': load.item,
-            'reference': list(load.reference),
+            'reference': [REFERENCE],
             'tolerance': load.tolerance,
             'note': load.note,
             'contenders': rows,
@@ -100,12 +90,11 @@ def race(workload: Workload, rounds: int, least: float) -> Outcome:
                 f'{workload.title}: {contender.name} differs from the others by '
                 f'{contender.gap:.3g}, more than {workload.tolerance:.3g}; nothing was timed'
             )
-    calls = {c.name: 1 if c.once else _calls(c, least) for c in workload.contenders}
+    calls = {c.name: _calls(c, least) for c in workload.contenders}
     seconds: dict[str, list[float]] = {c.name: [] for c in workload.contenders}
-    for k in range(rounds):
+    for _ in range(rounds):
         for contender in workload.contenders:
-            if k == 0 or not contender.once:
-                seconds[contender.name].append(_timed(contender, calls[contender.name]))
+            seconds[contender.name].append(_timed(contender, calls[contender.name]))
     return Outcome(workload, {name: np.array(values) for name, values in seconds.items()})
 
 

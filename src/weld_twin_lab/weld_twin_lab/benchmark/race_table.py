@@ -11,7 +11,7 @@ import numpy as np
 from weld_twin_msgs_py.files import markdown
 
 from .kinematics import OWN
-from .race import Outcome
+from .race import REFERENCE, Outcome
 
 UNITS = ((1.0, 's'), (1e-3, 'ms'), (1e-6, 'us'), (1e-9, 'ns'))
 """Units of time, the largest that a figure reaches is used."""
@@ -22,7 +22,7 @@ LEFT_OUT = 'N = 1,000'
 def lines(outcome: Outcome) -> Iterator[str]:
     """Yield a line for the workload and one for each contender."""
     load = outcome.workload
-    yield f'{load.title} (per {load.item}; times: {" and ".join(load.reference)} / contender)'
+    yield f'{load.title} (per {load.item}; times: {REFERENCE} / contender)'
     for contender in load.contenders:
         seconds = float(np.median(outcome.seconds[contender.name]))
         yield f'  {contender.name:<26} {duration(seconds):>10}  {times(outcome, contender.name)}'
@@ -39,14 +39,13 @@ def page(outcomes: list[Outcome]) -> str:
         others = [
             f'{c.name} {short(np.median(outcome.seconds[c.name]) / np.median(own))}'
             for c in load.contenders
-            if c.name != OWN and c.name not in load.reference
+            if c.name not in (OWN, REFERENCE)
         ]
-        reference = ' + '.join(load.reference)
         rows.append(
             (
                 load.title,
                 f'{duration(float(np.median(own)))} per {load.item}',
-                f'{reference}: **{times(outcome, OWN)}**',
+                f'{REFERENCE}: **{times(outcome, OWN)}**',
                 ', '.join(others),
             )
         )
@@ -59,8 +58,7 @@ def brief(outcomes: list[Outcome]) -> str:
     for outcome in outcomes:
         load, ratio = outcome.workload, outcome.ratio(OWN)
         if ratio is not None and not load.title.endswith(LEFT_OUT):
-            reference = ' + '.join(load.reference)
-            rows.append((load.title, f'{short(float(np.median(ratio)))} ({reference})'))
+            rows.append((load.title, f'{short(float(np.median(ratio)))} ({REFERENCE})'))
     return markdown.table(*rows)
 
 

@@ -3,7 +3,7 @@
 """
 Peers: the same arm in other packages, each in the fastest way its Python interface offers.
 
-A module here has ``make(robot)``, which imports the package and returns a `Peer`.
+A module here has ``make(robot)``, which imports the package and returns a `Peer`. Both loop in Python.
 """
 
 from __future__ import annotations
@@ -15,10 +15,6 @@ from importlib import import_module
 from weld_twin_core.arm.robot import Robot
 from weld_twin_core.arrays import Array
 
-MODULES = {
-    'pinocchio': 'pinocchio_peer',
-    'mujoco': 'mujoco_peer',
-}
 PACKAGES = {'pinocchio': 'pin', 'mujoco': 'mujoco'}
 """What they are called on PyPI."""
 
@@ -29,23 +25,21 @@ class Peer:
 
     poses: Callable[[Array], Array]
     """Joint positions (N, n) to poses (N, 4, 4)."""
-    screws: Callable[[Array], tuple[Array, Array]] | None = None
+    screws: Callable[[Array], tuple[Array, Array]]
     """Joint positions to poses and Jacobians (N, 6, n)."""
+    single: Callable[[Array], Array]
+    """One joint position (n,) to a pose (4, 4)."""
     dh: Callable[[Array], tuple[Array, Array]] | None = None
     """Joint positions to poses and derivatives by the DH values, (N, 6, 4 n), of each row by
     theta, d, a, alpha."""
-    single: Callable[[Array], Array] | None = None
-    """One joint position (n,) to a pose (4, 4)."""
-    loops: bool = True
-    """A Python loop, so that the time per pose does not depend on how many there are."""
 
 
 def find_peers(robot: Robot) -> tuple[dict[str, Peer], dict[str, str]]:
     """Return the peers that are installed, and why the others are left out."""
     found, missing = {}, {}
-    for name, module in MODULES.items():
+    for name, package in PACKAGES.items():
         try:
-            found[name] = import_module(f'{__name__}.{module}').make(robot)
+            found[name] = import_module(f'{__name__}.{name}_peer').make(robot)
         except ImportError as error:
-            missing[name] = f'not installed (pip install {PACKAGES[name]}): {error}'
+            missing[name] = f'not installed (pip install {package}): {error}'
     return found, missing

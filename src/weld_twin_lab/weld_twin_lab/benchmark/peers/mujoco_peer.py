@@ -68,7 +68,7 @@ def make(robot: Robot) -> Peer:
         pose(q, out)
         return out
 
-    return Peer(poses, screws, single=single)
+    return Peer(poses, screws, single)
 
 
 def _quaternion(placement: Array) -> Array:

@@ -65,7 +65,7 @@ def make(robot: Robot) -> Peer:
         every[:, ::4] += q
         return _jacobians(wide, wide_data, wide_tool, every)
 
-    return Peer(poses, screws, dh, single)
+    return Peer(poses, screws, single, dh)
 
 
 def _jacobians(model: pin.Model, data: pin.Data, tool: int, q: Array) -> tuple[Array, Array]:

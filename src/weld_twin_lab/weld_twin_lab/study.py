@@ -49,7 +49,7 @@ studies, so that they hold for the same engine."""
 MISSED = 1
 """Exit code where a goal was not met."""
 DONE = 'done'
-"""Folder of what is kept of the tasks of a study."""
+"""Folder of what is kept of the tasks of a study, with a folder of each engine that did them."""
 Tell = Callable[[str], None]
 """Told what is being done."""
 
@@ -124,7 +124,12 @@ class Study:
 
     @contextmanager
     def runner(self, what: str, store: Path | None = None) -> Iterator[Runner]:
-        """Yield what runs tasks, shows how far they are, and keeps what came of them."""
+        """
+        Yield what runs tasks, shows how far they are, and keeps what came of them.
+
+        store: folder of what is kept; left out, it is one of this engine's own, so that what another
+        engine said is not taken for what this one says.
+        """
         from rich.console import Console
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
@@ -139,7 +144,7 @@ class Study:
                 progress.update(bar, completed=done, total=total)
 
             pool = pool_of(self.args.scheduler, self.args.workers)
-            with Runner(pool, store or self.out / DONE, tell) as runner:
+            with Runner(pool, store or kept_of_engine(self.out), tell) as runner:
                 yield runner
 
     def tasks(self, tasks: Sequence[Task], what: str, store: Path | None = None) -> list[Any]:
@@ -178,6 +183,15 @@ def engine_digest() -> str:
     files = [file.read_bytes() for file in sorted(place.rglob('*.py'))]
     whole = [hashlib.sha256(text.replace(*_COPYRIGHT, 1)).hexdigest() for text in files]
     return hashlib.sha256('\n'.join(whole).encode()).hexdigest()
+
+
+def kept_of_engine(folder: Path, *more: str) -> Path:
+    """
+    Return where the tasks of a study are kept that this engine has done.
+
+    more: what else makes other results of the same tasks.
+    """
+    return folder / DONE / '-'.join((engine_digest()[:8], *more))
 
 
 def require_simulator() -> None:

@@ -214,11 +214,5 @@ def page(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
     """
     each = {name: scores(rows) for name, rows in tables.items()}
     first = next(iter(each.values()))
-    body = [(key, *(_in_words(own[key]) for own in each.values())) for key in first]
+    body = [(key, *(str(own[key]) for own in each.values())) for key in first]
     return markdown.table(('measure', *each), *body)
-
-
-def _in_words(value: Estimate) -> str:
-    if value.value is None:
-        return 'none'
-    return f'{value.value:.3f} ({value.low:.3f} to {value.high:.3f}; {value.cases})'

@@ -9,8 +9,9 @@ answer hangs on which recording was given first.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from ..blind.ambiguous import Site
 from ..blind.blind_cell import take
 from ..blind.making import MOTIONS_OF, truth_of
 from ..blind.statistics import share
+from ..study import tabled
 from .levels_of_truth import alike_by_structure
 from .mix import SEVERAL, SPANS, drawn
 from .trial import diagnosed, recordings_of, said
@@ -143,25 +145,17 @@ def page(rows: Sequence[Mapping[str, Any]]) -> str:
         'cells whose order changes a name': share([apart(row) == 1.0 for row in good]),
         'cells whose order moves a probability': share([apart(row) > SAME for row in good]),
     }
-    told = [
-        (
-            key,
-            'none'
-            if v.value is None
-            else f'{v.value:.3f} ({v.low:.3f} to {v.high:.3f}; {v.cases})',
-        )
-        for key, v in measures.items()
-    ]
-    fallen = [
-        (
-            s.name,
-            s.recordings,
-            f'{s.cause[0]} of {s.cause[1]}',
-            f'{s.before:.2f}',
-            f'{s.after:.2f}',
-        )
-        for s in every
-        if s.fell
-    ]
-    lost = markdown.table(('cell', 'recordings', 'cause', 'sure with', 'one more'), *fallen)
-    return markdown.table(('measure', 'value'), *told) + ('\n' + lost if fallen else '')
+    told = [(key, str(value)) for key, value in measures.items()]
+    fallen = [step for step in every if step.fell]
+    lost = '\n' + tabled(FALLEN, fallen) if fallen else ''
+    return markdown.table(('measure', 'value'), *told) + lost
+
+
+FALLEN: dict[str, Callable[[GrowingStep], object]] = {
+    'cell': attrgetter('name'),
+    'recordings': attrgetter('recordings'),
+    'cause': lambda step: f'{step.cause[0]} of {step.cause[1]}',
+    'sure with': lambda step: f'{step.before:.2f}',
+    'one more': lambda step: f'{step.after:.2f}',
+}
+"""Columns of the table of sure causes that fell."""

@@ -40,8 +40,7 @@ def diagnose_cases(
     Diagnose all cases, write what was said, and return it case by case.
 
     out: gets a diagnosis.json for every case, and the list of them.
-    runner: its store makes the work resumable; verdicts of another engine or other cases are not
-    taken for these.
+    runner: its store makes the work resumable; verdicts of other cases are not taken for these.
     allow_readable: go on although truths lie within reach.
     with_holdout: give the diagnosis the held-out recording to judge its shrink on; without, it
     judges on stretches of the training recording.
@@ -50,11 +49,10 @@ def diagnose_cases(
     """
     readable = _truths_readable(cases, allow_readable)
     listed = layout.read(cases / layout.CASES)
-    engine = engine_digest()
     tasks = [
         Task(
             diagnose_case,
-            (str(cases / entry['name']), entry['case'], engine, with_holdout),
+            (str(cases / entry['name']), entry['case'], with_holdout),
             entry['name'],
         )
         for entry in listed['cases']
@@ -64,7 +62,7 @@ def diagnose_cases(
         out / layout.VERDICTS,
         {
             'seal': listed['seal'],
-            'engine': engine,
+            'engine': engine_digest(),
             'version': __version__,
             'with_holdout': with_holdout,
             'truths_readable': readable,
@@ -95,12 +93,12 @@ def _truths_readable(cases: Path, allowed: bool) -> bool:
     return truths is not None
 
 
-def diagnose_case(place: str, digest: str, engine: str, with_holdout: bool) -> dict[str, Any]:
+def diagnose_case(place: str, digest: str, with_holdout: bool) -> dict[str, Any]:
     """
     Return the diagnosis of one case, how long it took and the memory it needed.
 
     A case that cannot be diagnosed says so in place of a verdict, so that one case does not stop
-    the others; the digests only tell this task from others.
+    the others; the digest only tells this task from others.
     """
     directory = Path(place)
     start = time.perf_counter()

@@ -20,7 +20,6 @@ TRUTHS = 'truths.json'
 TRUTH = 'truth.json'
 VERDICTS = 'verdicts.json'
 DIAGNOSIS = 'diagnosis.json'
-DONE = 'done'
 SCORE = 'score.json'
 
 SCHEMAS = {

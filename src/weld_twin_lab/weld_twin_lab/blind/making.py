@@ -44,7 +44,7 @@ from .cause_sizes import FAMILIES, MOVING, Cause, site
 from .deck import STRATA, Lot, lots
 from .displacement import rms
 from .poor_motion import poorer
-from .sizing import NotVisible, draw_causes, sized_together
+from .sizing import NotVisible, draw_causes, drawn_size, sized
 
 TRIES = 30
 """
@@ -213,8 +213,8 @@ def _causes(
     built = construct(lot.families[0], cell.robot, span, rng)
     if 'base' in cell.align and any(c['effect'] == 'base_pose' for c in built.causes):
         raise NotVisible('an aligned base hides what the base does')
-    causes, ratio = sized_together(cell, built.causes, train, lot.strata[0], rng)
-    return causes, built.alike, [ratio]
+    causes, off = sized(cell, built.causes, train, drawn_size(STRATA[lot.strata[0]], rng))
+    return causes, built.alike, [rms(off) / cell.noise]
 
 
 def _excluded(lot: Lot, rng: np.random.Generator) -> tuple[str, ...]:

@@ -27,25 +27,31 @@ class NotVisible(Exception):
     """No plausible cause of the family is as large as wanted on this motion."""
 
 
-def sized(cell: BlindCell, cause: Cause, taken: Take, wanted: float) -> tuple[Cause, Array]:
+def sized(
+    cell: BlindCell, causes: Sequence[Cause], taken: Take, wanted: float
+) -> tuple[list[Cause], Array]:
     """
-    Return a cause grown until its deviation is so many times the noise, and the deviation.
+    Return causes grown together until their deviation is so many times the noise, and the deviation.
 
-    Raises NotVisible: it would have to be implausibly large or small.
+    Raises NotVisible: one would have to be implausibly large or small.
     """
     factor = 1.0
     for _ in range(4):
-        trial = scaled(cause, factor)
-        off = deviation(cell, [trial], taken)
+        grown = [scaled(cause, factor) for cause in causes]
+        off = deviation(cell, grown, taken)
         ratio = rms(off) / cell.noise
         if 1.0 / NEAR < ratio / wanted < NEAR:
-            return trial, off
+            break
         factor *= wanted / max(ratio, 1e-9)
-        if not plausible(cell.robot, cause, factor):
-            raise NotVisible(
-                f'{cause["effect"]} is {ratio:.3g} times the noise, wanted {wanted:.3g}'
-            )
-    return trial, off
+        if not all(plausible(cell.robot, cause, factor) for cause in causes):
+            names = ', '.join(cause['effect'] for cause in causes)
+            raise NotVisible(f'{names} is {ratio:.3g} times the noise, wanted {wanted:.3g}')
+    return grown, off
+
+
+def drawn_size(stratum: tuple[float, float], rng: np.random.Generator) -> float:
+    """Return how many times the noise a cause of a stratum of `STRATA` is to be."""
+    return float(np.exp(rng.uniform(*np.log(stratum))))
 
 
 def draw_causes(
@@ -84,9 +90,9 @@ def _one(
     span = float(taken.command.t[-1] - taken.command.t[0])
     reason = NotVisible(family)
     for _ in range(TRIES):
-        wanted = float(np.exp(rng.uniform(*np.log(stratum))))
+        wanted = drawn_size(stratum, rng)
         try:
-            cause, off = sized(cell, draw(family, cell.robot, span, rng), taken, wanted)
+            (cause,), off = sized(cell, [draw(family, cell.robot, span, rng)], taken, wanted)
         except NotVisible as error:
             reason = error
             continue
@@ -94,24 +100,3 @@ def _one(
             return cause, off
         reason = NotVisible(f'{family} moves the tool as another cause does')
     raise reason
-
-
-def sized_together(
-    cell: BlindCell, causes: Sequence[Cause], taken: Take, stratum: int, rng: np.random.Generator
-) -> tuple[list[Cause], float]:
-    """
-    Return causes grown together, and how many times the noise their deviation is.
-
-    Raises NotVisible: they would have to be implausibly large or small.
-    """
-    wanted = float(np.exp(rng.uniform(*np.log(STRATA[stratum]))))
-    factor = 1.0
-    for _ in range(4):
-        grown = [scaled(cause, factor) for cause in causes]
-        ratio = rms(deviation(cell, grown, taken)) / cell.noise
-        if 1.0 / NEAR < ratio / wanted < NEAR:
-            break
-        factor *= wanted / max(ratio, 1e-9)
-        if not all(plausible(cell.robot, cause, factor) for cause in causes):
-            raise NotVisible(f'the construction is {ratio:.3g} times the noise')
-    return grown, ratio

@@ -26,6 +26,12 @@ class Estimate(NamedTuple):
     high: float | None
     cases: int
 
+    def __str__(self) -> str:
+        """Return it in words."""
+        if self.value is None:
+            return 'none'
+        return f'{self.value:.3f} ({self.low:.3f} to {self.high:.3f}; {self.cases})'
+
 
 def share(hits: Sequence[bool]) -> Estimate:
     """Return a share with its Wilson score interval."""

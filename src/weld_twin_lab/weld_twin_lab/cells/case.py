@@ -60,13 +60,12 @@ ON_TOOL = Motion(
 Told = dict[str, Any]
 
 
-def sealed(kind: str, seed: int, engine: str) -> Told:
+def sealed(kind: str, seed: int) -> Told:
     """
     Return what a tracker tells of one cause in a cell, opened.
 
     kind: one of `drawn.KINDS`.
     seed: decides arms, postures, cause and size.
-    engine: what diagnoses; a result of another one is not taken for this one's.
     """
     rng = np.random.default_rng([seed, len(kind)])
     data = cell(kind, seed)
@@ -91,7 +90,7 @@ def sealed(kind: str, seed: int, engine: str) -> Told:
 FRAMES = ('base', 'tool')
 
 
-def beside_a_camera(seed: int, engine: str) -> Told:
+def beside_a_camera(seed: int) -> Told:
     """Return what pixels of two cameras, and a tracker at the same stations, tell of one cause."""
     rng = np.random.default_rng([seed, 77])
     data = cell('arm', seed)

@@ -30,7 +30,7 @@ PARTS = 5
 CAMERAS = {'1': 'camera_1.yaml', '2': 'camera_2.yaml'}
 
 
-def part(data: str, which: int, engine: str) -> dict[str, object]:
+def part(data: str, which: int) -> dict[str, object]:
     """
     Return what is left on a stretch of time that was not fitted, by the tracker [mm RMS].
 
@@ -39,7 +39,6 @@ def part(data: str, which: int, engine: str) -> dict[str, object]:
 
     data: folder of published recordings; holds motoman_left.
     which: the stretch left out, counted from 0.
-    engine: what diagnoses; a result of another one is not taken for this one's.
     """
     folder = Path(data)
     robot = motoman(folder, masses=False).robot

@@ -58,6 +58,11 @@ class ContestCase:
     """Where the case lies."""
 
     @property
+    def measured(self) -> Measurements:
+        """Return what was measured to learn from."""
+        return _measured(self.train)
+
+    @property
     def known(self) -> Path | None:
         """Return the file of effects that are known, if there are any."""
         file = self.folder / _KNOWN

@@ -15,7 +15,6 @@ from ..blind.deck import lots
 from ..study import Tell, engine_digest, head, require_simulator
 from .goals import summary
 
-PARTS = 'parts'
 KINDS = ('single', 'double', 'triple')
 """Cases with their causes in the library: of the others no experiment can make anybody sure."""
 MOST_DRAWN = 40
@@ -36,10 +35,10 @@ def investigated(
     tell: told how many were drawn.
     minutes: no further cells are begun after so long.
     """
-    end, engine = time.monotonic() + 60.0 * minutes, engine_digest()
+    end = time.monotonic() + 60.0 * minutes
     drawn: list[dict[str, Any]] = []
     cases: list[dict[str, Any]] = []
-    for tasks in _batches(seed, wanted, engine):
+    for tasks in _batches(seed, wanted):
         drawn += runner.run(tasks)
         cases = [entry for entry in drawn if entry['open']][:wanted]
         tell(f'{len(drawn)} drawn, {len(cases)} left open at first')
@@ -47,7 +46,7 @@ def investigated(
             break
     return head(
         'investigate/2',
-        engine=engine,
+        engine=engine_digest(),
         seed=seed,
         drawn=drawn.index(cases[-1]) + 1 if len(cases) == wanted else len(drawn),
         summary=summary(cases),
@@ -55,19 +54,18 @@ def investigated(
     )
 
 
-def _batches(seed: int, wanted: int, engine: str) -> Iterator[list[Task]]:
+def _batches(seed: int, wanted: int) -> Iterator[list[Task]]:
     most = MOST_DRAWN * wanted
     for begin in range(0, most, BATCH):
         numbers = range(begin, min(begin + BATCH, most))
-        yield [Task(investigated_cell, (seed, k, engine), f'cell {k}') for k in numbers]
+        yield [Task(investigated_cell, (seed, k), f'cell {k}') for k in numbers]
 
 
-def investigated_cell(seed: int, number: int, engine: str) -> dict[str, Any]:
+def investigated_cell(seed: int, number: int) -> dict[str, Any]:
     """
     Return what came of one cell, in plain values; the simulator is loaded where it is needed.
 
     seed, number: decide the cell.
-    engine: only tells the results of one version of the core from those of another.
     """
     require_simulator()
     from .sealed_cell import SealedCell

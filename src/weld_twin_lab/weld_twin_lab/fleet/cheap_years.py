@@ -22,7 +22,7 @@ from weld_twin_core.history import Observation
 from weld_twin_report.history import Entry, observations
 from weld_twin_report.history.words import likely, named
 
-from .life import Event, Year, moved, year
+from .life import Year, moved, year
 from .scoring import WEEK, score
 
 
@@ -89,6 +89,3 @@ def _joints(check: Entry) -> list[str]:
     """Return the arm's joints in their order."""
     family = 'joint_offset '
     return [name.split(' ')[1] for name in check.names if name.startswith(family)]
-
-
-__all__ = ['Event', 'cheap_year']

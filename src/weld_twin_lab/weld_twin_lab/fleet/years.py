@@ -56,18 +56,15 @@ MORE = {
 }
 
 
-def run_years(
-    seed: int, years: int, cells: int, full: int, engine: str, runner: Runner
-) -> dict[str, Any]:
+def run_years(seed: int, years: int, cells: int, full: int, runner: Runner) -> dict[str, Any]:
     """
     Return all figures of the study.
 
     seed, years, cells: so many drawn years of so many cells.
     full: years that are diagnosed in full, of cells of their own.
-    engine: digest of the program: what another one found is not taken for this one's.
     """
     wanted = [
-        Task(_base, (seed, number, check, engine), f'cell {number + 1}')
+        Task(full_years.base, (seed, number, check), f'cell {number + 1}')
         for number in range(cells + full)
         for check in range(full_years.CHECKS)
     ]
@@ -76,11 +73,9 @@ def run_years(
         kept[full_years.CHECKS * k : full_years.CHECKS * (k + 1)] for k in range(cells + full)
     ]
     drawn = runner.run(
-        [Task(_cheap, (seed, k, bases[k % cells], engine), f'year {k + 1}') for k in range(years)]
+        [Task(cheap_year, (seed, k, bases[k % cells]), f'year {k + 1}') for k in range(years)]
     )
-    whole = [
-        _full(seed, number, bases[number], engine, runner) for number in range(cells, cells + full)
-    ]
+    whole = [_full(seed, number, bases[number], runner) for number in range(cells, cells + full)]
     return {
         'drawn': figures(drawn),
         'full': figures(whole),
@@ -88,26 +83,12 @@ def run_years(
     }
 
 
-def _base(seed: int, number: int, check: int, engine: str) -> Any:
-    return full_years.base(seed, number, check)
-
-
-def _cheap(seed: int, number: int, bases: Sequence[Result], engine: str) -> Any:
-    return cheap_year(seed, number, bases)
-
-
-def _check(seed: int, number: int, week: int, set_up: int, first: Result, engine: str) -> Any:
-    return full_years.check(seed, number, week, set_up, first)
-
-
-def _full(
-    seed: int, number: int, bases: Sequence[Result], engine: str, runner: Runner
-) -> dict[str, Any]:
+def _full(seed: int, number: int, bases: Sequence[Result], runner: Runner) -> dict[str, Any]:
     """Return what a year that is diagnosed in full came to."""
     first = bases[0]
     year = full_years.lived(seed, number, first)
     tasks = [
-        Task(_check, (seed, number, week, set_up, first, engine), f'week {week}')
+        Task(full_years.check, (seed, number, week, set_up, first), f'week {week}')
         for week, set_up in zip(year.weeks, year.set_ups, strict=True)
     ]
     return full_years.scored(seed, number, first, runner.run(tasks))

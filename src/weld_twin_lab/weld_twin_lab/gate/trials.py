@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import csv
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -14,26 +15,26 @@ from typing import Any
 import numpy as np
 
 from weld_twin_core.arm.robot import Robot
+from weld_twin_core.arm.rotation import quaternion_from_matrix
 from weld_twin_core.diagnosis.soundness.gate import examine
 from weld_twin_core.diagnosis.soundness.mending import Given
 from weld_twin_core.errors import DataError
 from weld_twin_core.recording import Recording
+from weld_twin_msgs_py.bags import read_recording, write_recording
+from weld_twin_msgs_py.tables import read_table
 
 from .mistakes import KINDS, Hidden, Made
 from .sound import Sound, draw
-from .through_files import as_bag, as_table
 
-WAYS = {'bag': as_bag, 'table': as_table}
 TRIES = 200
 """Draws of a sound recording until one is found that the mistake shows in."""
 
 
-def mistake(seed: int, kind: str, way: str, number: int, engine: str = '') -> dict[str, Any]:
+def mistake(seed: int, kind: str, way: str, number: int) -> dict[str, Any]:
     """
     Return whether the gate named a mistake of a kind, drawn by number, in a bag or a table.
 
     A mistake that only stands among those that are alike is not named, and counted apart.
-    ``engine`` only tells the results of one version of the core from those of another.
     """
     drawn = [seed, list(KINDS).index(kind), list(WAYS).index(way), number]
     rng = np.random.default_rng(drawn)
@@ -67,12 +68,8 @@ def _made(kind: str, way: str, rng: np.random.Generator) -> tuple[Sound, Made]:
     raise DataError(f'no recording shows a mistake of kind {kind}')
 
 
-def complaint(seed: int, number: int, engine: str = '') -> dict[str, Any]:
-    """
-    Return whether the gate was silent about a sound recording, drawn by number.
-
-    ``engine`` only tells the results of one version of the core from those of another.
-    """
+def complaint(seed: int, number: int) -> dict[str, Any]:
+    """Return whether the gate was silent about a sound recording, drawn by number."""
     rng = np.random.default_rng([seed, 1000, number])
     sound = draw(rng)
     static = sound.recording.joints.static
@@ -114,3 +111,31 @@ def looked(recording: Recording, robot: Robot, align: tuple[str, ...], way: str)
         ],
         'seconds': time.perf_counter() - begin,
     }
+
+
+def as_bag(recording: Recording, robot: Robot, folder: Path) -> Recording:
+    """Return the recording after it was a bag in the folder."""
+    write_recording(folder / 'bag', recording, robot)
+    return read_recording(folder / 'bag', robot, one_clock=False)
+
+
+def as_table(recording: Recording, robot: Robot, folder: Path) -> Recording:
+    """Return the stations of a recording after they were a table, read without any option."""
+    seen = recording.measured
+    assert seen is not None
+    q = recording.joints.at(seen.t)[0]
+    heads = [*robot.joint_names, 'x', 'y', 'z']
+    rows = np.concatenate([q, seen.position], axis=1)
+    if seen.rotation is not None:
+        heads += ['qx', 'qy', 'qz', 'qw']
+        rows = np.concatenate([rows, quaternion_from_matrix(seen.rotation)], axis=1)
+    path = folder / 'table.csv'
+    with path.open('w', newline='', encoding='utf-8') as file:
+        writer = csv.writer(file)
+        writer.writerow(heads)
+        writer.writerows([f'{value:.9f}' for value in row] for row in rows)
+    return read_table(path, robot).recording
+
+
+WAYS = {'bag': as_bag, 'table': as_table}
+"""How a recording is written and read again, as a user has it."""

@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from . import mujoco_model
-from .entries import Entry
 from .exponentials import Arm
+from .plant_recording import Entry
 from .textbook_effects import Causes
 
 HARDENING = 0.03

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from . import screws
-from .entries import Entry
+from .plant_recording import Entry
 from .screws import Motion
 
 

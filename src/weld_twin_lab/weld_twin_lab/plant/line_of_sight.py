@@ -12,7 +12,7 @@ less so the richer the physics.
 
 import numpy as np
 
-from .entries import Entry
+from .plant_recording import Entry
 from .screws import Motion
 from .textbook_effects import Causes
 

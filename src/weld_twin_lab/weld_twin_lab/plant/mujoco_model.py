@@ -16,8 +16,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from . import exponentials, screws
-from .entries import Entry
 from .exponentials import Arm
+from .plant_recording import Entry
 from .screws import Motion
 
 MASSLESS = 1e-6

@@ -31,10 +31,9 @@ from . import (
 from . import textbook_effects as library
 from . import tracker as sensors
 from .compliance import Compliant
-from .entries import Entry
 from .exponentials import Arm
 from .pedestal import Pedestal
-from .plant_recording import Command, Course, PlantRecording
+from .plant_recording import Command, Course, Entry, PlantRecording
 from .screws import Motion
 from .textbook_effects import Causes
 from .tracker import Tracker

@@ -2,10 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What goes into the plant and what comes out of it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+
+Entry = Mapping[str, Any]
+"""A robot file, one of its parts, or one effect of an effects file, as YAML gives it."""
 
 
 @dataclass(frozen=True, eq=False)

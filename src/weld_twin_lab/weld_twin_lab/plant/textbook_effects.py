@@ -17,8 +17,8 @@ import numpy as np
 from scipy.integrate import odeint
 
 from . import screws
-from .entries import Entry
 from .exponentials import Arm, Rows
+from .plant_recording import Entry
 from .screws import Motion
 
 REFERENCE_TEMPERATURE = 20.0

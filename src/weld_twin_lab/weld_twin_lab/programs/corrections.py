@@ -91,12 +91,11 @@ class AskedModel(ProgramModel):
         return np.asarray(np.linalg.inv(self.robot.T_world_base) @ out)
 
 
-def corrected_seam(language: str, seed: int, number: int, engine: str = '') -> dict[str, Any]:
+def corrected_seam(language: str, seed: int, number: int) -> dict[str, Any]:
     """
     Return what a correction does to one seam; a case that cannot be drawn says why.
 
     seed, number: decide everything random in it.
-    engine: only tells the results of one version of the core from those of another.
     """
     try:
         seam = sealed_seam(language, seed, number)

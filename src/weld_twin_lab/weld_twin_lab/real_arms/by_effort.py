@@ -14,9 +14,10 @@ from weld_twin_core.arrays import Array
 from weld_twin_core.diagnosis import diagnose
 from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.errors import DataError
-from weld_twin_core.recording import JointMotion, JointSignal, Recording
+from weld_twin_core.recording import Recording
 from weld_twin_msgs_py.files import markdown
 
+from ..transfer.splits import alone
 from ..transfer.unseen import ALIGN, PLAIN, plain_fit, residual
 
 WAYS = ('frames', 'geometry', 'statics', 'efforts')
@@ -50,7 +51,7 @@ def folds(
     rows = np.arange(recording.joints.t.size)
     out = []
     for stretch in np.array_split(rows, count):
-        train, test = _part(recording, np.setdiff1d(rows, stretch)), _part(recording, stretch)
+        train, test = (alone(recording, part) for part in (np.setdiff1d(rows, stretch), stretch))
         plain = replace(train, effort=None)
         found = diagnose(train, robot, align=ALIGN, experiment=False).model
         models: dict[str, Model] = {
@@ -67,18 +68,6 @@ def folds(
         out.append(Fold(away, told))
         tell(f'stretch {len(out)} of {count}: efforts {away["efforts"].mean() * 1e3:.3f} mm')
     return out
-
-
-def _part(recording: Recording, rows: np.ndarray) -> Recording:
-    """Return some stations of a recording with their efforts."""
-    joints, effort, measured = recording.joints, recording.effort, recording.measured
-    assert effort is not None and measured is not None
-    return replace(
-        recording,
-        joints=JointMotion(joints.t[rows], joints.q[rows], None, static=True),
-        measured=measured.take(rows),
-        effort=JointSignal(effort.t[rows], effort.value[rows]),
-    )
 
 
 def table(name: str, done: Sequence[Fold]) -> str:

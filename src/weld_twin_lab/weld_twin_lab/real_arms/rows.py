@@ -16,6 +16,7 @@ from weld_twin_core.contacts import Contacts
 from weld_twin_core.diagnosis.frames.aligned import frames_only
 from weld_twin_core.recording import JointMotion, Measurements, Recording
 
+from ..transfer import splits
 from ..transfer.splits import Rows, alone
 from . import sources
 from .sources import Source
@@ -122,11 +123,10 @@ def row(data: Path, plan: ArmPlan) -> ArmRow:
 
 def halves(recording: Recording) -> tuple[Recording, Recording] | None:
     """Return the odd and the even rows, each alone; None of motion, contacts and few stations."""
-    count = size(recording)
-    if not recording.joints.static or recording.contacts is not None or count < HALVED:
+    touched = recording.contacts is not None
+    if not recording.joints.static or touched or size(recording) < HALVED:
         return None
-    rows = np.arange(count)
-    return _part(recording, rows[1::2]), _part(recording, rows[0::2])
+    return splits.halves(recording)
 
 
 def size(recording: Recording) -> int:

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -18,6 +19,7 @@ from weld_twin_core.diagnosis.algebra.problem import Model
 from weld_twin_core.effects import REGISTRY
 from weld_twin_core.recording import Recording
 
+from ..study import tabled
 from ..transfer.unseen import PLAIN, plain_fit, residual, tried
 from .borne_out import Borne, borne_out
 from .rows import ArmRow, halves, plans, row, size
@@ -101,11 +103,7 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     shown = [(e, k) for e in done for k, b in e.get('kinds', {}).items() if b['out']]
     pairs = [e['halves'] for e in done if e.get('halves') and None not in e['halves']]
     alike = [_alike(*(told_claims(half) for half in pair)) for pair in pairs]
-    ratios = [
-        e['unseen_m']['product'] / min(v for k, v in e['unseen_m'].items() if k != 'product')
-        for e in done
-        if e.get('unseen_m') and len(e['unseen_m']) > 1
-    ]
+    ratios = [ratio for e in done if (ratio := _over_plain(e)) is not None]
     return {
         'rows': len(entries),
         'tracebacks': sum(e['traceback'] is not None for e in entries),
@@ -134,25 +132,15 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def table(entries: Sequence[Mapping[str, Any]]) -> str:
     """Return all rows and the figures as a page of Markdown."""
-    lines = [
-        '# Real arms',
-        '',
-        '| row | status | reported; borne out against all that is reported: bold | left beside '
-        '| error over the best plain fit |',
-        '|---|---|---|---|---|',
-    ]
-    for e in entries:
-        told = ', '.join(_bold(claim) for claim in e.get('claims', ()))
-        rest = ', '.join(_rest(c) for c in e.get('causes', ()) if c['rest'])
-        unseen = e.get('unseen_m') or {}
-        plain = min((v for k, v in unseen.items() if k != 'product'), default=None)
-        ratio = f'{unseen["product"] / plain:.2f}' if plain and 'product' in unseen else ''
-        lines.append(
-            f'| {e["name"]} | {e.get("status", "traceback")} | {told} | {rest} | {ratio} |'
-        )
-    lines.append('')
-    lines += [f'- {key}: {_figure(value)}' for key, value in summary(entries).items()]
-    return '\n'.join(lines) + '\n'
+    figures = [f'- {key}: {_figure(value)}' for key, value in summary(entries).items()]
+    return '\n'.join(['# Real arms', '', tabled(COLUMNS, entries), *figures]) + '\n'
+
+
+def _over_plain(entry: Mapping[str, Any]) -> float | None:
+    """Return the unseen error over that of the best plain fit; None where there is none."""
+    unseen = entry.get('unseen_m') or {}
+    plain = min((v for k, v in unseen.items() if k != 'product'), default=None)
+    return unseen['product'] / plain if plain and 'product' in unseen else None
 
 
 def _bold(claim: Mapping[str, Any]) -> str:
@@ -191,6 +179,20 @@ def _alike(one: Sequence[Mapping[str, Any]], two: Sequence[Mapping[str, Any]]) -
         for claim in own
     ]
     return float(np.mean(shared)) if shared else 1.0
+
+
+COLUMNS: dict[str, Callable[[Mapping[str, Any]], str]] = {
+    'row': itemgetter('name'),
+    'status': lambda e: e.get('status', 'traceback'),
+    'reported; borne out against all that is reported: bold': lambda e: ', '.join(
+        _bold(claim) for claim in e.get('claims', ())
+    ),
+    'left beside': lambda e: ', '.join(_rest(c) for c in e.get('causes', ()) if c['rest']),
+    'error over the best plain fit': lambda e: (
+        '' if (ratio := _over_plain(e)) is None else f'{ratio:.2f}'
+    ),
+}
+"""Columns of the table of rows."""
 
 
 def _accused(entry: Mapping[str, Any]) -> bool:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from weld_twin_core.arm import catalog
 from weld_twin_core.arrays import Array
-from weld_twin_core.recording import JointMotion, Recording
+from weld_twin_core.recording import JointMotion, JointSignal, Recording
 from weld_twin_msgs_py.tables import read_table
 
 Rows = NDArray[Any]
@@ -174,15 +174,12 @@ def alone(table: Recording, rows: Rows) -> Recording:
     Each row keeps its stamp: which came first is known.
     """
     assert table.measured is not None
-    joints = table.joints
-    return Recording(
-        table.name,
-        JointMotion(joints.t[rows], joints.q[rows], None, joints.static),
-        table.measured.take(rows),
-        wrench=table.wrench,
-        wrench_frame=table.wrench_frame,
-        temperature=table.temperature,
-        epoch_ns=table.epoch_ns,
+    joints, effort = table.joints, table.effort
+    return replace(
+        table,
+        joints=JointMotion(joints.t[rows], joints.q[rows], None, joints.static),
+        measured=table.measured.take(rows),
+        effort=None if effort is None else JointSignal(effort.t[rows], effort.value[rows]),
     )
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ...study import DONE, Study, engine_digest, options, require_simulator, study
+from ...study import Study, kept_of_engine, options, require_simulator, study
 
 TABLE, GROWING = 'answers.jsonl', 'growing'
 
@@ -66,12 +66,12 @@ def _answers(study: Study) -> list[dict[str, Any]]:
     require_simulator()
     args, out_of_it = study.args, tuple(sorted(study.args.without))
     with without(out_of_it):  # refuses a name that is none before anything is made
-        engine = '-'.join((engine_digest()[:8], *out_of_it))
+        store = kept_of_engine(study.out, *out_of_it)
     tasks = [
         Task(tried_without, (args.seed, k, SEVERAL, out_of_it), f'cell {k}')
         for k in range(args.cases)
     ]
-    return [brief(row) for row in study.tasks(tasks, 'diagnosing', study.out / DONE / engine)]
+    return [brief(row) for row in study.tasks(tasks, 'diagnosing', store)]
 
 
 def _growing(study: Study) -> None:
@@ -87,6 +87,6 @@ def _growing(study: Study) -> None:
         raise DataError('--growing takes --cases and no --beside')
     require_simulator()
     tasks = [Task(grown, (args.seed, k), f'cell {k}') for k in range(args.cases)]
-    rows = study.tasks(tasks, 'diagnosing', study.out / DONE / GROWING / engine_digest()[:8])
+    rows = study.tasks(tasks, 'diagnosing')
     write_rows(study.out / f'{GROWING}.jsonl', rows)
     study.write(GROWING, page=page(rows))

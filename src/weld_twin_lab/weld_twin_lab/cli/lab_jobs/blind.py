@@ -14,7 +14,16 @@ from pathlib import Path
 from weld_twin_core.errors import DataError
 from weld_twin_nodes.cli.options import add_command
 
-from ...study import DONE, Study, job, listed, options, require_simulator, study
+from ...study import (
+    DONE,
+    Study,
+    job,
+    kept_of_engine,
+    listed,
+    options,
+    require_simulator,
+    study,
+)
 from ..retired import BLIND, add_retired
 
 DRAW = """
@@ -68,7 +77,7 @@ def diagnose(study: Study) -> None:
     from ...blind.diagnosing import diagnose_cases
 
     args = study.args
-    with study.runner('diagnosing', study.out / DONE) as runner:
+    with study.runner('diagnosing') as runner:
         verdicts = diagnose_cases(
             Path(args.cases),
             study.out,
@@ -100,7 +109,7 @@ def whole(study: Study) -> None:
 
     cases, truths, results = (study.out / name for name in ('cases', 'truths', 'verdicts'))
     _made(study, cases, truths)
-    with study.runner('diagnosing', results / DONE) as runner:
+    with study.runner('diagnosing', kept_of_engine(results)) as runner:
         diagnose_cases(cases, results, runner, allow_readable=True)
     _scored(study, cases, truths, results)
 

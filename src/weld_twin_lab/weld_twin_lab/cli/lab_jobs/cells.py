@@ -9,7 +9,7 @@ tracker. Writes cells.json and cells.md; a run that was interrupted goes on wher
 
 from __future__ import annotations
 
-from ...study import Study, engine_digest, options, require_simulator, study
+from ...study import Study, head, options, require_simulator, study
 
 OPTIONS = options(
     """
@@ -31,15 +31,14 @@ def run(study: Study) -> bool:
     from ...cells.drawn import KINDS
     from ...cells.real_pixels import PARTS, part
     from ...cells.table import AS_TRACKED, named_as_tracked, page
-    from ...study import head
 
     require_simulator()
-    args, engine = study.args, engine_digest()
+    args = study.args
     seeds = range(args.seed, args.seed + args.cells)
-    kinds = [Task(sealed, (kind, seed, engine), kind) for seed in seeds for kind in KINDS]
+    kinds = [Task(sealed, (kind, seed), kind) for seed in seeds for kind in KINDS]
     cameras = range(args.seed, args.seed + args.cameras)
-    beside = [Task(beside_a_camera, (seed, engine), 'camera') for seed in cameras]
-    parts = [Task(part, (args.data, k, engine), 'pixels') for k in range(PARTS * bool(args.data))]
+    beside = [Task(beside_a_camera, (seed,), 'camera') for seed in cameras]
+    parts = [Task(part, (args.data, k), 'pixels') for k in range(PARTS * bool(args.data))]
     with study.runner('telling whole cells') as runner:
         cells, pixels, real = (runner.run(tasks) for tasks in (kinds, beside, parts))
     content = head('cells/1', seed=args.seed, cells=cells, pixels=pixels, real=real)

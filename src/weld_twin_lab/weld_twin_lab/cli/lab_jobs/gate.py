@@ -9,7 +9,7 @@ A run that was interrupted goes on where it stopped.
 
 from __future__ import annotations
 
-from ...study import Study, engine_digest, listed, options, require_simulator, study
+from ...study import Study, listed, options, require_simulator, study
 
 OPTIONS = options(
     """
@@ -28,18 +28,26 @@ OPTIONS = options(
 def run(study: Study) -> bool:
     """Run what is not done yet, write the result, print the table."""
     from weld_twin_core.errors import DataError
+    from weld_twin_nodes.offline.task_pool import Task
 
-    from ...gate.mistakes import KINDS
+    from ...gate.mistakes import KINDS, MOVING_ONLY
     from ...gate.table import page, result
-    from ...gate.tasks import drawn
+    from ...gate.trials import WAYS, complaint, mistake
 
     require_simulator()
-    args, engine = study.args, engine_digest()
+    args = study.args
     kinds = listed(args.kinds) or list(KINDS)
     for kind in kinds:
         if kind not in KINDS:
             raise DataError(f'there is no mistake {kind!r}; there are ' + ', '.join(KINDS))
-    tasks = drawn(args.seed, kinds, args.draws, args.sound, engine)
+    tasks = [
+        Task(mistake, (args.seed, kind, way, number), f'{kind} {way}')
+        for kind in kinds
+        for way in WAYS
+        for number in range(args.draws)
+        if not (way == 'table' and kind in MOVING_ONLY)
+    ]
+    tasks += [Task(complaint, (args.seed, n), 'sound') for n in range(args.sound)]
     content = result(study.tasks(tasks, 'trying the gate'), args.seed)
     study.write('gate', content, page(content))
     passed = bool(content['passed'])

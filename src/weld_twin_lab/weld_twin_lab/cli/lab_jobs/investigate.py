@@ -26,9 +26,9 @@ OPTIONS = options(
 def run(study: Study) -> None:
     """Investigate what is not done yet, and print the tables."""
     from ...experiments.goals import page
-    from ...experiments.study import PARTS, investigated
+    from ...experiments.study import investigated
 
     args = study.args
-    with study.runner('investigating', study.out / PARTS) as runner:
+    with study.runner('investigating') as runner:
         result = investigated(args.seed, args.cells, runner, study.tell, minutes=args.minutes)
     study.write('investigate', result, page(result))

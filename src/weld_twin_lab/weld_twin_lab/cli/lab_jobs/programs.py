@@ -30,12 +30,12 @@ def run(study: Study) -> None:
     from ...programs.correction_table import page, totals
     from ...programs.corrections import corrected_seam
 
-    seed, engine = study.args.seed, engine_digest()
+    seed = study.args.seed
     tasks = [
-        Task(corrected_seam, (language, seed, k, engine), f'{language} {k}')
+        Task(corrected_seam, (language, seed, k), f'{language} {k}')
         for language in CELLS
         for k in range(study.args.seams)
     ]
-    cases = study.tasks(tasks, 'corrections', study.out / 'parts')
-    found = {'engine': engine, 'seed': seed, 'totals': totals(cases), 'cases': cases}
+    cases = study.tasks(tasks, 'corrections')
+    found = {'engine': engine_digest(), 'seed': seed, 'totals': totals(cases), 'cases': cases}
     study.write('corrections', head('programs/1', **found), page(found))

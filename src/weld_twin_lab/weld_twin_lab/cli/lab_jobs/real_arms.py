@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...study import DONE, Study, engine_digest, options, study
+from ...study import Study, options, study
 
 OPTIONS = options(
     """
@@ -36,5 +36,5 @@ def run(study: Study) -> None:
         raise DataError(f"'{data}' is no directory; --data names the parent of the recordings")
     names = [plan.name for plan in plans() if study.args.only in plan.name]
     tasks = [Task(judged, (str(data), name), name) for name in names]
-    entries = study.tasks(tasks, 'diagnosing', study.out / DONE / engine_digest()[:8])
+    entries = study.tasks(tasks, 'diagnosing')
     study.write('real_arms', {'summary': summary(entries), 'rows': entries}, table(entries))

@@ -8,7 +8,7 @@ and diagnosed in full. A run that was interrupted goes on where it stopped.
 
 from __future__ import annotations
 
-from ...study import Study, engine_digest, options, require_simulator, study
+from ...study import Study, options, require_simulator, study
 
 OPTIONS = options(
     """
@@ -31,7 +31,7 @@ def run(study: Study) -> bool:
     require_simulator()
     args = study.args
     with study.runner('living through years') as runner:
-        result = run_years(args.seed, args.years, args.cells, args.full, engine_digest(), runner)
+        result = run_years(args.seed, args.years, args.cells, args.full, runner)
     study.write('years', result, page(result, args.seed, args.cells))
     kept = {name: result['drawn'][name] for name in GOALS}
     return all(

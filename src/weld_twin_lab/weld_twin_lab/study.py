@@ -212,8 +212,8 @@ def tabled(columns: Mapping[str, Callable[[Any], object]], rows: Iterable[Any]) 
 
     columns: by the head of each, what it says of a row.
     """
-    told = [[tell(row) for tell in columns.values()] for row in rows]
-    return markdown.table(tuple(columns), *told)
+    cells = [[tell(row) for tell in columns.values()] for row in rows]
+    return markdown.table(tuple(columns), *cells)
 
 
 def head(schema: str, **more: Any) -> dict[str, Any]:

@@ -74,7 +74,7 @@ def test_a_joint_that_slips_takes_position_and_turn_along(recording):
 
 def test_the_same_draw_is_the_same_recording():
     first, second = (sound.draw(np.random.default_rng(9)) for _ in range(2))
-    assert first.told == second.told
+    assert first.about == second.about
     assert np.array_equal(first.recording.measured.position, second.recording.measured.position)
 
 

@@ -26,9 +26,9 @@ MOST = 2 * CAUSES
 REASON = 80
 """Letters of a reason that are kept."""
 ACCUSED = 0.1
-"""Share of the squared gap from which on a place told is accused of it."""
-TOLD = 0.5
-"""Probability from which on a cause counts as told."""
+"""Share of the squared gap from which on a reported place is accused of it."""
+REPORTED = 0.5
+"""Probability from which on a cause counts as reported."""
 BETTER = 0.8
 """RMS on sealed data, as a share of that before, up to which a model explains it."""
 CURVES = frozenset({'joint_curve', 'frame_curve'})
@@ -44,14 +44,14 @@ def brief(row: Mapping[str, Any]) -> dict[str, Any]:
         return {'name': row['name'], 'error': row['error']}
     truth, verdict = row['truth'], row['verdict']
     kept = ('robot', 'motion', 'align', 'excluded', 'sites', 'floor_m', 'ratios', 'shown')
-    told = ('status', 'confidence', 'sure', 'complete', 'indistinguishable')
+    verdict_keys = ('status', 'confidence', 'sure', 'complete', 'indistinguishable')
     model = [site for site in row['model'] if site[0] not in CURVES]
     out = {
         'name': row['name'],
         'error': None,
         'truth': {key: truth[key] for key in kept},
         'verdict': {
-            **{key: verdict.get(key) for key in told},
+            **{key: verdict.get(key) for key in verdict_keys},
             'reasons': [reason[:REASON] for reason in verdict['reasons'][:1]],
             'causes': [_brief(cause) for cause in verdict['causes']],
         },
@@ -86,13 +86,13 @@ class Scored(NamedTuple):
     named: tuple[bool, ...]
     modelled: tuple[bool, ...]
     """Of every visible cause that the library holds: is it in a set, is it in the model?"""
-    told: tuple[tuple[float, bool, bool], ...]
-    """Of every cause told with a name: its probability, whether it is right, whether it is
+    reported: tuple[tuple[float, bool, bool], ...]
+    """Of every cause reported with a name: its probability, whether it is right, whether it is
     sure."""
     innocent: tuple[str, ...]
     """Places accused at which nothing is wrong."""
     disowned: bool
-    """No cause is told although the model explains much on sealed data."""
+    """No cause is reported although the model explains much on sealed data."""
     right: bool
     sure: bool
     """The whole answer."""
@@ -108,12 +108,12 @@ def scored(row: Mapping[str, Any]) -> Scored:
     row: as `brief` gives it, without an error.
     """
     truth, verdict = row['truth'], row['verdict']
-    held = whole(truth, verdict)
+    answer = whole(truth, verdict)
     model = {(e, j) for e, j in row['model']}
     every = frozenset[Site]().union(
         *(alike_by_structure(truth['robot'], (e, j)) for e, j in truth['sites'])
     )
-    told = tuple(
+    reported = tuple(
         (c['probability'], bool({(e, j) for e, j in c['name']} & every), _sure(c))
         for c in verdict['causes']
         if c['name'] and not c['rest']
@@ -122,12 +122,12 @@ def scored(row: Mapping[str, Any]) -> Scored:
         row['name'],
         len(truth['sites']),
         bool(truth['excluded']),
-        held.named,
-        tuple(bool(own & model) for own in held.asked),
-        told,
+        answer.named,
+        tuple(bool(own & model) for own in answer.asked),
+        reported,
         _innocent(row, levels_of({**truth, 'construction': None})),
-        _disowned(row, told),
-        held.right,
+        _disowned(row, reported),
+        answer.right,
         is_sure(verdict),
         float(verdict['confidence'] or 0.0),
         float(row['seconds']),
@@ -153,12 +153,12 @@ def _innocent(row: Mapping[str, Any], levels: Sequence[Levels]) -> tuple[str, ..
     return tuple(out)
 
 
-def _disowned(row: Mapping[str, Any], told: Sequence[tuple[float, bool, bool]]) -> bool:
+def _disowned(row: Mapping[str, Any], reported: Sequence[tuple[float, bool, bool]]) -> bool:
     sealed = row['sealed']
     if not row['model'] or sealed['before'] is None:
         return False
     explains = sealed['after'] <= BETTER * sealed['before']
-    return explains and not any(p > TOLD for p, _, _ in told)
+    return explains and not any(p > REPORTED for p, _, _ in reported)
 
 
 def scores(rows: Sequence[Mapping[str, Any]]) -> dict[str, Estimate]:
@@ -171,7 +171,7 @@ def scores(rows: Sequence[Mapping[str, Any]]) -> dict[str, Estimate]:
         scored(row) for row in rows if not row['error'] and row['verdict']['status'] != 'unsound'
     ]
     plain = [c for c in cases if not c.withheld]
-    told = [one for c in cases for one in c.told]
+    reported = [one for c in cases for one in c.reported]
     sure = [c for c in cases if c.sure]
     out = {}
     for few, most in ((1, 2), (3, 4), (5, 6)):
@@ -183,15 +183,21 @@ def scores(rows: Sequence[Mapping[str, Any]]) -> dict[str, Estimate]:
         'cases in which an innocent place is accused': share([bool(c.innocent) for c in cases]),
         'disowned': share([c.disowned for c in cases]),
         'with a family taken out: something is reported above 0.5': share(
-            [any(p > TOLD for p, _, _ in c.told) for c in cases if c.withheld and c.causes > 1]
+            [
+                any(p > REPORTED for p, _, _ in c.reported)
+                for c in cases
+                if c.withheld and c.causes > 1
+            ]
         ),
         'whole answers right': share([c.right for c in cases]),
         'whole answers right and sure': share([c.right and c.sure for c in cases]),
         'whole answers sure and wrong': share([c.sure and not c.right for c in cases]),
-        'causes reported that are right': share([right for _, right, _ in told]),
-        'causes sure and wrong, of the sure ones': share([not right for _, right, s in told if s]),
+        'causes reported that are right': share([right for _, right, _ in reported]),
+        'causes sure and wrong, of the sure ones': share(
+            [not right for _, right, s in reported if s]
+        ),
         'calibration error of causes': calibration_error(
-            [p for p, _, _ in told], [r for _, r, _ in told]
+            [p for p, _, _ in reported], [r for _, r, _ in reported]
         ),
         'calibration error of whole answers': calibration_error(
             [c.confidence for c in cases], [c.right for c in cases]

@@ -56,10 +56,10 @@ def grown(seed: int, number: int) -> dict[str, Any]:
     recordings = recordings_of(case, more)
     orders = [*(range(k + 1) for k in range(MOST)), range(MOST)[::-1]]
     try:
-        told = [said(diagnosed(case, [recordings[k] for k in order])) for order in orders]
+        answers = [said(diagnosed(case, [recordings[k] for k in order])) for order in orders]
     except Exception as error:
         return {'name': name, 'error': f'{type(error).__name__}: {error}'}
-    kept = [{key: one[key] for key in ('verdict', 'model', 'unsound')} for one in told]
+    kept = [{key: one[key] for key in ('verdict', 'model', 'unsound')} for one in answers]
     truth = truth_of(name, case)
     return {'name': name, 'error': None, 'truth': truth, 'told': kept[:-1], 'turned': kept[-1]}
 
@@ -68,7 +68,7 @@ class GrowingStep(NamedTuple):
     """
     A cause that was sure and right, before and after a recording more.
 
-    ``after`` is 0 where no set told holds the cause any more; ``sure`` tells whether it still is.
+    ``after`` is 0 where no reported set holds the cause any more; ``sure`` tells whether it still is.
     """
 
     name: str
@@ -93,14 +93,14 @@ def steps(row: Mapping[str, Any]) -> Iterator[GrowingStep]:
     truth = row['truth']
     for effect, joint in truth['sites']:
         alike = alike_by_structure(truth['robot'], (effect, joint))
-        held = [_of(one['verdict'], alike) for one in row['told']]
-        for k, ((before, sure), (after, still)) in enumerate(pairwise(held)):
+        beliefs = [_of(one['verdict'], alike) for one in row['told']]
+        for k, ((before, sure), (after, still)) in enumerate(pairwise(beliefs)):
             if sure:
                 yield GrowingStep(row['name'], k + 1, (effect, joint), before, after, still)
 
 
 def _of(verdict: Mapping[str, Any], alike: frozenset[Site]) -> tuple[float, bool]:
-    """Return how probable a cause is told, by its whole set, and whether it is sure."""
+    """Return how probable a cause is reported, by its whole set, and whether it is sure."""
     best = (0.0, False)
     for cause in verdict['causes']:
         names = {(item['effect'], item['joint']) for item in cause['name']}
@@ -121,9 +121,9 @@ def apart(row: Mapping[str, Any]) -> float:
                 frozenset((i['effect'], i['joint']) for i in cause['name']),
                 bool(cause.get('rest')),
             ): (cause['probability'] or 0.0)
-            for cause in told['verdict']['causes']
+            for cause in answer['verdict']['causes']
         }
-        for told in (row['told'][-1], row['turned'])
+        for answer in (row['told'][-1], row['turned'])
     )
     if one.keys() != other.keys() or row['told'][-1]['unsound'] != row['turned']['unsound']:
         return 1.0
@@ -145,10 +145,10 @@ def page(rows: Sequence[Mapping[str, Any]]) -> str:
         'cells whose order changes a name': share([apart(row) == 1.0 for row in good]),
         'cells whose order moves a probability': share([apart(row) > SAME for row in good]),
     }
-    told = [(key, str(value)) for key, value in measures.items()]
+    lines = [(key, str(value)) for key, value in measures.items()]
     fallen = [step for step in every if step.fell]
     lost = '\n' + tabled(FALLEN, fallen) if fallen else ''
-    return markdown.table(('measure', 'value'), *told) + lost
+    return markdown.table(('measure', 'value'), *lines) + lost
 
 
 FALLEN: dict[str, Callable[[GrowingStep], object]] = {

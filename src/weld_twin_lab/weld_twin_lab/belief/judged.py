@@ -36,10 +36,10 @@ class Example(NamedTuple):
     """As `weld_twin_core.diagnosis.calibration.features.KINDS` has it."""
     features: Mapping[str, float]
     right: bool
-    told: float
-    """What was told of it."""
+    reported: float
+    """The probability reported for it."""
     sure: bool = False
-    """Whether it was told as sure."""
+    """Whether it was reported as sure."""
     weight: float = 1.0
     """How much it counts."""
 
@@ -53,27 +53,27 @@ def kept(row: Mapping[str, Any]) -> dict[str, Any]:
     if row['error'] or not row['statements']:
         return {key: row.get(key) for key in ('name', 'error', 'unsound')}
     truth, verdict = row['truth'], row['verdict']
-    told = judge(_with_absorbed(row), {'verdict': {'effects': (), **verdict}})
-    right = _right(row, told)
+    judgement = judge(_with_absorbed(row), {'verdict': {'effects': (), **verdict}})
+    right = _right(row, judgement)
     sealed, causes = row['sealed'], verdict['causes']
-    as_good = sealed['after'] < AS_GOOD * sealed['floor'] and told.status in NAMING
+    as_good = sealed['after'] < AS_GOOD * sealed['floor'] and judgement.status in NAMING
     words = levels_of(truth)
     return {
         'name': row['name'],
         'error': None,
         'engine': row['engine'],
-        'kind': told.kind,
-        'robot': told.robot,
-        'motion': f'{told.motion} {row["poor"]}'.strip(),
-        'truth': told.truth,
-        'said': told.said,
+        'kind': judgement.kind,
+        'robot': judgement.robot,
+        'motion': f'{judgement.motion} {row["poor"]}'.strip(),
+        'truth': judgement.truth,
+        'said': judgement.said,
         'sizes': list(truth['ratios']),
-        'status': told.status,
+        'status': judgement.status,
         'confidence': verdict['confidence'],
         'sure': bool(verdict['sure']),
         'right': right,
         'honest': right or (as_good and bool(truth['sites'])),
-        'named': told.named,
+        'named': judgement.named,
         'place': _first(causes, 'place', frozenset().union(*(own.places for own in words))),
         'dependence': _first(
             causes, 'dependence', frozenset().union(*(own.dependences for own in words))
@@ -89,14 +89,14 @@ def _with_absorbed(row: Mapping[str, Any]) -> dict[str, Any]:
     return {**truth, 'causes': (), 'alike': [*truth['alike'], *_absorbed(row)]}
 
 
-def _right(row: Mapping[str, Any], told: Judged) -> bool:
+def _right(row: Mapping[str, Any], judgement: Judged) -> bool:
     """
     Return whether an answer is right as a whole, sets held to what they predict.
 
     Of two or three causes those that do not show may be missing, as of four to six.
     """
-    right = told.right
-    if 'shown' in row['truth'] and not (right and told.kind in FEW):
+    right = judgement.right
+    if 'shown' in row['truth'] and not (right and judgement.kind in FEW):
         right = whole(row['truth'], row['verdict']).right
     return right and _sets_hold(row)
 
@@ -104,8 +104,8 @@ def _right(row: Mapping[str, Any], told: Judged) -> bool:
 def _first(causes: Sequence[Mapping[str, Any]], level: str, words: frozenset[str]) -> bool:
     """Return whether the first place, or dependence, of the largest cause is right."""
     word = 'at' if level == 'place' else 'on'
-    placed = [cause for cause in causes if cause[level]]
-    first = max(placed, key=lambda cause: float(cause['share']), default=None)
+    located = [cause for cause in causes if cause[level]]
+    first = max(located, key=lambda cause: float(cause['share']), default=None)
     return first is not None and first[level][0][word] in words
 
 
@@ -151,13 +151,13 @@ def _sets_hold(row: Mapping[str, Any]) -> bool:
     at_work = _at_work(row['truth'])
     floor = row['sealed']['floor']
     for group in row['sealed'].get('members', ()):
-        left = {(item['effect'], item['joint']): item['left'] for item in group}
-        right = [site for site in left if site in at_work]
-        if len(left) < 2 or not right:
+        remaining = {(item['effect'], item['joint']): item['left'] for item in group}
+        right = [site for site in remaining if site in at_work]
+        if len(remaining) < 2 or not right:
             continue
         same = set().union(*(alike_by_structure(row['truth']['robot'], site) for site in right))
-        most = min(left[site] for site in right) + AS_WELL * floor
-        if any(value > most for site, value in left.items() if site not in same):
+        most = min(remaining[site] for site in right) + AS_WELL * floor
+        if any(value > most for site, value in remaining.items() if site not in same):
             return False
     return True
 
@@ -178,17 +178,17 @@ def examples_of(rows: Sequence[Mapping[str, Any]]) -> list[Example]:
 def _examples(
     row: Mapping[str, Any], whole_right: bool
 ) -> Iterator[tuple[str, Mapping[str, float], bool, float, bool]]:
-    """Yield kind, features, whether it was right, what was told of it and whether as sure."""
+    """Yield kind, features, whether it was right, the probability reported and whether as sure."""
     causes, at_work = row['verdict']['causes'], _at_work(row['truth'])
     truths = levels_of(row['truth'])
     named_right = whole_right and row['verdict']['status'] in NAMING
     nameless = row['truth']['kind'] in NOT_IN_LIBRARY and not named_right
     for said in row['statements']:
-        kind, told = said['kind'], said['probability']
+        kind, reported = said['kind'], said['probability']
         if said['cause'] is None:
             right = {'complete': _complete(row), 'nameless': nameless}.get(kind, whole_right)
             sure = kind.startswith('answer') and bool(row['verdict']['sure'])
-            yield kind, said['features'], right, told, sure
+            yield kind, said['features'], right, reported, sure
             continue
         cause, level = causes[said['cause']], kind.split()[0]
         named = any((n['effect'], n['joint']) in at_work for n in cause['name'])
@@ -201,18 +201,18 @@ def _examples(
             first = cause[level][0]['at' if level == 'place' else 'on']
             right = any(first in own[level == 'dependence'] for own in truths)
         sure = bool(cause['sure']) and (level == 'name' or kind == 'place of the rest')
-        yield kind, said['features'], right, told, sure
+        yield kind, said['features'], right, reported, sure
 
 
 def _complete(row: Mapping[str, Any]) -> bool:
     """Return whether no cause above the noise and a tenth of the squared gap is missing."""
-    truth, told = row['truth'], set[tuple[str, str | None]]()
+    truth, named = row['truth'], set[tuple[str, str | None]]()
     for cause in row['verdict']['causes']:
         if not cause['rest']:
-            told |= {(n['effect'], n['joint']) for n in cause['name']}
+            named |= {(n['effect'], n['joint']) for n in cause['name']}
     gap = next(one['features']['gap'] for one in row['statements'] if one['kind'] == 'complete')
     least = max(1.0, LARGE * 10.0 ** (2.0 * gap))
     return not any(
-        ratio**2 > least and not alike_by_structure(truth['robot'], (e, j)) & told
+        ratio**2 > least and not alike_by_structure(truth['robot'], (e, j)) & named
         for (e, j), ratio in zip(truth['sites'], truth['ratios'], strict=True)
     )

@@ -29,8 +29,10 @@ FOLDS = 8
 ENDS = (0.005, 0.995)
 """Quantiles of a feature between which it counts: beyond, single cases would decide."""
 OF_TODAY = 1.0
-"""Weight of a case from which on the engine at hand diagnosed it. What is sure of causes is read off
-these alone, as older engines told fewer causes; a bound on whole answers needs more cases than these."""
+"""
+Weight of a case from which on the engine at hand diagnosed it. What is sure of causes is read off
+these alone, as older engines reported fewer causes; a bound on whole answers needs more cases.
+"""
 CAUSES = ('name', 'name of many', 'place of the rest')
 """Kinds of statements by which a cause is sure."""
 FEWEST_NAMED = 30
@@ -93,7 +95,7 @@ def learned(
 
 def unseen(examples: Sequence[Example], content: Mapping[str, Any]) -> list[Example]:
     """
-    Return examples as they are told by weights that had not seen their cases.
+    Return examples as they are reported by weights that had not seen their cases.
 
     content: as `learned` returned it.
     """
@@ -104,7 +106,7 @@ def unseen(examples: Sequence[Example], content: Mapping[str, Any]) -> list[Exam
         what = 'answer' if kind.startswith('answer') else 'cause' if kind in CAUSES else ''
         bound = content['sure_from'].get(what, 2.0)
         out += [
-            e._replace(told=float(p), sure=bool(p >= bound))
+            e._replace(reported=float(p), sure=bool(p >= bound))
             for e, p in zip(own, _unseen(table, signs), strict=True)
         ]
     return out
@@ -185,12 +187,12 @@ class Scaled(NamedTuple):
 
 def _content(table: Table, names: Mapping[str, int], signs: Array) -> dict[str, Any]:
     scaled = Scaled.of(table.values)
-    found = fitted(scaled(table.values), table.right, signs, RIDGE, table.weight)
-    slopes = found.slopes / scaled.spread
+    fit = fitted(scaled(table.values), table.right, signs, RIDGE, table.weight)
+    slopes = fit.slopes / scaled.spread
     return {
         'examples': len(table.right),
         'right': int(table.right.sum()),
-        'constant': _short(found.bias - float(slopes @ scaled.middle)),
+        'constant': _short(fit.bias - float(slopes @ scaled.middle)),
         'weights': {
             name: {'weight': _short(slope), 'low': _short(low), 'high': _short(high)}
             for name, slope, low, high in zip(names, slopes, scaled.low, scaled.high, strict=True)
@@ -210,7 +212,7 @@ def _unseen(table: Table, signs: Array) -> Array:
         here = table.folds == fold
         rest = Table(*(column[~here] for column in table))
         scaled = Scaled.of(rest.values)
-        found = fitted(scaled(rest.values), rest.right, signs, RIDGE, rest.weight)
-        odds = found.bias + scaled(table.values[here]) @ found.slopes
+        fit = fitted(scaled(rest.values), rest.right, signs, RIDGE, rest.weight)
+        odds = fit.bias + scaled(table.values[here]) @ fit.slopes
         out[here] = 1.0 / (1.0 + np.exp(-odds))
     return out

@@ -64,8 +64,8 @@ def fitted(
         (0.0 if sign > 0 else None, 0.0 if sign < 0 else None) for sign in signs
     ]
     start = np.concatenate([[np.log(share / (1.0 - share))], prior])
-    found = minimize(loss, start, jac=True, bounds=bounds, method='L-BFGS-B')
-    return Weights(float(found.x[0]), np.asarray(found.x[1:]))
+    solution = minimize(loss, start, jac=True, bounds=bounds, method='L-BFGS-B')
+    return Weights(float(solution.x[0]), np.asarray(solution.x[1:]))
 
 
 def log_loss(probability: Array, right: Array | NDArray[np.bool_], weight: Array) -> float:
@@ -74,6 +74,6 @@ def log_loss(probability: Array, right: Array | NDArray[np.bool_], weight: Array
 
     probability, right, weight: shape (N,).
     """
-    held = np.clip(probability, 1e-4, 1.0 - 1e-4)
-    loss = -np.where(np.asarray(right, dtype=bool), np.log(held), np.log(1.0 - held))
+    clipped = np.clip(probability, 1e-4, 1.0 - 1e-4)
+    loss = -np.where(np.asarray(right, dtype=bool), np.log(clipped), np.log(1.0 - clipped))
     return float((weight * loss).sum() / weight.sum())

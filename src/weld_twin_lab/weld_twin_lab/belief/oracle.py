@@ -210,12 +210,17 @@ def _solved(bench: _Bench, whole: Array, columns: Array) -> tuple[float, Array, 
     seen, design = slice(bench.seen), np.concatenate([columns, bench.nuisance], axis=1)
     gap = bench.y - whole
     step = fitted(design[seen], gap[seen])
-    left = gap - design @ step
+    residual = gap - design @ step
     basis = np.linalg.qr(bench.nuisance[seen])[0]
     bare = columns[seen] - basis @ (basis.T @ columns[seen])
     sizes = np.maximum(np.linalg.svd(bare, compute_uv=False), 1e-3)
     volume = float(0.5 * sizes.size * log(2.0 * pi) - np.log(sizes).sum())
-    return float((left[seen] ** 2).sum()), step[: columns.shape[1]], bench.y - left, volume
+    return (
+        float((residual[seen] ** 2).sum()),
+        step[: columns.shape[1]],
+        bench.y - residual,
+        volume,
+    )
 
 
 def _log_prior(case: SealedCase, family: str, mix: str) -> float:
@@ -238,11 +243,11 @@ def _others(
     for family in FAMILIES:
         if family in fitted or family in still:
             continue
-        found: dict[str | None, list[Cause]] = {}
+        by_joint: dict[str | None, list[Cause]] = {}
         for _ in range(PATIENCE * robot.n if 'joint' in _any(case, family) else DRAWS):
             cause = drawn_cause(family, robot, float(t[-1] - t[0]), rng)
-            kept = found.setdefault(cause.get('joint'), [])
+            kept = by_joint.setdefault(cause.get('joint'), [])
             if len(kept) < DRAWS and site(cause) != own:
                 kept.append(cause)
         share = _log_prior(case, family, mix) - log(DRAWS)
-        yield from ((cause, share) for kept in found.values() for cause in kept)
+        yield from ((cause, share) for kept in by_joint.values() for cause in kept)

@@ -87,10 +87,10 @@ def judged(
     """
     Return what answers were worth on cases that nothing was learned from.
 
-    content: of the file of weights that they were told by.
+    content: of the file of weights that they were reported by.
     rows: as `judged.kept` gives them; none where the cases learned from are judged by weights that
     had not seen them.
-    examples: what was told.
+    examples: what was reported.
     """
     own = [row for row in rows if row.get('examples')]
     foreign = {str(row['name']) for row in own if row['kind'] in NOT_IN_LIBRARY}
@@ -124,30 +124,30 @@ def _answers(examples: Sequence[Example]) -> list[Example]:
 
 def worth(examples: Sequence[Example]) -> dict[str, Any]:
     """Return how far what is told of some statements can be trusted."""
-    told, right = told_of(examples)
+    reported, right = probabilities_of(examples)
     sure = [e.sure for e in examples]
     wrong = sum(e.sure and not e.right for e in examples)
     return {
         'statements': len(examples),
         'right': int(right.sum()),
-        'log_loss': log_loss(told, right, np.ones(right.size)),
-        'ece': calibration_error(list(told), list(map(bool, right)))._asdict(),
-        'brier': brier(list(told), list(map(bool, right)))._asdict(),
+        'log_loss': log_loss(reported, right, np.ones(right.size)),
+        'ece': calibration_error(list(reported), list(map(bool, right)))._asdict(),
+        'brier': brier(list(reported), list(map(bool, right)))._asdict(),
         'sure': share(sure)._asdict(),
         'sure_and_wrong': wrong,
         'sure_and_wrong_most_95': upper_limit(wrong, len(examples), 0.05),
-        'wrong_at_70': _risk_at(told, right),
+        'wrong_at_70': _risk_at(reported, right),
     }
 
 
-def told_of(examples: Sequence[Example]) -> tuple[Array, NDArray[np.bool_]]:
+def probabilities_of(examples: Sequence[Example]) -> tuple[Array, NDArray[np.bool_]]:
     """Return what was told of some statements, and which were right."""
-    return np.array([e.told for e in examples]), np.array([e.right for e in examples], bool)
+    return np.array([e.reported for e in examples]), np.array([e.right for e in examples], bool)
 
 
-def _risk_at(told: Array, right: NDArray[np.bool_]) -> float:
+def _risk_at(reported: Array, right: NDArray[np.bool_]) -> float:
     """Return the share that is wrong among the surest."""
-    first = np.argsort(-told, kind='stable')[: max(round(COVERAGE * told.size), 1)]
+    first = np.argsort(-reported, kind='stable')[: max(round(COVERAGE * reported.size), 1)]
     return float((~right[first]).mean())
 
 

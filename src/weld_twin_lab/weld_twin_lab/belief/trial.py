@@ -58,21 +58,26 @@ def row_of(name: str, case: SealedCase, *, held_out: bool = True) -> dict[str, A
     }
     start = time.process_time()
     try:
-        told = diagnosed(case, recordings_of(case), held_out=held_out)
+        diagnosis = diagnosed(case, recordings_of(case), held_out=held_out)
     except Exception as error:
         return {**row, 'error': f'{type(error).__name__}: {error}'}
     row['seconds'] = time.process_time() - start
-    return {**row, 'error': None, **said(told), 'sealed': _sealed(case, row['truth'], told)}
+    return {
+        **row,
+        'error': None,
+        **said(diagnosis),
+        'sealed': _sealed(case, row['truth'], diagnosis),
+    }
 
 
-def said(told: Diagnosis) -> dict[str, Any]:
+def said(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return a verdict and its statements in plain values."""
-    whole = told.as_dict()
+    whole = diagnosis.as_dict()
     return {
         'verdict': whole['verdict'],
         'model': [(e['effect'], e.get('joint')) for e in (whole['model'] or {}).get('found', ())],
         'unsound': [item['kind'] for item in whole['unsound']],
-        'statements': [vars(one) for one in told.statements],
+        'statements': [vars(one) for one in diagnosis.statements],
     }
 
 
@@ -114,43 +119,43 @@ def _recorded(case: SealedCase, use: str) -> Recording:
     return as_recording(use, record(case.cell, case.causes, taken))
 
 
-def _sealed(case: SealedCase, truth: dict[str, Any], told: Diagnosis) -> dict[str, Any]:
+def _sealed(case: SealedCase, truth: dict[str, Any], diagnosis: Diagnosis) -> dict[str, Any]:
     """Return what is left on the recording that the diagnosis never saw, RMS [m]."""
-    if told.status == 'unsound':
+    if diagnosis.status == 'unsound':
         return {}
     test = _recorded(case, layout.TEST)
     good = counted(test, truth['outliers'])
     robot = case.cell.robot
-    bare = Model(robot, (robot.T_world_base,), told.model.known)
+    bare = Model(robot, (robot.T_world_base,), diagnosis.model.known)
     if case.cell.align:
         train = _recorded(case, layout.TRAIN)
         bare = aligned_on(bare, train, list(case.cell.align))
 
-    def left(model: Model) -> float:
+    def remaining(model: Model) -> float:
         return rms(gap_on(model, test)[good])
 
     return {
-        'before': left(bare),
-        'after': left(told.model),
+        'before': remaining(bare),
+        'after': remaining(diagnosis.model),
         'floor': truth['floor_m'],
-        'members': _members(told, left),
+        'members': _members(diagnosis, remaining),
     }
 
 
-def _members(told: Diagnosis, left: Any) -> list[list[dict[str, Any]]]:
+def _members(diagnosis: Diagnosis, remaining: Any) -> list[list[dict[str, Any]]]:
     """Return what each member of every set leaves in its place, the rest as it is."""
-    if not isinstance(told.evidence, Evidence) or told.families:
+    if not isinstance(diagnosis.evidence, Evidence) or diagnosis.families:
         return []
-    by_site = {r.site: r for slot in told.evidence.slots for r in slot}
+    by_site = {r.site: r for candidate_set in diagnosis.evidence.slots for r in candidate_set}
     out = []
-    for group in told.indistinguishable:
+    for group in diagnosis.indistinguishable:
         rivals: Sequence[Rival] = [by_site[site] for site in group if site in by_site]
         out.append(
             [
                 {
                     'effect': r.site.effect,
                     'joint': r.site.joint,
-                    'left': left(_for_one(told.model, r.fit.model)),
+                    'left': remaining(_for_one(diagnosis.model, r.fit.model)),
                 }
                 for r in rivals
             ]

@@ -51,8 +51,8 @@ def shown(case: SealedCase) -> list[float]:
         others = [own for j, part in enumerate(columns) if j != k for own in part]
         design = np.array([*others, *frames]).T
         gone = whole - moved(cell, [*case.causes[:k], *case.causes[k + 1 :]], takes)
-        left = gone - design @ fitted(design[~unseen], gone[~unseen]) if design.size else gone
-        out.append(min(float((left[part] ** 2).sum()) for part in (unseen, ~unseen)))
+        remaining = gone - design @ fitted(design[~unseen], gone[~unseen]) if design.size else gone
+        out.append(min(float((remaining[part] ** 2).sum()) for part in (unseen, ~unseen)))
     return out
 
 

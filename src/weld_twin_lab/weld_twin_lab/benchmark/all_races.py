@@ -57,13 +57,13 @@ def benchmark(folder: Path, effort: Effort, say: Callable[[str], None]) -> None:
             say(line)
     (folder / 'benchmark.md').write_text(race_table.page(outcomes), encoding='utf-8')
     (folder / 'brief.md').write_text(race_table.brief(outcomes), encoding='utf-8')
-    found = {
+    results = {
         'schema': 'weld_twin/benchmark/1',
         'machine': _machine(),
         'left_out': missing,
         'workloads': [outcome.as_dict() for outcome in outcomes],
     }
-    text = json.dumps(found, indent=1) + '\n'
+    text = json.dumps(results, indent=1) + '\n'
     (folder / 'benchmark.json').write_text(text, encoding='utf-8')
 
 

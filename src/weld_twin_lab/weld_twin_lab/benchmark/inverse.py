@@ -33,19 +33,19 @@ def inverse(count: int, with_pinocchio: bool) -> Workload:
     def own() -> Array:
         return solve_path(robot, poses, seed=q[0]).q
 
-    def left(found: Array) -> float:
-        return float(np.abs(forward(robot, found)[:, :3, 3] - poses[:, :3, 3]).max())
+    def gap_of(solved: Array) -> float:
+        return float(np.abs(forward(robot, solved)[:, :3, 3] - poses[:, :3, 3]).max())
 
     def all_postures() -> Array:
         return solve_path(robot, poses).q
 
     contenders = [
-        Contender(OWN, own, count, left(own())),
-        Contender(f'{OWN}, all postures', all_postures, count, left(all_postures())),
+        Contender(OWN, own, count, gap_of(own())),
+        Contender(f'{OWN}, all postures', all_postures, count, gap_of(all_postures())),
     ]
     if with_pinocchio:
         newton = _newton(robot, poses, q[0])
-        contenders.append(Contender('pinocchio', newton, count, left(newton())))
+        contenders.append(Contender('pinocchio', newton, count, gap_of(newton())))
     return Workload(
         f'inverse kinematics along {count:,} points',
         'point',

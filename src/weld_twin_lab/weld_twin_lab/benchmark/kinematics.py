@@ -123,10 +123,10 @@ def _with_screws(
     as_peers: brings the kernel's screws (6, k, N) into the form that peers give.
     """
     poses, out = kernel.screws(q)
-    found = as_peers(out[..., :LOOPED])
-    wanted = ways[REFERENCE](q[:LOOPED])[1] if REFERENCE in ways else found
+    result = as_peers(out[..., :LOOPED])
+    wanted = ways[REFERENCE](q[:LOOPED])[1] if REFERENCE in ways else result
     contenders = [
-        Contender(OWN, lambda: kernel.screws(q, poses, out), len(q), _gap(found, wanted))
+        Contender(OWN, lambda: kernel.screws(q, poses, out), len(q), _gap(result, wanted))
     ]
     for name, way in ways.items():
         gap = _gap(way(q[:LOOPED])[1], wanted)
@@ -142,5 +142,5 @@ def written_out(screws: Array) -> Array:
     return np.transpose(out, (2, 0, 1))
 
 
-def _gap(found: Array, wanted: Array) -> float:
-    return float(np.abs(found[: len(wanted)] - wanted).max())
+def _gap(result: Array, wanted: Array) -> float:
+    return float(np.abs(result[: len(wanted)] - wanted).max())

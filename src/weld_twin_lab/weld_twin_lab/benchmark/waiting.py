@@ -172,8 +172,8 @@ def merged(kept: Sequence[Entry], new: Sequence[Entry]) -> list[Entry]:
 
     kept, new: as `measured` gives them. What is no job any more is left out.
     """
-    found = {entry['job']: entry for entry in (*kept, *new)}
-    return [found[job.name] for job in JOBS if job.name in found]
+    by_job = {entry['job']: entry for entry in (*kept, *new)}
+    return [by_job[job.name] for job in JOBS if job.name in by_job]
 
 
 def _entry(job: WaitingJob, pythons: dict[str, str], out: Path, runs: int) -> Entry:

@@ -37,8 +37,8 @@ def over_floor(cases: Path, truths: Path, truth: Mapping[str, Any], diagnosis: P
     name = str(truth['name'])
     robot = load_robot(str(cases / name / layout.ROBOT))
     test = read_recording(truths / name / layout.TEST, robot)
-    left = gap_on(read_model(robot, diagnosis), test)[counted(test, truth['outliers'])]
-    return rms(left) / float(truth['floor_m'])
+    remaining = gap_on(read_model(robot, diagnosis), test)[counted(test, truth['outliers'])]
+    return rms(remaining) / float(truth['floor_m'])
 
 
 def aligned_on(model: Model, recording: Recording, align: list[str]) -> Model:

@@ -282,8 +282,8 @@ def floor(cell: BlindCell, causes: Sequence[Cause], taken: Take) -> tuple[float,
     true = record(cell, causes, taken, quiet).position
     noise = seen.position - true
     gross = np.linalg.norm(noise, axis=1) > GROSS * cell.noise
-    left = noise if seen.static else noise - _by_jitter(cell, causes, taken, seen)
-    return rms(left[~gross]), [int(k) for k in np.nonzero(gross)[0]]
+    remaining = noise if seen.static else noise - _by_jitter(cell, causes, taken, seen)
+    return rms(remaining[~gross]), [int(k) for k in np.nonzero(gross)[0]]
 
 
 def _by_jitter(

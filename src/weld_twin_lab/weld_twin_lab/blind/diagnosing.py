@@ -104,8 +104,8 @@ def diagnose_case(place: str, digest: str, with_holdout: bool) -> dict[str, Any]
     start = time.perf_counter()
     answer, failure = None, None
     try:
-        told = diagnosis_of(directory, with_holdout)
-        answer = dict(json.loads(diagnosis_text(told, ())))
+        diagnosis = diagnosis_of(directory, with_holdout)
+        answer = dict(json.loads(diagnosis_text(diagnosis, ())))
     except Exception as error:
         failure = f'{type(error).__name__}: {error}'
     return {
@@ -123,7 +123,7 @@ def diagnosis_of(directory: Path, with_holdout: bool = True) -> Diagnosis:
     known = directory / layout.KNOWN if case['known'] else ''
     twin = build_twin(load_robot(str(directory / layout.ROBOT)), known)
     holdout = [layout.HOLDOUT] if with_holdout else []
-    train, *held = (
+    train, *held_out = (
         read_recording(directory / use, twin.robot) for use in (layout.TRAIN, *holdout)
     )
     return diagnose(
@@ -132,5 +132,5 @@ def diagnosis_of(directory: Path, with_holdout: bool = True) -> Diagnosis:
         align=frozenset(case['align']),
         known=twin.effects,
         exclude=case['exclude'],
-        holdout=held,
+        holdout=held_out,
     )

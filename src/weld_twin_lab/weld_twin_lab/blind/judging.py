@@ -102,13 +102,13 @@ def judge(truth: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> Judg
 
 def is_sure(verdict: Mapping[str, Any]) -> bool:
     """
-    Return whether an answer is told as sure.
+    Return whether an answer is reported as sure.
 
     verdict: as diagnosis.json has it; the first schema tells only a confidence, and 0.8 at the
     most of what is not sure.
     """
-    told = verdict.get('sure')
-    return float(verdict.get('confidence') or 0.0) > CONFIDENT if told is None else bool(told)
+    sure = verdict.get('sure')
+    return float(verdict.get('confidence') or 0.0) > CONFIDENT if sure is None else bool(sure)
 
 
 def _sites(items: Iterable[Sequence[Any]]) -> list[Site]:
@@ -119,8 +119,8 @@ def _matched(answer: Sequence[Site], groups: Sequence[set[Site]]) -> int:
     """Return how many causes have a set of their own that holds them."""
     if not answer or not groups:
         return 0
-    held = np.array([[at in group for group in groups] for at in answer], dtype=float)
-    return int(held[linear_sum_assignment(-held)].sum())
+    contained = np.array([[at in group for group in groups] for at in answer], dtype=float)
+    return int(contained[linear_sum_assignment(-contained)].sum())
 
 
 def _share(answer: Sequence[Site], groups: Sequence[set[Site]]) -> float:
@@ -154,16 +154,18 @@ def answers_of(truth: Mapping[str, Any]) -> list[list[Site]]:
     return [_sites(answer) for answer in (truth['sites'], *truth['alike'])]
 
 
-def _all(told: Any, answers: Sequence[Sequence[Site]], groups: Sequence[set[Site]]) -> bool | None:
+def _all(
+    is_named: Any, answers: Sequence[Sequence[Site]], groups: Sequence[set[Site]]
+) -> bool | None:
     """Return whether all parts of one answer are told, None where there is nothing to tell."""
-    found = [
+    judged = [
         parts
-        for parts in ([told(at, groups) for at in answer] for answer in answers)
+        for parts in ([is_named(at, groups) for at in answer] for answer in answers)
         if any(part is not None for part in parts)
     ]
-    if not found:
+    if not judged:
         return None
-    return any(all(part is not False for part in parts) for parts in found)
+    return any(all(part is not False for part in parts) for parts in judged)
 
 
 def _family(at: Site, groups: Sequence[set[Site]]) -> bool:

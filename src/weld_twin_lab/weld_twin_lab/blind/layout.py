@@ -45,9 +45,9 @@ def read(path: Path) -> dict[str, Any]:
     except ValueError as error:
         raise DataError(f"'{path}' is not JSON: {error}") from None
     wanted = SCHEMAS[path.name]
-    found = data.get('schema') if isinstance(data, dict) else None
-    if found != wanted:
-        raise DataError(f"'{path}' has the schema {found!r}, expected {wanted}")
+    schema = data.get('schema') if isinstance(data, dict) else None
+    if schema != wanted:
+        raise DataError(f"'{path}' has the schema {schema!r}, expected {wanted}")
     return dict(data)
 
 

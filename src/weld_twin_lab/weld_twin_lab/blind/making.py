@@ -121,10 +121,10 @@ def _refuse_other(cases: Path, truths: Path, asked: dict[str, Any]) -> None:
     if cases.resolve() == truths.resolve():
         raise DataError('cases and truths must go to different directories')
     if (truths / layout.TRUTHS).exists():
-        found = layout.read(truths / layout.TRUTHS)
-        if any(found.get(key) != value for key, value in asked.items()):
+        existing = layout.read(truths / layout.TRUTHS)
+        if any(existing.get(key) != value for key, value in asked.items()):
             raise DataError(
-                f"'{truths}' holds the truths of other cases, of seed {found['seed']}; choose "
+                f"'{truths}' holds the truths of other cases, of seed {existing['seed']}; choose "
                 'another place'
             )
     elif (cases / layout.CASES).exists():

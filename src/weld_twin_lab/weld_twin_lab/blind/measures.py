@@ -63,15 +63,15 @@ def _row(item: Mapping[str, Any]) -> tuple[str, ...]:
         return (item['title'], '-', '-', '0', '-', '-')
     digits = 3 if item['key'].startswith(('brier', 'ece')) else 2
 
-    def told(value: float) -> str:
+    def in_words(value: float) -> str:
         return f'{value:.{digits}f}' if item['key'] in NUMBERS else f'{100.0 * value:.1f} %'
 
     return (
         item['title'],
-        told(estimate['value']),
-        f'{told(estimate["low"])} to {told(estimate["high"])}',
+        in_words(estimate['value']),
+        f'{in_words(estimate["low"])} to {in_words(estimate["high"])}',
         str(estimate['cases']),
-        '' if goal is None else f'{"≥" if item["at_least"] else "≤"} {told(goal)}',
+        '' if goal is None else f'{"≥" if item["at_least"] else "≤"} {in_words(goal)}',
         REACHED[item['reached']],
     )
 
@@ -83,7 +83,7 @@ class Question(NamedTuple):
     title: str
     asked: Callable[[Any], bool]
     """Tells which cases are asked."""
-    told: Callable[[Any], Any]
+    right: Callable[[Any], Any]
     """Tells whether the answer to a case is right; None where it cannot be said."""
     goal: float | None = None
     at_least: bool = True
@@ -94,8 +94,8 @@ def measured(questions: Sequence[Question], cases: Sequence[Any]) -> list[Measur
     """Return the share of cases that each question is asked of and that answer it rightly."""
     out = []
     for q in questions:
-        told = [q.told(case) for case in cases if q.asked(case)]
-        hits = [bool(one) for one in told if one is not None]
+        answers = [q.right(case) for case in cases if q.asked(case)]
+        hits = [bool(one) for one in answers if one is not None]
         out.append(Measure(q.key, q.title, share(hits), q.goal, q.at_least))
     return out
 
@@ -116,26 +116,28 @@ def _status(*statuses: str) -> Callable[[Judged], bool]:
     return lambda case: case.status in statuses
 
 
-def alias_measure(cases: Sequence[Judged], left: Mapping[str, float]) -> Measure:
+def alias_measure(cases: Sequence[Judged], remaining: Mapping[str, float]) -> Measure:
     """Return how often a cause no library knows is unknown, or what is named does as well."""
     question = Question(
         'alias',
         "withheld or outside: 'unknown', or as good on the sealed recording",
         _kind(*NOT_IN_LIBRARY),
-        lambda case: case.status == 'unknown' or left.get(case.name, AS_GOOD) < AS_GOOD,
+        lambda case: case.status == 'unknown' or remaining.get(case.name, AS_GOOD) < AS_GOOD,
     )
     return measured([question], cases)[0]
 
 
 def calibration_measures(cases: Sequence[Judged]) -> list[Measure]:
     """Return how far the confidence can be trusted."""
-    told = [c for c in cases if c.status != 'error']
-    known = [c for c in told if c.kind not in NOT_IN_LIBRARY]
+    answered = [c for c in cases if c.status != 'error']
+    known = [c for c in answered if c.kind not in NOT_IN_LIBRARY]
     return [
-        Measure('ece', 'expected calibration error', _calibrated(told), 0.03, False),
+        Measure('ece', 'expected calibration error', _calibrated(answered), 0.03, False),
         Measure('ece_library', 'the same, causes in the library and none', _calibrated(known)),
         Measure(
-            'brier', 'Brier score', brier([c.confidence for c in told], [c.right for c in told])
+            'brier',
+            'Brier score',
+            brier([c.confidence for c in answered], [c.right for c in answered]),
         ),
     ]
 

@@ -86,7 +86,7 @@ def score(
     listed = _verdicts_on(cases, results)
     verdicts = {verdict['name']: verdict for verdict in listed['verdicts']}
     judged: list[Judged] = []
-    left = {}
+    remaining = {}
     for truth in opened:
         name = truth['name']
         file = results / name / layout.DIAGNOSIS
@@ -94,13 +94,13 @@ def score(
         case = judge(truth, diagnosis)
         judged.append(case)
         if diagnosis and case.kind in NOT_IN_LIBRARY and case.status in NAMING:
-            left[name] = over_floor(cases, truths, truth, file)
-    told = {key: value for key, value in listed.items() if key not in ('schema', 'verdicts')}
-    made = {'seed': layout.read(truths / layout.TRUTHS)['seed'], **told}
+            remaining[name] = over_floor(cases, truths, truth, file)
+    about = {key: value for key, value in listed.items() if key not in ('schema', 'verdicts')}
+    made = {'seed': layout.read(truths / layout.TRUTHS)['seed'], **about}
     return Score(
         made,
         judged,
-        left,
+        remaining,
         _costs(list(verdicts.values())),
         {name: verdict['error'] for name, verdict in verdicts.items() if verdict['error']},
     )

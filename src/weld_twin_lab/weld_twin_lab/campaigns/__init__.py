@@ -71,8 +71,8 @@ def refuse_foreign(path: Path | str, campaign: str) -> None:
     if not target.exists():
         return
     try:
-        found = json.loads(target.read_text(encoding='utf-8'))
-        ours = (found['schema'], found['campaign']) == (SCHEMA, campaign)
+        content = json.loads(target.read_text(encoding='utf-8'))
+        ours = (content['schema'], content['campaign']) == (SCHEMA, campaign)
     except (OSError, ValueError, LookupError, TypeError):
         ours = False
     if not ours:

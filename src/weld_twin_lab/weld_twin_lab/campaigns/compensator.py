@@ -77,13 +77,13 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
 
         def keep(said: str) -> None:
             tell(said)
-            found = _made(args, known, '', None)
-            write_result(args.out, 'compensator', time.monotonic() - begun, found)
+            results = _made(args, known, '', None)
+            write_result(args.out, 'compensator', time.monotonic() - begun, results)
 
         for arm in unfinished(known, args.goals, args.seed):
             for said in tried(arm, IN_A_CELL, right_and_wrong(arm), known):
                 keep(f'{arm.name} {arm.seed}: {said}')
-            keep(f'{arm.name} {arm.seed}: {_told(arm.of(known.rows))}')
+            keep(f'{arm.name} {arm.seed}: {_in_words(arm.of(known.rows))}')
         other = other_arm(args.seed)
         tell(other)
         poses = race(args, tell)
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
         for arm in arms_of(args.without_cell, WITHOUT, args.seed + APART):
             if arm.seed not in done:
                 known.without.extend(judged(arm.name, arm.seed, WITHOUT))
-                keep(f'{len(known.without)} goals without a cell: {_told(known.without)}')
+                keep(f'{len(known.without)} goals without a cell: {_in_words(known.without)}')
     return _made(args, known, other, poses)
 
 
@@ -99,8 +99,8 @@ def _made(
     args: argparse.Namespace, known: Known, other: str, poses: dict[str, Any] | None
 ) -> dict[str, Any]:
     """Return what goes into the file."""
-    found = summary(known.rows, known.changes, other, poses, known.without)
-    return {**found, 'seed': args.seed, 'goals': known.rows, 'goals_without': known.without}
+    results = summary(known.rows, known.changes, other, poses, known.without)
+    return {**results, 'seed': args.seed, 'goals': known.rows, 'goals_without': known.without}
 
 
 def unfinished(known: Known, goals: int, seed: int) -> list[Arm]:
@@ -131,17 +131,17 @@ def _before(args: argparse.Namespace) -> Known:
     file = Path(args.out)
     if not args.go_on or not file.exists():
         return Known([], [], [])
-    found = json.loads(file.read_text(encoding='utf-8'))
-    if found['seed'] != args.seed:
+    content = json.loads(file.read_text(encoding='utf-8'))
+    if content['seed'] != args.seed:
         raise DataError(
-            f"the goals of '{file}' were drawn with --seed {found['seed']}; go on with it"
+            f"the goals of '{file}' were drawn with --seed {content['seed']}; go on with it"
         )
-    return Known(found['goals'], found['changes'], found['goals_without'])
+    return Known(content['goals'], content['changes'], content['goals_without'])
 
 
-def _told(rows: Sequence[dict[str, Any]]) -> str:
-    found = counted(rows)
-    return ', '.join(f'{key} {found[key]}' for key in ('goals', 'corrected', 'worse', 'held'))
+def _in_words(rows: Sequence[dict[str, Any]]) -> str:
+    counts = counted(rows)
+    return ', '.join(f'{key} {counts[key]}' for key in ('goals', 'corrected', 'worse', 'held'))
 
 
 def worse(row: dict[str, Any]) -> bool:
@@ -164,7 +164,7 @@ def spread(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     for row in rows:
         if row['verdict'] == 'corrected' and row['bound_m'] is not None:
             arms.setdefault((row['robot'], row['arm']), []).append(_held(row))
-    shares = [sum(held) / len(held) for held in arms.values()]
+    shares = [sum(holds) / len(holds) for holds in arms.values()]
     return {
         'arms': len(arms),
         'all': sum(share == 1.0 for share in shares),
@@ -213,7 +213,7 @@ def summary(
     unchanged = [c for c in changes if c['change'] == NOTHING]
     totals, beside = counted(calm), counted(without)
     after = _counted_by('after', [row for row in rows if row['after']])
-    held = (totals['held'] + beside['held']) / ((totals['bounds'] + beside['bounds']) or 1)
+    covered = (totals['held'] + beside['held']) / ((totals['bounds'] + beside['bounds']) or 1)
     goals = {
         'none worse': not any(worse(row) for row in (*rows, *without)),
         'corrected where it pays': totals['of_them_corrected'] >= CORRECTED * totals['to_correct'],
@@ -221,14 +221,14 @@ def summary(
         'nothing noticed without a change': not any(c['noticed'] for c in unchanged),
         'nothing corrected after a change': all(not row['corrected'] for row in after.values()),
         'model of another arm refused': other.startswith('exit code 2'),
-        'bound holds': HELD[0] <= held <= HELD[1],
+        'bound holds': HELD[0] <= covered <= HELD[1],
     }
     if poses is not None:
         goals['poses in time'] = max(poses['ratio'].values()) <= SLOWER and not poses['lost']
     return {
         'passed': all(goals.values()),
         'reached': goals,
-        'held': held,
+        'held': covered,
         'spread': spread((*calm, *without)),
         'totals': totals,
         'robots': _counted_by('robot', calm),
@@ -266,24 +266,24 @@ def table(result: dict[str, Any]) -> str:
 
 def _spread(result: dict[str, Any]) -> str:
     """Return how differently bounds held in the arms of both tables."""
-    found = result['spread']
-    if not found['arms']:
+    counts = result['spread']
+    if not counts['arms']:
         return ''
     return (
-        f'{result["held"]:.1%} of all bounds held: all of them in {found["all"]} of {found["arms"]} '
-        f'arms, at least {HELD[0]:.0%} in {found["most"]}, fewer than half in '
-        f'{found["fewer_than_half"]}; {found["least"]:.0%} in the worst'
+        f'{result["held"]:.1%} of all bounds held: all of them in {counts["all"]} of {counts["arms"]} '
+        f'arms, at least {HELD[0]:.0%} in {counts["most"]}, fewer than half in '
+        f'{counts["fewer_than_half"]}; {counts["least"]:.0%} in the worst'
     )
 
 
 def _millimetres(key: str) -> Callable[[Any], str]:
     """Return what tells the median of a distance [mm]; nothing where there is none."""
 
-    def told(row: Any) -> str:
+    def in_words(row: Any) -> str:
         value = row[1]['median'][key]
         return '' if value is None else f'{value * 1e3:.4f}'
 
-    return told
+    return in_words
 
 
 COLUMNS: dict[str, Callable[[Any], object]] = {

@@ -174,7 +174,7 @@ def table(result: dict[str, Any]) -> str:
         )
         for row in result['faults']
     ]
-    told = [
+    scenes = [
         (
             row['fault'],
             each['what'],
@@ -192,7 +192,7 @@ def table(result: dict[str, Any]) -> str:
     return (
         markdown.table(('fault', *COLUMNS.values(), 'wrong', 'passed'), *rows)
         + '\n'
-        + markdown.table(('fault', 'done', 'node', 'after [s]', 'what it said', 'passed'), *told)
+        + markdown.table(('fault', 'done', 'node', 'after [s]', 'what it said', 'passed'), *scenes)
         + f'\n{refused} of {len(result["parameters"])} absurd parameter values were refused in a '
         f'sentence. The bags of the whole campaign have {messages:,} messages; all of them can be '
         'read.\n'

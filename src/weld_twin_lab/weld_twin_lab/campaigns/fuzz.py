@@ -45,19 +45,19 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
     if unknown := set(chosen) - set(names):
         listed = ', '.join(names)
         raise DataError(f'no kind of file is called {min(unknown)!r}; there are {listed}')
-    found: dict[str, Finding] = {}
+    findings: dict[str, Finding] = {}
     kinds = {}
     for name in chosen:
-        tally = hunt(name, args.seed, args.cases, found)
+        tally = hunt(name, args.seed, args.cases, findings)
         kinds[name] = asdict(tally)
         tell(f'{name}: {tally.right} read, {tally.refused} refused, {tally.wrong} wrong')
-    for finding in found.values():
+    for finding in findings.values():
         tell(f'{finding.target} {finding.case}: {finding.what} ({finding.times} times)')
     malicious = try_all()
     for name, outcome in malicious.items():
         tell(f'{name}: {outcome}')
     recordings = worst_of(args.recordings, args.seed, tell) if args.recordings else {'bad': []}
-    passed = not (found or recordings['bad'])
+    passed = not (findings or recordings['bad'])
     passed = passed and all(text.startswith('refused') for text in malicious.values())
     return {
         'passed': passed,
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace, tell: Callable[[str], None]) -> dict[str, Any]
         'cpu_limit_s': CPU_LIMIT,
         'memory_limit_mb': MEMORY_LIMIT / 1e6,
         'kinds': kinds,
-        'findings': [asdict(finding) for finding in found.values()],
+        'findings': [asdict(finding) for finding in findings.values()],
         'malicious': malicious,
         'recordings': recordings,
     }

@@ -106,5 +106,5 @@ def table(result: dict[str, Any]) -> str:
         for way in WAYS
         if way in result
     ]
-    told = '\n'.join([*more, *([result['reason']] if result['reason'] else [])])
-    return f'{markdown.table(head, *rows)}\n{told}\n'
+    remarks = '\n'.join([*more, *([result['reason']] if result['reason'] else [])])
+    return f'{markdown.table(head, *rows)}\n{remarks}\n'

@@ -57,10 +57,10 @@ ON_TOOL = Motion(
     np.array([0.03, -0.05, 0.04]),
 )
 """The board on the tool: its face away from the flange."""
-Told = dict[str, Any]
+Case = dict[str, Any]
 
 
-def sealed(kind: str, seed: int) -> Told:
+def sealed(kind: str, seed: int) -> Case:
     """
     Return what a tracker tells of one cause in a cell, opened.
 
@@ -79,18 +79,18 @@ def sealed(kind: str, seed: int) -> Told:
     tool = truly([cause])
     turned = exp_screw_about(rng.normal(0.0, TURN, (STATIONS, 3))) @ tool.rotation
     place = tool.position + rng.normal(0.0, SIGMA, (STATIONS, 3))
-    found = diagnose(
+    diagnosis = diagnose(
         _recording(q, Measurements(_t(q), place, turned)), robot, align=FRAMES, experiment=False
     )
     return {'kind': kind, 'seed': seed, 'robot': robot.name, 'noises': shown} | opened(
-        found, site(cause)
+        diagnosis, site(cause)
     )
 
 
 FRAMES = ('base', 'tool')
 
 
-def beside_a_camera(seed: int) -> Told:
+def beside_a_camera(seed: int) -> Case:
     """Return what pixels of two cameras, and a tracker at the same stations, tell of one cause."""
     rng = np.random.default_rng([seed, 77])
     data = cell('arm', seed)
@@ -126,16 +126,16 @@ def beside_a_camera(seed: int) -> Told:
     }
 
 
-def opened(found: Diagnosis, truth: tuple[str, str | None]) -> Told:
+def opened(diagnosis: Diagnosis, truth: tuple[str, str | None]) -> Case:
     """Return what a diagnosis says beside the truth."""
-    groups = [[(s.effect, s.joint) for s in group] for group in found.indistinguishable]
-    groups = groups or [[(item.effect.name, item.effect.site)] for item in found.effects]
+    groups = [[(s.effect, s.joint) for s in group] for group in diagnosis.indistinguishable]
+    groups = groups or [[(item.effect.name, item.effect.site)] for item in diagnosis.effects]
     named = any(truth in group for group in groups)
     return {
         'truth': list(truth),
-        'status': found.status,
-        'sure': bool(found.sure),
-        'confidence': found.confidence,
+        'status': diagnosis.status,
+        'sure': bool(diagnosis.sure),
+        'confidence': diagnosis.confidence,
         'told': [[list(at) for at in group] for group in groups],
         'named': named,
         'right': named and len(groups) == 1,
@@ -158,10 +158,10 @@ def _cause(
         if family == 'joint_coupling' and _apart(robot, cause):
             continue
         moved = truly([cause])
-        left = rms(beyond_frames(plain, moved.position - plain.position)) / noise
+        remaining = rms(beyond_frames(plain, moved.position - plain.position)) / noise
         wanted = float(rng.uniform(*SIZE))
-        if left > 0.0 and plausible(robot, cause, wanted / left):
-            return scaled(cause, wanted / left), wanted
+        if remaining > 0.0 and plausible(robot, cause, wanted / remaining):
+            return scaled(cause, wanted / remaining), wanted
     raise DataError(f'no cause of {robot.name} is as large as wanted')
 
 

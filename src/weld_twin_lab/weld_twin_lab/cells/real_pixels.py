@@ -52,12 +52,12 @@ def part(data: str, which: int) -> dict[str, object]:
     rest = np.setdiff1d(np.arange(len(place)), test)
     bare = replace(seen, measured=None, images=None, notes=())
     pixels = seen_by(bare, seen.images.take(np.isin(seen.images.image, rest)))
-    found = diagnose(pixels, robot, align=ALIGN, experiment=False)
+    diagnosis = diagnose(pixels, robot, align=ALIGN, experiment=False)
     train, judged = (_of(bare, place, rows) for rows in (rest, test))
     geometry = plain_fit(train, robot, PLAIN['geometry'], ALIGN).found
-    models = {'frames': (), 'pixels': found.model.found, 'tracker': geometry}
-    left = {name: _left(train, judged, robot, effects) for name, effects in models.items()}
-    return {'part': which, 'status': found.status, **left}
+    models = {'frames': (), 'pixels': diagnosis.model.found, 'tracker': geometry}
+    remaining = {name: _left(train, judged, robot, effects) for name, effects in models.items()}
+    return {'part': which, 'status': diagnosis.status, **remaining}
 
 
 def _tracked(path: Path) -> Array:

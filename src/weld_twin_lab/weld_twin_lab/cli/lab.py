@@ -16,8 +16,8 @@ from .retired import LAB, add_retired, add_retired_options, refuse_retired
 
 def proofs() -> dict[str, str]:
     """Return the module of every proof by the name the command line has for it."""
-    found = sorted(module.name for module in iter_modules(lab_jobs.__path__))
-    return {name.replace('_', '-'): f'{lab_jobs.__name__}.{name}' for name in found}
+    names = sorted(module.name for module in iter_modules(lab_jobs.__path__))
+    return {name.replace('_', '-'): f'{lab_jobs.__name__}.{name}' for name in names}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -66,8 +66,8 @@ def refuse_retired(args: Any) -> None:
 
     Raises ModelError: it is one; the message says where its question is answered.
     """
-    if told := getattr(args, 'retired', ''):
-        raise ModelError(told)
+    if sentence := getattr(args, 'retired', ''):
+        raise ModelError(sentence)
     for words, now in OPTIONS.items():
         if getattr(args, words, None) is not None:
             raise ModelError(f"'{words}' is retired: {now}")

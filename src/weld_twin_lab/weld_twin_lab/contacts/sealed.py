@@ -86,10 +86,10 @@ def _starts(robot: Robot, rng: np.random.Generator) -> tuple[Array, list[str], A
     for k, middle in enumerate(SOCKETS):
         for socket in (0, 1):
             place = middle + socket * APART
-            found = postures_at(robot, place, EACH, rng)
-            q.append(found)
-            labels += [f'{k}/{socket}'] * len(found)
-            places.append(np.tile(place, (len(found), 1)))
+            postures = postures_at(robot, place, EACH, rng)
+            q.append(postures)
+            labels += [f'{k}/{socket}'] * len(postures)
+            places.append(np.tile(place, (len(postures), 1)))
     return np.concatenate(q), labels, np.concatenate(places)
 
 

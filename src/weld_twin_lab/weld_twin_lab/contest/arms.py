@@ -49,13 +49,13 @@ def arm_cases(ur5: Path, ur10: Path, out: Path) -> dict[str, Array]:
     if (out / MEASURED).exists():
         kept = json.loads((out / MEASURED).read_text(encoding='utf-8'))
         return {name: np.array(rows) for name, rows in kept.items()}
-    found: dict[str, Array] = {}
+    measured: dict[str, Array] = {}
     for split in all_splits(ur5, ur10):
         if split.kind in KINDS:
-            found[split.name] = _written(split, out / split.name)
-    content = {name: rows.tolist() for name, rows in found.items()}
+            measured[split.name] = _written(split, out / split.name)
+    content = {name: rows.tolist() for name, rows in measured.items()}
     write_text(out / MEASURED, json.dumps(content) + '\n')
-    return found
+    return measured
 
 
 def _written(split: Split, folder: Path) -> Array:
@@ -91,16 +91,16 @@ def lefts(runs: Mapping[str, Mapping[str, Run]], measured: Mapping[str, Array]) 
     }
 
 
-def arm_table(found: Mapping[str, Mapping[str, float]], names: list[str]) -> str:
+def arm_table(by_method: Mapping[str, Mapping[str, float]], names: list[str]) -> str:
     """Return mean errors in millimetres, a row for each method, the least bold, in Markdown."""
     best = {
-        name: min((errors[name] for errors in found.values() if name in errors), default=0.0)
+        name: min((errors[name] for errors in by_method.values() if name in errors), default=0.0)
         for name in names
     }
     rows: list[list[object]] = [['method', *names]]
-    for method, errors in found.items():
-        told = [_millimetres(errors.get(name), best[name]) for name in names]
-        rows.append([method, *told])
+    for method, errors in by_method.items():
+        cells = [_millimetres(errors.get(name), best[name]) for name in names]
+        rows.append([method, *cells])
     return table(*rows)
 
 

@@ -146,10 +146,10 @@ def _start(words: Sequence[str], case: Path, place: Path) -> None:
 
 def _kept(place: Path, count: int) -> Run:
     """Return what came of a run; an answer out of form is none."""
-    found = Ended(**json.loads((place / RUN).read_text(encoding='utf-8')))
-    used = found.seconds, found.memory_bytes
-    if found.trouble:
-        return Run(None, *used, found.trouble)
+    end = Ended(**json.loads((place / RUN).read_text(encoding='utf-8')))
+    used = end.seconds, end.memory_bytes
+    if end.trouble:
+        return Run(None, *used, end.trouble)
     try:
         return Run(read_answer(place, count), *used)
     except DataError as error:

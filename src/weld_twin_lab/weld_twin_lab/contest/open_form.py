@@ -211,8 +211,8 @@ def write_answer(folder: Path, answer: ContestAnswer) -> None:
         'none': answer.none,
     }
     (folder / ANSWER).write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
-    told = [answer.predicted, *([] if answer.sigma is None else [answer.sigma])]
-    _write(folder / PREDICTED, ['x', 'y', 'z', 'sx', 'sy', 'sz'][: 3 * len(told)], told)
+    parts = [answer.predicted, *([] if answer.sigma is None else [answer.sigma])]
+    _write(folder / PREDICTED, ['x', 'y', 'z', 'sx', 'sy', 'sz'][: 3 * len(parts)], parts)
 
 
 def read_answer(folder: Path, count: int) -> ContestAnswer:

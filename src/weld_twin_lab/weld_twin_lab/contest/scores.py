@@ -100,8 +100,8 @@ def promised(off: Array, sigma: Array) -> tuple[float, float, float]:
     """
     z = off / sigma
     score = sigma * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * DENSITY * np.exp(-0.5 * z**2) - APART)
-    held = float((np.abs(z) <= NORMAL_90).mean())
-    return held, 2.0 * NORMAL_90 * float(np.median(sigma)), float(score.mean())
+    covered = float((np.abs(z) <= NORMAL_90).mean())
+    return covered, 2.0 * NORMAL_90 * float(np.median(sigma)), float(score.mean())
 
 
 def point(answer: ContestAnswer, case: Sealed) -> Point:
@@ -162,8 +162,8 @@ def _sure_wrong(answer: ContestAnswer, case: Sealed) -> bool:
         sure = [[(effect, joint)] for effect, joint, p in _names(answer) if p > CONFIDENT]
         denies = answer.none > CONFIDENT
     else:
-        told = zip(answer.causes, answer.sure, strict=False)
-        sure = [[(effect, joint) for effect, joint, _ in cause] for cause, known in told if known]
+        pairs = zip(answer.causes, answer.sure, strict=False)
+        sure = [[(effect, joint) for effect, joint, _ in cause] for cause, known in pairs if known]
         denies = answer.none > 0.0 and answer.sure[-1]
     denied = denies and case.truth['kind'] != 'none'
     return denied or any(not right & set(group) for group in sure)
@@ -186,13 +186,13 @@ def summary(runs: Mapping[str, Run], cases: Mapping[str, Sealed]) -> dict[str, A
     for key in ('detected', 'false_alarm', 'family', 'joint', 'belief', 'sure_wrong'):
         values = [getattr(each, key) for each in points if getattr(each, key) is not None]
         out[key] = float(np.mean(values)) if values else None
-    left = np.array([each.left for each in points])
-    out['left'] = float(np.median(left)) if points else None
+    remaining = np.array([each.left for each in points])
+    out['left'] = float(np.median(remaining)) if points else None
     out['over_floor'] = float(np.median([p.over_floor for p in points])) if points else None
     for key in ('held', 'width_m', 'crps_m'):
-        told = [getattr(each, key) for each in points if getattr(each, key) is not None]
-        out[key] = None if not told else float((np.mean if key == 'held' else np.median)(told))
-    out['worse_than_nominal'] = int((left > 1.0).sum())
+        given = [getattr(each, key) for each in points if getattr(each, key) is not None]
+        out[key] = None if not given else float((np.mean if key == 'held' else np.median)(given))
+    out['worse_than_nominal'] = int((remaining > 1.0).sum())
     out['seconds'] = float(np.median([run.seconds for run in runs.values()]))
     out['memory_bytes'] = float(np.median([run.memory_bytes for run in runs.values()]))
     return out

@@ -97,8 +97,8 @@ def page(all_: Heard) -> str:
     """Return what was learned, and what it is worth on cells that it was not learned from."""
     from weld_twin_msgs_py.files import markdown
 
-    found, probability = weights(all_), unseen(all_)
-    learned = zip((*SIGNS, 'added'), (*found.slopes, found.bias), strict=True)
+    fit, probability = weights(all_), unseen(all_)
+    learned = zip((*SIGNS, 'added'), (*fit.slopes, fit.bias), strict=True)
     rows = [(f'{least:.2f}', *map(str, reached(all_, probability, least))) for least in TRIED]
     return '\n'.join(
         [

@@ -54,8 +54,8 @@ def _statuses(cases: Sequence[Case]) -> list[str]:
     return sorted({str(case['first']['status']) for case in cases})
 
 
-def _count(cases: Sequence[Case], told: Callable[..., bool]) -> int:
-    return sum(bool(told(case)) for case in cases)
+def _count(cases: Sequence[Case], holds: Callable[..., bool]) -> int:
+    return sum(bool(holds(case)) for case in cases)
 
 
 def _median(values: Sequence[float]) -> float | None:
@@ -64,12 +64,12 @@ def _median(values: Sequence[float]) -> float | None:
 
 def page(result: dict[str, Any]) -> str:
     """Return the results in Markdown."""
-    told, cases = result['summary'], result['cases']
+    totals, cases = result['summary'], result['cases']
     if not cases:
         return 'No cell was left open.\n'
     return '\n'.join(
         [
-            *(f'- {key}: {told[key]}' for key in told if not isinstance(told[key], dict)),
+            *(f'- {key}: {totals[key]}' for key in totals if not isinstance(totals[key], dict)),
             '',
             tabled(COLUMNS, cases),
             '',
@@ -77,10 +77,10 @@ def page(result: dict[str, Any]) -> str:
     )
 
 
-def _told(found: dict[str, Any]) -> str:
-    right = 'right' if found['right'] else 'wrong'
-    sure = 'sure' if found['sure'] else 'open'
-    return f'{found["status"]}, {right}, {sure}'
+def _in_words(answer: dict[str, Any]) -> str:
+    right = 'right' if answer['right'] else 'wrong'
+    sure = 'sure' if answer['sure'] else 'open'
+    return f'{answer["status"]}, {right}, {sure}'
 
 
 COLUMNS: dict[str, Callable[[Case], object]] = {
@@ -90,11 +90,11 @@ COLUMNS: dict[str, Callable[[Case], object]] = {
     'causes': lambda case: ' + '.join(
         ' of '.join(filter(None, site)) for site in case['truth']['sites']
     ),
-    'first': lambda case: _told(case['first']),
+    'first': lambda case: _in_words(case['first']),
     'asked': lambda case: ', '.join(
         f'{s["kind"]} {s["robot_minutes"]:.1f} min' for s in case['rounds']
     ),
-    'loop': lambda case: _told(case['loop']),
+    'loop': lambda case: _in_words(case['loop']),
     'ended': lambda case: case['end'],
 }
 """Columns of the table of cells."""

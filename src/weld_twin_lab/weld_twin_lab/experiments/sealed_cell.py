@@ -120,7 +120,7 @@ class SealedCell:
         names = [recording.name for recording in recordings]
         changes = {names.index(name): c for name, c in self._changed.items() if name in names}
         recordings, may_change = with_changes(recordings, changes, self.robot)
-        found = diagnose(
+        diagnosis = diagnose(
             recordings,
             self.robot,
             align=self._case.cell.align,
@@ -128,7 +128,7 @@ class SealedCell:
             may_change=may_change,
             **options,
         )
-        return dict(json.loads(diagnosis_text(found, ())))
+        return dict(json.loads(diagnosis_text(diagnosis, ())))
 
     def opened(self) -> dict[str, Any]:
         """Return the truth."""
@@ -144,9 +144,9 @@ class SealedCell:
             'ratios': case.ratios,
         }
 
-    def judged(self, found: Mapping[str, Any]) -> Judged:
+    def judged(self, diagnosis: Mapping[str, Any]) -> Judged:
         """Return what a diagnosis is worth."""
-        return judge(self.opened(), found)
+        return judge(self.opened(), diagnosis)
 
 
 def _changed(robot: Robot, change: SetUpChange) -> Robot:

@@ -23,7 +23,8 @@ MINUTES = 5.0
 """Of robot motion at most, all experiments together."""
 VISIT = 60.0
 """Minutes at most, all experiments together, with what has to be set up for them."""
-Found = Mapping[str, Any]
+Content = Mapping[str, Any]
+"""The content of a diagnosis.json."""
 LEAST = 0.25
 """Minutes that an experiment is planned with where hardly any are left."""
 ASKED = (
@@ -33,9 +34,9 @@ ASKED = (
 """What is kept of every experiment."""
 
 
-def said(cell: SealedCell, found: Mapping[str, Any], why: str) -> dict[str, Any]:
+def said(cell: SealedCell, diagnosis: Mapping[str, Any], why: str) -> dict[str, Any]:
     """Return a diagnosis in short, judged by the truth; why it closes the question, if it does."""
-    judged = cell.judged(found)
+    judged = cell.judged(diagnosis)
     return {
         'status': judged.status,
         'confidence': judged.confidence,
@@ -47,7 +48,7 @@ def said(cell: SealedCell, found: Mapping[str, Any], why: str) -> dict[str, Any]
 
 def answered(
     cell: SealedCell, first: Recording, later: Sequence[Recording], limits: Limits
-) -> tuple[Found, str, dict[str, Any]]:
+) -> tuple[Content, str, dict[str, Any]]:
     """
     Return the answer from the first recording and later ones, why it closes the question, and how.
 
@@ -55,7 +56,7 @@ def answered(
 
     Returns
     -------
-    found : mapping
+    diagnosis : mapping
     why : str
     heard : dict
         What the two diagnoses were weighed by, and what they are worth; empty where there was one.
@@ -75,38 +76,40 @@ def answered(
     return *weighed(together), {}
 
 
-def _weight(cell: SealedCell, found: Found, other: Found) -> dict[str, Any]:
+def _weight(cell: SealedCell, diagnosis: Content, other: Content) -> dict[str, Any]:
     return {
-        'signs': signs(found, other),
-        'stated': found['verdict']['status'] in STATED,
-        'right': cell.judged(found).right,
+        'signs': signs(diagnosis, other),
+        'stated': diagnosis['verdict']['status'] in STATED,
+        'right': cell.judged(diagnosis).right,
     }
 
 
-def _left(minutes: float, visit: float = VISIT) -> Limits:
+def _limits(minutes: float, visit: float = VISIT) -> Limits:
     return Limits(minutes=max(visit, LEAST), moving=max(minutes, LEAST))
 
 
 def poor_at_first(cell: SealedCell) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Return the first diagnosis and what it is worth; None where it is right or finds a mistake."""
-    found, why, _ = answered(cell, cell.first, [], _left(MINUTES))
-    first = said(cell, found, why)
+    diagnosis, why, _ = answered(cell, cell.first, [], _limits(MINUTES))
+    first = said(cell, diagnosis, why)
     wrong = first['status'] in ('ambiguous', 'unknown') or not first['right']
     # What cannot be told apart by any motion is no question for an experiment; nor is one that only
     # confirms what is right already.
-    confirms = bool((found['next_experiment'] or {}).get('confirms'))
+    confirms = bool((diagnosis['next_experiment'] or {}).get('confirms'))
     closed = first['right'] and (first['sure'] or confirms)
-    return (dict(found), first) if wrong and not closed else None
+    return (dict(diagnosis), first) if wrong and not closed else None
 
 
-def looped(cell: SealedCell, found: Mapping[str, Any], first: Mapping[str, Any]) -> dict[str, Any]:
+def looped(
+    cell: SealedCell, diagnosis: Mapping[str, Any], first: Mapping[str, Any]
+) -> dict[str, Any]:
     """
     Return what came of one cell that was investigated.
 
-    found: the first diagnosis.
+    diagnosis: the first diagnosis.
     first: the same in short.
     """
-    rounds, end, answer = investigated(cell, cell.first, found, dict(first))
+    rounds, end, answer = investigated(cell, cell.first, diagnosis, dict(first))
     return {
         'name': cell.name,
         'seal': cell.seal,
@@ -122,34 +125,34 @@ def looped(cell: SealedCell, found: Mapping[str, Any], first: Mapping[str, Any])
 
 
 def investigated(
-    cell: SealedCell, start: Recording, found: Mapping[str, Any], answer: dict[str, Any]
+    cell: SealedCell, start: Recording, diagnosis: Mapping[str, Any], answer: dict[str, Any]
 ) -> tuple[list[dict[str, Any]], str, dict[str, Any]]:
     """Return the rounds of the loop, the word that it ended with, and its last answer."""
     later: list[Recording] = []
     rounds: list[dict[str, Any]] = []
-    left, visit, why = MINUTES, VISIT, None
+    remaining, visit, why = MINUTES, VISIT, None
     while True:
-        asked = question(found, visit, [step['kind'] for step in rounds], why)
+        asked = question(diagnosis, visit, [step['kind'] for step in rounds], why)
         if not isinstance(asked, dict):
             # What the visit would allow, the minutes of motion may not.
-            spent = asked[0] == 'nothing would part them' and not why and short(left)
+            spent = asked[0] == 'nothing would part them' and not why and short(remaining)
             return rounds, 'minutes spent' if spent else asked[0], answer
-        if len(rounds) == ROUNDS or asked['robot_minutes'] > left:
+        if len(rounds) == ROUNDS or asked['robot_minutes'] > remaining:
             return rounds, 'rounds spent' if len(rounds) == ROUNDS else 'minutes spent', answer
         name = f'experiment {len(rounds) + 1}'
         motion = as_motion(asked['motion'], cell.robot)
         later.append(cell.made(name, motion, 100 + len(rounds), asked['changes']))
-        left, visit = left - asked['robot_minutes'], visit - asked['minutes']
+        remaining, visit = remaining - asked['robot_minutes'], visit - asked['minutes']
         begun = time.perf_counter()
         try:
-            found, why, heard = answered(cell, start, later, _left(left, visit))
+            diagnosis, why, heard = answered(cell, start, later, _limits(remaining, visit))
         except TwinError as error:
             return rounds, f'refused: {error}', answer
-        answer = said(cell, found, why)
+        answer = said(cell, diagnosis, why)
         rounds.append(
             {
                 **{key: asked[key] for key in ASKED},
-                'decided': decided(asked, found),
+                'decided': decided(asked, diagnosis),
                 'seconds': time.perf_counter() - begun,
                 'found': answer,
                 'heard': heard,

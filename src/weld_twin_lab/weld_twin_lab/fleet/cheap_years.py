@@ -74,8 +74,8 @@ def drawn(
         check = seen[k]
         off = moved(lived.events, week)
         theta = np.array([truth[name] + off.get(name, 0.0) for name in check.names])
-        told = shown[k] @ theta + roots[k] @ rng.normal(size=theta.size)
-        value = check.covariance @ told
+        information = shown[k] @ theta + roots[k] @ rng.normal(size=theta.size)
+        value = check.covariance @ information
         out.append(replace(check, day=WEEK * week, value=value))
     return out
 

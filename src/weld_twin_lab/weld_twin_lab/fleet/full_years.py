@@ -33,8 +33,8 @@ def base(seed: int, number: int, check: int) -> dict[str, Any]:
     causes = [*yearly.as_built, set_up(rng)]
     drawn = int(rng.integers(2**31))
     with tempfile.TemporaryDirectory(prefix='years-') as place:
-        found = diagnosed(yearly, causes, check, drawn, Path(place) / 'check', FIRST)
-    return found.plain()
+        entry = diagnosed(yearly, causes, check, drawn, Path(place) / 'check', FIRST)
+    return entry.plain()
 
 
 def lived(seed: int, number: int, first: Mapping[str, Any]) -> Year:
@@ -52,8 +52,8 @@ def check(seed: int, number: int, week: int, set_up_number: int, first: Mapping[
     at = FIRST + timedelta(weeks=week)
     with tempfile.TemporaryDirectory(prefix='years-') as place:
         stations = set_up_number % CHECKS
-        found = diagnosed(yearly, causes, stations, drawn, Path(place) / 'check', at)
-    return found.plain()
+        entry = diagnosed(yearly, causes, stations, drawn, Path(place) / 'check', at)
+    return entry.plain()
 
 
 def _together(causes: Sequence[Cause]) -> list[Cause]:
@@ -88,8 +88,10 @@ def scored(
         for each in yearly.as_built
     }
     joints = yearly.cell.robot.joint_names
-    found = score(seen, lived(seed, number, first), named(entries), likely(entries), joints, truth)
+    scores = score(
+        seen, lived(seed, number, first), named(entries), likely(entries), joints, truth
+    )
     status: dict[str, int] = {}
     for each in entries:
         status[each.status] = status.get(each.status, 0) + 1
-    return {**found, 'status': status, 'weeks': len(entries), 'unit': WEEK}
+    return {**scores, 'status': status, 'weeks': len(entries), 'unit': WEEK}

@@ -63,11 +63,11 @@ def score(
     found: list[int | None] = [None] * len(year.events)
     false: list[dict[str, Any]] = []
     before: set[tuple[str, str]] = set()
-    told: tuple[Change, ...] = ()
+    reported: tuple[Change, ...] = ()
     for k in range(FEWEST, len(observations) + 1):
-        told = changes(observations[:k], named=named, likely=likely)
+        reported = changes(observations[:k], named=named, likely=likely)
         wrong = set()
-        for change in told:
+        for change in reported:
             hits = [i for i, event in enumerate(year.events) if _same(event, change, joints)]
             for i in hits:
                 found[i] = k - 1 if found[i] is None else found[i]
@@ -77,8 +77,8 @@ def score(
         before = wrong
     events = [
         {
-            **_entry(event, reached, first, told, weeks, joints),
-            'forecast': _forecast(observations, year.events, event, told, truth),
+            **_entry(event, reached, first, reported, weeks, joints),
+            'forecast': _forecast(observations, year.events, event, reported, truth),
         }
         for event, reached, first in zip(year.events, due, found, strict=True)
     ]
@@ -112,8 +112,8 @@ def _reached(
         free = whole[: -size.size, : -size.size]
         side = whole[: -size.size, -size.size :]
         rest = free + 1e-12 * np.diag(np.diag(free) + 1e-300)
-        left = whole[-size.size :, -size.size :] - side.T @ np.linalg.solve(rest, side)
-        if k and size @ left @ size >= ERRORS**2:
+        remaining = whole[-size.size :, -size.size :] - side.T @ np.linalg.solve(rest, side)
+        if k and size @ remaining @ size >= ERRORS**2:
             return k
     return None
 
@@ -146,12 +146,12 @@ def _entry(
     event: Event,
     reached: int | None,
     found: int | None,
-    told: Sequence[Change],
+    reported: Sequence[Change],
     weeks: Array,
     joints: Sequence[str],
 ) -> dict[str, Any]:
     """Return what became of one event; what and when it was is judged at the end of the year."""
-    mine = [change for change in told if _same(event, change, joints)]
+    mine = [change for change in reported if _same(event, change, joints)]
     return {
         'kind': event.kind,
         'name': event.name,
@@ -168,11 +168,14 @@ def _entry(
 
 def _size(event: Event, mine: Sequence[Change]) -> dict[str, Any] | None:
     """Return the 90 % interval of the size of a change told as it is, and the true one."""
-    for told in mine:
-        if (told.name, told.kind) == (event.name, event.kind):
-            half, unit = NORMAL_90 * told.std, WEEK if event.kind == 'trend' else 1.0
+    for change in mine:
+        if (change.name, change.kind) == (event.name, event.kind):
+            half, unit = NORMAL_90 * change.std, WEEK if event.kind == 'trend' else 1.0
             size = abs(event.size) if event.kind == 'season' else event.size
-            return {'ci90': [unit * (told.size - half), unit * (told.size + half)], 'true': size}
+            return {
+                'ci90': [unit * (change.size - half), unit * (change.size + half)],
+                'true': size,
+            }
     return None
 
 
@@ -180,7 +183,7 @@ def _forecast(
     observations: Sequence[Observation],
     events: Sequence[Event],
     event: Event,
-    told: Sequence[Change],
+    reported: Sequence[Change],
     truth: Mapping[str, float],
 ) -> dict[str, Any] | None:
     """
@@ -188,7 +191,7 @@ def _forecast(
 
     None where no trend of that coordinate was told, or it moves towards zero.
     """
-    now = outlook(observations, told, event.name)
+    now = outlook(observations, reported, event.name)
     if event.kind != 'trend' or now is None:
         return None
     last = observations[-1].day / WEEK

@@ -98,8 +98,8 @@ def figures(years: Sequence[Result]) -> dict[str, Any]:
     """Return the measures of some years."""
     real = [e for year in years for e in year['events'] if e['reached'] is not None]
     in_time = [e['found'] is not None and e['found'] <= e['reached'] + GRACE for e in real]
-    told = [e for e in real if e['found'] is not None]
-    right = [e['what'] and e['when'] for e in told]
+    detected = [e for e in real if e['found'] is not None]
+    right = [e['what'] and e['when'] for e in detected]
     ahead = [e['forecast']['held'] for year in years for e in year['events'] if e['forecast']]
     sizes = [e['size'] for year in years for e in year['events'] if e.get('size')]
     false = sum(len(year['false']) for year in years)
@@ -111,8 +111,8 @@ def figures(years: Sequence[Result]) -> dict[str, Any]:
         'found_at_last': _share([e['found'] is not None for e in real]),
         'false_a_year': false / max(len(years), 1),
         'right': _share(right),
-        'what': _share([e['what'] for e in told]),
-        'when': _share([e['when'] for e in told]),
+        'what': _share([e['what'] for e in detected]),
+        'when': _share([e['when'] for e in detected]),
         'sizes': _share([s['ci90'][0] <= s['true'] <= s['ci90'][1] for s in sizes]),
         'forecasts': len(ahead),
         'forecast': _share(ahead),

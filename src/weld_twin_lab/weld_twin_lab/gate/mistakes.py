@@ -173,36 +173,36 @@ def other_robot(sound: Sound, rng: np.random.Generator) -> Made:
     q = sound.recording.joints.q[:: max(len(sound.recording.joints.q) // 60, 1)]
     off = rng.standard_normal((2, robot.n)) * (np.stack([robot.a, robot.d]) != 0.0)
     for _ in range(20):
-        told = replace(robot, a=robot.a + off[0], d=robot.d + off[1], name='sibling')
-        size = _untaken(sound.robot, q, forward(told, q))
+        sibling = replace(robot, a=robot.a + off[0], d=robot.d + off[1], name='sibling')
+        size = _untaken(sound.robot, q, forward(sibling, q))
         if abs(size - wanted) < 0.02 * wanted:
-            return told, sound.recording, f'{size * 1e3:.1f} mm'
+            return sibling, sound.recording, f'{size * 1e3:.1f} mm'
         off = off * wanted / max(size, 1e-9)
         if np.abs(off).max() > UNLIKE_SIBLINGS:
             raise Hidden('frames and zeros take up every difference')
     raise Hidden('no sibling differs by as much')
 
 
-def _untaken(robot: Robot, q: Array, told: Array) -> float:
+def _untaken(robot: Robot, q: Array, poses: Array) -> float:
     """
     Return the RMS distance of poses (M, 4, 4) from those of a robot that nothing else takes up.
 
     Frames that were given wrong, and zeros within what a mastering leaves, are causes of their own.
     """
     real = forward(robot, q)
-    left = told[:, :3, 3] - real[:, :3, 3]
-    columns = [*(np.eye(3)[:, None] * np.ones((len(left), 1)))]
+    remaining = poses[:, :3, 3] - real[:, :3, 3]
+    columns = [*(np.eye(3)[:, None] * np.ones((len(remaining), 1)))]
     columns += [np.cross(axis, real[:, :3, 3]) for axis in np.eye(3)]
     columns += [real[:, :3, k] for k in range(3)]
     for turn in NUDGE * np.eye(robot.n):
         columns.append(ZERO_OFF / NUDGE * (forward(robot, q + turn) - real)[:, :3, 3])
     design = np.stack([column.ravel() for column in columns], axis=1)
     # Zeros by a prior in units of what is seen at all; frames are free.
-    held = np.diag(np.r_[np.zeros(9), np.full(robot.n, SEEN_AT_ALL)])
-    system, wanted = np.vstack([design, held]), np.r_[left.ravel(), np.zeros(len(held))]
+    prior = np.diag(np.r_[np.zeros(9), np.full(robot.n, SEEN_AT_ALL)])
+    system, wanted = np.vstack([design, prior]), np.r_[remaining.ravel(), np.zeros(len(prior))]
     taken = design @ np.linalg.lstsq(system, wanted, rcond=None)[0]
-    left = left - taken.reshape(-1, 3)
-    return float(np.sqrt((left**2).sum(axis=1).mean()))
+    remaining = remaining - taken.reshape(-1, 3)
+    return float(np.sqrt((remaining**2).sum(axis=1).mean()))
 
 
 def _middle(sound: Sound, rng: np.random.Generator) -> Array:
@@ -359,8 +359,8 @@ def computed(sound: Sound, rng: np.random.Generator) -> Made:
     if rng.random() < 0.5:
         off = rng.normal(scale=CALIBRATED, size=(4, robot.n))
         names = ('theta', 'd', 'a', 'alpha')
-        told = {name: getattr(robot, name) + o for name, o in zip(names, off, strict=True)}
-        own, said = replace(robot, **told), 'calibrated'
+        calibrated = {name: getattr(robot, name) + o for name, o in zip(names, off, strict=True)}
+        own, said = replace(robot, **calibrated), 'calibrated'
     poses = forward(own, q)
     rotation = None if seen.rotation is None else poses[:, :3, :3]
     made = replace(seen, position=poses[:, :3, 3], rotation=rotation, sigma=None)

@@ -39,7 +39,7 @@ class Sound:
     align: tuple[str, ...]
     real: Robot
     """The same arm with its tool as it is; the base as it was told."""
-    told: dict[str, object]
+    about: dict[str, object]
     """Robot, motion, causes, how the motion was made poor."""
 
 
@@ -74,14 +74,14 @@ def _drawn(rng: np.random.Generator, rich: bool) -> Sound:
         causes, _ = draw_causes(cell, families, strata, taken, rng)
     align = ALIGNS[int(rng.integers(len(ALIGNS)))]
     robot, recording = _as_told(cell, as_recording('run', record(cell, causes, taken)), align, rng)
-    told: dict[str, object] = {
+    about: dict[str, object] = {
         'robot': name,
         'motion': kind,
         'poor': poor,
         'align': align,
         'causes': causes,
     }
-    return Sound(robot, recording, align, cell.robot, told)
+    return Sound(robot, recording, align, cell.robot, about)
 
 
 def _as_told(

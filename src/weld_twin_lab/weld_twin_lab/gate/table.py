@@ -57,15 +57,15 @@ def _share(trials: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 def table(content: Mapping[str, Any]) -> str:
     """Return the result as a Markdown table."""
-    ways = sorted({w for found in content['named'].values() for w in found} - NUMBERS)
+    ways = sorted({w for counts in content['named'].values() for w in counts} - NUMBERS)
     rows = [
         [
             kind,
-            *(_cell(found.get(way)) for way in ways),
-            _cell(found),
-            found['only_alike'] or '-',
+            *(_cell(counts.get(way)) for way in ways),
+            _cell(counts),
+            counts['only_alike'] or '-',
         ]
-        for kind, found in content['named'].items()
+        for kind, counts in content['named'].items()
     ]
     sound = content['sound']
     made = markdown.table(('mistake', *ways, *HEADS), *rows)
@@ -90,5 +90,5 @@ def page(content: Mapping[str, Any]) -> str:
     return '\n\n'.join(part.rstrip() for part in out) + '\n'
 
 
-def _cell(found: Mapping[str, Any] | None) -> str:
-    return '-' if not found else f'{found["named"]} of {found["trials"]}'
+def _cell(counts: Mapping[str, Any] | None) -> str:
+    return '-' if not counts else f'{counts["named"]} of {counts["trials"]}'

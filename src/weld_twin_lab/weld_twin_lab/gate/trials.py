@@ -39,22 +39,22 @@ def mistake(seed: int, kind: str, way: str, number: int) -> dict[str, Any]:
     drawn = [seed, list(KINDS).index(kind), list(WAYS).index(way), number]
     rng = np.random.default_rng(drawn)
     sound, (robot, recording, said) = _made(kind, way, rng)
-    found = looked(recording, robot, sound.align, way)
+    verdict = looked(recording, robot, sound.align, way)
     return {
         'kind': kind,
         'way': way,
         'number': number,
         'what': said,
         **_plain(sound),
-        **found,
-        **judged(kind, found),
+        **verdict,
+        **judged(kind, verdict),
     }
 
 
-def judged(kind: str, found: Mapping[str, Any]) -> dict[str, bool]:
+def judged(kind: str, verdict: Mapping[str, Any]) -> dict[str, bool]:
     """Return whether a mistake is named, and whether it only stands among those alike."""
-    right = kind in (*found['kinds'], *found['dated'])
-    return {'right': right, 'only_alike': not right and kind in found['alike']}
+    right = kind in (*verdict['kinds'], *verdict['dated'])
+    return {'right': right, 'only_alike': not right and kind in verdict['alike']}
 
 
 def _made(kind: str, way: str, rng: np.random.Generator) -> tuple[Sound, Made]:
@@ -74,14 +74,20 @@ def complaint(seed: int, number: int) -> dict[str, Any]:
     sound = draw(rng)
     static = sound.recording.joints.static
     way = 'table' if static and rng.random() < 0.5 else 'bag'
-    found = looked(sound.recording, sound.robot, sound.align, way)
-    return {'number': number, 'way': way, **_plain(sound), **found, 'right': not found['kinds']}
+    verdict = looked(sound.recording, sound.robot, sound.align, way)
+    return {
+        'number': number,
+        'way': way,
+        **_plain(sound),
+        **verdict,
+        'right': not verdict['kinds'],
+    }
 
 
 def _plain(sound: Sound) -> dict[str, Any]:
-    causes = sound.told['causes']
+    causes = sound.about['causes']
     assert isinstance(causes, list)
-    return {**sound.told, 'align': list(sound.align), 'causes': [dict(c) for c in causes]}
+    return {**sound.about, 'align': list(sound.align), 'causes': [dict(c) for c in causes]}
 
 
 def looked(recording: Recording, robot: Robot, align: tuple[str, ...], way: str) -> dict[str, Any]:

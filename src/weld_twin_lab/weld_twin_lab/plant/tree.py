@@ -62,8 +62,8 @@ def moving(
     tree = Tree(parts, (q, motor(t, 1), motor(t, 2)), wrench)
     path = rollout.run(tree.model, *tree.drive(), tree.pull(wrench))
     out = np.zeros_like(q)
-    for slot, i in (*tree.gaps.items(), *tree.springs.items()):
-        out[:, i] += path[:, slot]
+    for dof, i in (*tree.gaps.items(), *tree.springs.items()):
+        out[:, i] += path[:, dof]
     return out
 
 
@@ -92,16 +92,16 @@ class Tree:
         # heavy motor sides swell the inertia that MuJoCo scales its tolerance with
         spec.option.tolerance = 1e-15
         at = exponentials.home(parts.arm)
-        motors, gaps, springs, slot = {}, {}, {}, 0
+        motors, gaps, springs, dof = {}, {}, {}, 0
         for i, body in enumerate(mujoco_model.add_links(spec, parts.robot, parts.arm, parts.load)):
             mujoco_model.add_hinge(body, parts.arm, at, i, f'motor{i}', **rollout.follower())
-            motors[slot], slot = i, slot + 1
+            motors[dof], dof = i, dof + 1
             if parts.width[i] > 0.0:
                 self._add_gap(spec, body, at, i)
-                gaps[slot], slot = i, slot + 1
+                gaps[dof], dof = i, dof + 1
             if parts.compliance[i] > 0.0:
                 mujoco_model.add_hinge(body, parts.arm, at, i, f'spring{i}', **self._spring(i))
-                springs[slot], slot = i, slot + 1
+                springs[dof], dof = i, dof + 1
         self.model, self.gaps, self.springs = spec.compile(), gaps, springs
         self.motors = motors
         self._soften()
@@ -167,16 +167,16 @@ class Tree:
 
     def _soften(self) -> None:
         """Give the edges of the gaps the softness that yields `EDGE_SHARE` under friction."""
-        for slot, i in self.gaps.items():
+        for dof, i in self.gaps.items():
             give = self._edge() * self.parts.width[i]
-            wanted = self.friction(i) / give * self.model.dof_invweight0[slot]
+            wanted = self.friction(i) / give * self.model.dof_invweight0[dof]
             # MuJoCo's stiffness of a limit of constant impedance d: 1/((1-d) tc^2 invweight)
             ratio = np.clip(wanted * (2.0 * STEP) ** 2, SOFTEST, STIFFEST)
             impedance = 1.0 - 1.0 / ratio
             # an edge softer than that is slower instead: a low impedance rings at this step
             slow = max(1.0, np.sqrt(SOFTEST / (wanted * (2.0 * STEP) ** 2)))
-            self.model.jnt_solref[slot] = [2.0 * STEP * slow, 1.0]
-            self.model.jnt_solimp[slot] = [impedance, impedance, 1e-3, 0.5, 2.0]
+            self.model.jnt_solref[dof] = [2.0 * STEP * slow, 1.0]
+            self.model.jnt_solimp[dof] = [impedance, impedance, 1e-3, 0.5, 2.0]
 
     def drive(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """
@@ -189,14 +189,14 @@ class Tree:
         spared = max(0.0, 1.0 - self.parts.richness)
         force = np.zeros((len(q), self.model.nv))
         position, velocity = np.zeros((2, self.model.nv))
-        for slot, i in self.motors.items():
-            position[slot] = q[0, i]
-            force[:, slot], velocity[slot] = rollout.follow(q[:, i], STEP)
-        for slot, i in self.gaps.items():
-            force[:, slot] = -(1.0 - UNBALANCED) * self._fine(self.tau[:, i])
-        for slot, i in self.springs.items():
-            position[slot] = self.first_sag[i]
-            force[:, slot] = spared * self._fine(self.inertial[:, i])
+        for dof, i in self.motors.items():
+            position[dof] = q[0, i]
+            force[:, dof], velocity[dof] = rollout.follow(q[:, i], STEP)
+        for dof, i in self.gaps.items():
+            force[:, dof] = -(1.0 - UNBALANCED) * self._fine(self.tau[:, i])
+        for dof, i in self.springs.items():
+            position[dof] = self.first_sag[i]
+            force[:, dof] = spared * self._fine(self.inertial[:, i])
         return position, velocity, force
 
     def _fine(self, torque: np.ndarray) -> np.ndarray:

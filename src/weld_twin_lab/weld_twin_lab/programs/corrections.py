@@ -102,26 +102,26 @@ def corrected_seam(language: str, seed: int, number: int) -> dict[str, Any]:
     except TwinError as error:
         return {'language': language, 'undrawn': str(error)}
     along = seam_driven(seam, seam.text)
-    found = _diagnosed(seam, along, seed)
-    told = promised_and_true(seam, along, found)
-    after = told.pop('text')
+    diagnosis = _diagnosed(seam, along, seed)
+    outcome = promised_and_true(seam, along, diagnosis)
+    after = outcome.pop('text')
     asked = AskedModel(seam.robot, (), temperature=seam.temperature, seam=seam)
     _, best, limit = _or_as_it_was(seam, asked)
     texts = {'before': seam.text, 'after': after, 'true': best}
     accuracy = {name: _accuracy(seam, text, along) for name, text in texts.items()}
     return {
         **drawn_as(seam),
-        'status': found.status,
-        **told,
+        'status': diagnosis.status,
+        **outcome,
         'limit': limit,
         'at_m': {name: one.at for name, one in accuracy.items()},
         'rms_m': {name: one.rms for name, one in accuracy.items()},
     }
 
 
-def promised_and_true(seam: SealedSeam, along: Driven, found: Diagnosis) -> dict[str, Any]:
+def promised_and_true(seam: SealedSeam, along: Driven, diagnosis: Diagnosis) -> dict[str, Any]:
     """Return what a diagnosis makes of a seam, what it promises before and after, and what is true."""
-    text, outcome, why, promised = _by_diagnosis(seam, found)
+    text, outcome, why, promised = _by_diagnosis(seam, diagnosis)
     off = {'before': _off(seam, seam.text, along), 'after': _off(seam, text, along)}
     return {'text': text, 'outcome': outcome, 'why': why, 'off_m': off, 'promised': promised}
 
@@ -167,12 +167,12 @@ def _diagnosed(seam: SealedSeam, along: Driven, seed: int) -> Diagnosis:
 
 
 def _by_diagnosis(
-    seam: SealedSeam, found: Diagnosis
+    seam: SealedSeam, diagnosis: Diagnosis
 ) -> tuple[str, str, str, dict[str, Any] | None]:
     """Return the program corrected with a diagnosis file, what became of it, why, and its promise."""
     with TemporaryDirectory() as place:
         file = Path(place) / RESULT
-        write_text(file, diagnosis_text(found, ()))
+        write_text(file, diagnosis_text(diagnosis, ()))
         try:
             model = program_model(seam.robot, file, seam.temperature)
         except TwinError as error:
@@ -184,9 +184,9 @@ def _by_diagnosis(
 def _promised(made: CorrectedProgram) -> dict[str, Any]:
     """Return what a correction promises of before and after, as plain JSON values."""
     return {
-        name: {'ci90_m': [told.low, told.high], 'sure_within_m': told.sure_within}
-        for name, told in zip(('before', 'after'), made.accuracy, strict=True)
-        if told is not None and told.low is not None
+        name: {'ci90_m': [accuracy.low, accuracy.high], 'sure_within_m': accuracy.sure_within}
+        for name, accuracy in zip(('before', 'after'), made.accuracy, strict=True)
+        if accuracy is not None and accuracy.low is not None
     }
 
 

@@ -64,17 +64,17 @@ def krl(files: Texts) -> Moves:
     out: Moves = []
     for line in src.splitlines():
         line = line.split(';')[0].strip()
-        found = re.match(r'(PTP|LIN|CIRC) (.*)', line)
-        if not found:
+        match = re.match(r'(PTP|LIN|CIRC) (.*)', line)
+        if not match:
             continue
         places = []
-        for item in re.findall(r'\{[^}]*\}|XP\d+', found[2]):
+        for item in re.findall(r'\{[^}]*\}|XP\d+', match[2]):
             fields = known[item] if item in known else krl_fields(item)
             if 'A1' in fields:
                 places.append(np.radians([fields[f'A{k}'] for k in range(1, 7)]))
             else:
                 places.append(krl_pose(fields))
-        out.append((found[1], places))
+        out.append((match[1], places))
     return out
 
 

@@ -88,13 +88,13 @@ class Borne:
 
 
 def borne_out(
-    row: ArmRow, told: Sequence[Effect], claims: Sequence[Sequence[str]]
+    row: ArmRow, reported: Sequence[Effect], claims: Sequence[Sequence[str]]
 ) -> tuple[dict[str, Borne], list[tuple[Borne, Borne]]]:
     """
     Return what unseen data say of every kind, and of every claim.
 
-    told: what a diagnosis tells, as it found it: shapes that are not straight are taken from it.
-    claims: kinds that are told, several where they are told as alike: those are taken out
+    reported: what a diagnosis reports: shapes that are not straight are taken from it.
+    claims: kinds that are reported, several where they are reported as alike: those are taken out
     together.
 
     Returns
@@ -102,12 +102,12 @@ def borne_out(
     kinds : dict of str to Borne
         Each against all others.
     claims : list of (Borne, Borne)
-        Each against all other kinds there are, and against all others that are told.
+        Each against all other kinds there are, and against all others that are reported.
 
     """
     fitted, other = thinned(row.fitted), None if row.other is None else thinned(row.other)
     robot = _aligned(fitted, row)
-    kinds = _kinds(robot, fitted, told)
+    kinds = _kinds(robot, fitted, reported)
     own = _Columns.of(robot, row, fitted, kinds)
     if other is not None:
         judged = _Columns.of(robot, row, other, kinds)
@@ -147,11 +147,11 @@ def _aligned(recording: Recording, row: ArmRow) -> Robot:
     return model.robot.with_frames(base=model.bases[0])
 
 
-def _kinds(robot: Robot, recording: Recording, told: Sequence[Effect]) -> Kinds:
+def _kinds(robot: Robot, recording: Recording, reported: Sequence[Effect]) -> Kinds:
     """Return every kind that the recording can show, with its effects on all joints."""
     out: dict[str, list[tuple[Effect, int]]] = {}
-    known = {(e.name, e.site): e for e in told}
-    names = dict.fromkeys([*GENERAL, *(e.name for e in told)])
+    known = {(e.name, e.site): e for e in reported}
+    names = dict.fromkeys([*GENERAL, *(e.name for e in reported)])
     view = Twin(robot).joint_view(recording)
     for name in names:
         kind = REGISTRY[name]
@@ -294,8 +294,10 @@ def _left(
         system = normal / noise**2 + np.eye(len(normal))
         step = np.linalg.solve(system, right / noise**2)
         determined = len(step) - float(np.trace(np.linalg.inv(system)))
-        left = target - step @ design
-        noise = float(np.sqrt(left @ left / max(target.size - determined, 0.1 * target.size)))
+        remaining = target - step @ design
+        noise = float(
+            np.sqrt(remaining @ remaining / max(target.size - determined, 0.1 * target.size))
+        )
     seen, columns = judged.rows(part, among)
     error = (seen - step @ columns).reshape(-1, judged.width)[:, :3]
     return float(np.sqrt((error**2).sum(axis=1).mean()))
@@ -311,7 +313,7 @@ def _parts(recording: Recording) -> list[NDArray[np.bool_]]:
         if np.unique(places).size > 1:
             return [places == k for k in np.unique(places)]
     count = 2**REGIONS
-    stretch = np.arange(t.size) * count // t.size
+    fold = np.arange(t.size) * count // t.size
     q = recording.joints.at(t)[0]
     region = np.zeros(t.size, dtype=int)
     for _ in range(REGIONS):
@@ -322,5 +324,5 @@ def _parts(recording: Recording) -> list[NDArray[np.bool_]]:
             ordered = here[np.argsort(q[here, widest], kind='stable')]
             after[ordered[ordered.size // 2 :]] += 1
         region = after
-    parts = [stretch == k for k in range(count)] + [region == k for k in range(count)]
+    parts = [fold == k for k in range(count)] + [region == k for k in range(count)]
     return [part for part in parts if part.any()]

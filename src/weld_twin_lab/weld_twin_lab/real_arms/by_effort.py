@@ -30,7 +30,7 @@ class Fold:
 
     away: dict[str, Array]
     """Distance of measured from predicted, for each of `WAYS`, shape (M,) [m]."""
-    told: tuple[str, ...]
+    names: tuple[str, ...]
     """What was found with efforts, one text each."""
 
 
@@ -42,7 +42,7 @@ def folds(
 
     recording: stations with measured poses and efforts.
     count: stretches, of equal numbers of stations in the order of time.
-    tell: told of each stretch that is done.
+    tell: told of each fold that is done.
 
     Raises DataError: no efforts, no measurements, or no stations.
     """
@@ -50,22 +50,22 @@ def folds(
         raise DataError(f'{recording.name} needs stations with measured poses and efforts')
     rows = np.arange(recording.joints.t.size)
     out = []
-    for stretch in np.array_split(rows, count):
-        train, test = (alone(recording, part) for part in (np.setdiff1d(rows, stretch), stretch))
+    for rows_out in np.array_split(rows, count):
+        train, test = (alone(recording, part) for part in (np.setdiff1d(rows, rows_out), rows_out))
         plain = replace(train, effort=None)
-        found = diagnose(train, robot, align=ALIGN, experiment=False).model
+        by_efforts = diagnose(train, robot, align=ALIGN, experiment=False).model
         models: dict[str, Model] = {
             'frames': plain_fit(plain, robot, PLAIN['frames'], ALIGN),
             'geometry': plain_fit(plain, robot, PLAIN['geometry'], ALIGN),
             'statics': diagnose(plain, robot, align=ALIGN, experiment=False).model,
-            'efforts': found,
+            'efforts': by_efforts,
         }
         away = {
             name: np.linalg.norm(residual(model, train, test)[:3], axis=0)
             for name, model in models.items()
         }
-        told = tuple(f'{e.name} of {e.site}' if e.site else e.name for e in found.found)
-        out.append(Fold(away, told))
+        names = tuple(f'{e.name} of {e.site}' if e.site else e.name for e in by_efforts.found)
+        out.append(Fold(away, names))
         tell(f'stretch {len(out)} of {count}: efforts {away["efforts"].mean() * 1e3:.3f} mm')
     return out
 
@@ -99,6 +99,6 @@ def table(name: str, done: Sequence[Fold]) -> str:
         ),
         'Found with efforts, stretch by stretch:',
         '',
-        *(f'* {", ".join(fold.told) or "nothing"}' for fold in done),
+        *(f'* {", ".join(fold.names) or "nothing"}' for fold in done),
     ]
     return '\n'.join(lines) + '\n'

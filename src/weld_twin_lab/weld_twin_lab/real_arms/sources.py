@@ -100,10 +100,10 @@ def places_of(data: Path, arm: str) -> tuple[str, ...]:
     Raises DataError: there are none.
     """
     folder = data / arm
-    found = sorted(item.name for item in folder.glob('*') if (item / 'hole_0.csv').is_file())
-    if not found:
+    places = sorted(item.name for item in folder.glob('*') if (item / 'hole_0.csv').is_file())
+    if not places:
         raise DataError(f"'{folder}' holds no place with hole_0.csv; --data names its parent")
-    return tuple(found)
+    return tuple(places)
 
 
 def touches(data: Path, arm: str, places: Sequence[str]) -> Recording:

@@ -1,6 +1,6 @@
 # Copyright 2026 weld_twin contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Every row diagnosed, each cause that is told held against unseen data, and the table of it all."""
+"""Every row diagnosed, each reported cause held against unseen data, and the table of it all."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from ..transfer.unseen import PLAIN, plain_fit, residual, tried
 from .borne_out import Borne, borne_out
 from .rows import ArmRow, halves, plans, row, size
 
-TOLD = 0.5
-"""Probability from which on a cause counts as told: it is likelier right than wrong."""
+REPORTED = 0.5
+"""Probability from which on a cause counts as reported: it is likelier right than wrong."""
 ELSEWHERE = ('instrument', 'base', 'clock')
 """Places outside the arm."""
 
 
 def judged(data: str, name: str) -> dict[str, Any]:
     """
-    Return what is told of one row, and what unseen data say of it, as plain JSON values.
+    Return what is reported of one row, and what unseen data say of it, as plain JSON values.
 
     data: directory with the sources.
     name: of a row.
@@ -41,25 +41,25 @@ def judged(data: str, name: str) -> dict[str, Any]:
     one = row(Path(data), plan)
     start = perf_counter()
     options = {'align': one.align, 'experiment': False}
-    found, error = tried(one.fitted, one.robot, **options)
+    diagnosis, error = tried(one.fitted, one.robot, **options)
     out: dict[str, Any] = {
         'name': name,
         'stations': size(one.fitted),
         'seconds': round(perf_counter() - start, 1),
         'traceback': error,
     }
-    if found is None:
+    if diagnosis is None:
         return out
-    out |= _said(found)
-    claims = told_claims(out)
-    if found.status != 'unsound':
-        known = [each.effect for each in found.effects]
+    out |= _said(diagnosis)
+    claims = reported_claims(out)
+    if diagnosis.status != 'unsound':
+        known = [each.effect for each in diagnosis.effects]
         kinds, borne = borne_out(one, known, [claim['kinds'] for claim in claims])
         out['kinds'] = {kind: _plain(each) for kind, each in kinds.items()}
         for claim, (whole, beside) in zip(claims, borne, strict=True):
             claim |= {'against_all': _plain(whole), 'against_told': _plain(beside)}
     out['claims'] = claims
-    out['unseen_m'] = _unseen(one, found)
+    out['unseen_m'] = _unseen(one, diagnosis)
     pair = halves(one.fitted) if plan.halved else None
     if pair is not None:
         both = [tried(half, one.robot, **options)[0] for half in pair]
@@ -67,18 +67,18 @@ def judged(data: str, name: str) -> dict[str, Any]:
     return out
 
 
-def told_claims(said: Mapping[str, Any]) -> list[dict[str, Any]]:
+def reported_claims(said: Mapping[str, Any]) -> list[dict[str, Any]]:
     """
-    Return what is told by name: sets of kinds, their joints, and whether each is placed.
+    Return what is reported by name: sets of kinds, their joints, and whether each is placed.
 
-    Names told as alike are one claim. Of many small errors every kind is a claim of its own.
+    Names reported as alike are one claim. Of many small errors every kind is a claim of its own.
     """
     out: dict[tuple[str, ...], dict[str, Any]] = {}
     for cause in said['causes']:
         names = [n for n in cause['names'] if n[0] in REGISTRY and REGISTRY[n[0]].traits.cause]
-        if cause['probability'] <= TOLD or cause['rest'] or not names:
+        if cause['probability'] <= REPORTED or cause['rest'] or not names:
             continue
-        many = said['families'] and all(p > TOLD for _, _, p in names)
+        many = said['families'] and all(p > REPORTED for _, _, p in names)
         for group in [[name] for name in names] if many else [names]:
             kinds = tuple(sorted({kind for kind, _, _ in group}))
             claim = out.setdefault(kinds, {'kinds': list(kinds), 'joints': [], 'share': 0.0})
@@ -102,7 +102,7 @@ def summary(entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     claims = [c for e in done for c in e['claims']]
     shown = [(e, k) for e in done for k, b in e.get('kinds', {}).items() if b['out']]
     pairs = [e['halves'] for e in done if e.get('halves') and None not in e['halves']]
-    alike = [_alike(*(told_claims(half) for half in pair)) for pair in pairs]
+    alike = [_alike(*(reported_claims(half) for half in pair)) for pair in pairs]
     ratios = [ratio for e in done if (ratio := _over_plain(e)) is not None]
     return {
         'rows': len(entries),
@@ -196,15 +196,15 @@ COLUMNS: dict[str, Callable[[Mapping[str, Any]], str]] = {
 
 
 def _accused(entry: Mapping[str, Any]) -> bool:
-    """Return whether something outside the arm is told without a name, as likely as not."""
+    """Return whether something outside the arm is reported without a name, as likely as not."""
     return any(
-        not cause['names'] and place in ELSEWHERE and p > TOLD
+        not cause['names'] and place in ELSEWHERE and p > REPORTED
         for cause in entry['causes']
         for place, p in cause['place'][:1]
     )
 
 
-def _said(found: Diagnosis) -> dict[str, Any]:
+def _said(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return status and causes."""
     causes = [
         {
@@ -216,27 +216,27 @@ def _said(found: Diagnosis) -> dict[str, Any]:
             'dependence': [list(item) for item in c.dependence[:3]],
             'names': [[s.effect, s.joint, p] for s, p in c.name],
         }
-        for c in found.causes
+        for c in diagnosis.causes
     ]
     return {
-        'status': found.status,
-        'confidence': found.confidence,
-        'sure': found.sure,
-        'families': bool(found.families),
-        'reasons': list(found.reasons),
+        'status': diagnosis.status,
+        'confidence': diagnosis.confidence,
+        'sure': diagnosis.sure,
+        'families': bool(diagnosis.families),
+        'reasons': list(diagnosis.reasons),
         'causes': causes,
-        'gap_m': None if found.gap is None else found.gap.rms_m,
-        'shrink': None if found.shrink is None else found.shrink.ratio,
+        'gap_m': None if diagnosis.gap is None else diagnosis.gap.rms_m,
+        'shrink': None if diagnosis.shrink is None else diagnosis.shrink.ratio,
     }
 
 
-def _unseen(one: ArmRow, found: Diagnosis) -> dict[str, float] | None:
+def _unseen(one: ArmRow, diagnosis: Diagnosis) -> dict[str, float] | None:
     """Return the RMS error [m] of plain fits and of the diagnosis on what was not fitted."""
-    if one.other is None or found.status == 'unsound':
+    if one.other is None or diagnosis.status == 'unsound':
         return None
-    models: dict[str, Model] = {'product': found.model}
+    models: dict[str, Model] = {'product': diagnosis.model}
     if one.other.contacts is not None:
-        return {'product': _spread(found.model, one.other)}
+        return {'product': _spread(diagnosis.model, one.other)}
     for name, families in PLAIN.items():
         models[name] = plain_fit(one.fitted, one.robot, families, frozenset(one.align))
     return {

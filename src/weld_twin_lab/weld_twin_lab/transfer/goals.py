@@ -34,32 +34,32 @@ class Measure(NamedTuple):
 
 def measures(entries: Sequence[Entry]) -> list[Measure]:
     """Return every measure over the splits, the servo axis left out."""
-    found = [e for e in entries if e['kind'] != 'servo_axis']
+    splits = [e for e in entries if e['kind'] != 'servo_axis']
     return [
-        _never_much_worse(found),
-        _median(found, MANY, 0.85),
-        _median(found, 0, 1.0),
+        _never_much_worse(splits),
+        _median(splits, MANY, 0.85),
+        _median(splits, 0, 1.0),
         _none(
             'splits whose stations that are not flagged are worse than frames only by 5 % or more',
-            found,
+            splits,
             lambda e: any(
                 _of(e, region, 'unflagged_over_frames', {'ratio': 0.0})['ratio'] >= WORSE
                 for region in ('inside', 'outside')
             ),
         ),
-        *_outside(found),
-        _flagged(found),
-        _none('sound splits called unsound', found, lambda e: e.get('status') == 'unsound'),
-        _interval(found),
-        _stable(found),
+        *_outside(splits),
+        _flagged(splits),
+        _none('sound splits called unsound', splits, lambda e: e.get('status') == 'unsound'),
+        _interval(splits),
+        _stable(splits),
         _none(
             'named parameters outside their plausible range',
-            found,
+            splits,
             lambda e: len(e.get('beyond') or ()),
         ),
         _none(
             'identified with nothing named',
-            found,
+            splits,
             lambda e: e.get('status') == 'identified' and not e.get('families'),
         ),
         _none(
@@ -170,9 +170,9 @@ def _below(what: str, value: float, goal: float, blame: tuple[str, ...] = ()) ->
     return Measure(what, f'<= {goal}', f'{value:.2f}', reached, blame)
 
 
-def page(entries: Sequence[Entry], found: Sequence[Measure]) -> str:
+def page(entries: Sequence[Entry], measured: Sequence[Measure]) -> str:
     """Return both tables, and that of the servo axis."""
-    parts = [goal_table(found), split_table(entries)]
+    parts = [goal_table(measured), split_table(entries)]
     parts += [axis_table(e) for e in entries if e['kind'] == 'servo_axis']
     return '\n'.join(parts)
 
@@ -202,23 +202,23 @@ def _name(entry: Entry) -> str:
 def _mm(region: str, name: str) -> Callable[[Entry], str]:
     """Return what tells the mean error of a model in a region [mm]."""
 
-    def told(entry: Entry) -> str:
+    def in_words(entry: Entry) -> str:
         mean = _of(entry, region, 'mean_m', {}).get(name)
         return '' if mean is None else f'{1e3 * mean:.3f}'
 
-    return told
+    return in_words
 
 
 def _ratio(region: str, key: str) -> Callable[[Entry], str]:
     """Return what tells a ratio in a region, with its interval."""
 
-    def told(entry: Entry) -> str:
-        found = _of(entry, region, key)
-        if found is None:
+    def in_words(entry: Entry) -> str:
+        estimate = _of(entry, region, key)
+        if estimate is None:
             return ''
-        return f'{found["ratio"]:.2f} ({found["low"]:.2f} to {found["high"]:.2f})'
+        return f'{estimate["ratio"]:.2f} ({estimate["low"]:.2f} to {estimate["high"]:.2f})'
 
-    return told
+    return in_words
 
 
 def _share_flagged(entry: Entry) -> str:

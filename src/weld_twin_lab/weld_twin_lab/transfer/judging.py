@@ -58,7 +58,7 @@ def judge(split: Split) -> dict[str, Any]:
 
 def said(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return status, confidence, what is named, and whether a machine can have it."""
-    named = sorted({found.effect.name for found in diagnosis.effects})
+    named = sorted({item.effect.name for item in diagnosis.effects})
     families = sorted(family.effect for family in diagnosis.families if family.named)
     return {
         'status': diagnosis.status,
@@ -67,9 +67,9 @@ def said(diagnosis: Diagnosis) -> dict[str, Any]:
         'families': families or named,
         'reasons': list(diagnosis.reasons),
         'beyond': [
-            [found.effect.name, found.effect.site, name, value, limit]
-            for found in diagnosis.effects
-            for name, value, limit in beyond(diagnosis.model.robot, found.effect)
+            [item.effect.name, item.effect.site, name, value, limit]
+            for item in diagnosis.effects
+            for name, value, limit in beyond(diagnosis.model.robot, item.effect)
         ],
         'claimed': diagnosis.shrink
         and {'ratio': diagnosis.shrink.ratio, 'ci95': list(diagnosis.shrink.ci95)},
@@ -109,8 +109,8 @@ def paired(mine: Array, other: Array) -> dict[str, Any]:
         means = rows.mean(axis=axis)
         return np.asarray(means[..., 0] / np.maximum(means[..., 1], 1e-300))
 
-    found = bootstrap(np.stack([mine, other], axis=1), ratio)
-    return {'ratio': found.value, 'low': found.low, 'high': found.high}
+    estimate = bootstrap(np.stack([mine, other], axis=1), ratio)
+    return {'ratio': estimate.value, 'low': estimate.low, 'high': estimate.high}
 
 
 def _sizes(parts: Array) -> Array:

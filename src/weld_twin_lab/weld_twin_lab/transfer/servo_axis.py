@@ -71,10 +71,10 @@ def judge_axis(directory: Path) -> dict[str, Any]:
     if diagnosis is None:
         return out
     out |= said(diagnosis)
-    out['found'] = [found.as_dict() for found in diagnosis.effects]
+    out['found'] = [item.as_dict() for item in diagnosis.effects]
     if diagnosis.status != 'unsound':
-        left = residual(diagnosis.model, train, test)[2]
-        out['rms_m']['product'] = float(np.sqrt((left**2).mean()))
+        remaining = residual(diagnosis.model, train, test)[2]
+        out['rms_m']['product'] = float(np.sqrt((remaining**2).mean()))
     return out
 
 

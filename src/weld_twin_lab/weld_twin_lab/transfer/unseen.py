@@ -84,16 +84,16 @@ def residual(model: Model, train: Recording, other: Recording) -> Array:
 
     model: fitted on ``train``.
     """
-    found = seen_from(model.found, train.epoch_ns, train.span_ns, other)
-    placed = Model(model.robot, model.bases[:1], model.known, found)
-    return Problem((usable(other),), ALIGN).residuals(placed)[0]
+    effects = seen_from(model.found, train.epoch_ns, train.span_ns, other)
+    there = Model(model.robot, model.bases[:1], model.known, effects)
+    return Problem((usable(other),), ALIGN).residuals(there)[0]
 
 
 def flagged(posterior: Posterior, other: Recording, t: Array) -> NDArray[np.bool_]:
     """Return which poses a prediction flags as outside what was recorded, shape (M,)."""
-    found = posterior.domain.outside(*as_seen(other, t))
+    outside = posterior.domain.outside(*as_seen(other, t))
     out = np.zeros(t.size, dtype=bool)
-    for first, last, _ in found:
+    for first, last, _ in outside:
         out[first : last + 1] = True
     return out
 
@@ -105,13 +105,13 @@ def tried(
     try:
         return diagnose([recording], robot, **options), None
     except Exception:  # what is counted here is exactly what nobody expected
-        return None, traceback_told()
+        return None, traceback_text()
 
 
 _BEFORE = re.compile(r'(?<=File ").*?(?=(?:weld_twin_\w+|site-packages)/)')
 """What stands before a package in the path of its file: of this machine alone."""
 
 
-def traceback_told() -> str:
+def traceback_text() -> str:
     """Return the traceback of the exception being handled, files as from their package on."""
     return _BEFORE.sub('', traceback.format_exc())

@@ -36,10 +36,10 @@ class Peer:
 
 def find_peers(robot: Robot) -> tuple[dict[str, Peer], dict[str, str]]:
     """Return the peers that are installed, and why the others are left out."""
-    found, missing = {}, {}
+    peers, missing = {}, {}
     for name, package in PACKAGES.items():
         try:
-            found[name] = import_module(f'{__name__}.{name}_peer').make(robot)
+            peers[name] = import_module(f'{__name__}.{name}_peer').make(robot)
         except ImportError as error:
             missing[name] = f'not installed (pip install {package}): {error}'
-    return found, missing
+    return peers, missing

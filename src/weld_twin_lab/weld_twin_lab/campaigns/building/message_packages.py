@@ -145,11 +145,11 @@ def messages_importable() -> Iterator[None]:
         yield
     finally:
         sys.path.remove(str(folder))
-        left = os.environ.get('PYTHONPATH', '').split(os.pathsep)
-        if str(folder) in left:
-            left.remove(str(folder))
-        os.environ['PYTHONPATH'] = os.pathsep.join(left)
-        if not any(left):
+        paths = os.environ.get('PYTHONPATH', '').split(os.pathsep)
+        if str(folder) in paths:
+            paths.remove(str(folder))
+        os.environ['PYTHONPATH'] = os.pathsep.join(paths)
+        if not any(paths):
             del os.environ['PYTHONPATH']
 
 

@@ -145,8 +145,8 @@ def learned(robot: Robot, causes: list[dict[str, Any]], rng: np.random.Generator
     noise = float(rng.choice(NOISE))
     errors = rng.normal(scale=noise, size=real.position.shape)
     seen = Measurements(t, real.position + errors, real.rotation)
-    found = diagnose([commanded.with_measured(seen)], robot, experiment=False)
-    return Learned(diagnosis_text(found, ()), noise)
+    diagnosis = diagnose([commanded.with_measured(seen)], robot, experiment=False)
+    return Learned(diagnosis_text(diagnosis, ()), noise)
 
 
 def right_and_wrong(arm: Arm) -> tuple[Learned, Learned | None]:
@@ -205,8 +205,8 @@ def _along(bare: Robot, begin: Array, rng: np.random.Generator) -> Goal | None:
     q = np.empty((count, bare.n))
     at = begin
     for k in range(count):
-        (at,), left = polish(bare, at[None], poses[k : k + 1])
-        if np.abs(left).max() > 1e-10:
+        (at,), remaining = polish(bare, at[None], poses[k : k + 1])
+        if np.abs(remaining).max() > 1e-10:
             return None
         q[k] = at
     if np.abs(np.diff(q, axis=0)).max() > 0.2:

@@ -220,8 +220,8 @@ class CellTrial:
     def _best(self, goal: Goal, start: Start) -> float:
         """Return what would be left with the true causes [m]."""
         true = ProgramModel(self.robot, true_effects(self.robot, self.causes))
-        found = corrected_goal(true, goal, GoalLimits(acceleration=20.0), start)
-        return np.inf if isinstance(found, Refusal) else found.after
+        correction = corrected_goal(true, goal, GoalLimits(acceleration=20.0), start)
+        return np.inf if isinstance(correction, Refusal) else correction.after
 
     # Changes ---------------------------------------------------------------------------------
 
@@ -246,8 +246,8 @@ class CellTrial:
             self.analyzer.stop()
 
         def noticed() -> bool:
-            told = self.compensator.log[count:]
-            return 'does not hold' in told or 'is lost' in told
+            log = self.compensator.log[count:]
+            return 'does not hold' in log or 'is lost' in log
 
         # The arm goes to and fro meanwhile: measurements of one place tell of one place.
         while not noticed() and time.monotonic() - begun < limit:
@@ -315,12 +315,12 @@ def _changed(trial: CellTrial, known: Known) -> Iterator[str]:
     for k, what in enumerate((NOTHING, *CHANGES)):
         if what in changes:
             continue
-        found = trial.changed(what)
+        change = trial.changed(what)
         if what != NOTHING:
             for drawn in goals_of(trial.arm, AFTER + EACH * k, EACH):
                 known.rows.append(trial.judged(drawn, what))
-        known.changes.append(found)
-        yield str(found)
+        known.changes.append(change)
+        yield str(change)
         if what != CHANGES[-1]:
             trial.restore()
 

@@ -42,16 +42,16 @@ def judged(name: str, seed: int, goals: int) -> list[dict[str, Any]]:
     for _ in range(goals):
         goal, inside = drawn_goal(robot, rng)
         start = Start(goal.q[0], False, rng.choice([-1.0, 1.0], robot.n))
-        found, best = (corrected_goal(each, goal, LIMITS, start) for each in (model, true))
+        corrected, best = (corrected_goal(each, goal, LIMITS, start) for each in (model, true))
         before, _ = _off(true, goal, goal, start)
         row = {'robot': name, 'arm': seed, 'after': '', 'inside': inside, 'before_m': before}
         row['best_m'] = before if isinstance(best, Refusal) else best.after
-        if isinstance(found, Refusal):
+        if isinstance(corrected, Refusal):
             row |= {'verdict': 'refused', 'after_m': before, 'bound_m': None}
         else:
-            after, worst = _off(true, found.goal.later(-found.waits), goal, start)
+            after, worst = _off(true, corrected.goal.later(-corrected.waits), goal, start)
             row |= {'verdict': 'corrected', 'after_m': after, 'worst_m': worst}
-            row |= {'bound_m': found.bound}
+            row |= {'bound_m': corrected.bound}
         rows.append(row)
     return rows
 

@@ -64,12 +64,14 @@ def trial(bench: Bench, fault: Fault) -> dict[str, Any]:
     bench.health.clear()
     fault.run(bench)
     bench.run(1.2)
-    told = {name: bench.health.of(name) for name in NODES}
+    reported = {name: bench.health.of(name) for name in NODES}
     bench.health.clear()
     bench.run(AFTER)
     _settle(bench)
     well = _well_again(bench)
-    rows = {name: _row(bench, name, marks[name], told[name], fault, well[name]) for name in NODES}
+    rows = {
+        name: _row(bench, name, marks[name], reported[name], fault, well[name]) for name in NODES
+    }
     resumed = _outputs(bench, 'deviation_analyzer') > 0
     return {
         'fault': fault.name,
@@ -80,7 +82,7 @@ def trial(bench: Bench, fault: Fault) -> dict[str, Any]:
 
 
 def _row(
-    bench: Bench, name: str, mark: int, told: list[tuple[str, str]], fault: Fault, well: bool
+    bench: Bench, name: str, mark: int, reported: list[tuple[str, str]], fault: Fault, well: bool
 ) -> dict[str, Any]:
     """Return what became of one node; its log before the mark is of earlier faults."""
     process = bench.processes[name]
@@ -90,7 +92,7 @@ def _row(
         'traceback': 'Traceback' in log,
         'outputs': _outputs(bench, name),
         'wrong': _wrong(bench, name),
-        **_summary(told),
+        **_summary(reported),
         'must_tell': name in fault.tell,
         'ok_again': well,
     }
@@ -172,11 +174,11 @@ def _right(bench: Bench, message: Any) -> bool:
     return False
 
 
-def _summary(told: list[tuple[str, str]]) -> dict[str, Any]:
+def _summary(reported: list[tuple[str, str]]) -> dict[str, Any]:
     """Return the worst level and the commonest sentence of it."""
     order = ('ok', 'warn', 'stale', 'error')
-    worst = max((level for level, _ in told), key=order.index, default='silent')
-    said = Counter(text for level, text in told if level == worst and level != 'ok')
+    worst = max((level for level, _ in reported), key=order.index, default='silent')
+    said = Counter(text for level, text in reported if level == worst and level != 'ok')
     return {'told': worst, 'said': said.most_common(1)[0][0] if said else ''}
 
 

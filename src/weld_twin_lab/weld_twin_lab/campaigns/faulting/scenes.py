@@ -47,7 +47,7 @@ STARTED = 40.0
 LEARNING = 12.0
 """Seconds of sound motion before a fault: the clocks are compared over 8 of them."""
 
-Told = tuple[str, str, float, 'float | None', str]
+Reported = tuple[str, str, float, 'float | None', str]
 """What is done, who is to tell, within what time, after what time it did, and what it said [s]."""
 
 
@@ -55,7 +55,7 @@ class Scene(NamedTuple):
     """One fault."""
 
     name: str
-    run: Callable[[Stand], Iterator[Told]]
+    run: Callable[[Stand], Iterator[Reported]]
     """Does it on a stand whose nodes run; yields what was told."""
     nodes: dict[str, dict[str, Any]]
     """Nodes that run, with their parameters."""
@@ -72,14 +72,14 @@ TRACKER = _turned(2.0, 0.7)
 """Where the tracker is in the world."""
 
 
-def _told(stand: Stand, what: str, node: str, words: str, within: float = SOON) -> Told:
-    seconds, said = stand.told(node, words, within)
+def _reported(stand: Stand, what: str, node: str, words: str, within: float = SOON) -> Reported:
+    seconds, said = stand.reported(node, words, within)
     return what, node, within, seconds, said
 
 
-def _wrong_frame(stand: Stand) -> Iterator[Told]:
+def _wrong_frame(stand: Stand) -> Iterator[Reported]:
     stand.frame = 'camera'
-    yield _told(stand, 'camera', ANALYZER, "given in 'camera', but measuring_frame is 'world'")
+    yield _reported(stand, 'camera', ANALYZER, "given in 'camera', but measuring_frame is 'world'")
     stand.frame = 'world'
 
 
@@ -92,7 +92,7 @@ def _by_tf(stand: Stand, *, moving: bool) -> Callable[[str, str, Array], None]:
     return tell
 
 
-def _silent_tf(stand: Stand) -> Iterator[Told]:
+def _silent_tf(stand: Stand) -> Iterator[Reported]:
     tell = _by_tf(stand, moving=True)
 
     def beat(k: int) -> None:
@@ -101,38 +101,38 @@ def _silent_tf(stand: Stand) -> Iterator[Told]:
 
     stand.beats.append(beat)
     stand.run(LEARNING)
-    yield _told(stand, 'while it is told', ANALYZER, 'is taken for', 0.0)
+    yield _reported(stand, 'while it is told', ANALYZER, 'is taken for', 0.0)
     stand.beats.clear()
-    yield _told(stand, 'silence', ANALYZER, "last transform of 'tracker' in 'world' is")
+    yield _reported(stand, 'silence', ANALYZER, "last transform of 'tracker' in 'world' is")
     stand.beats.append(beat)
 
 
-def _loop(stand: Stand) -> Iterator[Told]:
+def _loop(stand: Stand) -> Iterator[Reported]:
     _by_tf(stand, moving=False)
     stand.run(
         LEARNING
     )  # the right way is known first: which of two makes the loop is a matter of order
     wrong = stand.transforms(static=False)
     stand.beats.append(lambda k: None if k % 10 else wrong('tracker', 'world', np.eye(4)))
-    yield _told(stand, 'world in tracker', ANALYZER, "'world' makes a loop")
+    yield _reported(stand, 'world in tracker', ANALYZER, "'world' makes a loop")
     stand.beats.clear()
 
 
-def _moving_base(stand: Stand) -> Iterator[Told]:
+def _moving_base(stand: Stand) -> Iterator[Reported]:
     """The node waits for its base, so the base is told before."""
     tell = stand.transforms(static=True)
     tell('world', 'base_link', np.eye(4))
     stand.run(LEARNING)
     tell('world', 'base_link', _turned(0.004, 0.0))
-    yield _told(stand, '4 mm', TWIN, "'base_link' has moved in 'world' by 4 mm")
+    yield _reported(stand, '4 mm', TWIN, "'base_link' has moved in 'world' by 4 mm")
     tell('world', 'base_link', np.eye(4))
 
 
-def _clock(stand: Stand) -> Iterator[Told]:
+def _clock(stand: Stand) -> Iterator[Reported]:
     for offset in OFFSETS:
         stand.run(LEARNING)
         stand.offset = lambda _, o=offset: o  # type: ignore[misc]
-        what, node, _, seconds, said = _told(stand, f'{offset:+g} s', ANALYZER, ' the joints')
+        what, node, _, seconds, said = _reported(stand, f'{offset:+g} s', ANALYZER, ' the joints')
         right = seconds is not None and seconds <= PROMPT and _names(said, offset)
         yield what, node, PROMPT, seconds, said if right else ''
         stand.offset = lambda _: 0.0
@@ -141,37 +141,39 @@ def _clock(stand: Stand) -> Iterator[Told]:
 
 def _names(said: str, offset: float) -> bool:
     """Return whether a sentence names an offset [s], to a twentieth of it."""
-    found = re.search(r'are ([\d.]+) s (ahead of|behind) the joints', said)
-    if found is None:
+    match = re.search(r'are ([\d.]+) s (ahead of|behind) the joints', said)
+    if match is None:
         return False
-    told = float(found[1]) * (1.0 if found[2] == 'ahead of' else -1.0)
-    return abs(told - offset) <= 0.05 * abs(offset)
+    named = float(match[1]) * (1.0 if match[2] == 'ahead of' else -1.0)
+    return abs(named - offset) <= 0.05 * abs(offset)
 
 
-def _drift(stand: Stand) -> Iterator[Told]:
+def _drift(stand: Stand) -> Iterator[Reported]:
     stand.offset = lambda t: 0.02 + DRIFT * t
-    what, node, within, seconds, said = _told(stand, '100 ppm', ANALYZER, 'drifts by', DRIFTING)
+    what, node, within, seconds, said = _reported(
+        stand, '100 ppm', ANALYZER, 'drifts by', DRIFTING
+    )
     rate = re.search(r'drifts by ([+-]\d+) ppm', said)
     right = rate is not None and abs(float(rate[1]) - DRIFT * 1e6) <= 0.3 * DRIFT * 1e6
     yield what, node, within, seconds, said if right else ''
     stand.offset = lambda _: 0.0
 
 
-def _other_type(stand: Stand) -> Iterator[Told]:
+def _other_type(stand: Stand) -> Iterator[Reported]:
     publisher = stand.other.create_publisher(
         TEMPERATURE.message_class(), TOOL_WRENCH.name, TOOL_WRENCH.offered.to_rclpy()
     )
     words = '/other sends sensor_msgs/msg/Temperature, this node needs geometry_msgs'
-    yield _told(stand, 'wrench', TWIN, words)
+    yield _reported(stand, 'wrench', TWIN, words)
     stand.other.destroy_publisher(publisher)
 
 
-def _namespace(stand: Stand) -> Iterator[Told]:
+def _namespace(stand: Stand) -> Iterator[Reported]:
     own = stand.joints
     stand.joints = stand.publisher(JOINT_STATES, '/left/joint_states')
     stand.other.destroy_publisher(own)
     words = '/joint_states has no publisher, but /other publishes /left/joint_states'
-    yield _told(stand, 'left', TWIN, words)
+    yield _reported(stand, 'left', TWIN, words)
     stand.other.destroy_publisher(stand.joints)
     stand.joints = stand.publisher(JOINT_STATES)
 
@@ -183,16 +185,16 @@ def _urdf(stand: Stand, name: str) -> Any:
     return ROBOT_DESCRIPTION.message_class()(data=file.read_text())
 
 
-def _description(stand: Stand) -> Iterator[Told]:
+def _description(stand: Stand) -> Iterator[Reported]:
     publisher = stand.publisher(ROBOT_DESCRIPTION)
     publisher.publish(_urdf(stand, 'ur5'))
     stand.run(LEARNING)
     publisher.publish(_urdf(stand, 'ur10'))
-    yield _told(stand, 'UR10', TWIN, 'another robot is told on /robot_description now')
+    yield _reported(stand, 'UR10', TWIN, 'another robot is told on /robot_description now')
     publisher.publish(_urdf(stand, 'ur5'))
 
 
-def _controller(stand: Stand) -> Iterator[Told]:
+def _controller(stand: Stand) -> Iterator[Reported]:
     """Another controller takes over: other node, other order of the joints."""
     own = stand.joints
     second = stand.cell.node.create_publisher(
@@ -201,7 +203,7 @@ def _controller(stand: Stand) -> Iterator[Told]:
     stand.joints = second
     stand.other.destroy_publisher(own)
     words = '/joint_states comes from /harness now, it came from /other'
-    yield _told(stand, 'harness', TWIN, words)
+    yield _reported(stand, 'harness', TWIN, words)
 
 
 BOTH: dict[str, dict[str, Any]] = {'forward_kinematics_twin': {}, 'deviation_analyzer': {}}

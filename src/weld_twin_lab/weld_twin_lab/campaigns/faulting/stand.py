@@ -133,7 +133,7 @@ class Stand:
 
     # Waiting ---------------------------------------------------------------------------------
 
-    def told(self, node: str, words: str, within: float) -> tuple[float | None, str]:
+    def reported(self, node: str, words: str, within: float) -> tuple[float | None, str]:
         """
         Return after how long [s] a node's health tells something, and the whole sentence.
 
@@ -141,21 +141,21 @@ class Stand:
         within: [s]
         """
         self.health.clear()
-        begun, found = time.monotonic(), ['']
+        begun, sentence = time.monotonic(), ['']
 
         def there() -> bool:
             self.step()
             for name, entries in self.health.told.items():
                 if name == node or name.startswith(f'{node}: '):
-                    found[0] = next(
+                    sentence[0] = next(
                         (text for level, text in entries if words in text and level != 'ok'), ''
                     )
-                    if found[0]:
+                    if sentence[0]:
                         return True
             return time.monotonic() - begun > within
 
         self.cell.wait(there, f'{words!r} to be told', limit=within + MEETING)
-        return (time.monotonic() - begun if found[0] else None), found[0]
+        return (time.monotonic() - begun if sentence[0] else None), sentence[0]
 
     def well(self, node: str, within: float = 30.0) -> bool:
         """Return whether a node says within a time [s] that it is well, and nothing else."""

@@ -157,11 +157,11 @@ def _zero(rng: Random, data: bytes) -> bytes:
 
 
 def _replace(rng: Random, data: bytes, pattern: re.Pattern[bytes], by: bytes | None) -> bytes:
-    found = list(pattern.finditer(data))
-    if not found:
+    matches = list(pattern.finditer(data))
+    if not matches:
         return data
-    place = rng.choice(found)
-    new = rng.choice(found).group() if by is None else by
+    place = rng.choice(matches)
+    new = rng.choice(matches).group() if by is None else by
     return data[: place.start()] + new + data[place.end() :]
 
 

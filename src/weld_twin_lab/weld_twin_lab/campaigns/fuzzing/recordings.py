@@ -23,7 +23,7 @@ from weld_twin_core.errors import TwinError
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 from weld_twin_core.twin.twin import Twin
 
-from ...transfer.unseen import traceback_told
+from ...transfer.unseen import traceback_text
 
 ROBOTS = ('slide', 'turn', 'planar', 'ur5', 'franka_panda', 'nine')
 ALIGNS = ('', 'base', 'tool', 'base,tool')
@@ -146,21 +146,21 @@ def tried(draw: Draw) -> dict[str, Any]:
     recording, robot = recording_of(draw)
     out: dict[str, Any] = {'draw': asdict(draw), 'status': None, 'traceback': None, 'wrong': []}
     try:
-        found = diagnose([recording], robot, align=draw.align)
-        found.as_dict()
+        diagnosis = diagnose([recording], robot, align=draw.align)
+        diagnosis.as_dict()
     except TwinError as error:
         return out | {'status': 'refused', 'sentence': str(error)}
     except Exception:  # what is counted here is exactly what nobody expected
-        return out | {'traceback': traceback_told()}
+        return out | {'traceback': traceback_text()}
     wrong = []
-    if found.status == 'identified' and not (found.effects or found.families):
+    if diagnosis.status == 'identified' and not (diagnosis.effects or diagnosis.families):
         wrong.append('identified with nothing named')
     wrong += [
         f'{each.effect.name} of {each.effect.site}: {name} = {value:.3g}'
-        for each in found.effects
+        for each in diagnosis.effects
         for name, value, _ in beyond(robot, each.effect)
     ]
-    return out | {'status': found.status, 'wrong': wrong}
+    return out | {'status': diagnosis.status, 'wrong': wrong}
 
 
 def worst_of(count: int, first: int, tell: Callable[[str], None]) -> dict[str, Any]:

@@ -145,7 +145,7 @@ def _tables() -> tuple[bytes, ...]:
 
 def _diagnosis() -> str:
     frame = np.eye(4).tolist()
-    found = effects_from_list(parse_yaml(EFFECTS, 'effects'), ROBOT)
+    effects = effects_from_list(parse_yaml(EFFECTS, 'effects'), ROBOT)
     return json.dumps(
         {
             'schema': 'weld_twin/diagnosis/1',
@@ -155,7 +155,7 @@ def _diagnosis() -> str:
                 'known': [],
                 'epochs_ns': [0],
                 'spans_ns': [[0, 1]],
-                'found': [effect.to_mapping() for effect in found],
+                'found': [effect.to_mapping() for effect in effects],
             },
         }
     )

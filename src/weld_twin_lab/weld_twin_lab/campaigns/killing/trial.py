@@ -62,13 +62,13 @@ class _Sent:
         """Return how many were sent by then."""
         return sum(int(np.searchsorted(times, moment)) for times in self.times.values())
 
-    def missing(self, topic: str, held: int, moment: float) -> float:
+    def missing(self, topic: str, received: int, moment: float) -> float:
         """Return what time of a topic is missing of what was sent by then [s]."""
         times = self.times[topic]
         last = int(np.searchsorted(times, moment)) - 1
-        if held > last:
+        if received > last:
             return 0.0
-        return times[last] - (times[held - 1] if held else times[0] - STEP)
+        return times[last] - (times[received - 1] if received else times[0] - STEP)
 
 
 def try_once(trial: Trial) -> dict[str, Any]:
@@ -86,13 +86,13 @@ def try_once(trial: Trial) -> dict[str, Any]:
             'fault': '',
         }
         try:
-            row['opened'], held = _left(out)
+            row['opened'], kept = _left(out)
         except TwinError as error:
             sentence = str(error).replace(place, '')
             row['opened' if NOTHING in sentence else 'fault'] = sentence
-            held = {}
+            kept = {}
         for topic in sent.times:
-            numbers = held.get(topic, [])
+            numbers = kept.get(topic, [])
             if numbers != list(range(len(numbers))):
                 row['fault'] = f'{topic} is not what was sent from the first message on'
             missing = sent.missing(topic, len(numbers), moment)

@@ -38,18 +38,18 @@ def main() -> int:
     moving = node.create_publisher(kind, '/tf', QoSProfile(depth=100))
     make = ros_messages()
 
-    def placed(parent: str, child: str) -> Any:
+    def transform(parent: str, child: str) -> Any:
         out = stamped(child_frame_id=child)
         out.header.frame_id, out.header.stamp = parent, make.time(time.time_ns())
         out.transform.rotation.w = 1.0
         return out
 
-    fixed.publish(kind(transforms=[placed('world', 'base_link')]))
+    fixed.publish(kind(transforms=[transform('world', 'base_link')]))
     over = threading.Event()
     threading.Thread(target=_wait_for, args=(over,), daemon=True).start()
     names = ['base_link', *(f'link_{k}' for k in range(LINKS))]
     while not over.wait(1.0 / RATE):
-        moving.publish(kind(transforms=[placed(*pair) for pair in pairwise(names)]))
+        moving.publish(kind(transforms=[transform(*pair) for pair in pairwise(names)]))
     rclpy.try_shutdown()
     return 0
 

@@ -112,7 +112,7 @@ class Soak:
             if round(due / every) % 12 == 0:
                 tell(self._line(due))
             due += every
-        self._told = {name: list(entries) for name, entries in self._listener.told.items()}
+        self._reported = {name: list(entries) for name, entries in self._listener.told.items()}
         end = time.monotonic() + COMPLETE
         self._cell.wait(
             lambda: self._least() >= self.sent or time.monotonic() > end,
@@ -169,7 +169,7 @@ class Soak:
         """Return received, refused and missing of each input, and what was told but ok."""
         out: dict[str, Any] = {}
         for name, values in sorted(self._listener.values.items()):
-            told = [entry for entry in self._told.get(name, []) if entry[0] != 'ok']
+            reported = [entry for entry in self._reported.get(name, []) if entry[0] != 'ok']
             row: dict[str, int] = {
                 key: int(values[key]) for key in ('received', 'refused') if key in values
             }
@@ -177,8 +177,8 @@ class Soak:
                 row['missing'] = self.sent - row['received']
             out[name] = {
                 **row,
-                'not_ok': len(told),
-                'worst': sorted({text for _, text in told})[:5],
+                'not_ok': len(reported),
+                'worst': sorted({text for _, text in reported})[:5],
             }
         return out
 

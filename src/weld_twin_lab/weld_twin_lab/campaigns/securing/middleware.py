@@ -74,8 +74,8 @@ def secured_middleware(source: Path, work: Path) -> Iterator[None]:
 
 
 def _refuse_unable(source: Path) -> None:
-    found = _packages(source)
-    if MIDDLEWARE not in found:
+    packages = _packages(source)
+    if MIDDLEWARE not in packages:
         raise TwinError(f"'{source}' holds no {MIDDLEWARE}: {FETCH}")
     tools = {
         'cmake': 'apt-get install cmake',

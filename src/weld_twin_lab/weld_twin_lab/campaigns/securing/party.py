@@ -60,8 +60,8 @@ def main() -> int:
         if publisher is not None:
             publisher.publish(make.joint_state(stamp, names, posture))
         turn += 1
-        while (left := begun + turn * PERIOD - time.monotonic()) > 0:
-            rclpy.spin_once(node, timeout_sec=left)
+        while (wait := begun + turn * PERIOD - time.monotonic()) > 0:
+            rclpy.spin_once(node, timeout_sec=wait)
     if publisher is not None:
         publisher.wait_for_all_acked(Duration(seconds=MEETING))
     print(len(poses), flush=True)

@@ -61,12 +61,12 @@ def _sealed(study: Study, methods: dict[str, list[str]]) -> tuple[dict[str, Any]
     }
     counts = {name: case.times.size for name, case in known.items()}
     runs = course.run_all(out / 'cases', names, methods, out / 'answers', counts, study.tell)
-    found = {method: scores.summary(said, truth) for method, said in runs.items()}
+    summaries = {method: scores.summary(said, truth) for method, said in runs.items()}
     troubles = {
         method: {name: run.trouble for name, run in said.items() if run.trouble}
         for method, said in runs.items()
     }
-    content = {'methods': found, 'troubles': troubles, 'cases': names}
+    content = {'methods': summaries, 'troubles': troubles, 'cases': names}
     return content, scores.page(runs, truth, f'{len(names)} cases.')
 
 

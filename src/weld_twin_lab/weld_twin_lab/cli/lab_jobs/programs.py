@@ -37,5 +37,5 @@ def run(study: Study) -> None:
         for k in range(study.args.seams)
     ]
     cases = study.tasks(tasks, 'corrections')
-    found = {'engine': engine_digest(), 'seed': seed, 'totals': totals(cases), 'cases': cases}
-    study.write('corrections', head('programs/1', **found), page(found))
+    results = {'engine': engine_digest(), 'seed': seed, 'totals': totals(cases), 'cases': cases}
+    study.write('corrections', head('programs/1', **results), page(results))

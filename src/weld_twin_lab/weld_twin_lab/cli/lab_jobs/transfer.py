@@ -38,8 +38,8 @@ def run(study: Study) -> bool:
     entries = [part(split.name, partial(judge, split)) for split in chosen]
     if args.only in 'servo_axis':
         entries.append(part('servo_axis', partial(judge_axis, Path(args.emps))))
-    found = measures(entries)
-    result = head('transfer/1', measures=[m._asdict() for m in found], splits=entries)
-    study.write('transfer', result, page(entries, found), say=False)
-    print(goal_table(found))
-    return all(m.reached is not False for m in found)
+    goals = measures(entries)
+    result = head('transfer/1', measures=[m._asdict() for m in goals], splits=entries)
+    study.write('transfer', result, page(entries, goals), say=False)
+    print(goal_table(goals))
+    return all(m.reached is not False for m in goals)

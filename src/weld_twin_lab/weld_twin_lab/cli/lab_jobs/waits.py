@@ -54,7 +54,7 @@ def _kept(file: Path) -> list[Entry]:
     if not file.exists():
         return []
     try:
-        found: list[Entry] = json.loads(file.read_text(encoding='utf-8'))
+        entries: list[Entry] = json.loads(file.read_text(encoding='utf-8'))
     except ValueError:
         raise DataError(f"'{file}' is damaged; remove it to measure all jobs anew") from None
-    return found
+    return entries

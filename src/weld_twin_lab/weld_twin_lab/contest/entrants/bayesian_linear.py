@@ -21,10 +21,10 @@ def answer(case: ContestCase) -> ContestAnswer:
 
 
 def _learn(known: Array, error: Array, asked: Array) -> tuple[Array, Array]:
-    told = []
+    predictions = []
     # In millimetres: what is believed of precisions beforehand is meant for numbers about one.
     for column in 1e3 * error.T:
         each = make_pipeline(StandardScaler(), BayesianRidge()).fit(known, column)
-        told.append(each.predict(asked, return_std=True))
-    added, sigma = 1e-3 * np.transpose(told, (1, 2, 0))
+        predictions.append(each.predict(asked, return_std=True))
+    added, sigma = 1e-3 * np.transpose(predictions, (1, 2, 0))
     return added, sigma

@@ -21,12 +21,12 @@ def answer(case: ContestCase) -> ContestAnswer:
     """Return what `geometry` says, and by how much its predictions scatter beside what it leaves."""
     rng, measured = np.random.default_rng(0), case.measured
     asked, _ = case.ask.joints.at(case.times)
-    told = []
+    predictions = []
     for _ in range(DRAWS):
         rows = np.sort(rng.choice(measured.t.size, measured.t.size))
         drawn = replace(case, train=case.train.with_measured(measured.take(np.unique(rows))))
-        told.append(forward(fit(drawn, ALL).robot, asked)[:, :3, 3])
+        predictions.append(forward(fit(drawn, ALL).robot, asked)[:, :3, 3])
     seen, _ = case.train.joints.at(measured.t)
-    left = measured.position - forward(fit(case, ALL).robot, seen)[:, :3, 3]
-    sigma = np.sqrt(np.var(told, axis=0, ddof=1) + (left**2).mean())
+    remaining = measured.position - forward(fit(case, ALL).robot, seen)[:, :3, 3]
+    sigma = np.sqrt(np.var(predictions, axis=0, ddof=1) + (remaining**2).mean())
     return replace(answer_with(case, ALL), sigma=sigma)

@@ -80,15 +80,15 @@ def fit(case: ContestCase, free: tuple[str, ...]) -> Fitted:
 
     # DH values of an arm are degenerate (parallel axes): the method needs a little damping.
     damped = 1e-3
-    found = least_squares(
+    solution = least_squares(
         lambda values: np.append(off(values), damped * values), np.zeros(len(names)), method='lm'
     )
-    slope = found.jac[: -len(names)]
-    noise = float((found.fun[: -len(names)] ** 2).mean())
-    spread = np.linalg.pinv(found.jac.T @ found.jac) * noise
-    effect = np.sqrt(((slope * found.x) ** 2).sum(axis=0) / len(seen))
+    slope = solution.jac[: -len(names)]
+    noise = float((solution.fun[: -len(names)] ** 2).mean())
+    spread = np.linalg.pinv(solution.jac.T @ solution.jac) * noise
+    effect = np.sqrt(((slope * solution.x) ** 2).sum(axis=0) / len(seen))
     errors = np.sqrt(np.maximum(np.diag(spread), 1e-30))
-    return Fitted(names, found.x, errors, effect, _moved(case.robot, names, found.x))
+    return Fitted(names, solution.x, errors, effect, _moved(case.robot, names, solution.x))
 
 
 def _moved(robot: Robot, names: tuple[tuple[str, int], ...], values: Array) -> Robot:

@@ -27,23 +27,23 @@ TO_SIGMA = 1.4826
 def answer(case: ContestCase) -> ContestAnswer:
     """Return the verdict: every name with its probability, and the prediction of the model."""
     twin = build_twin(case.robot, '' if case.known is None else case.known)
-    found = diagnose(
+    diagnosis = diagnose(
         [case.train],
         twin.robot,
         align=frozenset(case.align),
         known=twin.effects,
         exclude=case.exclude,
     )
-    text = diagnosis_text(found, ())
+    text = diagnosis_text(diagnosis, ())
     with TemporaryDirectory() as folder:
         file = Path(folder) / 'diagnosis.json'
         file.write_text(text, encoding='utf-8')
         model = read_model(twin.robot, file)
     verdict = json.loads(text)['verdict']
-    told = [cause for cause in verdict['causes'] if cause['effect'] is not None]
+    named = [cause for cause in verdict['causes'] if cause['effect'] is not None]
     causes = tuple(
         tuple((str(x['effect']), x['joint'], float(x['probability'])) for x in cause['name'])
-        for cause in told
+        for cause in named
     )
     sure = float(verdict['confidence'] or 0.0)
     status = verdict['status']
@@ -53,8 +53,8 @@ def answer(case: ContestCase) -> ContestAnswer:
         causes,
         unknown=sure if status == 'unknown' else 0.0,
         none=sure if status == 'none' else 0.0,
-        sure=(*(bool(cause['sure']) for cause in told), bool(verdict['sure'])),
-        sigma=_sigma(case, found.posterior, model),
+        sure=(*(bool(cause['sure']) for cause in named), bool(verdict['sure'])),
+        sigma=_sigma(case, diagnosis.posterior, model),
     )
 
 
@@ -65,6 +65,6 @@ def _sigma(case: ContestCase, posterior: Posterior | None, model: Model) -> Arra
         return None
     twin = model.twin(0)
     sure = pose_covariances(posterior, twin, case.ask, case.times)[:, :3, :3]
-    left = measured.position - twin.poses(case.train, measured.t).position
-    noise = TO_SIGMA * np.median(np.abs(left - np.median(left, axis=0)))
+    remaining = measured.position - twin.poses(case.train, measured.t).position
+    noise = TO_SIGMA * np.median(np.abs(remaining - np.median(remaining, axis=0)))
     return np.asarray(np.sqrt(np.diagonal(sure, axis1=1, axis2=2) + noise**2))

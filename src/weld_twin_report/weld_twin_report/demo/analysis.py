@@ -142,12 +142,12 @@ def run_live(job: Job, progress: Progress) -> None:
         with Cell() as cell:
             deviations = _start(cell, job)
 
-            def told() -> bool:
+            def complete() -> bool:
                 progress(len(deviations) / samples)
                 return len(deviations) == samples
 
             cell.wait(
-                told,
+                complete,
                 lambda: f'the deviations: {len(deviations)} of {samples} are here',
                 limit=LIMIT,
                 progress=lambda: len(deviations),

@@ -187,7 +187,7 @@ def run_fleet(
     known = writing.runs.finished(again)
     tally: Counter[str] = Counter()
 
-    def told(written: Iterable[Run | None]) -> None:
+    def count(written: Iterable[Run | None]) -> None:
         for run in written:
             tally[THERE if run is None else run.state] += 1
             tell(tally.total(), len(listed), run)
@@ -199,8 +199,8 @@ def run_fleet(
             tally[THERE] += there
             tell(tally.total(), len(listed), None)
         for _, text in pool.run(tasks):
-            told(writing.take(json.loads(text)))
-    told(writing.last())
+            count(writing.take(json.loads(text)))
+    count(writing.last())
     for cell in sorted(writing.touched):
         with suppress(DataError):  # pages work it out again, and tell what is wrong with a cell
             writing.runs.look(cell)

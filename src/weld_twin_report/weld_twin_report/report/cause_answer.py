@@ -86,8 +86,8 @@ class CauseAnswer:
         Of a cause without a name only curves do: what imitates it says nothing of it.
         """
         result = self.diagnosis.model.found
-        held = [result[m] for m in self.cause.members if m < len(result)]
-        return [e for e in held if e.name in CURVES] if unnamed(self.cause) else held
+        effects = [result[m] for m in self.cause.members if m < len(result)]
+        return [e for e in effects if e.name in CURVES] if unnamed(self.cause) else effects
 
     @cached_property
     def alike(self) -> tuple[Site, ...]:
@@ -243,20 +243,20 @@ class CauseAnswer:
         return f'{text} ({sides}).' if sides else f'{text}.', f' RMS {rms_words(parts[good])}.'
 
     @cached_property
-    def left(self) -> Left | None:
+    def remaining(self) -> Left | None:
         """Return what is left with it alone mended; None where it cannot be thought away."""
         return left_without(self.diagnosis, self.k)
 
     @cached_property
     def mended(self) -> tuple[str, str] | None:
         """Return what mending it alone does to the gap, and what mended means without a name."""
-        if self.left is None:
+        if self.remaining is None:
             return None
-        rms, rms_after, largest, largest_after = map(millimetres, self.left)
+        rms, rms_after, largest, largest_after = map(millimetres, self.remaining)
         reported = (
-            f'RMS {"falls" if self.left.rms_after < self.left.rms else "rises"} from '
+            f'RMS {"falls" if self.remaining.rms_after < self.remaining.rms else "rises"} from '
             f'{rms} to {rms_after}, the largest '
-            f'{"grows" if self.left.grows else "goes"} from {largest} to {largest_after}'
+            f'{"grows" if self.remaining.grows else "goes"} from {largest} to {largest_after}'
         )
         if not unnamed(self.cause):
             return reported, ''

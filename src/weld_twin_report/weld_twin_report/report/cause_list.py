@@ -158,10 +158,10 @@ def _effect(reported: CauseAnswer) -> Html | None:
 
 def _mended(reported: CauseAnswer, rule: Rule | None) -> Html | None:
     """Return the gap that would be left if only this were mended, and whether that passes."""
-    if reported.mended is None or reported.left is None or rule is None:
+    if reported.mended is None or reported.remaining is None or rule is None:
         return None
     after, how = reported.mended
-    return joined([after, mark(rule, reported.left.largest_after, ', '), '.', how or None])
+    return joined([after, mark(rule, reported.remaining.largest_after, ', '), '.', how or None])
 
 
 def _picture(reported: CauseAnswer) -> Html | None:

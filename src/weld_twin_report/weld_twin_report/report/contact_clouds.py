@@ -42,13 +42,13 @@ def contacts_section(diagnosis: Diagnosis) -> Html | None:
 
 def contacts_sentence(result: ContactResult) -> str:
     """Return how far the tool point is from what it touched, in one sentence."""
-    before, after, held = (
+    before, after, elsewhere = (
         millimetres(v)
         for v in (result.spread_before_m, result.spread_after_m, result.held_out_spread_m)
     )
     return (
         f'The tool point is {before} from what it touched on average, {after} after the fit, and '
-        f'{held} where it was foretold from the others: that is what to expect near them.'
+        f'{elsewhere} where it was foretold from the others: that is what to expect near them.'
     )
 
 

@@ -117,9 +117,9 @@ def _whole(answer: Answer) -> str:
     reported, remaining = sum(shares or remaining), remaining if shares else []
     rows = [*(('without a name', share) for share in remaining), *answer.remainder]
     rest = [f'{answer.percent(share)} is {name}' for name, share in rows]
-    held = 'The causes explain' if diagnosis.effects else 'The places found hold'
+    subject = 'The causes explain' if diagnosis.effects else 'The places found hold'
     return (
-        f'{held} {answer.percent(reported)} of the squared gap; '
+        f'{subject} {answer.percent(reported)} of the squared gap; '
         f'{listed(rest)}. So a place can be certain and still hold less than the whole.'
     )
 

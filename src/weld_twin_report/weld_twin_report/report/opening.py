@@ -272,7 +272,7 @@ def causes_table(answer: Answer) -> Html | None:
 
 def _row(answer: Answer, reported: CauseAnswer, rule: Rule) -> Html:
     value, ends = answer.share_of(reported)
-    remaining = reported.left
+    remaining = reported.remaining
     cells: list[Child] = [
         joined([tag('b', value), f' ({ends})']),
         lines(reported.off_in_short(_VALUES)) or 'open',

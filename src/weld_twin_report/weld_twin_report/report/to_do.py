@@ -89,12 +89,12 @@ def _settled(diagnosis: Diagnosis, rule: Rule | None) -> dict[Site, str]:
     """
     share, unsure = share_by_site(diagnosis), open_sites(diagnosis)
     most = max((share.get(site, 0.0) for site in unsure), default=0.0)
-    held = cause_by_site(diagnosis)
+    causes = cause_by_site(diagnosis)
     out = {}
     for site in map(site_of, diagnosis.effects):
         if site in unsure:
             continue
-        remaining = left_without(diagnosis, held[site]) if site in held else None
+        remaining = left_without(diagnosis, causes[site]) if site in causes else None
         if share.get(site, 0.0) > most:
             out[site] = ''
         elif (
@@ -139,14 +139,14 @@ def _mending(diagnosis: Diagnosis) -> list[str]:
     Where mending one alone makes the worst spot worse, that is said beside it.
     """
     unsure = open_sites(diagnosis)
-    held = cause_by_site(diagnosis)
+    causes = cause_by_site(diagnosis)
     out = []
     for named, action in zip(diagnosis.effects, diagnosis.actions, strict=True):
         if site_of(named) in unsure:
             action = f'Should it be {found_name(named)}: {action[:1].lower()}{action[1:]}'
         twins = ' '.join(same_words(diagnosis, site_of(named)))
         action = ' '.join(filter(None, [action, gearing(named.effect), twins]))
-        worse = warning(diagnosis, held[site_of(named)]) if site_of(named) in held else ''
+        worse = warning(diagnosis, causes[site_of(named)]) if site_of(named) in causes else ''
         out.append(f'{action} {worse}'.rstrip())
     return out
 
@@ -181,10 +181,10 @@ def _at(diagnosis: Diagnosis, k: int) -> str:
     cause = diagnosis.causes[k]
     if unnamed(cause):
         return ' '.join(look_at(diagnosis, k))
-    result = diagnosis.model.found
-    held = [result[m] for m in cause.members if m < len(result)]
+    all_effects = diagnosis.model.found
+    effects = [all_effects[m] for m in cause.members if m < len(all_effects)]
     model = diagnosis.model
-    return ' '.join(actions(held, model.robot, model.turned))
+    return ' '.join(actions(effects, model.robot, model.turned))
 
 
 def minutes(wanted: Mapping[str, Any] | None) -> str:

@@ -180,8 +180,8 @@ def claims_markdown(result: dict[str, Any]) -> str:
     """Return the table for reading."""
     rows = [('Claim', 'In the paper', 'Holds as written', 'Verdict', 'Why, as measured')]
     for c in result['claims']:
-        held = f'{c["held"]} of {c["cases"]}'
-        rows.append((c['statement'], c['where'], held, f'**{c["verdict"]}**', c['reason']))
+        share = f'{c["held"]} of {c["cases"]}'
+        rows.append((c['statement'], c['where'], share, f'**{c["verdict"]}**', c['reason']))
     return (
         f'Measured on {len(result["robots"])} robots ({", ".join(result["robots"])}) and '
         f'{len(result["seams"])} seams ({", ".join(result["seams"])}) each.\n\n'

@@ -47,7 +47,7 @@ class Directory:
 
     def __init__(self, path: Path) -> None:
         self.path = followed(path)
-        self._held: int | None = None
+        self._lock_file: int | None = None
         try:
             self._open()
         except OSError as error:
@@ -83,9 +83,9 @@ class Directory:
 
     def close(self) -> None:
         """Let another server in."""
-        held, self._held = self._held, None
-        if held is not None:
-            os.close(held)
+        lock, self._lock_file = self._lock_file, None
+        if lock is not None:
+            os.close(lock)
 
     def _open(self) -> None:
         if os.path.lexists(self.path) and not self.path.is_dir():
@@ -112,19 +112,19 @@ class Directory:
 
     def _lock(self) -> None:
         flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW
-        self._held = os.open(self.path / MARK, flags, 0o600)
+        self._lock_file = os.open(self.path / MARK, flags, 0o600)
         try:
-            fcntl.flock(self._held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(self._lock_file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise DataError(
-                f"another server works in '{self.path}'{_of(self._held)}; end it, or give another "
+                f"another server works in '{self.path}'{_of(self._lock_file)}; end it, or give another "
                 '--dir'
             ) from None
         except OSError:  # a file system without locks
             pass
         reported = json.dumps({'schema': SCHEMA, 'process': os.getpid()}) + '\n'
-        os.ftruncate(self._held, 0)
-        os.pwrite(self._held, reported.encode(), 0)
+        os.ftruncate(self._lock_file, 0)
+        os.pwrite(self._lock_file, reported.encode(), 0)
 
 
 def _cut_off(name: str) -> bool:
@@ -132,10 +132,10 @@ def _cut_off(name: str) -> bool:
     return name in (UPLOADS, MODEL) or FILE in name
 
 
-def _of(held: int) -> str:
+def _of(lock: int) -> str:
     """Return which process holds a mark."""
     with suppress(ValueError, LookupError, TypeError):
-        return f' (process {int(json.loads(os.pread(held, 1000, 0))["process"])})'
+        return f' (process {int(json.loads(os.pread(lock, 1000, 0))["process"])})'
     return ''
 
 

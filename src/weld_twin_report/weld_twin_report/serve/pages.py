@@ -252,12 +252,17 @@ def _question(job: Job, reported: Mapping[str, Any]) -> tuple[Child, ...]:
             tag('p.note', sentence(str(each.get('remedy') or ''))),
         )
     ]
-    told = {**job.asked.told, 'robot': job.asked.robot, 'cell': job.asked.cell, 'at': job.asked.at}
+    answers = {
+        **job.asked.told,
+        'robot': job.asked.robot,
+        'cell': job.asked.cell,
+        'at': job.asked.at,
+    }
     mend = _form(
         f'/recordings/{job.key}/again',
         *(
             tag('input', type='hidden', name_=n, value=v)
-            for n, v in (told | {'apply': 'yes'}).items()
+            for n, v in (answers | {'apply': 'yes'}).items()
         ),
         _submit('Correct it and go on'),
     )

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -69,14 +71,6 @@ def seen(commanded: Recording, robot: Robot, effects: list[Effect], at: Array) -
     return commanded.with_measured(Measurements(at, position, turned * sign))
 
 
-def _motion(place: Path) -> None:
-    write_recording(place, moving(60.0), load('ur5'))
-
-
-def _minutes(place: Path) -> None:
-    write_recording(place, moving(600.0), load('ur5'))
-
-
 def stations(count: int) -> Recording:
     """Return so many stations of a UR10 with errors of its geometry and of its gears."""
     robot, rng = load('ur10'), np.random.default_rng(11)
@@ -93,14 +87,6 @@ def stations(count: int) -> Recording:
     ]
     commanded = Recording('stations', JointMotion(t, q, static=True))
     return seen(commanded, robot, effects, t)
-
-
-def _stations(place: Path) -> None:
-    write_recording(place, stations(STATIONS), load('ur10'))
-
-
-def _hour(place: Path) -> None:
-    write_recording(place, moving(3600.0), load('ur5'))
 
 
 def _table(place: Path) -> None:
@@ -124,11 +110,16 @@ def _plant(place: Path) -> None:
     database.close()
 
 
-MAKERS = {
+def _moving(seconds: float, place: Path) -> None:
+    write_recording(place, moving(seconds), load('ur5'))
+
+
+MAKERS: dict[str, Callable[[Path], None]] = {
     'plant': _plant,
-    'motion': _motion,
-    'minutes': _minutes,
-    'hour': _hour,
-    'stations': _stations,
+    'motion': partial(_moving, 60.0),
+    'minutes': partial(_moving, 600.0),
+    'hour': partial(_moving, 3600.0),
+    'stations': lambda place: write_recording(place, stations(STATIONS), load('ur10')),
     'table': _table,
 }
+"""What makes the data of a name at a place."""

@@ -53,7 +53,7 @@ def aligned_on(model: Model, recording: Recording, align: list[str]) -> Model:
 
 def gap_on(model: Model, recording: Recording) -> Array:
     """Return measured minus predicted position, shape (M, 3) [m]."""
-    measured = _measured(recording)
+    measured = measured_of(recording)
     return np.asarray(measured.position - model.twin(0).poses(recording, measured.t).position)
 
 
@@ -63,13 +63,18 @@ def counted(recording: Recording, outliers: list[int]) -> Array:
 
     outliers: numbers of the samples that are none of the arm's doing.
     """
-    t, joints = _measured(recording).t, recording.joints
+    t, joints = measured_of(recording).t, recording.joints
     good = (t >= joints.t[0]) & (t <= joints.t[-1])
     good[np.asarray(outliers, dtype=int)] = False
     return np.asarray(good)
 
 
-def _measured(recording: Recording) -> Measurements:
+def measured_of(recording: Recording) -> Measurements:
+    """
+    Return what was measured.
+
+    Raises DataError: nothing was.
+    """
     if recording.measured is None:
         raise DataError(f'the recording {recording.name!r} of a case holds no measurements')
     return recording.measured

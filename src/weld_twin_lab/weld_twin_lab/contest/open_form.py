@@ -26,6 +26,8 @@ from weld_twin_core.errors import DataError
 from weld_twin_core.recording import JointMotion, Measurements, Recording, Signal
 from weld_twin_msgs_py.robots import load_robot
 
+from ..blind.achieved import measured_of
+
 ANSWER, PREDICTED = 'answer.json', 'predicted.csv'
 _CASE, _ROBOT, _KNOWN = 'case.json', 'robot.yaml', 'known.yaml'
 _SLACK = 1e-6
@@ -60,7 +62,7 @@ class ContestCase:
     @property
     def measured(self) -> Measurements:
         """Return what was measured to learn from."""
-        return _measured(self.train)
+        return measured_of(self.train)
 
     @property
     def known(self) -> Path | None:
@@ -114,7 +116,7 @@ def write_case(
     (folder / _CASE).write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
     for use, recording in (('train', train), ('ask', ask)):
         _write_inputs(folder, use, recording)
-    measured, asked = _measured(train), _measured(ask)
+    measured, asked = measured_of(train), measured_of(ask)
     columns, names = [measured.t, measured.position], ['t', 'x', 'y', 'z']
     if measured.rotation is not None:
         columns.append(quaternion_from_matrix(measured.rotation))
@@ -145,12 +147,6 @@ def _write_inputs(folder: Path, use: str, recording: Recording) -> None:
 def _write(path: Path, names: Sequence[str], columns: Sequence[Array]) -> None:
     head = ','.join(names)
     np.savetxt(path, np.column_stack(columns), '%.17g', ',', header=head, comments='')
-
-
-def _measured(recording: Recording) -> Measurements:
-    if recording.measured is None:
-        raise DataError(f'the recording {recording.name!r} of a case holds no measurements')
-    return recording.measured
 
 
 def read_case(folder: Path) -> ContestCase:

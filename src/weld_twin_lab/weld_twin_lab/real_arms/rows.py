@@ -180,12 +180,8 @@ def _all(source: Source) -> tuple[Rows, Rows]:
     return _span(0.0, 1.0, source)
 
 
-def _odd(source: Source) -> tuple[Rows, Rows]:
-    return _parted(source, np.arange(1, size(source.recording), 2))
-
-
-def _even(source: Source) -> tuple[Rows, Rows]:
-    return _parted(source, np.arange(0, size(source.recording), 2))
+def _every_other(first: int, source: Source) -> tuple[Rows, Rows]:
+    return _parted(source, np.arange(first, size(source.recording), 2))
 
 
 def _quarter(k: int, source: Source) -> tuple[Rows, Rows]:
@@ -209,8 +205,8 @@ def _place(k: int, source: Source) -> tuple[Rows, Rows]:
 
 _PARTS: dict[str, Make] = {
     'all': _all,
-    'odd': _odd,
-    'even': _even,
+    'odd': partial(_every_other, 1),
+    'even': partial(_every_other, 0),
     'first half': partial(_span, 0.0, 0.5),
     'last half': partial(_span, 0.5, 1.0),
 }

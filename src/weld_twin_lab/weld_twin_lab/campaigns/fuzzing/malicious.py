@@ -33,16 +33,17 @@ Make = Callable[[Path], Path]
 
 def harms() -> dict[str, tuple[Make, Callable[[Path], Any]]]:
     """Return what makes each file in a folder, and what reads it."""
+    nested = '<robot name="x">' + '<link name="a">' * 60_000
     return {
         'URDF with entities that expand': (_laughs, load_robot),
         'URDF that names a file of the machine': (_outside, load_robot),
-        'URDF nested deeply': (_nested_xml, load_robot),
+        'URDF nested deeply': (_holding('robot.urdf', nested), load_robot),
         'URDF with a chain of ten thousand links': (_long_chain, load_robot),
         'YAML aliases that expand': (_aliases, load_robot),
-        'YAML nested deeply': (_nested_yaml, load_robot),
+        'YAML nested deeply': (_holding('robot.yaml', '[' * 500_000), load_robot),
         'YAML that asks for a Python object': (_object, load_robot),
         'YAML path of a device': (_device, read_path),
-        'JSON nested deeply': (_nested_json, lambda path: load_model(ROBOT, path)),
+        'JSON nested deeply': (_holding('diagnosis.json', '[' * 1_000_000), _model),
         'mcap chunk of zstd, a gigabyte of zeros': (_bomb('zstd'), _bag),
         'mcap chunk of lz4, a gigabyte of zeros': (_bomb('lz4'), _bag),
         'the same chunk with a small size declared': (_bomb('zstd', 1000), _bag),
@@ -100,6 +101,14 @@ def _recovered(path: Path) -> Any:
     return recover(path, path.with_name('recovered'))
 
 
+def _model(path: Path) -> Any:
+    return load_model(ROBOT, path)
+
+
+def _holding(name: str, content: str) -> Make:
+    return lambda folder: _file(folder, name, content)
+
+
 def _file(folder: Path, name: str, content: str | bytes) -> Path:
     path = folder / name
     path.write_bytes(content.encode() if isinstance(content, str) else content)
@@ -115,10 +124,6 @@ def _laughs(folder: Path) -> Path:
 def _outside(folder: Path) -> Path:
     text = '<!DOCTYPE robot [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot name="&x;"/>'
     return _file(folder, 'robot.urdf', text)
-
-
-def _nested_xml(folder: Path) -> Path:
-    return _file(folder, 'robot.urdf', '<robot name="x">' + '<link name="a">' * 60_000)
 
 
 def _long_chain(folder: Path) -> Path:
@@ -138,10 +143,6 @@ def _aliases(folder: Path) -> Path:
     return _file(folder, 'robot.yaml', '\n'.join(lines))
 
 
-def _nested_yaml(folder: Path) -> Path:
-    return _file(folder, 'robot.yaml', '[' * 500_000)
-
-
 def _object(folder: Path) -> Path:
     text = f'!!python/object/apply:os.system ["touch {folder}/done"]'
     return _file(folder, 'robot.yaml', text)
@@ -150,10 +151,6 @@ def _object(folder: Path) -> Path:
 def _device(folder: Path) -> Path:
     (folder / 'path.yaml').symlink_to('/dev/zero')
     return folder / 'path.yaml'
-
-
-def _nested_json(folder: Path) -> Path:
-    return _file(folder, 'diagnosis.json', '[' * 1_000_000)
 
 
 def _zeros(pack: str) -> bytes:

@@ -57,10 +57,10 @@ ON_TOOL = Motion(
     np.array([0.03, -0.05, 0.04]),
 )
 """The board on the tool: its face away from the flange."""
-Case = dict[str, Any]
+CellResult = dict[str, Any]
 
 
-def sealed(kind: str, seed: int) -> Case:
+def sealed(kind: str, seed: int) -> CellResult:
     """
     Return what a tracker tells of one cause in a cell, opened.
 
@@ -90,7 +90,7 @@ def sealed(kind: str, seed: int) -> Case:
 FRAMES = ('base', 'tool')
 
 
-def beside_a_camera(seed: int) -> Case:
+def beside_a_camera(seed: int) -> CellResult:
     """Return what pixels of two cameras, and a tracker at the same stations, tell of one cause."""
     rng = np.random.default_rng([seed, 77])
     data = cell('arm', seed)
@@ -126,7 +126,7 @@ def beside_a_camera(seed: int) -> Case:
     }
 
 
-def opened(diagnosis: Diagnosis, truth: tuple[str, str | None]) -> Case:
+def opened(diagnosis: Diagnosis, truth: tuple[str, str | None]) -> CellResult:
     """Return what a diagnosis says beside the truth."""
     groups = [[(s.effect, s.joint) for s in group] for group in diagnosis.indistinguishable]
     groups = groups or [[(item.effect.name, item.effect.site)] for item in diagnosis.effects]

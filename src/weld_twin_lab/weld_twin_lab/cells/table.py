@@ -11,12 +11,14 @@ import numpy as np
 
 from weld_twin_msgs_py.files import markdown
 
-Case = Mapping[str, Any]
+CellResult = Mapping[str, Any]
 AS_TRACKED = 0.8
 """Goal: share of the causes named beside a tracker that pixels name, too."""
 
 
-def page(cases: Sequence[Case], pixels: Sequence[Case], real: Sequence[Case]) -> str:
+def page(
+    cases: Sequence[CellResult], pixels: Sequence[CellResult], real: Sequence[CellResult]
+) -> str:
     """Return the page of sealed cells, of cases beside a camera, and of a real arm's pixels."""
     lines = ['# Whole cells, and cameras', '']
     if cases:
@@ -31,13 +33,13 @@ def page(cases: Sequence[Case], pixels: Sequence[Case], real: Sequence[Case]) ->
     return '\n'.join(lines)
 
 
-def named_as_tracked(pixels: Sequence[Case]) -> float:
+def named_as_tracked(pixels: Sequence[CellResult]) -> float:
     """Return the share of causes named beside a tracker that pixels name, too."""
     both = [one['pixels']['named'] for one in pixels if one['tracker']['named']]
     return float(np.mean(both)) if both else 1.0
 
 
-def _cells(cases: Sequence[Case]) -> str:
+def _cells(cases: Sequence[CellResult]) -> str:
     rows = []
     for kind in dict.fromkeys(case['kind'] for case in cases):
         own = [case for case in cases if case['kind'] == kind]
@@ -47,20 +49,20 @@ def _cells(cases: Sequence[Case]) -> str:
     )
 
 
-def _beside(pixels: Sequence[Case]) -> str:
+def _beside(pixels: Sequence[CellResult]) -> str:
     rows = [(way, *_counts([one[way] for one in pixels])) for way in ('tracker', 'pixels')]
     head = ('told from', 'cases', 'named', 'nothing else', 'sure', 'sure and wrong')
     share = f'Of what the tracker names, pixels name {100.0 * named_as_tracked(pixels):.0f} %.'
     return f'{markdown.table(head, *rows)}\n{share}'
 
 
-def _counts(cases: Sequence[Case]) -> tuple[str, ...]:
+def _counts(cases: Sequence[CellResult]) -> tuple[str, ...]:
     wrong = sum(one['sure'] and not one['right'] for one in cases)
     each = (sum(bool(one[key]) for one in cases) for key in ('named', 'right', 'sure'))
     return str(len(cases)), *map(str, each), str(wrong)
 
 
-def _real(real: Sequence[Case]) -> str:
+def _real(real: Sequence[CellResult]) -> str:
     keys = ('frames', 'pixels', 'tracker')
     rows = [(str(k + 1), *(f'{fold[key]:.3f}' for key in keys)) for k, fold in enumerate(real)]
     means = [float(np.mean([fold[key] for fold in real])) for key in keys]

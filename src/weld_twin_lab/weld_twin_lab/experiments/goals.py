@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -24,13 +25,13 @@ def summary(cases: Sequence[Case]) -> dict[str, Any]:
     certain = [case for case in cases if case['loop']['right'] and case['loop']['sure']]
     return {
         'cells': len(cases),
-        'first': {
-            s: _count(cases, lambda c, s=s: c['first']['status'] == s) for s in _statuses(cases)
-        },
+        'first': dict(sorted(Counter(str(c['first']['status']) for c in cases).items())),
         'right_and_sure': len(certain),
         'right': _count(cases, lambda c: c['loop']['right']),
         'sure_and_wrong': _count(cases, lambda c: c['loop']['sure'] and not c['loop']['right']),
-        'minutes_to_certainty': _median([c['minutes'] for c in certain]),
+        'minutes_to_certainty': float(np.median([c['minutes'] for c in certain]))
+        if certain
+        else None,
         'experiments': len(rounds),
         **_promises(rounds),
         'seconds': max((step['seconds'] for step in rounds), default=0.0),
@@ -50,16 +51,8 @@ def _promises(rounds: Sequence[Case]) -> dict[str, Any]:
     }
 
 
-def _statuses(cases: Sequence[Case]) -> list[str]:
-    return sorted({str(case['first']['status']) for case in cases})
-
-
 def _count(cases: Sequence[Case], holds: Callable[..., bool]) -> int:
     return sum(bool(holds(case)) for case in cases)
-
-
-def _median(values: Sequence[float]) -> float | None:
-    return float(np.median(values)) if values else None
 
 
 def page(result: dict[str, Any]) -> str:

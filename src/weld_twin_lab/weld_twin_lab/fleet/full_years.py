@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta, timezone
@@ -91,7 +92,5 @@ def scored(
     scores = score(
         seen, lived(seed, number, first), named(entries), likely(entries), joints, truth
     )
-    status: dict[str, int] = {}
-    for each in entries:
-        status[each.status] = status.get(each.status, 0) + 1
+    status = dict(Counter(each.status for each in entries))
     return {**scores, 'status': status, 'weeks': len(entries), 'unit': WEEK}

@@ -312,10 +312,15 @@ def test_a_missing_joint_names_message_topic_and_joints(tmp_path, robot):
         read_recording(tmp_path / 'bag', robot)
 
 
-def test_no_joint_of_the_robot_at_all_names_those_wanted(tmp_path, robot):
-    write_messages(tmp_path / 'bag', joint_states([SECOND], ('j1', 'j2')))
-    with pytest.raises(DataError, match="holds a joint of robot 'two': shoulder, elbow"):
+@pytest.mark.parametrize(('count', 'there'), [(2, 'j0, j1. If'), (40, ' and more. If')])
+def test_no_joint_of_the_robot_at_all_names_those_wanted_and_those_there(
+    tmp_path, robot, count, there
+):
+    names = tuple(f'j{k}' for k in range(count))
+    write_messages(tmp_path / 'bag', joint_states([SECOND], names))
+    with pytest.raises(DataError, match="holds a joint of robot 'two': shoulder, elbow") as caught:
         read_recording(tmp_path / 'bag', robot)
+    assert there in str(caught.value) and ('and more' in str(caught.value)) is (count > 2)
 
 
 def test_unset_stamps_everywhere_are_an_error(tmp_path, robot):

@@ -493,6 +493,8 @@ def test_a_positioner_that_stands_elsewhere_is_told_as_its_controller_takes_it(b
     step = frame_in(parts[3].split('new value is ')[1].split('old value')[0], brand)
     step[:3, 3] *= 1e-3 if brand == 'abb' else 1.0  # PoseMult is in mm
     np.testing.assert_allclose(step @ old @ other, new @ other, atol=4e-6)
+    if brand == 'abb':  # as a program of it is written
+        assert re.search(r'\[\[(-?\d+\.\d{3},?){3}\],\[(-?\d\.\d{7},?){4}\]\]', told)
 
 
 def test_a_frame_on_the_workpiece_is_told_where_it_is_on_the_positioner():
